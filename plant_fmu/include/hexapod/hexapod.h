@@ -1,0 +1,240 @@
+/* hexapod.h - the plant: a six-legged robot of 19 rigid bodies and 18 revolute joints on compliant ground.
+ *
+ * SI units. World frame W: z up when gravity is (0, 0, -g). Every vector is in world axes unless said otherwise. Quaternions are
+ * [w x y z], body to world. Legs in the order LF LM LR RF RM RR, joints (and the link each one moves) coxa, femur, tibia.
+ * Bodies: 0 = torso, 1 + 3 leg + joint = link. Equation numbers: docs/equations.md.
+ *
+ * A plant has no pointers, no globals and no hidden state: its bytes are its state. After create nothing allocates, prints or exits.
+ */
+#ifndef HEXAPOD_H
+#define HEXAPOD_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(HX_SHARED) && !defined(_WIN32)
+#define HX_API __attribute__((visibility("default")))
+#elif defined(HX_SHARED)
+#define HX_API __declspec(dllexport)
+#else
+#define HX_API
+#endif
+
+enum {
+  HX_LEGS = 6,
+  HX_JOINTS = 3,                         /* per leg */
+  HX_BODIES = 1 + HX_LEGS * HX_JOINTS,   /* 19 */
+  HX_BODY_STATE = 13,                    /* r[3] p[4] v[3] w[3] */
+  HX_MULTIPLIERS = 5,                    /* per joint */
+  HX_MESSAGE_SIZE = 512
+};
+
+/* What a call came to. The list is closed; the message says got, expected, fix. */
+typedef enum hxStatus {
+  HX_OK = 0,
+  HX_INVALID_ARGUMENT,  /* a value outside its range, or not finite; nothing changed */
+  HX_INVALID_MODEL,     /* a definition no robot can have; nothing changed */
+  HX_STEP_TOO_SMALL,    /* the error control asks for a step below its floor */
+  HX_NOT_FINITE,        /* the motion has left the numbers */
+  HX_OUT_OF_MEMORY,
+  HX_BAD_STATE          /* a saved state that is damaged or of another version; nothing changed */
+} hxStatus;
+
+typedef enum hxContactLaw {
+  HX_CONTACT_EXACT_RESTITUTION = 1,
+  HX_CONTACT_FLORES,
+  HX_CONTACT_LANKARANI_NIKRAVESH,
+  HX_CONTACT_HUNT_CROSSLEY,
+  HX_CONTACT_CONSTANT_DAMPING,
+  HX_CONTACT_HERTZ
+} hxContactLaw;
+
+typedef enum hxFrictionLaw { HX_FRICTION_TANH = 1, HX_FRICTION_NONE } hxFrictionLaw;
+
+typedef enum hxTerrainKind { HX_TERRAIN_FLAT = 1, HX_TERRAIN_SLOPE } hxTerrainKind;
+
+typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
+
+typedef enum hxMethod {
+  HX_METHOD_ROS34PW2 = 1,  /* linearly implicit W-method, order 3(2) */
+  HX_METHOD_ROS2,          /* linearly implicit W-method, order 2(1) */
+  HX_METHOD_DP54,          /* explicit Dormand-Prince, order 5(4) */
+  HX_METHOD_BS32,          /* explicit Bogacki-Shampine, order 3(2) */
+  HX_METHOD_RK4            /* explicit classic, order 4, fixed step only */
+} hxMethod;
+
+/* One link: its frame sits at its own joint, and has the parent link's axes when the joint angle is 0. */
+typedef struct hxLink {
+  double mass;        /* kg         > 0 */
+  double length;      /* m          next joint (tibia: foot centre) along the link's x */
+  double offset_y;    /* m          the same point along y, 0 in most robots */
+  double offset_z;    /* m          the same point along z */
+  double com[3];      /* m          centre of mass, link axes */
+  double inertia[6];  /* kg m2      about the centre of mass, link axes: xx yy zz xy xz yz */
+  double axis[3];     /* 1          joint axis, in the parent link's axes (coxa: hip axes); normalised on use */
+} hxLink;
+
+typedef struct hxLeg {
+  double hip_position[3];  /* m    coxa joint, torso axes, from the torso's origin */
+  double hip_yaw;          /* rad  hip frame: torso axes turned about z by this */
+  hxLink link[HX_JOINTS];
+} hxLeg;
+
+/* The robot, the laws and the settings. hx_definition_default fills in the ATHENA-like robot. */
+typedef struct hxDefinition {
+  struct {
+    double mass;        /* kg */
+    double com[3];      /* m      from the torso's origin, torso axes */
+    double inertia[6];  /* kg m2  about the centre of mass, torso axes: xx yy zz xy xz yz */
+  } torso;
+  hxLeg leg[HX_LEGS];
+  double foot_radius;  /* m */
+  struct {
+    int law;                    /* hxContactLaw */
+    double stiffness;           /* N/m^1.5  K of eq. 4 */
+    double restitution;         /* 1        [0, 1]; the dissipative laws need > 0 */
+    double damping_factor;      /* s/m      c of the constant law F = K d^1.5 (1 + 1.5 c dd) */
+    double impact_speed_floor;  /* m/s      a slower touch-down counts as this fast */
+  } contact;
+  struct {
+    int law;       /* hxFrictionLaw */
+    double mu;     /* 1 */
+    double slope;  /* s/m  k_t of eq. 5 */
+  } friction;
+  struct {
+    int mode;                 /* hxServoMode, all joints */
+    double kp;                /* N m/rad */
+    double kd;                /* N m s/rad */
+    double torque_max;        /* N m      at stall */
+    double speed_max;         /* rad/s    no-load speed: the torque-speed line ends here */
+    double rotor_inertia;     /* kg m2    seen at the joint */
+    double coulomb_friction;  /* N m      in the gear, regularised by tanh(speed / 0.05 rad/s) */
+  } servo;
+  struct {
+    double alpha, beta;  /* 1/s */
+  } baumgarte;
+  double gravity[3];  /* m/s2 */
+  struct {
+    int method;        /* hxMethod */
+    double step;       /* s   > 0: fixed step; 0: error control */
+    double tolerance;  /* 1   of the error control */
+    double step_max;   /* s   of the error control */
+  } solver;
+  struct {
+    int kind;        /* hxTerrainKind */
+    double height;   /* m    of the ground below the world's origin */
+    double incline;  /* rad  of HX_TERRAIN_SLOPE: the ground rises along the heading */
+    double heading;  /* rad  about z, from x */
+  } terrain;
+  struct {
+    double position[3];          /* m      torso's centre of mass */
+    double quaternion[4];        /* 1      normalised on use */
+    double velocity[3];          /* m/s */
+    double angular_velocity[3];  /* rad/s */
+    double angle[HX_LEGS][HX_JOINTS];
+    double speed[HX_LEGS][HX_JOINTS];
+  } initial;
+} hxDefinition;
+
+/* What the outside does to the robot; held constant over a step. */
+typedef struct hxInput {
+  double angle_ref[HX_LEGS][HX_JOINTS];   /* rad */
+  double speed_ref[HX_LEGS][HX_JOINTS];   /* rad/s */
+  double torque_ref[HX_LEGS][HX_JOINTS];  /* N m   feed-forward */
+  double push_force[3];                   /* N     at the torso's centre of mass */
+  double push_torque[3];                  /* N m */
+} hxInput;
+
+/* What the robot shows. Booleans are ints. */
+typedef struct hxOutput {
+  double time;                                    /* s */
+  double angle[HX_LEGS][HX_JOINTS];               /* rad */
+  double speed[HX_LEGS][HX_JOINTS];               /* rad/s */
+  double torque[HX_LEGS][HX_JOINTS];              /* N m    motor on child (kinematic mode: the drive's multiplier) */
+  double reaction_force[HX_LEGS][HX_JOINTS][3];   /* N      joint on child */
+  double reaction_torque[HX_LEGS][HX_JOINTS][3];  /* N m    joint on child, about the joint's point */
+  struct {
+    double force[HX_LEGS][3];             /* N    ground on foot */
+    double normal_force[HX_LEGS];         /* N */
+    double tangential_force[HX_LEGS];     /* N    size */
+    double position[HX_LEGS][3];          /* m    contact point: the foot's lowest towards the ground */
+    double velocity[HX_LEGS][3];          /* m/s  of the foot's material point there */
+    double slip_speed[HX_LEGS];           /* m/s  tangential part of it */
+    double penetration[HX_LEGS];          /* m    < 0: clearance */
+    double impact_speed[HX_LEGS];         /* m/s  at the last touch-down */
+    int contact[HX_LEGS];
+  } foot;
+  struct {
+    double position[3], quaternion[4];  /* m, 1     centre of mass, attitude */
+    double roll, pitch, yaw;            /* rad      z-y-x */
+    double velocity[3];                 /* m/s */
+    double angular_velocity[3];         /* rad/s */
+  } torso;
+  struct {
+    double specific_force[3];    /* m/s2   torso axes, at the centre of mass */
+    double angular_velocity[3];  /* rad/s  torso axes */
+  } imu;
+  struct {
+    double kinetic;        /* J  bodies and rotors */
+    double potential;      /* J  gravity and the elastic part of the contacts */
+    double actuator_work;  /* J  by the motors on the joints, since start */
+    double push_work;      /* J  by push_force and push_torque */
+    double dissipated;     /* J  in contact, friction and gears */
+    double residual;       /* J  stored - stored at start - work + dissipated: what the books do not explain */
+  } energy;
+  struct {
+    double position_error;  /* m or 1          norm of Phi */
+    double velocity_error;  /* m/s or 1/s      norm of dPhi/dt */
+  } constraint;
+  struct {
+    double evaluations, steps, rejected, touchdowns; /* 1, since start */
+  } solver;
+} hxOutput;
+
+typedef struct hxPlant hxPlant;
+
+HX_API const char *hx_version(void);
+HX_API const char *hx_status_name(hxStatus status);
+
+HX_API void hx_definition_default(hxDefinition *definition);
+HX_API void hx_input_default(hxInput *input); /* the ATHENA-like robot's standing pose */
+
+/* Checks a definition. On failure message (HX_MESSAGE_SIZE bytes, may be NULL) says what, got, expected. */
+HX_API hxStatus hx_definition_check(const hxDefinition *definition, char *message);
+
+/* Allocates a plant holding the default robot in its initial state; NULL when out of memory. */
+HX_API hxPlant *hx_plant_create(void);
+HX_API void hx_plant_destroy(hxPlant *plant);
+
+/* Puts the robot of a definition into its initial state at time t. On failure the plant is unchanged but for its message. */
+HX_API hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t);
+
+/* Integrates to t_end >= time, exactly. On failure the plant is as it was before the call, but for its message. */
+HX_API hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end);
+
+/* Everything there is to see at the present time under this input. */
+HX_API void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output);
+
+HX_API double hx_plant_time(const hxPlant *plant);
+HX_API const char *hx_plant_message(const hxPlant *plant); /* of the last failure, "" before any */
+
+/* The plant's bytes: size, copy out, copy in (checked: HX_BAD_STATE leaves the plant as it was). */
+HX_API size_t hx_plant_state_size(void);
+HX_API void hx_plant_get_state(const hxPlant *plant, void *bytes);
+HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size);
+
+/* For multibody researchers: the bodies' states, drifted joints allowed, and eq. 1 solved for them. */
+HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);
+HX_API hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]);
+HX_API void hx_plant_accelerations(hxPlant *plant, const hxInput *input,
+                                   double acceleration[HX_BODIES][6], /* m/s2 then rad/s2 */
+                                   double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
+                                   double drive_torque[HX_BODIES - 1]); /* N m */
+
+#ifdef __cplusplus
+}
+#endif
+#endif
