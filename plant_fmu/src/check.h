@@ -1,0 +1,10 @@
+/* check.h - what an input must satisfy before it reaches the physics (hx_definition_check is public) */
+#ifndef HX_CHECK_H
+#define HX_CHECK_H
+
+#include "hexapod/hexapod.h"
+
+/* message: HX_MESSAGE_SIZE bytes, written on failure only; may be NULL */
+hxStatus hx_input_check(const hxInput *input, char *message);
+
+#endif

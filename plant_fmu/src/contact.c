@@ -1,0 +1,104 @@
+#include "contact.h"
+
+#include <math.h>
+
+double hx_exact_restitution_chi(double e) {
+  if (e >= 1.0) return 0.0;
+  /* g(chi) = ln(1 + chi) - ln(1 - chi e) - chi (1 + e) falls from 0, then rises to infinity at 1/e: one root in between */
+  double low = 0.0, high = 1.0 / e;
+  for (int i = 0; i < 200; ++i) {
+    const double chi = 0.5 * (low + high);
+    if (chi <= low || chi >= high) break;
+    if (log1p(chi) - log1p(-chi * e) - chi * (1.0 + e) < 0.0)
+      low = chi;
+    else
+      high = chi;
+  }
+  return 0.5 * (low + high);
+}
+
+static double exact(const hxDefinition *d) { return hx_exact_restitution_chi(d->contact.restitution); }
+static double flores(const hxDefinition *d) { return 8.0 * (1.0 - d->contact.restitution) / (5.0 * d->contact.restitution); }
+static double lankarani_nikravesh(const hxDefinition *d) { return 0.75 * (1.0 - d->contact.restitution * d->contact.restitution); }
+static double hunt_crossley(const hxDefinition *d) { return 1.5 * (1.0 - d->contact.restitution); }
+static double constant(const hxDefinition *d) { return 1.5 * d->contact.damping_factor; }
+static double hertz(const hxDefinition *d) {
+  (void)d;
+  return 0.0;
+}
+
+/* d = chi / v0, with the floor that keeps a slow touch-down from dividing by zero */
+static double over_impact_speed(const hxModel *model, double impact_speed) {
+  return model->damping_scale / fmax(impact_speed, model->impact_speed_floor);
+}
+
+static double whatever_the_speed(const hxModel *model, double impact_speed) {
+  (void)impact_speed;
+  return model->damping_scale;
+}
+
+static const hxContactRow rows[] = {
+    [HX_CONTACT_EXACT_RESTITUTION] = {"exact_restitution", exact, over_impact_speed},
+    [HX_CONTACT_FLORES] = {"flores", flores, over_impact_speed},
+    [HX_CONTACT_LANKARANI_NIKRAVESH] = {"lankarani_nikravesh", lankarani_nikravesh, over_impact_speed},
+    [HX_CONTACT_HUNT_CROSSLEY] = {"hunt_crossley", hunt_crossley, over_impact_speed},
+    [HX_CONTACT_CONSTANT_DAMPING] = {"constant_damping", constant, whatever_the_speed},
+    [HX_CONTACT_HERTZ] = {"hertz", hertz, whatever_the_speed},
+};
+
+const hxContactRow *hx_contact(int law) { return law >= 1 && law < (int)(sizeof rows / sizeof rows[0]) ? &rows[law] : NULL; }
+
+hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta) {
+  const hxReal zero = hx_splat(0.0);
+  const hxReal depth = closed * hx_max(delta, zero);
+  const hxReal root = hx_sqrt(depth);
+  const hxReal elastic = model->stiffness * depth * root;
+  const hxReal factor = 1.0 + damping * ddelta;
+  const hxMask pushes = hx_less(zero, factor);
+  return (hxNormalForce){
+      .force = elastic * hx_max(factor, zero),
+      .elastic = elastic,
+      .stiffness = hx_select(pushes, closed * (1.5 * model->stiffness) * root * factor, zero),
+      .viscosity = hx_select(pushes, elastic * damping, zero),
+  };
+}
+
+static void close_foot(const hxModel *model, hxContactState *contact, int leg, double impact_speed) {
+  contact->closed[leg] = 1.0;
+  contact->impact_speed[leg] = impact_speed;
+  contact->damping[leg] = hx_contact(model->contact_law)->damping(model, impact_speed);
+}
+
+static void open_foot(hxContactState *contact, int leg) {
+  contact->closed[leg] = 0.0;
+  contact->damping[leg] = 0.0;
+}
+
+static void fill_contact_slots(hxContactState *contact) {
+  hx_fill_slots(contact->closed);
+  hx_fill_slots(contact->damping);
+  hx_fill_slots(contact->impact_speed);
+}
+
+void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    open_foot(contact, leg);
+    contact->impact_speed[leg] = 0.0;
+    if (delta[leg] > 0.0) close_foot(model, contact, leg, 0.0);
+  }
+  fill_contact_slots(contact);
+}
+
+int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact) {
+  int touchdowns = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    if (contact->closed[leg] == 0.0 && delta[leg] > 0.0) {
+      close_foot(model, contact, leg, ddelta[leg]);
+      ++touchdowns;
+    } else if (contact->closed[leg] != 0.0 && delta[leg] <= 0.0) {
+      open_foot(contact, leg);
+    }
+  }
+  fill_contact_slots(contact);
+  return touchdowns;
+}

@@ -1,0 +1,87 @@
+/* dynamics.h - eq. 1 solved exactly in O(n): Newton-Euler with multipliers and Baumgarte on the tree of 19 bodies */
+#ifndef HX_DYNAMICS_H
+#define HX_DYNAMICS_H
+
+#include "actuator.h"
+#include "contact.h"
+#include "kinematics.h"
+
+/* What the O(n) sweeps of eq. 10-12 keep of joint k. */
+typedef struct {
+  hxVec3 e;            /* s_j^P - s_i^P: X = [1 0; skew(e) 1] */
+  hxMotion6 S;         /* (s, s_j^P x s) */
+  hxInertia6 I;        /* articulated inertia of the child with all it carries */
+  hxForce6 U;          /* I S */
+  hxReal inverse_d;    /* 1/d; 0 where the joint is driven kinematically */
+} hxSweep;
+
+typedef struct {
+  hxJointKinematics kin;
+  hxSweep sweep;
+  hxServo servo;
+  hxReal mass;
+  hxSym3 J;            /* child's inertia, world axes */
+  hxForce6 applied;    /* on the child at its centre of mass: gravity, gyroscopic, contact; not the servo */
+  hxReal torque;       /* N m  on the joint's axis: servo and gear (kinematic mode: gear, then the drive's too) */
+  hxMotion6 bias;      /* a_k of eq. 10, with S qdd in kinematic mode */
+  hxReal driven;       /* rad/s2  the drive's qdd in kinematic mode, else 0 */
+  hxForce6 p;          /* bias force of the sweep */
+  hxReal u;            /* torque - S.p */
+  hxMotion6 acceleration;
+  hxReal qdd;
+  hxVec3 lambda_lin;   /* multipliers, rows 1-3 */
+  hxReal lambda[2];    /* rows 4, 5 */
+} hxJointWork;
+
+typedef struct {
+  hxFootKinematics kin;
+  hxNormalForce normal;
+  hxReal slip_speed;
+  hxReal drag;         /* N s/m  size of the tangential force over the slip speed */
+  hxVec3 slip, force;  /* m/s, N  tangential velocity, ground on foot */
+} hxFootWork;
+
+typedef struct {
+  hxJointWork joint[HX_JOINTS];
+  hxFootWork foot;
+} hxLegWork;
+
+typedef struct {
+  hxBodyWork torso;
+  hxSym3 torso_J;
+  double torso_applied[6]; /* torque, force at the centre of mass */
+  double torso_acceleration[6];
+  hxLegWork pack[HX_PACKS];
+} hxWork;
+
+/* L D L^T of the torso's articulated 6 x 6. */
+typedef struct {
+  double L[6][6], inverse_d[6];
+} hxTorsoFactor;
+
+/* (M - h gamma G_v - (h gamma)^2 G_x) on the constraints, factorised: contact and servo stay inside the tree. */
+typedef struct {
+  hxQuat torso_p;
+  hxTorsoFactor torso;
+  struct {
+    struct {
+      hxQuat p;
+      hxSweep sweep;
+      hxReal stiffness, damping; /* servo */
+    } joint[HX_JOINTS];
+    hxVec3 arm, normal;
+    hxReal stiffness, viscosity, drag; /* contact */
+  } pack[HX_PACKS];
+} hxImplicit;
+
+/* Everything at (t, y): work, and dy/dt into rate. The multipliers are found when asked for, and in kinematic mode. */
+void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
+                          const hxMotion *motion, int multipliers, hxWork *work, hxMotion *rate);
+
+/* Factorises W at the evaluated point; h_gamma = h gamma. */
+void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit);
+
+/* u of W u + D^T mu = G_v dv + G_x dx, D u = 0, in the velocity entries of u. dx and dv: positions of dx, velocities of dv. */
+void hx_implicit_solve(const hxImplicit *implicit, const hxMotion *dx, const hxMotion *dv, hxMotion *u);
+
+#endif

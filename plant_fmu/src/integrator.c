@@ -1,0 +1,242 @@
+#include "integrator.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "dynamics.h"
+#include "method.h"
+
+static const double step_floor = 1e-11;     /* s  below this the error control gives up */
+static const double touch_depth = 1e-10;    /* m  a touch-down is found when the foot is in by less than this */
+
+/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s. */
+static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
+
+/* Where a step starts, evaluated once however often the step is tried. */
+typedef struct {
+  const hxModel *model;
+  const hxCommand *command;
+  const hxContactState *contact;
+  const hxMethodRow *method;
+  double t;
+  const hxMotion *y;
+  hxWork work;
+  hxMotion rate;
+} hxStart;
+
+typedef struct {
+  hxMotion y;
+  double error; /* of the step over the tolerance; 0 without an estimate */
+} hxTrial;
+
+static void add_scaled(hxMotion *y, double s, const hxMotion *x) {
+  for (int i = 0; i < HX_MOTION_SIZE; ++i) y->y[i] += s * x->y[i];
+}
+
+static void combine(hxMotion *y, const hxMotion *base, const double *weights, const hxMotion *k, int count) {
+  *y = *base;
+  for (int j = 0; j < count; ++j)
+    if (weights[j] != 0.0) add_scaled(y, weights[j], &k[j]);
+}
+
+/* Adds to k = h f what the implicit part of a stage changes; s = sum_{j<i} g_ij k_j. With dv = s + gamma h f and
+ * dx = s + gamma h (f + N dv):  W u + D^T mu = h (G_v dv + G_x dx), D u = 0;  k_v = h f_v + u,  k_x = h f_x + h N (s_v + gamma k_v). */
+static void implicit_stage(const hxImplicit *implicit, const hxMotion *y, double h, double gamma, const hxMotion *s, hxMotion *k) {
+  hxMotion dv = *s, dx, u, carried;
+  add_scaled(&dv, gamma, k);
+  hx_position_rates(y, &dv, &carried);
+  dx = dv;
+  for (int i = HX_R; i < HX_V; ++i) {
+    dx.torso[i] += h * gamma * carried.torso[i];
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      for (int slot = 0; slot < HX_SLOTS; ++slot) dx.link[joint][i][slot] += h * gamma * carried.link[joint][i][slot];
+  }
+  hx_implicit_solve(implicit, &dx, &dv, &u);
+  for (int i = HX_V; i < HX_BODY_STATE; ++i) {
+    k->torso[i] += h * u.torso[i];
+    dv.torso[i] += gamma * h * u.torso[i];
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      for (int slot = 0; slot < HX_SLOTS; ++slot) {
+        k->link[joint][i][slot] += h * u.link[joint][i][slot];
+        dv.link[joint][i][slot] += gamma * h * u.link[joint][i][slot];
+      }
+  }
+  hx_position_rates(y, &dv, &carried);
+  for (int i = HX_R; i < HX_V; ++i) {
+    k->torso[i] += h * carried.torso[i];
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      for (int slot = 0; slot < HX_SLOTS; ++slot) k->link[joint][i][slot] += h * carried.link[joint][i][slot];
+  }
+}
+
+/* largest error over scale, NaN kept */
+static double error_norm(const hxMotion *error, double tolerance) {
+  double worst = 0.0;
+  for (int i = 0; i < HX_BODY_STATE; ++i) {
+    const double weight = 1.0 / (tolerance * error_scale[i]);
+    double e = fabs(error->torso[i]);
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      for (int leg = 0; leg < HX_LEGS; ++leg) e = fabs(error->link[joint][i][leg]) > e ? fabs(error->link[joint][i][leg]) : e;
+    worst = e * weight > worst || isnan(e) ? e * weight : worst;
+  }
+  return worst;
+}
+
+static void normalise_quaternions(hxMotion *m) {
+  double *p = &m->torso[HX_P];
+  const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+  for (int i = 0; i < 4; ++i) p[i] *= scale;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    double(*q)[HX_SLOTS] = &m->link[joint][HX_P];
+    for (int slot = 0; slot < HX_SLOTS; ++slot) {
+      const double s = 1.0 / sqrt(q[0][slot] * q[0][slot] + q[1][slot] * q[1][slot] + q[2][slot] * q[2][slot] + q[3][slot] * q[3][slot]);
+      for (int i = 0; i < 4; ++i) q[i][slot] *= s;
+    }
+  }
+}
+
+static void fill_motion_slots(hxMotion *m) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(m->link[joint][i]);
+}
+
+/* One step of the method from a start, kept or not. */
+static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
+  const hxMethodRow *m = start->method;
+  hxMotion k[HX_STAGES], y, zero = {{0}};
+  hxImplicit implicit;
+  hxWork work;
+  if (m->gamma > 0.0) hx_implicit_factorise(start->model, &start->work, h * m->gamma, &implicit);
+  for (int i = 0; i < m->stages; ++i) {
+    k[i] = start->rate;
+    if (i > 0) {
+      combine(&y, start->y, m->a[i], k, i);
+      hx_dynamics_evaluate(start->model, start->contact, start->command, start->t + m->c[i] * h, &y, 0, &work, &k[i]);
+      state->evaluations += 1.0;
+    }
+    for (int j = 0; j < HX_MOTION_SIZE; ++j) k[i].y[j] *= h;
+    if (m->gamma > 0.0) {
+      combine(&y, &zero, m->g[i], k, i);
+      implicit_stage(&implicit, start->y, h, m->gamma, &y, &k[i]);
+    }
+  }
+  combine(&trial->y, start->y, m->b, k, m->stages);
+  combine(&y, &zero, m->e, k, m->stages);
+  trial->error = m->error_order > 0 && start->model->step == 0.0 ? error_norm(&y, start->model->tolerance) : 0.0;
+  normalise_quaternions(&trial->y);
+  fill_motion_slots(&trial->y);
+}
+
+/* how deep the deepest open foot is in the ground */
+static double open_depth(const hxStart *start, const hxMotion *y) {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS], depth = -HUGE_VAL;
+  hx_feet(start->model, y, delta, ddelta);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (start->contact->closed[leg] == 0.0 && delta[leg] > depth) depth = delta[leg];
+  return depth;
+}
+
+/* Shortens a step that ends below the ground to one that ends on it: false position (Illinois) on the step itself. */
+static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial) {
+  double low = 0.0, high = h, depth_low = open_depth(start, start->y), depth_high = open_depth(start, &trial->y);
+  int side = 0;
+  while (depth_high > touch_depth && high - low > step_floor) {
+    double middle = low + (high - low) * depth_low / (depth_low - depth_high);
+    if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
+    hxTrial nearer;
+    try_step(start, middle, state, &nearer);
+    const double depth = open_depth(start, &nearer.y);
+    if (depth > 0.0) {
+      high = middle, depth_high = depth, *trial = nearer;
+      depth_low *= side == 1 ? 0.5 : 1.0, side = 1;
+    } else {
+      low = middle, depth_low = depth;
+      depth_high *= side == -1 ? 0.5 : 1.0, side = -1;
+    }
+  }
+  return high;
+}
+
+/* Factor by which the step may change, from the error of an attempt. */
+static double step_factor(const hxMethodRow *method, double error) {
+  if (isnan(error)) return 0.2;
+  const double factor = 0.9 * pow(error, -1.0 / (method->error_order + 1));
+  return fmin(5.0, fmax(0.2, factor));
+}
+
+static hxStatus give_up(const hxTrial *trial, double t, double h, char *message) {
+  const int lost = isnan(trial->error);
+  snprintf(message, HX_MESSAGE_SIZE,
+           lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, stiffness and inputs, or let the error "
+                  "control choose the step (solver.step = 0)"
+                : "the error control asks for steps below its floor at t = %.9g s (got %.3g s, expected at least 1e-11 s); raise "
+                  "solver.tolerance or use a linearly implicit solver.method",
+           t, h);
+  return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
+}
+
+static int all_finite(const hxMotion *y) {
+  double sum = 0.0;
+  for (int i = 0; i < HX_MOTION_SIZE; ++i) sum += 0.0 * y->y[i];
+  return sum == 0.0;
+}
+
+/* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is its length. */
+static hxStatus advance(hxStart *start, double h_max, hxState *state, double *taken, char *message) {
+  const hxModel *model = start->model;
+  hxTrial trial;
+  hx_dynamics_evaluate(model, start->contact, start->command, start->t, start->y, 0, &start->work, &start->rate);
+  state->evaluations += 1.0;
+  double h = model->step > 0.0 ? h_max : fmin(h_max, state->next_step);
+  for (;;) {
+    try_step(start, h, state, &trial);
+    if (!all_finite(&trial.y)) trial.error = NAN;
+    if (trial.error <= 1.0) break;
+    state->rejected += 1.0;
+    h *= fmin(step_factor(start->method, trial.error), 0.9);
+    if (h < step_floor || (model->step > 0.0 && isnan(trial.error))) return give_up(&trial, start->t, h, message);
+  }
+  if (model->step == 0.0) {
+    const double next = fmin(model->step_max, h * step_factor(start->method, fmax(trial.error, 1e-10)));
+    /* a step cut short by the end of the interval says little against a longer one */
+    state->next_step = h < h_max ? next : fmax(next, state->next_step);
+  }
+  *taken = open_depth(start, &trial.y) > 0.0 ? find_touchdown(start, h, state, &trial) : h;
+  state->motion = trial.y;
+  state->steps += 1.0;
+  return HX_OK;
+}
+
+static void switch_contacts(const hxModel *model, hxState *state) {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  hx_feet(model, &state->motion, delta, ddelta);
+  state->touchdowns += hx_contact_switch(model, delta, ddelta, &state->contact);
+}
+
+/* From state->time to t_end; the last step lands on it exactly. */
+static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+  while (state->time < t_end) {
+    const double left = t_end - state->time;
+    const hxMotion y = state->motion;
+    hxStart start = {.model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .t = state->time, .y = &y};
+    double taken;
+    const hxStatus status = advance(&start, left, state, &taken, message);
+    if (status != HX_OK) return status;
+    const double t = state->time + taken;
+    state->time = taken >= left || t_end - t < step_floor ? t_end : t;
+    switch_contacts(model, state);
+  }
+  return HX_OK;
+}
+
+hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+  if (model->step == 0.0) return run_to(model, command, t_end, state, message);
+  const double t_start = state->time;
+  const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
+  for (double i = 1.0; i <= count; i += 1.0) {
+    const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
+    const hxStatus status = run_to(model, command, t, state, message);
+    if (status != HX_OK) return status;
+  }
+  return HX_OK;
+}

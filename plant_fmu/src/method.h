@@ -1,0 +1,22 @@
+/* method.h - integration methods as coefficients: explicit Runge-Kutta and linearly implicit Rosenbrock-W (eq. 15) */
+#ifndef HX_METHOD_H
+#define HX_METHOD_H
+
+enum { HX_STAGES = 7 };
+
+/*   y_i = y_0 + sum_{j<i} a_ij k_j
+ *   (1 - h gamma A) k_i = h f(t_0 + c_i h, y_i) + h A sum_{j<i} g_ij k_j      gamma = 0: explicit
+ *   y_1 = y_0 + sum b_i k_i,   error estimate sum e_i k_i                     e = b - b of the embedded method */
+typedef struct hxMethodRow {
+  const char *name;
+  int stages;
+  int order;
+  int error_order; /* of the embedded method; 0: none, fixed step only */
+  double gamma;
+  double a[HX_STAGES][HX_STAGES], g[HX_STAGES][HX_STAGES];
+  double c[HX_STAGES], b[HX_STAGES], e[HX_STAGES];
+} hxMethodRow;
+
+const hxMethodRow *hx_method(int method); /* NULL when there is no such method */
+
+#endif

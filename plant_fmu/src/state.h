@@ -1,0 +1,95 @@
+/* state.h - what a plant is made of: constants compiled from the definition, and the state that moves.
+ *
+ * Legs are stored innermost, [quantity][component][slot]. No pointers anywhere: the bytes are the plant.
+ */
+#ifndef HX_STATE_H
+#define HX_STATE_H
+
+#include "hexapod/hexapod.h"
+#include "lanes.h"
+
+enum {
+  HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES, /* a pack is HX_LANES legs */
+  HX_TORSO_SIZE = 16,
+  HX_MOTION_SIZE = HX_TORSO_SIZE + HX_JOINTS * HX_BODY_STATE * HX_SLOTS
+};
+
+/* Where a body state's parts begin. */
+enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
+
+/* y of y' = f(t, y). The same 328 doubles as a vector for the integrator and by name for the physics. */
+typedef union hxMotion {
+  double y[HX_MOTION_SIZE];
+  struct {
+    double torso[HX_BODY_STATE];
+    double actuator_work, push_work, dissipated; /* J */
+    double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
+  };
+} hxMotion;
+
+/* A joint and the link it moves; i = parent, j = child (equations.md: s, s^P, a, b). */
+typedef struct hxJointModel {
+  double mass[HX_SLOTS];
+  double inertia[6][HX_SLOTS];  /* child's axes */
+  double s_i[3][HX_SLOTS];      /* joint axis, parent's axes */
+  double s_j[3][HX_SLOTS];      /* joint axis, child's axes */
+  double a_j[3][HX_SLOTS];      /* normals to it, child's axes */
+  double b_j[3][HX_SLOTS];
+  double sP_i[3][HX_SLOTS];     /* parent's centre of mass to the joint, parent's axes */
+  double sP_j[3][HX_SLOTS];     /* child's centre of mass to the joint, child's axes */
+  double zero[2][HX_SLOTS];     /* w, z of the turn about z from the parent's to the child's axes at angle 0 */
+} hxJointModel;
+
+typedef struct hxModel {
+  double torso_mass;
+  double torso_inertia[6];
+  hxJointModel joint[HX_JOINTS];
+  double foot_centre[3][HX_SLOTS];  /* tibia's centre of mass to the foot's centre, tibia's axes */
+  double foot_radius;
+  double gravity[3];
+  double alpha, beta;               /* Baumgarte */
+  int contact_law, friction_law, terrain_kind, servo_mode, method;
+  double stiffness, damping_scale, impact_speed_floor; /* eq. 4; what damping_scale means is the law's business */
+  double mu, slope;                 /* eq. 5 */
+  double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
+  double ground_point[3], ground_normal[3];
+  double step, tolerance, step_max;
+} hxModel;
+
+/* The inputs of one step, legs innermost. */
+typedef struct hxCommand {
+  double angle[HX_JOINTS][HX_SLOTS];
+  double speed[HX_JOINTS][HX_SLOTS];
+  double torque[HX_JOINTS][HX_SLOTS];
+  double push_force[3], push_torque[3];
+  double time;  /* s  when it was given: the kinematic drive follows angle + speed (t - time) */
+} hxCommand;
+
+/* Changes at touch-down and lift-off only, never within a step. */
+typedef struct hxContactState {
+  double closed[HX_SLOTS];        /* 1 from touch-down to lift-off, else 0 */
+  double damping[HX_SLOTS];       /* s/m  d of f_n = K delta^1.5 (1 + d ddelta), fixed at touch-down */
+  double impact_speed[HX_SLOTS];  /* m/s  at the last touch-down */
+} hxContactState;
+
+typedef struct hxState {
+  double time;
+  double next_step;        /* s  what the error control would take next */
+  double stored_at_start;  /* J  energy the audit starts from */
+  hxMotion motion;
+  hxContactState contact;
+  double evaluations, steps, rejected, touchdowns;
+} hxState;
+
+struct hxPlant {
+  hxModel model;
+  hxState state;
+  char message[HX_MESSAGE_SIZE];
+};
+
+/* Copies leg 0 into the slots past the last leg, so that every lane always holds a physical leg. */
+static inline void hx_fill_slots(double *slots) {
+  for (int slot = HX_LEGS; slot < HX_SLOTS; ++slot) slots[slot] = slots[0];
+}
+
+#endif
