@@ -36,7 +36,7 @@ static void not_negative(hxChecker *c, const char *where, const char *name, doub
   within(c, where, name, x, 0.0, DBL_MAX, "zero or a positive number");
 }
 
-static void finite(hxChecker *c, const char *where, const char *name, const double *x, int n) {
+static void finite_all(hxChecker *c, const char *where, const char *name, const double *x, int n) {
   for (int i = 0; i < n; ++i) within(c, where, name, x[i], -DBL_MAX, DBL_MAX, "finite numbers");
 }
 
@@ -52,8 +52,8 @@ static int is_inertia(const double I[6]) {
 
 static void body(hxChecker *c, const char *where, double mass, const double com[3], const double inertia[6]) {
   positive(c, where, ".mass", mass);
-  finite(c, where, ".com", com, 3);
-  finite(c, where, ".inertia", inertia, 6);
+  finite_all(c, where, ".com", com, 3);
+  finite_all(c, where, ".inertia", inertia, 6);
   if (!is_inertia(inertia))
     fail(c, where, ".inertia_xx", inertia[0], "an inertia that a body can have: positive, each principal moment at most the sum of the others");
 }
@@ -67,15 +67,15 @@ static void length_not_zero(hxChecker *c, const char *where, const char *name, c
 static void legs(hxChecker *c, const hxDefinition *d) {
   char where[32];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    finite(c, leg_names[leg], ".hip_position", d->leg[leg].hip_position, 3);
-    finite(c, leg_names[leg], ".hip_yaw", &d->leg[leg].hip_yaw, 1);
+    finite_all(c, leg_names[leg], ".hip_position", d->leg[leg].hip_position, 3);
+    finite_all(c, leg_names[leg], ".hip_yaw", &d->leg[leg].hip_yaw, 1);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxLink *link = &d->leg[leg].link[joint];
       const double offset[2] = {link->offset_y, link->offset_z};
       snprintf(where, sizeof where, "%s.%s", leg_names[leg], joint_names[joint]);
       body(c, where, link->mass, link->com, link->inertia);
       positive(c, where, ".length", link->length);
-      finite(c, where, ".offset", offset, 2);
+      finite_all(c, where, ".offset", offset, 2);
       length_not_zero(c, where, ".axis", link->axis, 3, "a direction: not all zero");
     }
   }
@@ -108,24 +108,24 @@ static void settings(hxChecker *c, const hxDefinition *d) {
   not_negative(c, "servo", ".coulomb_friction", d->servo.coulomb_friction);
   not_negative(c, "baumgarte", ".alpha", d->baumgarte.alpha);
   not_negative(c, "baumgarte", ".beta", d->baumgarte.beta);
-  finite(c, "gravity", "", d->gravity, 3);
+  finite_all(c, "gravity", "", d->gravity, 3);
   if (step != 0.0) within(c, "solver", ".step", step, 1e-9, 1.0, "0 (error control) or 1e-9 s to 1 s");
   within(c, "solver", ".tolerance", d->solver.tolerance, 1e-13, 1.0, "1e-13 to 1");
   within(c, "solver", ".step_max", d->solver.step_max, 1e-9, 1.0, "1e-9 s to 1 s");
   if (hx_method(d->solver.method) && hx_method(d->solver.method)->error_order == 0 && step == 0.0)
     fail(c, "solver", ".step", step, "a fixed step > 0 with this solver.method, which has no error estimate");
-  finite(c, "terrain", ".height", &d->terrain.height, 1);
+  finite_all(c, "terrain", ".height", &d->terrain.height, 1);
   within(c, "terrain", ".incline", d->terrain.incline, -1.5, 1.5, "-1.5 to 1.5 rad");
-  finite(c, "terrain", ".heading", &d->terrain.heading, 1);
+  finite_all(c, "terrain", ".heading", &d->terrain.heading, 1);
 }
 
 static void initial(hxChecker *c, const hxDefinition *d) {
-  finite(c, "initial", ".position", d->initial.position, 3);
+  finite_all(c, "initial", ".position", d->initial.position, 3);
   length_not_zero(c, "initial", ".quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");
-  finite(c, "initial", ".velocity", d->initial.velocity, 3);
-  finite(c, "initial", ".angular_velocity", d->initial.angular_velocity, 3);
-  finite(c, "initial", ".angle", &d->initial.angle[0][0], HX_LEGS * HX_JOINTS);
-  finite(c, "initial", ".speed", &d->initial.speed[0][0], HX_LEGS * HX_JOINTS);
+  finite_all(c, "initial", ".velocity", d->initial.velocity, 3);
+  finite_all(c, "initial", ".angular_velocity", d->initial.angular_velocity, 3);
+  finite_all(c, "initial", ".angle", &d->initial.angle[0][0], HX_LEGS * HX_JOINTS);
+  finite_all(c, "initial", ".speed", &d->initial.speed[0][0], HX_LEGS * HX_JOINTS);
 }
 
 hxStatus hx_definition_check(const hxDefinition *d, char *message) {
@@ -141,11 +141,11 @@ hxStatus hx_definition_check(const hxDefinition *d, char *message) {
 hxStatus hx_input_check(const hxInput *input, char *message) {
   hxChecker c = {HX_OK, message};
   const int n = HX_LEGS * HX_JOINTS;
-  finite(&c, "input", ".angle_ref", &input->angle_ref[0][0], n);
-  finite(&c, "input", ".speed_ref", &input->speed_ref[0][0], n);
-  finite(&c, "input", ".torque_ref", &input->torque_ref[0][0], n);
-  finite(&c, "torso", ".push_force", input->push_force, 3);
-  finite(&c, "torso", ".push_torque", input->push_torque, 3);
+  finite_all(&c, "input", ".angle_ref", &input->angle_ref[0][0], n);
+  finite_all(&c, "input", ".speed_ref", &input->speed_ref[0][0], n);
+  finite_all(&c, "input", ".torque_ref", &input->torque_ref[0][0], n);
+  finite_all(&c, "torso", ".push_force", input->push_force, 3);
+  finite_all(&c, "torso", ".push_torque", input->push_torque, 3);
   return c.status == HX_OK ? HX_OK : HX_INVALID_ARGUMENT;
 }
 
