@@ -1,0 +1,121 @@
+"""Foot on ground: normal force with restitution (eq. 4) and friction (eq. 5).
+
+f_n = K delta^1.5 max(0, 1 + d ddelta), with d [s/m] fixed at touch-down from the approach speed there and held to lift-off.
+Most laws are of the form d = chi(e) / v0; chi(e) is what tells them apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres
+from hexapod_cosim.models.records import Array, Contact, Friction, Robot
+from hexapod_cosim.models.terrain import ground
+
+SERIES_BELOW = 1e-2  # where the closed form of _log_rest has lost more digits than its series leaves out
+SERIES_TERMS = 9
+
+
+def _log_rest(x: float) -> float:
+    """(ln(1 + x) - x) / x^2, without cancellation near 0; -inf as x -> -1 is not reached by its callers' brackets."""
+    if abs(x) < SERIES_BELOW:
+        return sum((-1.0) ** (n + 1) * x ** (n - 2) / n for n in range(2, 2 + SERIES_TERMS))
+    return (math.log1p(x) - x) / (x * x)
+
+
+def _balance(chi: float, e: float) -> float:
+    """[ln(1 + chi) - ln(1 - chi e) - chi (1 + e)] / chi^2: 0 where a law with chi gives back exactly e."""
+    return _log_rest(chi) - e * e * _log_rest(-chi * e) if chi * e < 1.0 else math.inf
+
+
+def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
+    """The root of a function that is negative at low and positive at high, to the last bit."""
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if function(middle) < 0.0 else (low, middle)
+    return 0.5 * (low + high)
+
+
+def exact_restitution_chi(e: float) -> float:
+    """chi of the law that gives back exactly the restitution e in (0, 1]: chi (1 + e) = ln[(1 + chi)/(1 - chi e)]."""
+    return 0.0 if e >= 1.0 else _bisect(lambda chi: _balance(chi, e), 0.0, 1.0 / e)
+
+
+def achieved_restitution(chi: float) -> float:
+    """The restitution that a law with this chi > 0 really gives back: the same equation solved for e."""
+    return 1.0 if chi <= 0.0 else _bisect(lambda e: _balance(chi, e), 0.0, min(1.0, 1.0 / chi))
+
+
+CHI: dict[str, Callable[[float], float]] = {
+    "exact_restitution": exact_restitution_chi,
+    "flores": lambda e: 8.0 * (1.0 - e) / (5.0 * e),
+    "lankarani_nikravesh": lambda e: 0.75 * (1.0 - e * e),
+    "hunt_crossley": lambda e: 1.5 * (1.0 - e),
+}
+
+
+def contact_damping(contact: Contact, impact_speed: float) -> float:
+    """d [s/m] of a foot that touches down with this approach speed [m/s]; slower ones count as the floor."""
+    if contact.law == "hertz":
+        return 0.0
+    if contact.law == "constant_damping":
+        return 1.5 * contact.damping_factor
+    return CHI[contact.law](contact.restitution) / max(impact_speed, contact.impact_speed_floor)
+
+
+def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) -> float:
+    """f_n [N] at penetration delta [m] and approach speed ddelta [m/s]; never pulls. Damping nan: not in contact."""
+    if math.isnan(damping):
+        return 0.0
+    return contact.stiffness * float(max(delta, 0.0) ** 1.5) * max(0.0, 1.0 + damping * ddelta)
+
+
+def friction_force(friction: Friction, normal: float, slip: Array) -> Array:
+    """(3,) f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t| [N], with its limit -mu f_n k_t v_t at rest."""
+    if friction.law == "none":
+        return np.zeros(3)
+    speed = float(np.linalg.norm(slip))
+    x = friction.slope * speed
+    per_speed = math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
+    return -friction.mu * normal * per_speed * slip
+
+
+@dataclass(frozen=True)
+class FootContact:
+    """One foot at the ground, world axes."""
+
+    point: Array  # (3,) m    centre - R n
+    velocity: Array  # (3,) m/s  of the foot's material point there
+    normal: Array  # (3,)
+    penetration: float  # m    delta, < 0: clearance
+    approach_speed: float  # m/s  ddelta
+
+
+def foot_contact(robot: Robot, tibia: Array, centre: Array) -> FootContact:
+    """Where and how a foot of this tibia (13,) with this centre (3,) meets the ground."""
+    distance, normal = ground(robot.terrain, centre)
+    point = centre - robot.foot.radius * normal
+    velocity = tibia[7:10] + cross(tibia[10:13], point - tibia[0:3])
+    return FootContact(point, velocity, normal, robot.foot.radius - distance, float(-velocity @ normal))
+
+
+def foot_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
+    """The six feet of bodies (19, 13)."""
+    centres = foot_centres(robot, body)
+    return tuple(foot_contact(robot, body[JOINTS * (leg + 1)], centres[leg]) for leg in range(LEGS))
+
+
+def foot_force(robot: Robot, foot: FootContact, damping: float) -> Array:
+    """(3,) ground on foot [N]: f_n n + f_t."""
+    f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
+    slip = foot.velocity + foot.approach_speed * foot.normal
+    return f_n * foot.normal + friction_force(robot.friction, f_n, slip)
+
+
+def standing_damping(robot: Robot, body: Array) -> Array:
+    """(6,) damping of feet put down slowly where they are in the ground, nan where they are not."""
+    slow = contact_damping(robot.contact, 0.0)
+    return np.array([slow if foot.penetration > 0.0 else math.nan for foot in foot_contacts(robot, body)])

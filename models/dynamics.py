@@ -1,0 +1,199 @@
+"""The paper's equations, dense and plain: the oracle for the C plant, which solves the same system in O(n).
+
+    [ M  D^T ] [ dv     ]   [ g                                    ]
+    [ D  0   ] [ lambda ] = [ gamma - 2 alpha dPhi - beta^2 Phi    ]     (eq. 1)
+
+Velocities are stacked body by body, v then w, world axes: 19 x 6 = 114. Each joint has 5 multipliers: 18 x 5 = 90.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hexapod_cosim.models.actuator import gear_friction, servo_torque
+from hexapod_cosim.models.contact import foot_contacts, foot_force
+from hexapod_cosim.models.kinematics import (
+    BODIES,
+    JOINTS,
+    LEGS,
+    JointModel,
+    cross,
+    inertia_matrix,
+    joint_angles,
+    joint_models,
+    joint_speeds,
+    rotation_matrix,
+    skew,
+    split,
+)
+from hexapod_cosim.models.records import Array, Robot
+
+MULTIPLIERS = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What the outside does to the robot. Arrays (6, 3) leg-major, (3,) world axes at the torso's centre of mass."""
+
+    angle_ref: Array  # rad
+    speed_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # rad/s
+    torque_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # N m
+    push_force: Array = field(default_factory=lambda: np.zeros(3))  # N
+    push_torque: Array = field(default_factory=lambda: np.zeros(3))  # N m
+    age: float = 0.0  # s  since it was given: a kinematic drive follows angle_ref + speed_ref age
+
+
+@dataclass(frozen=True)
+class JointKinematics:
+    """One joint's constraint: rows 1-3 hold the point, rows 4-5 the axis."""
+
+    phi: Array  # (5,)  Phi
+    dphi: Array  # (5,)  its rate
+    D_i: Array  # (5, 6)  Jacobian on the parent's (v, w)
+    D_j: Array  # (5, 6)  on the child's
+    gamma: Array  # (5,)  -dD/dt (v, w)
+    s: Array  # (3,)  axis, world
+
+
+def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKinematics:
+    """Eq. 2 and 3 for the joint between two bodies (13,), drift allowed. The lost dots of gamma's first row are restored."""
+    (r_i, p_i, v_i, w_i), (r_j, p_j, v_j, w_j) = split(parent), split(child)
+    R_i, R_j = rotation_matrix(p_i), rotation_matrix(p_j)
+    sP_i, sP_j, s = R_i @ joint.point_i, R_j @ joint.point_j, R_i @ joint.s_i
+    a, b = R_j @ joint.a_j, R_j @ joint.b_j
+
+    # Phi = (r_j + s_j^P - r_i - s_i^P,  a.s,  b.s)
+    phi = np.concatenate([r_j + sP_j - r_i - sP_i, [a @ s, b @ s]])
+
+    # D = [-1, skew(s_i^P), 1, -skew(s_j^P);  0, -a^T skew(s), 0, -s^T skew(a);  the same with b]
+    one, none = np.eye(3), np.zeros(3)
+    D_i = np.vstack([np.hstack([-one, skew(sP_i)]), np.hstack([none, -a @ skew(s)]), np.hstack([none, -b @ skew(s)])])
+    D_j = np.vstack([np.hstack([one, -skew(sP_j)]), np.hstack([none, -s @ skew(a)]), np.hstack([none, -s @ skew(b)])])
+    dphi = D_i @ np.concatenate([v_i, w_i]) + D_j @ np.concatenate([v_j, w_j])
+
+    # gamma = (-skew(ds_i^P) w_i + skew(ds_j^P) w_j,  -s^T skew(w_j) da - a^T skew(w_i) ds - 2 da.ds,  the same with b)
+    dsP_i, dsP_j, ds = cross(w_i, sP_i), cross(w_j, sP_j), cross(w_i, s)
+    rows = [-s @ skew(w_j) @ dn - n @ skew(w_i) @ ds - 2.0 * dn @ ds for n, dn in ((a, cross(w_j, a)), (b, cross(w_j, b)))]
+    gamma = np.concatenate([-skew(dsP_i) @ w_i + skew(dsP_j) @ w_j, rows])
+    return JointKinematics(phi, dphi, D_i, D_j, gamma, s)
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """All joints, stacked."""
+
+    phi: Array  # (90,)
+    dphi: Array  # (90,)
+    D: Array  # (90, 114)
+    gamma: Array  # (90,)
+    G: Array  # (18, 114)  joint speeds: qd = G v
+
+
+def constraints(robot: Robot, body: Array) -> Constraints:
+    """The constraint equations of the joints between bodies (19, 13)."""
+    models = joint_models(robot)
+    joints = [joint_kinematics(model, body[model.parent], body[model.child]) for model in models]
+    D, G = np.zeros((MULTIPLIERS * len(models), 6 * BODIES)), np.zeros((len(models), 6 * BODIES))
+    for k, (model, joint) in enumerate(zip(models, joints, strict=True)):
+        rows, i, j = slice(MULTIPLIERS * k, MULTIPLIERS * (k + 1)), 6 * model.parent, 6 * model.child
+        D[rows, i : i + 6], D[rows, j : j + 6] = joint.D_i, joint.D_j
+        G[k, i + 3 : i + 6], G[k, j + 3 : j + 6] = -joint.s, joint.s
+    stack = [np.concatenate([getattr(joint, name) for joint in joints]) for name in ("phi", "dphi", "gamma")]
+    return Constraints(phi=stack[0], dphi=stack[1], D=D, gamma=stack[2], G=G)
+
+
+def masses(robot: Robot) -> Array:
+    """(19,) kg"""
+    return np.array([robot.torso.mass, *(link.mass for leg in robot.legs for link in leg.links)])
+
+
+def world_inertias(robot: Robot, body: Array) -> Array:
+    """(19, 3, 3) J = R J_B R^T, world axes [kg m2]."""
+    local = [robot.torso.inertia, *(link.inertia for leg in robot.legs for link in leg.links)]
+    turns = [rotation_matrix(state[3:7]) for state in body]
+    return np.array([R @ inertia_matrix(entries) @ R.T for R, entries in zip(turns, local, strict=True)])
+
+
+def mass_matrix(robot: Robot, body: Array) -> Array:
+    """(114, 114) M = diag(m 1, J) + J_r G^T G: the geared rotors' inertia acts on the joint speeds."""
+    M = np.zeros((6 * BODIES, 6 * BODIES))
+    for k, (mass, J) in enumerate(zip(masses(robot), world_inertias(robot, body), strict=True)):
+        M[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
+        M[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = J
+    G = constraints(robot, body).G
+    return M + robot.servo.rotor_inertia * G.T @ G
+
+
+def applied_forces(robot: Robot, body: Array, command: Command, damping: Array) -> Array:
+    """(19, 6) force and torque on each body at its centre of mass: gravity, gyroscopic, contact, push; no servo.
+
+    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact.
+    """
+    g = np.zeros((BODIES, 6))
+    g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
+    J, w = world_inertias(robot, body), body[:, 10:13]
+    g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        tibia = JOINTS * (leg + 1)
+        force = foot_force(robot, foot, damping[leg])
+        g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
+    g[0] += np.concatenate([command.push_force, command.push_torque])
+    return g
+
+
+def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
+    """(6, 3) motor torque (0 in kinematic mode, where it is a multiplier) and (6, 3) gear torque on the child [N m]."""
+    angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
+    gear = gear_friction(robot.servo, speed)
+    if robot.servo.mode == "kinematic":
+        return np.zeros_like(gear), gear
+    return servo_torque(robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref), gear
+
+
+def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
+    """(6, 3) s.(dw_j - dw_i) [rad/s2] that keeps a kinematically driven joint on q_ref + qd_ref age, with Baumgarte's terms."""
+    alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
+    error = joint_angles(robot, body) - (command.angle_ref + command.speed_ref * command.age)
+    return -2.0 * alpha * (joint_speeds(robot, body) - command.speed_ref) - beta**2 * error
+
+
+@dataclass(frozen=True)
+class Accelerations:
+    """The solution of eq. 1."""
+
+    dv: Array  # (19, 6)  m/s2 then rad/s2
+    multipliers: Array  # (18, 5)  lambda
+    drive_torque: Array  # (6, 3)  motor on child [N m]; in kinematic mode the drive's multiplier
+    gear_torque: Array  # (6, 3)  gear on child [N m]
+
+
+def accelerations(robot: Robot, body: Array, command: Command, damping: Array) -> Accelerations:
+    """Solves eq. 1 for bodies (19, 13), drifted joints allowed; damping (6,) as in `applied_forces`.
+
+    In kinematic mode each joint adds the row G dv = drive_acceleration, whose multiplier is minus the motor's torque.
+    """
+    joints = constraints(robot, body)
+    motor, gear = joint_torques(robot, body, command)
+    g = applied_forces(robot, body, command, damping).ravel() + joints.G.T @ (motor + gear).ravel()
+    c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi - robot.baumgarte.beta**2 * joints.phi
+    D = joints.D
+    if robot.servo.mode == "kinematic":
+        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive_acceleration(robot, body, command).ravel()])
+    none = np.zeros((len(c), len(c)))
+    solution = np.linalg.solve(np.block([[mass_matrix(robot, body), D.T], [D, none]]), np.concatenate([g, c]))
+    dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
+    motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
+    return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)
+
+
+def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:
+    """(18, 3) force and (18, 3) torque of each joint on its child, the torque about the joint's point: -D_j^T lambda moved there."""
+    force, torque = np.zeros((LEGS * JOINTS, 3)), np.zeros((LEGS * JOINTS, 3))
+    for k, model in enumerate(joint_models(robot)):
+        joint = joint_kinematics(model, body[model.parent], body[model.child])
+        wrench = -joint.D_j.T @ multipliers[k]
+        sP_j = rotation_matrix(body[model.child, 3:7]) @ model.point_j
+        force[k], torque[k] = wrench[0:3], wrench[3:6] - cross(sP_j, wrench[0:3])
+    return force, torque

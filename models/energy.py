@@ -1,0 +1,44 @@
+"""What the books hold: energies of the bodies, momentum, and how far the joints have drifted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.dynamics import constraints, masses, world_inertias
+from hexapod_cosim.models.kinematics import joint_speeds
+from hexapod_cosim.models.records import Array, Robot
+
+
+def kinetic_energy(robot: Robot, body: Array) -> float:
+    """J, of the bodies (19, 13) and the geared rotors."""
+    v, w = body[:, 7:10], body[:, 10:13]
+    linear = masses(robot) @ np.sum(v * v, axis=1)
+    angular = np.einsum("ki,kij,kj->", w, world_inertias(robot, body), w)
+    rotors = robot.servo.rotor_inertia * np.sum(joint_speeds(robot, body) ** 2)
+    return 0.5 * float(linear + angular + rotors)
+
+
+def potential_energy(robot: Robot, body: Array) -> float:
+    """J, of gravity (0 at the world's origin) and the elastic part of the contacts, 2/5 K delta^2.5."""
+    gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
+    depth = np.array([max(foot.penetration, 0.0) for foot in foot_contacts(robot, body)])
+    return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5))
+
+
+def centre_of_mass(robot: Robot, body: Array) -> Array:
+    """(3,) of the whole robot, world [m]."""
+    return masses(robot) @ body[:, 0:3] / robot.total_mass
+
+
+def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
+    """(3,) linear [kg m/s] and (3,) angular momentum about the world's origin [kg m2/s], rotors' spin left out (geared, internal)."""
+    linear = masses(robot)[:, None] * body[:, 7:10]
+    spin = np.einsum("kij,kj->ki", world_inertias(robot, body), body[:, 10:13])
+    return linear.sum(axis=0), (np.cross(body[:, 0:3], linear) + spin).sum(axis=0)
+
+
+def constraint_errors(robot: Robot, body: Array) -> tuple[float, float]:
+    """Norms of Phi [m or 1] and of its rate [m/s or 1/s]."""
+    joints = constraints(robot, body)
+    return float(np.linalg.norm(joints.phi)), float(np.linalg.norm(joints.dphi))

@@ -1,0 +1,198 @@
+"""Where the bodies are: rotations, joint angles to bodies and back. Frames: docs/architecture.md.
+
+Letters: R_WB turns B's components into the world's. World W, torso T, hip H, parent link P, link L, centre of mass c.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from hexapod_cosim.models.records import Array, Leg, Robot
+
+LEGS, JOINTS = 6, 3
+BODIES = 1 + LEGS * JOINTS
+BODY_STATE = 13  # r[3] p[4] v[3] w[3]
+
+
+def skew(a: Array) -> Array:
+    """(3, 3) matrix with skew(a) b = a x b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """(3,) a x b, for single vectors several times as fast as numpy's."""
+    return skew(a) @ b
+
+
+def rotation_matrix(p: Array) -> Array:
+    """(3, 3) body to world, from a quaternion [w x y z] that is normalised on use."""
+    w, x, y, z = p / np.linalg.norm(p)
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_rate(p: Array, w: Array) -> Array:
+    """(4,) dp/dt of a body that turns with w [rad/s], world axes."""
+    return 0.5 * np.concatenate([[-w @ p[1:]], p[0] * w + cross(w, p[1:])])
+
+
+def quaternion_product(p: Array, q: Array) -> Array:
+    """(4,) the rotation q followed by p."""
+    return np.concatenate([[p[0] * q[0] - p[1:] @ q[1:]], p[0] * q[1:] + q[0] * p[1:] + cross(p[1:], q[1:])])
+
+
+def axis_quaternion(axis: Array, angle: float) -> Array:
+    """(4,) rotation by angle [rad] about a unit axis."""
+    return np.concatenate([[np.cos(angle / 2.0)], np.sin(angle / 2.0) * axis])
+
+
+def axis_rotation(axis: Array, angle: float) -> Array:
+    """(3, 3) rotation by angle [rad] about a unit axis."""
+    return rotation_matrix(axis_quaternion(axis, angle))
+
+
+def inertia_matrix(inertia: tuple[float, ...]) -> Array:
+    """(3, 3) from the entries xx yy zz xy xz yz."""
+    xx, yy, zz, xy, xz, yz = inertia
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def unit_axis(axis: tuple[float, ...]) -> Array:
+    """(3,) the joint axis at unit length."""
+    vector: Array = np.array(axis)
+    return vector / float(np.linalg.norm(vector))
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """Constants of the joint between parent i and child j: vectors fixed in a body, in that body's axes."""
+
+    parent: int  # body number
+    child: int
+    s_i: Array  # axis, in i
+    s_j: Array  # axis, in j
+    a_j: Array  # two normals to it, in j
+    b_j: Array
+    point_i: Array  # centre of mass of i to the joint's point [m]
+    point_j: Array  # centre of mass of j to the joint's point [m]
+    zero: Array  # (4,) turn from the parent's to the child's axes at angle 0
+
+
+def axis_normals(axis: Array) -> tuple[Array, Array]:
+    """Two unit normals to a unit axis: a = axis x (the coordinate direction it is least along, the first on ties), b = axis x a."""
+    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    a = cross(axis, least)
+    a = a / np.linalg.norm(a)
+    return a, cross(axis, a)
+
+
+@lru_cache(maxsize=64)
+def joint_models(robot: Robot) -> tuple[JointModel, ...]:
+    """The 18 joints, leg by leg; joint k moves body k + 1."""
+    return tuple(_joint_model(robot, leg, joint) for leg in range(LEGS) for joint in range(JOINTS))
+
+
+def _joint_model(robot: Robot, leg: int, joint: int) -> JointModel:
+    data, child = robot.legs[leg], 1 + JOINTS * leg + joint
+    link, axis = data.links[joint], unit_axis(data.links[joint].axis)
+    zero = axis_quaternion(np.array([0.0, 0.0, 1.0]), data.hip_yaw if joint == 0 else 0.0)
+    above = data.links[joint - 1]
+    from_com = np.subtract(data.hip_position, robot.torso.com) if joint == 0 else np.subtract(above.tip, above.com)
+    a_j, b_j = axis_normals(axis)
+    return JointModel(
+        parent=0 if joint == 0 else child - 1, child=child, s_i=rotation_matrix(zero) @ axis, s_j=axis, a_j=a_j, b_j=b_j,
+        point_i=from_com, point_j=-np.array(link.com), zero=zero,
+    )  # fmt: skip
+
+
+def foot_position(leg: Leg, angle: Array) -> Array:
+    """(3,) the foot sphere's centre in the torso frame [m] at three joint angles [rad]."""
+    p_T = np.array(leg.hip_position)
+    R_TL = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
+    for link, q in zip(leg.links, angle, strict=True):
+        R_TL = R_TL @ axis_rotation(unit_axis(link.axis), q)
+        p_T = p_T + R_TL @ np.array(link.tip)
+    return p_T
+
+
+def foot_positions(robot: Robot, angle: Array) -> Array:
+    """(6, 3) the feet's centres in the torso frame [m] at joint angles (6, 3) [rad]."""
+    return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angle, strict=True)])
+
+
+def body_states(
+    robot: Robot, position: Array, quaternion: Array, velocity: Array, angular_velocity: Array, angle: Array, speed: Array
+) -> Array:
+    """All bodies on their joints exactly, from the torso's motion and the joints'.
+
+    Args:
+        position, velocity: (3,) of the torso's centre of mass, world axes [m, m/s].
+        quaternion: (4,) torso to world, normalised here.
+        angular_velocity: (3,) of the torso, world axes [rad/s].
+        angle, speed: (6, 3) of the joints [rad, rad/s].
+
+    Returns:
+        (19, 13) rows r[3] p[4] v[3] w[3], world axes, at the centres of mass.
+    """
+    p = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    body = np.zeros((BODIES, BODY_STATE))
+    body[0] = np.concatenate([position, p, velocity, angular_velocity])
+    for k, joint in enumerate(joint_models(robot)):
+        q, qd = angle[k // JOINTS][k % JOINTS], speed[k // JOINTS][k % JOINTS]
+        body[k + 1] = _child_state(joint, body[joint.parent], q, qd)
+    return body
+
+
+def _child_state(joint: JointModel, parent: Array, q: float, qd: float) -> Array:
+    r_i, p_i, v_i, w_i = split(parent)
+    p_j = quaternion_product(quaternion_product(p_i, joint.zero), axis_quaternion(joint.s_j, q))
+    sP_i, sP_j = rotation_matrix(p_i) @ joint.point_i, rotation_matrix(p_j) @ joint.point_j
+    w_j = w_i + qd * (rotation_matrix(p_i) @ joint.s_i)
+    v_j = v_i + cross(w_i, sP_i) - cross(w_j, sP_j)
+    return np.concatenate([r_i + sP_i - sP_j, p_j, v_j, w_j])
+
+
+def split(state: Array) -> tuple[Array, Array, Array, Array]:
+    """r, p, v, w of one body's state (13,)."""
+    return state[0:3], state[3:7], state[7:10], state[10:13]
+
+
+def joint_angle(joint: JointModel, parent: Array, child: Array) -> float:
+    """Angle [rad] in (-pi, pi] of the twist about the axis, so that small violations of the joint do not enter to first order."""
+    p_i = quaternion_product(parent[3:7], joint.zero)
+    p = quaternion_product(p_i * np.array([1.0, -1.0, -1.0, -1.0]), child[3:7])
+    angle = 2.0 * np.arctan2(joint.s_j @ p[1:], p[0])
+    return float(angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi)))
+
+
+def joint_speed(joint: JointModel, parent: Array, child: Array) -> float:
+    """s . (w_j - w_i) [rad/s]"""
+    s = rotation_matrix(parent[3:7]) @ joint.s_i
+    return float(s @ (child[10:13] - parent[10:13]))
+
+
+def joint_angles(robot: Robot, body: Array) -> Array:
+    """(6, 3) angles [rad] of bodies (19, 13), drifted joints allowed."""
+    angles = [joint_angle(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)]
+    return np.array(angles).reshape(LEGS, JOINTS)
+
+
+def joint_speeds(robot: Robot, body: Array) -> Array:
+    """(6, 3) speeds [rad/s] of bodies (19, 13), drifted joints allowed."""
+    speeds = [joint_speed(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)]
+    return np.array(speeds).reshape(LEGS, JOINTS)
+
+
+def foot_centres(robot: Robot, body: Array) -> Array:
+    """(6, 3) the feet's centres in the world [m] of bodies (19, 13)."""
+    tibias = body[JOINTS::JOINTS]
+    arms = [np.array(leg.links[-1].tip) - np.array(leg.links[-1].com) for leg in robot.legs]
+    return np.array([state[0:3] + rotation_matrix(state[3:7]) @ arm for state, arm in zip(tibias, arms, strict=True)])

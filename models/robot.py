@@ -1,0 +1,169 @@
+"""Robots from files: `load_robot("athena")` gives a checked `Robot`. The records themselves stand in records.py.
+
+A robot file shares link data between the legs in [links.coxa], [links.femur], [links.tibia]; any leg may override any of
+those keys in [legs.LF.femur] and so on, so legs need not be equal. Two figures may be left out and are then computed:
+torso.inertia (the homogeneous box of torso.size) and contact.stiffness (Hertz, from the foot's radius and material).
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.records import (
+    CONTACT_LAWS,
+    FRICTION_LAWS,
+    GAITS,
+    JOINT_NAMES,
+    LEG_NAMES,
+    METHODS,
+    SERVO_MODES,
+    TERRAINS,
+    Array,
+    Baumgarte,
+    Contact,
+    Foot,
+    Friction,
+    Gait,
+    Leg,
+    Link,
+    Robot,
+    Servo,
+    Solver,
+    Terrain,
+    Torso,
+    Vector3,
+    Vector6,
+)
+from hexapod_cosim.models.schema import Number, Vector, expect_table, read_given, refuse_unknown_keys, require
+from hexapod_cosim.models.validation import check_robot
+
+__all__ = [
+    "CONTACT_LAWS", "FRICTION_LAWS", "GAITS", "JOINT_NAMES", "LEG_NAMES", "METHODS", "SERVO_MODES", "TERRAINS",
+    "Array", "Baumgarte", "Contact", "Foot", "Friction", "Gait", "Leg", "Link", "Robot", "Servo", "Solver", "Terrain", "Torso",
+    "box_inertia", "check_robot", "hertz_stiffness", "list_robots", "load_robot", "robot_from_table",
+]  # fmt: skip
+
+SECTIONS: dict[str, type[Any]] = {
+    "torso": Torso, "foot": Foot, "contact": Contact, "friction": Friction, "servo": Servo, "baumgarte": Baumgarte,
+    "solver": Solver, "terrain": Terrain, "gait": Gait,
+}  # fmt: skip
+STANCE = Number("rad", at_least=-math.pi, at_most=math.pi)
+
+
+def list_robots() -> list[str]:
+    """Names of the robots that come with the package."""
+    return sorted(path.stem for path in Path(__file__).parent.glob("*.toml"))
+
+
+def load_robot(path_or_name: str | Path) -> Robot:
+    """Reads and checks a robot file, or one of `list_robots()` by name. Raises RobotError."""
+    path = _robot_path(path_or_name)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        fix = "give the path of a robot file, or one of: " + ", ".join(list_robots())
+        raise RobotError("cannot read the robot file", got=error.strerror, fix=fix, where=str(path)) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RobotError(
+            "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
+        ) from error
+    return robot_from_table(table, where=str(path))
+
+
+def _robot_path(path_or_name: str | Path) -> Path:
+    path = Path(path_or_name)
+    if path.suffix or len(path.parts) != 1 or path.is_file():
+        return path
+    if str(path_or_name) not in list_robots():
+        raise unknown_name("robot", str(path_or_name), list_robots(), error=RobotError)
+    return Path(__file__).parent / f"{path_or_name}.toml"
+
+
+def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
+    """A checked robot from the nested tables of a robot file; `where` names the file in messages. Raises RobotError."""
+    refuse_unknown_keys(table, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
+    sections = {name: _read_section(table, name, f"{where}: {name}") for name in ("foot", *SECTIONS)}
+    robot = Robot(
+        name=_read_text(table.get("name"), f"{where}: name"),
+        gravity=_vector3(Vector("m/s2", 3).read(table.get("gravity", (0.0, 0.0, -9.81)), f"{where}: gravity")),
+        legs=_read_legs(table, where),
+        source={
+            key: _read_text(text, f"{where}: source.{key}")
+            for key, text in expect_table(table.get("source", {}), f"{where}: source").items()
+        },
+        **sections,
+    )
+    check_robot(robot, where=where)
+    return robot
+
+
+def _read_text(value: Any, where: str) -> str:
+    if not isinstance(value, str) or not value:
+        raise RobotError("wrong type", got=value, expected="a text", fix="give it in quotes", where=where)
+    return value
+
+
+def _vector3(value: tuple[float, ...]) -> Vector3:
+    x, y, z = value
+    return (x, y, z)
+
+
+def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
+    if name not in table:
+        raise RobotError("missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where)
+    record = SECTIONS[name]
+    given = read_given(record, expect_table(table[name], where), where)
+    if record is Torso and {"mass", "size"} <= given.keys():
+        given.setdefault("inertia", box_inertia(given["mass"], given["size"]))
+    if record is Contact and "stiffness" not in given:
+        given["stiffness"] = hertz_stiffness(_read_section(table, "foot", where.replace("contact", "foot")))
+    return record(**require(record, given, where))
+
+
+def _read_legs(table: Mapping[str, Any], where: str) -> tuple[Leg, ...]:
+    shared = expect_table(table.get("links", {}), f"{where}: links")
+    legs = expect_table(table.get("legs", {}), f"{where}: legs")
+    refuse_unknown_keys(shared, list(JOINT_NAMES), f"{where}: links")
+    refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")
+    common = {joint: _read_link(shared.get(joint, {}), f"{where}: links.{joint}") for joint in JOINT_NAMES}
+    return tuple(_read_leg(name, legs, common, f"{where}: legs.{name}") for name in LEG_NAMES)
+
+
+def _read_link(table: Any, where: str) -> dict[str, Any]:
+    given = read_given(Link, expect_table(table, where), where, extra=("stance",))
+    if "stance" in table:
+        given["stance"] = STANCE.read(table["stance"], f"{where}.stance")
+    return given
+
+
+def _read_leg(name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str, Any]], where: str) -> Leg:
+    if name not in legs:
+        raise RobotError("missing leg", expected="legs " + " ".join(LEG_NAMES), fix=f"add [legs.{name}]", where=where)
+    table = expect_table(legs[name], where)
+    refuse_unknown_keys(table, ["hip_position", "hip_yaw", *JOINT_NAMES], where)
+    placed = {key: value for key, value in table.items() if key not in JOINT_NAMES}
+    links, stance = [], []
+    for joint in JOINT_NAMES:
+        values = common[joint] | _read_link(table.get(joint, {}), f"{where}.{joint}")
+        if "stance" not in values:
+            raise RobotError("missing key", expected="a value in rad", fix="add `stance = ...`", where=f"{where}.{joint}.stance")
+        stance.append(values.pop("stance"))
+        links.append(Link(**require(Link, values, f"{where}.{joint}")))
+    given = read_given(Leg, placed, where) | {"stance": tuple(stance)}
+    return Leg(name=name, links=(links[0], links[1], links[2]), **require(Leg, given, where))
+
+
+def box_inertia(mass: float, size: Vector3) -> Vector6:
+    """Inertia of a homogeneous box about its centre [kg m2]: xx yy zz xy xz yz."""
+    x2, y2, z2 = (edge * edge for edge in size)
+    return (mass / 12.0 * (y2 + z2), mass / 12.0 * (x2 + z2), mass / 12.0 * (x2 + y2), 0.0, 0.0, 0.0)
+
+
+def hertz_stiffness(foot: Foot) -> float:
+    """K of F = K delta^1.5 for the foot's sphere on a rigid half-space [N/m^1.5]."""
+    return 4.0 / 3.0 * math.sqrt(foot.radius) * foot.youngs_modulus / (1.0 - foot.poisson**2)

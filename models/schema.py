@@ -1,0 +1,129 @@
+"""Typed records read from TOML tables: what a field may hold stands in its annotation, and is checked in one place.
+
+mass: Annotated[float, Number("kg", above=0.0)]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, cast, get_type_hints
+
+from hexapod_cosim.models.errors import RobotError, unknown_name
+
+
+@dataclass(frozen=True)
+class Number:
+    """A finite number with a unit and a range."""
+
+    unit: str
+    above: float = -math.inf  # exclusive
+    below: float = math.inf  # exclusive
+    at_least: float = -math.inf
+    at_most: float = math.inf
+    default: float | None = None
+
+    def range_text(self) -> str:
+        """The range in words, "a finite number" when there is none."""
+        bounds = [(self.above, ">"), (self.at_least, ">="), (self.below, "<"), (self.at_most, "<=")]
+        parts = [f"{sign} {bound:g}" for bound, sign in bounds if math.isfinite(bound)]
+        text = "a finite number" + (" " + " and ".join(parts) if parts else "")
+        return f"{text} [{self.unit}]"
+
+    def holds(self, value: float) -> bool:
+        return math.isfinite(value) and self.above < value < self.below and self.at_least <= value <= self.at_most
+
+    def read(self, value: Any, where: str) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise RobotError("wrong type", got=value, expected=self.range_text(), fix="give a number", where=where)
+        if not self.holds(value):
+            raise RobotError("value not allowed", got=value, expected=self.range_text(), fix="correct the value and its unit", where=where)
+        return float(value)
+
+
+@dataclass(frozen=True)
+class Vector:
+    """A fixed count of finite numbers with one unit."""
+
+    unit: str
+    size: int
+    above: float = -math.inf  # each entry, exclusive
+    default: tuple[float, ...] | None = None
+
+    def read(self, value: Any, where: str) -> tuple[float, ...]:
+        expected = f"{self.size} numbers [{self.unit}]"
+        if not isinstance(value, list | tuple):
+            raise RobotError("wrong type", got=value, expected=expected, fix="give a list of numbers", where=where)
+        if len(value) != self.size:
+            raise RobotError("wrong length", got=value, expected=expected, fix=f"give exactly {self.size} entries", where=where)
+        entry = Number(self.unit, above=self.above)
+        return tuple(entry.read(item, f"{where}[{k}]") for k, item in enumerate(value))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One name of a closed list."""
+
+    names: tuple[str, ...]
+    default: str | None = None
+
+    def read(self, value: Any, where: str) -> str:
+        if not isinstance(value, str):
+            raise RobotError("wrong type", got=value, expected=f"one of {', '.join(self.names)}", fix="give a name in quotes", where=where)
+        if value not in self.names:
+            raise unknown_name("name", value, self.names, where=where, error=RobotError)
+        return value
+
+
+Spec = Number | Vector | Choice
+
+
+def specs(record: type[Any]) -> dict[str, Spec]:
+    """The annotated fields of a record class, by name."""
+    return _specs(cast(Hashable, record))
+
+
+@cache
+def _specs(record: Any) -> dict[str, Spec]:
+    hints = get_type_hints(record, include_extras=True)
+    return {name: spec for name, hint in hints.items() for spec in getattr(hint, "__metadata__", ()) if isinstance(spec, Spec)}
+
+
+def expect_table(value: Any, where: str) -> Mapping[str, Any]:
+    """The value, if it is a TOML table."""
+    if not isinstance(value, Mapping):
+        raise RobotError("wrong type", got=value, expected="a table", fix="write it as [section] with keys below", where=where)
+    return value
+
+
+def refuse_unknown_keys(table: Mapping[str, Any], valid: list[str], where: str) -> None:
+    """Raises on the first key that is not valid, proposing the nearest."""
+    for key in table:
+        if key not in valid:
+            raise unknown_name("key", key, valid, where=where, error=RobotError)
+
+
+def read_given(record: type[Any], table: Mapping[str, Any], where: str, *, extra: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The record's fields that the table gives, each checked; `extra` names keys that belong to someone else."""
+    fields = specs(record)
+    refuse_unknown_keys(table, [*fields, *extra], where)
+    return {key: fields[key].read(value, f"{where}.{key}") for key, value in table.items() if key in fields}
+
+
+def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """All fields of the record: given ones and defaults. Raises on a missing one."""
+    values = {key: spec.default for key, spec in specs(record).items() if spec.default is not None}
+    values |= given
+    for key, spec in specs(record).items():
+        if key not in values:
+            expected = f"one of {', '.join(spec.names)}" if isinstance(spec, Choice) else f"a value in {spec.unit}"
+            raise RobotError("missing key", expected=expected, fix=f"add `{key} = ...`", where=f"{where}.{key}")
+    return values
+
+
+def check_record(record: Any, where: str) -> None:
+    """Checks a record that was built in Python by the same rules that hold for files."""
+    for key, spec in specs(type(record)).items():
+        spec.read(getattr(record, key), f"{where}.{key}")

@@ -1,0 +1,155 @@
+"""How the robot stands: the pose in which nothing accelerates.
+
+Tanh friction holds nothing at rest, so on level ground the feet spread until no tangential force is left. On a slope no such
+pose exists; the robot stands while it creeps, and friction at the creep's velocity carries what pulls it downhill.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexapod_cosim.models.actuator import servo_torque
+from hexapod_cosim.models.contact import foot_contacts, foot_force
+from hexapod_cosim.models.dynamics import masses
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.kinematics import (
+    JOINTS,
+    LEGS,
+    axis_quaternion,
+    body_states,
+    cross,
+    joint_models,
+    quaternion_product,
+    rotation_matrix,
+)
+from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.terrain import ground_normal
+
+RESIDUAL = 1e-9  # N and N m: some 1e4 times the rounding of forces of this size
+ITERATIONS = 60
+DIFFERENCE = 1e-7  # of the Jacobian's columns; Newton forgives its error
+UNKNOWNS = 6 + LEGS * JOINTS
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A pose of rest, torso above the world's origin, heading along x."""
+
+    position: Array  # (3,) m  torso's centre of mass
+    quaternion: Array  # (4,)
+    angle: Array  # (6, 3) rad
+    velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground
+    foot_force: Array  # (6, 3) N  ground on foot
+
+
+def settled(robot: Robot) -> tuple[Array, Array, Array]:
+    """Torso position (3,), quaternion (4,) and joint angles (6, 3) at rest on the ground, servos holding the stance. Raises RobotError."""
+    pose = standing(robot)
+    return pose.position, pose.quaternion, pose.angle
+
+
+def standing(robot: Robot) -> Standing:
+    """Static equilibrium by Newton on torso height, roll, pitch, creep velocities and joint angles.
+
+    Servos in position or torque mode hold the stance by their PD law (a torque servo alone would not stand); kinematic ones exactly.
+    Raises RobotError when there is no such pose: servos too weak or soft, or a slope without friction.
+    """
+    x = _start(robot)
+    residual = _residual(robot, x)
+    for _ in range(ITERATIONS):
+        if np.max(np.abs(residual)) < RESIDUAL:
+            return _standing(robot, x)
+        x, residual = _newton_step(robot, x, residual)
+    raise _no_equilibrium(robot, residual)
+
+
+def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
+    got = f"forces out of balance by {np.max(np.abs(residual)):.3g}"
+    fix = "raise servo.kp or servo.torque_max, change the stance, or give a slope more friction"
+    return RobotError("the robot does not stand", got=got, expected=f"a pose in balance to {RESIDUAL} N", fix=fix, where=robot.name)
+
+
+def _newton_step(robot: Robot, x: Array, residual: Array) -> tuple[Array, Array]:
+    """One damped step: halved until the residual falls, since feet lose the ground (and all slope) when a step is too long."""
+    columns = [(_residual(robot, x + DIFFERENCE * unit) - residual) / DIFFERENCE for unit in np.eye(UNKNOWNS)]
+    try:
+        step = np.linalg.solve(np.array(columns).T, -residual)
+    except np.linalg.LinAlgError as error:
+        raise _no_equilibrium(robot, residual) from error
+    for shorter in 0.5 ** np.arange(30):
+        trial = _residual(robot, x + shorter * step)
+        if np.linalg.norm(trial) < np.linalg.norm(residual):
+            return x + shorter * step, trial
+    raise _no_equilibrium(robot, residual)
+
+
+def _start(robot: Robot) -> Array:
+    """Unknowns z, roll, pitch, creep (vx, vy, yaw rate), angles: the stance, along the ground, its feet as deep as they carry."""
+    x = np.zeros(UNKNOWNS)
+    normal = ground_normal(robot.terrain)
+    x[1], x[2] = -np.arcsin(normal[1]), np.arctan2(normal[0], normal[2])
+    x[6:] = robot.stance.ravel()
+    weight = robot.total_mass * float(np.linalg.norm(robot.gravity))
+    depth = (weight / LEGS / robot.contact.stiffness) ** (2.0 / 3.0)
+    highest = min(foot.penetration for foot in foot_contacts(robot, _bodies(robot, x)))
+    x[0] += (highest - depth) / normal[2]
+    return x
+
+
+def _attitude(x: Array) -> Array:
+    roll, pitch = axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1]), axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2])
+    return quaternion_product(pitch, roll)
+
+
+def _velocity(robot: Robot, x: Array) -> Array:
+    """(3,) creep along the ground."""
+    normal = ground_normal(robot.terrain)
+    return np.array([x[3], x[4], -(normal[0] * x[3] + normal[1] * x[4]) / normal[2]])
+
+
+def _bodies(robot: Robot, x: Array) -> Array:
+    """(19, 13) bodies of the unknowns, all moving with the creep."""
+    angle = x[6:].reshape(LEGS, JOINTS)
+    turning = x[5] * ground_normal(robot.terrain)
+    position = np.array([0.0, 0.0, x[0]])
+    return body_states(robot, position, _attitude(x), _velocity(robot, x), turning, angle, np.zeros((LEGS, JOINTS)))
+
+
+def _residual(robot: Robot, x: Array) -> Array:
+    """(24,) force and moment on the robot at the torso, and the torque left over at each joint (kinematic: rad off the stance)."""
+    body = _bodies(robot, x)
+    force = masses(robot)[:, None] * np.array(robot.gravity)
+    moment = np.zeros_like(force)
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        tibia, push = JOINTS * (leg + 1), foot_force(robot, foot, 0.0)
+        force[tibia] += push
+        moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
+    left_over = _carry_to_torso(robot, body, force, moment)
+    angle = x[6:]
+    if robot.servo.mode == "kinematic":
+        left_over = robot.stance.ravel() - angle
+    else:
+        servo, zero = replace(robot.servo, mode="position"), np.zeros_like(angle)
+        left_over += servo_torque(servo, angle, zero, robot.stance.ravel(), zero, zero)
+    return np.concatenate([force[0], moment[0], left_over])
+
+
+def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> Array:
+    """Adds each child's force and moment to its parent's, leaf to root, in place; returns (18,) torques about the joint axes."""
+    torque = np.zeros(LEGS * JOINTS)
+    for k, joint in reversed(list(enumerate(joint_models(robot)))):
+        i, j = joint.parent, joint.child
+        R_i = rotation_matrix(body[i, 3:7])
+        at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + R_i @ joint.point_i), force[j])
+        torque[k] = at_joint @ (R_i @ joint.s_i)
+        force[i] += force[j]
+        moment[i] += at_joint + cross(R_i @ joint.point_i, force[j])
+    return torque
+
+
+def _standing(robot: Robot, x: Array) -> Standing:
+    position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
+    forces = np.array([foot_force(robot, foot, 0.0) for foot in foot_contacts(robot, _bodies(robot, x))])
+    return Standing(position, _attitude(x), angle, _velocity(robot, x), forces)

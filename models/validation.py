@@ -1,0 +1,174 @@
+"""Is this robot physically possible? Rules that need more than one number; single values are judged by their annotations.
+
+A robot whose inertias no solid body can have simulates wrongly or not at all, so it is refused on load.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array, Leg, Link, Robot
+from hexapod_cosim.models.schema import Vector, check_record
+
+# an inertia printed with four figures may miss the triangle inequality by rounding: a thin rod meets it with equality
+INERTIA_ROUNDING = 1e-3
+# matter lies within a link's extent, but a short bracket may carry a servo longer than itself; real links stay below 0.8
+GYRATION_PER_EXTENT = 2.0
+# the box holds all matter: twice its half diagonal is already generous
+GYRATION_PER_DIAGONAL = 1.0
+# largest distance of a stance foot from the plane through all six: a leg's sag under load is of this size
+STANCE_PLANE_TOLERANCE = 0.01
+AXIS_TOLERANCE = 1e-6
+DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
+
+
+def check_robot(robot: Robot, *, where: str | None = None) -> None:
+    """Raises RobotError on the first rule that the robot breaks; `where` names its file in the message."""
+    at = f"{where or robot.name}: "
+    Vector("m/s2", 3).read(robot.gravity, at + "gravity")
+    for name in ("torso", "foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "gait"):
+        check_record(getattr(robot, name), at + name)
+    check_inertia(robot.torso.mass, robot.torso.inertia, GYRATION_PER_DIAGONAL * math.hypot(*robot.torso.size), at + "torso")
+    _check_com(robot.torso.com, math.hypot(*robot.torso.size), at + "torso")
+    if tuple(leg.name for leg in robot.legs) != LEG_NAMES:
+        expected = "legs " + " ".join(LEG_NAMES)
+        raise RobotError(
+            "wrong legs", got=[leg.name for leg in robot.legs], expected=expected, fix="give these six in this order", where=at + "legs"
+        )
+    for leg in robot.legs:
+        _check_leg(leg, f"{at}legs.{leg.name}")
+    _check_laws(robot, at)
+    _check_stance(robot, at)
+
+
+def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where: str) -> None:
+    """Positive definite, triangle inequality of the principal moments, radius of gyration at most `extent` [m]."""
+    moments = np.linalg.eigvalsh(inertia_matrix(inertia))
+    shown = [float(f"{moment:.4g}") for moment in moments]
+    fix = "check units (kg m2), the reference point (centre of mass) and the signs of the products"
+    if moments[0] <= 0.0:
+        raise RobotError("inertia not positive definite", got=shown, expected="principal moments > 0", fix=fix, where=where + ".inertia")
+    if moments[0] + moments[1] < (1.0 - INERTIA_ROUNDING) * moments[2]:
+        expected = "principal moments of which no one exceeds the sum of the others"
+        raise RobotError("inertia of no possible body", got=shown, expected=expected, fix=fix, where=where + ".inertia")
+    radius = math.sqrt(float(moments.sum()) / (2.0 * mass))
+    if radius > extent:
+        expected = f"a radius of gyration of at most {extent:.3g} m for matter of this extent"
+        raise RobotError("inertia too large for the mass", got=f"{radius:.3g} m", expected=expected, fix=fix, where=where + ".inertia")
+
+
+def _check_leg(leg: Leg, where: str) -> None:
+    check_record(leg, where)
+    for link, joint, stance in zip(leg.links, JOINT_NAMES, leg.stance, strict=True):
+        _check_link(link, f"{where}.{joint}")
+        if not link.angle_min <= stance <= link.angle_max:
+            expected = f"{link.angle_min:.4g} to {link.angle_max:.4g} rad"
+            raise RobotError(
+                "stance outside the joint's limits",
+                got=stance,
+                expected=expected,
+                fix="change the pose or the limits",
+                where=f"{where}.{joint}.stance",
+            )
+
+
+def _check_link(link: Link, where: str) -> None:
+    check_record(link, where)
+    extent = math.hypot(*link.tip)
+    if extent <= 0.0:
+        raise RobotError(
+            "link without extent", got=link.tip, expected="a tip away from the joint", fix="give a length", where=where + ".length"
+        )
+    check_inertia(link.mass, link.inertia, GYRATION_PER_EXTENT * extent, where)
+    _check_com(link.com, GYRATION_PER_EXTENT * extent, where)
+    if abs(math.hypot(*link.axis) - 1.0) > AXIS_TOLERANCE:
+        raise RobotError("axis not of unit length", got=link.axis, expected="a unit vector", fix="normalise it", where=where + ".axis")
+    if link.angle_min >= link.angle_max:
+        got = [link.angle_min, link.angle_max]
+        raise RobotError(
+            "limits not ordered", got=got, expected="angle_min < angle_max", fix="swap or correct them (rad)", where=where + ".angle_min"
+        )
+
+
+def _check_com(com: tuple[float, ...], extent: float, where: str) -> None:
+    if math.hypot(*com) > extent:
+        raise RobotError(
+            "centre of mass outside the body",
+            got=com,
+            expected=f"within {extent:.3g} m of the frame",
+            fix="check the unit (m)",
+            where=where + ".com",
+        )
+
+
+def _check_laws(robot: Robot, at: str) -> None:
+    contact, solver, servo, friction = robot.contact, robot.solver, robot.servo, robot.friction
+    if contact.law in DISSIPATIVE_LAWS and contact.restitution <= 0.0:
+        fix = "give a positive value, or choose the hertz or constant_damping law"
+        raise RobotError(
+            "no finite damping for this law", got=contact.restitution, expected="restitution > 0", fix=fix, where=at + "contact.restitution"
+        )
+    if solver.method == "rk4" and solver.step <= 0.0:
+        raise RobotError(
+            "rk4 has no error control", got=solver.step, expected="a fixed step > 0 s", fix="set solver.step", where=at + "solver.step"
+        )
+    if servo.torque_continuous > servo.torque_max:
+        expected = f"at most torque_max = {servo.torque_max:g} N m"
+        raise RobotError(
+            "more torque for ever than at stall",
+            got=servo.torque_continuous,
+            expected=expected,
+            fix="lower it",
+            where=at + "servo.torque_continuous",
+        )
+    if friction.mu_static < friction.mu:
+        expected = f"at least mu = {friction.mu:g}"
+        raise RobotError(
+            "static friction below kinetic", got=friction.mu_static, expected=expected, fix="raise it", where=at + "friction.mu_static"
+        )
+
+
+def _check_stance(robot: Robot, at: str) -> None:
+    feet = foot_positions(robot, robot.stance)
+    distance, slope = _plane_fit(feet)
+    worst = int(np.argmax(np.abs(distance)))
+    where = f"{at}legs.{LEG_NAMES[worst]}.stance"
+    if abs(distance[worst]) > STANCE_PLANE_TOLERANCE:
+        got = f"{distance[worst]:.4g} m off the plane of the other feet"
+        raise RobotError(
+            "a stance foot does not reach the ground",
+            got=got,
+            expected=f"at most {STANCE_PLANE_TOLERANCE} m",
+            fix="adapt this leg's stance",
+            where=where,
+        )
+    if slope > 0.5:
+        raise RobotError(
+            "the stance feet do not lie below the torso",
+            got=f"slope {slope:.3g}",
+            expected="at most 0.5",
+            fix="adapt the stance",
+            where=at + "legs",
+        )
+    hips = np.array([leg.hip_position for leg in robot.legs])
+    high = int(np.argmax(feet[:, 2] - hips[:, 2]))
+    if feet[high, 2] - robot.foot.radius >= hips[high, 2]:
+        got = f"{feet[high, 2] - hips[high, 2]:.4g} m above the hip"
+        raise RobotError(
+            "a stance foot is above its hip",
+            got=got,
+            expected="below",
+            fix="adapt this leg's stance",
+            where=f"{at}legs.{LEG_NAMES[high]}.stance",
+        )
+
+
+def _plane_fit(points: Array) -> tuple[Array, float]:
+    """Heights above the least-squares plane z = c + ax + by, and that plane's slope."""
+    columns = np.column_stack([np.ones(len(points)), points[:, :2]])
+    plane = np.linalg.lstsq(columns, points[:, 2], rcond=None)[0]
+    return points[:, 2] - columns @ plane, float(np.hypot(plane[1], plane[2]))

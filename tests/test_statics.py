@@ -1,0 +1,118 @@
+"""How the robots stand: balance of forces, agreement with the equations of motion, and the poses that do not exist."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.models import Robot, RobotError, load_robot
+from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.dynamics import Command, accelerations
+from hexapod_cosim.models.energy import centre_of_mass
+from hexapod_cosim.models.kinematics import body_states, foot_centres, rotation_matrix
+from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.statics import Standing, settled, standing
+
+AT_REST = 1e-6  # m/s2 and rad/s2: balance to 1e-9 N over the lightest inertias leaves less
+BALANCE = 1e-8  # N, sums of forces that balance to 1e-9 each
+ROBOTS = ("athena", "phantomx_mk4")
+MODES = ("position", "torque", "kinematic")
+
+
+def robot_on(name: str, *, mode: str = "position", kind: str = "flat", incline: float = 0.0) -> Robot:
+    robot = load_robot(name)
+    terrain = replace(robot.terrain, kind=kind, incline=incline, heading=0.7, height=0.3)
+    return replace(robot, servo=replace(robot.servo, mode=mode), terrain=terrain)
+
+
+def bodies(robot: Robot, pose: Standing) -> Array:
+    return body_states(robot, pose.position, pose.quaternion, pose.velocity, np.zeros(3), pose.angle, np.zeros((6, 3)))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("mode", ["position", "kinematic"])
+@pytest.mark.parametrize("incline", [0.0, 0.2])
+def test_nothing_accelerates_in_the_standing_pose(name: str, mode: str, incline: float) -> None:
+    robot = robot_on(name, mode=mode, kind="slope", incline=incline)
+    pose = standing(robot)
+    body = bodies(robot, pose)
+    result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body))
+    assert float(np.max(np.abs(result.dv))) < AT_REST
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("mode", MODES)
+def test_standing_forces_carry_the_weight_below_the_centre_of_mass(name: str, mode: str) -> None:
+    robot = robot_on(name, mode=mode)
+    pose = standing(robot)
+    body = bodies(robot, pose)
+    assert pose.foot_force.sum(axis=0) == pytest.approx(-robot.total_mass * np.array(robot.gravity), abs=BALANCE)
+    assert np.all(pose.foot_force[:, 2] > 0.0)
+    assert np.all(pose.velocity == pytest.approx(0.0, abs=1e-9))
+    pressure = pose.foot_force[:, 2] @ foot_centres(robot, body) / pose.foot_force[:, 2].sum()
+    assert pressure[:2] == pytest.approx(centre_of_mass(robot, body)[:2], abs=1e-8)
+
+
+def test_settled_gives_the_pose_above_the_origin_heading_along_x() -> None:
+    position, quaternion, angle = settled(robot_on("phantomx_mk4"))
+    x_axis = rotation_matrix(quaternion)[:, 0]
+    assert (position.shape, quaternion.shape, angle.shape) == ((3,), (4,), (6, 3))
+    assert position[0] == position[1] == 0.0
+    assert x_axis[1] == pytest.approx(0.0, abs=1e-12)
+    assert float(np.linalg.norm(quaternion)) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_symmetric_robot_stands_level_and_symmetric() -> None:
+    robot = robot_on("athena")
+    pose = standing(robot)
+    assert pose.quaternion == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-9)
+    assert pose.angle[:3] * [-1.0, 1.0, 1.0] == pytest.approx(pose.angle[3:], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_servos_sag_by_their_torque_over_their_stiffness_and_stay_within_limits(name: str) -> None:
+    robot = robot_on(name)
+    pose = standing(robot)
+    body = bodies(robot, pose)
+    torque = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body)).drive_torque
+    assert robot.stance - pose.angle == pytest.approx(torque / robot.servo.kp, abs=1e-12)
+    assert float(np.max(np.abs(torque))) < robot.servo.torque_continuous
+    assert np.all(robot.angle_min < pose.angle)
+    assert np.all(pose.angle < robot.angle_max)
+
+
+def test_kinematic_servos_hold_the_stance_exactly() -> None:
+    robot = robot_on("athena", mode="kinematic")
+    assert standing(robot).angle == pytest.approx(robot.stance, abs=1e-9)
+
+
+@pytest.mark.parametrize("incline", [0.1, 0.3])
+def test_on_a_slope_the_robot_creeps_downhill_at_the_speed_of_the_tanh_law(incline: float) -> None:
+    robot = robot_on("athena", kind="slope", incline=incline)
+    pose = standing(robot)
+    creep = math.atanh(math.tan(incline) / robot.friction.mu) / robot.friction.slope
+    downhill = -np.array([math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)])
+    assert pose.velocity == pytest.approx(creep * downhill, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("servo", [{"torque_max": 0.3, "torque_continuous": 0.3}, {"kp": 0.0}], ids=["weak", "limp"])
+def test_servos_that_cannot_hold_the_robot_are_refused(servo: dict[str, float]) -> None:
+    robot = robot_on("athena")
+    with pytest.raises(RobotError, match=r"athena: the robot does not stand: .*raise servo\.kp or servo\.torque_max"):
+        settled(replace(robot, servo=replace(robot.servo, **servo)))  # type: ignore[arg-type]
+
+
+def test_a_slope_steeper_than_the_friction_angle_is_refused() -> None:
+    with pytest.raises(RobotError, match="give a slope more friction"):
+        settled(robot_on("athena", kind="slope", incline=math.atan(0.75)))
+
+
+def test_a_robot_with_an_uneven_load_leans_towards_it() -> None:
+    robot = robot_on("athena")
+    loaded = replace(robot, torso=replace(robot.torso, com=(0.05, 0.0, 0.0)))
+    pose = standing(loaded)
+    assert rotation_matrix(pose.quaternion)[2, 0] < -1e-3
+    assert pose.foot_force[[0, 3], 2].sum() > pose.foot_force[[2, 5], 2].sum()
