@@ -1,0 +1,95 @@
+"""Packs an FMU: the same binary for every robot, with the robot's model description and start values."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from hexapod_cosim.cosim.documentation import render_html
+from hexapod_cosim.cosim.interface import Interface, Variable, load_interface
+from hexapod_cosim.cosim.model_description import render_fmi2
+from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, binary, fmi2_platform, installed_platforms, source_files
+from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.records import Robot
+
+FMI_VERSIONS = (2,)
+ALL_PLATFORMS = "all"
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
+
+
+def export_fmu(robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
+    """Writes a robot's FMU and returns its path.
+
+    Args:
+        robot: what the FMU's start values are.
+        path: the file to write; it appears complete or not at all. Its folder is made if need be.
+        fmi: version of the standard.
+        platforms: folders such as linux64; by default this machine's. "all": every one whose binary is installed.
+
+    Raises FmuError: no binary, a path that cannot be written, a version that is not offered.
+    """
+    if fmi not in FMI_VERSIONS:
+        offered = ", ".join(map(str, FMI_VERSIONS))
+        raise FmuError("no such FMI version", got=fmi, expected=offered, fix="export with one of these")
+    members = _members(load_interface(robot), _platforms(platforms))
+    return _write_atomically(Path(path), members)
+
+
+def _platforms(platforms: Iterable[str] | None) -> list[str]:
+    if platforms is None:
+        return [fmi2_platform()]
+    chosen = [platforms] if isinstance(platforms, str) else list(platforms)
+    return (installed_platforms() or [fmi2_platform()]) if ALL_PLATFORMS in chosen else chosen
+
+
+def _members(interface: Interface, platforms: Iterable[str]) -> dict[str, bytes]:
+    """Contents of the archive by path."""
+    description = render_fmi2(interface)
+    members = {
+        "modelDescription.xml": description.xml.encode(),
+        "documentation/index.html": render_html(interface, description.guid).encode(),
+        "resources/start_values.txt": start_values(interface, description.guid).encode(),
+    }
+    for platform in platforms:
+        library = binary(platform)
+        members[f"binaries/{platform}/{MODEL_IDENTIFIER}{library.suffix}"] = library.read_bytes()
+    return members | {f"sources/{name}": path.read_bytes() for name, path in source_files().items()}
+
+
+def start_values(interface: Interface, guid: str) -> str:
+    """What the binary reads at instantiation: the GUID, then "reference value name" of every input and parameter, exactly."""
+    return "\n".join([guid, *map(_start_line, interface.of_causality("input", "parameter"))]) + "\n"
+
+
+def _start_line(variable: Variable) -> str:
+    value = float(variable.start or 0.0).hex() if variable.type == "Real" else str(variable.start)
+    return f"{variable.reference} {value} {variable.name}"
+
+
+def _write_atomically(path: Path, members: dict[str, bytes]) -> Path:
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with zipfile.ZipFile(part, "w") as archive:
+            for name, content in members.items():
+                archive.writestr(_member(name), content)
+        os.replace(part, path)
+    except OSError as error:
+        raise FmuError(
+            "cannot write the FMU", got=error.strerror, expected="a writable file", fix="choose another path", where=str(path)
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink()
+    return path
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, TIMESTAMP)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system = 3  # Unix, wherever it is packed
+    info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+    return info

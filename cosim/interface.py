@@ -1,0 +1,235 @@
+"""The FMU's variables, expanded from plant_fmu/interface.toml for one robot: the only list of names, references and start values."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
+from types import SimpleNamespace
+from typing import Any, Literal
+
+from hexapod_cosim.cosim.plant_files import interface_file, package_version
+from hexapod_cosim.models.errors import HexapodError, unknown_name
+from hexapod_cosim.models.records import Robot
+from hexapod_cosim.models.statics import settled
+
+Causality = Literal["input", "output", "parameter"]
+Type = Literal["Real", "Boolean", "Enumeration"]
+
+CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter")
+DEFAULT_VARIABILITY = {"input": "continuous", "output": "continuous", "parameter": "fixed"}
+POSE_DECIMALS = 10  # of the settled pose (m, rad): far below what matters, far above what differs between machines
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """A unit as exponents of the SI base units (None where FMI's integers cannot say it) and as users like to see it."""
+
+    name: str
+    exponents: Mapping[str, int] | None
+    display: tuple[str, float] | None  # name, and display value = factor * value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Enumeration:
+    """A choice; item k of `items` (name, description) has the number k + 1 and the C constant {prefix}_{NAME}."""
+
+    name: str
+    prefix: str
+    items: tuple[tuple[str, str], ...]
+
+    def number(self, item: str) -> int:
+        """The number of an item. Raises HexapodError for an unknown one."""
+        names = [name for name, _ in self.items]
+        if item not in names:
+            raise unknown_name(self.name, item, names)
+        return names.index(item) + 1
+
+    def constant(self, number: int) -> str:
+        """The C constant of a number."""
+        return f"{self.prefix}_{self.items[number - 1][0]}".upper()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """One scalar variable of the FMU."""
+
+    name: str
+    reference: int
+    type: Type
+    causality: Causality
+    variability: str
+    unit: str | None  # of a Real
+    minimum: float | None
+    maximum: float | None
+    nominal: float | None
+    start: float | int | None  # None for outputs
+    enumeration: str | None
+    field: str  # lvalue in struct hxVariables
+    description: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pattern:
+    """One entry of interface.toml, for documentation: what its variables have in common."""
+
+    name: str
+    causality: Causality
+    kind: str  # the unit, or the type
+    description: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interface:
+    """Everything an importer sees of one robot's FMU."""
+
+    robot: Robot
+    version: str
+    variables: tuple[Variable, ...]
+    patterns: tuple[Pattern, ...]
+    units: tuple[Unit, ...]
+    enumerations: Mapping[str, Enumeration]
+    log_categories: Mapping[str, str]
+    first_reference: Mapping[str, int]
+    stop_time: float  # s
+    step: float  # s
+
+    @cached_property
+    def by_name(self) -> Mapping[str, Variable]:
+        """Variables by name."""
+        return {variable.name: variable for variable in self.variables}
+
+    def variable(self, name: str) -> Variable:
+        """A variable by name. Raises HexapodError naming the nearest one."""
+        if name not in self.by_name:
+            raise unknown_name("FMU variable", name, self.by_name)
+        return self.by_name[name]
+
+    def references(self, names: Iterable[str]) -> list[int]:
+        """Value references of variables by name, in the order given. Raises HexapodError."""
+        return [self.variable(name).reference for name in names]
+
+    def of_causality(self, *causalities: Causality) -> list[Variable]:
+        """Variables of some causalities, in the order of their references."""
+        return [variable for variable in self.variables if variable.causality in causalities]
+
+
+@lru_cache(maxsize=16)
+def load_interface(robot: Robot) -> Interface:
+    """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit its variable."""
+    table = _table()
+    enumerations = {name: _enumeration(name, entry) for name, entry in table["enumeration"].items()}
+    return Interface(
+        robot=robot,
+        version=package_version(),
+        variables=tuple(_expand_all(table, enumerations, _roots(robot))),
+        patterns=tuple(_pattern(entry, causality) for causality in CAUSALITIES for entry in table[causality]),
+        units=tuple(_unit(name, entry) for name, entry in table["unit"].items()),
+        enumerations=enumerations,
+        log_categories=table["log_category"],
+        first_reference=table["first_reference"],
+        stop_time=table["experiment"]["stop"],
+        step=table["experiment"]["step"],
+    )
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return tomllib.loads(interface_file().read_text(encoding="utf-8"))
+
+
+def _roots(robot: Robot) -> SimpleNamespace:
+    """What a start value's path may begin with."""
+    position, quaternion, angle = settled(robot)
+    pose = SimpleNamespace(position=_rounded(position), quaternion=_rounded(quaternion), angle=[_rounded(leg) for leg in angle])
+    return SimpleNamespace(robot=robot, settled=pose)
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [round(float(value), POSE_DECIMALS) + 0.0 for value in values]
+
+
+def _enumeration(name: str, entry: Mapping[str, str]) -> Enumeration:
+    items = tuple((item, text) for item, text in entry.items() if item != "prefix")
+    return Enumeration(name=name, prefix=entry["prefix"], items=items)
+
+
+def _unit(name: str, entry: Any) -> Unit:
+    if isinstance(entry, str):
+        return Unit(name=name, exponents=None, display=None)
+    display = (entry["display"]["name"], float(entry["display"]["factor"])) if "display" in entry else None
+    return Unit(name=name, exponents={key: value for key, value in entry.items() if key != "display"}, display=display)
+
+
+def _pattern(entry: Mapping[str, Any], causality: Causality) -> Pattern:
+    return Pattern(name=entry["name"], causality=causality, kind=entry.get("unit", entry.get("type", "")), description=entry["description"])
+
+
+def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace) -> Iterable[Variable]:
+    for causality in CAUSALITIES:
+        places = itertools.chain.from_iterable(_places(entry, table["axis"]) for entry in table[causality])
+        for reference, (entry, place) in enumerate(places, start=table["first_reference"][causality]):
+            yield _variable(entry, place, reference, causality, enumerations, roots)
+
+
+def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable[tuple[Mapping[str, Any], dict[str, tuple[int, str]]]]:
+    """An entry with each combination of its axes: axis -> (index from 0, label)."""
+    labels = dict(axes) | {"i": [str(i + 1) for i in range(entry.get("size", 0))]}
+    used = [axis or "i" for axis in re.findall(r"\{(\w+)\}|\[i\]", entry["name"])]
+    for combination in itertools.product(*(enumerate(labels[axis]) for axis in used)):
+        yield entry, dict(zip(used, combination, strict=True))
+
+
+def _variable(
+    entry: Mapping[str, Any], place: Mapping[str, tuple[int, str]], reference: int, causality: Causality,
+    enumerations: Mapping[str, Enumeration], roots: SimpleNamespace,
+) -> Variable:  # fmt: skip
+    labels = {axis: label for axis, (_, label) in place.items()}
+    enumeration = enumerations.get(entry.get("type", ""))
+    kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
+    variable = Variable(
+        name=entry["name"].replace("[i]", f"[{labels.get('i')}]").format(**labels),
+        reference=reference,
+        type=kind,
+        causality=causality,
+        variability=entry.get("variability", DEFAULT_VARIABILITY[causality] if kind == "Real" or causality == "parameter" else "discrete"),
+        unit=entry.get("unit"),
+        minimum=1 if enumeration else entry.get("min"),
+        maximum=len(enumeration.items) if enumeration else entry.get("max"),
+        nominal=entry.get("nominal"),
+        start=_start(entry.get("start"), place, enumeration, roots),
+        enumeration=enumeration.name if enumeration else None,
+        field=re.sub(r"\[(\w+)\]", lambda match: f"[{place[match[1]][0]}]", entry["field"]),
+        description=entry["description"].format(**labels),
+    )
+    _check_start(variable)
+    return variable
+
+
+def _start(
+    given: float | str | None, place: Mapping[str, tuple[int, str]], enumeration: Enumeration | None, roots: SimpleNamespace
+) -> float | int | None:
+    if not isinstance(given, str):
+        return given
+    value: Any = roots
+    for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
+        value = getattr(value, attribute) if attribute else value[place[axis][0]]
+    return enumeration.number(value) if enumeration else float(value)
+
+
+def _check_start(variable: Variable) -> None:
+    """A start value outside its variable's range would make an FMU that importers refuse."""
+    low = -math.inf if variable.minimum is None else variable.minimum
+    high = math.inf if variable.maximum is None else variable.maximum
+    if variable.start is not None and not (low <= variable.start <= high and math.isfinite(variable.start)):
+        raise HexapodError(
+            "start value out of range",
+            got=variable.start,
+            expected=f"{low} to {high} {variable.unit}",
+            fix="correct the robot",
+            where=variable.name,
+        )

@@ -1,0 +1,133 @@
+"""modelDescription.xml of FMI 2.0 and the GUID that ties it to the binary's start values."""
+
+from __future__ import annotations
+
+import hashlib
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from hexapod_cosim.cosim.interface import Enumeration, Interface, Unit, Variable
+from hexapod_cosim.cosim.plant_files import DISTRIBUTION, MODEL_IDENTIFIER, source_files
+
+# what the binary can do; tests/test_fmi.py holds each of these to its word
+CAPABILITIES = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "maxOutputDerivativeOrder": "0",
+    "canRunAsynchronuously": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+    "providesDirectionalDerivative": "false",
+}
+
+
+@dataclass(frozen=True)
+class ModelDescription:
+    """The document and its GUID, a fingerprint of the document: any other variable, unit, value or version is another GUID."""
+
+    guid: str
+    xml: str
+
+
+def render_fmi2(interface: Interface) -> ModelDescription:
+    """The model description of a robot's FMU."""
+    root = _document(interface)
+    digest = hashlib.sha256(ElementTree.tostring(root)).digest()
+    guid = "{" + str(uuid.UUID(bytes=digest[:16], version=4)) + "}"
+    root.set("guid", guid)
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return ModelDescription(guid=guid, xml=f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def _document(interface: Interface) -> Element:
+    robot = interface.robot
+    root = Element("fmiModelDescription", {
+        "fmiVersion": "2.0", "modelName": robot.name, "guid": "", "version": interface.version,
+        "description": "Hexapod robot of 19 rigid bodies and 18 servo joints, walking on compliant ground",
+        "license": "MIT", "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
+    })  # fmt: skip
+    _add_co_simulation(root)
+    _add_units(root, interface.units)
+    _add_types(root, interface.enumerations.values())
+    categories = SubElement(root, "LogCategories")
+    for name, text in interface.log_categories.items():
+        SubElement(categories, "Category", name=name, description=text)
+    SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(interface.stop_time), stepSize=repr(interface.step))
+    _add_provenance(root, interface)
+    variables = SubElement(root, "ModelVariables")
+    for variable in interface.variables:
+        _add_variable(variables, variable, interface.units)
+    _add_structure(root, interface.variables)
+    return root
+
+
+def _add_co_simulation(root: Element) -> None:
+    element = SubElement(root, "CoSimulation", {"modelIdentifier": MODEL_IDENTIFIER} | CAPABILITIES)
+    files = SubElement(element, "SourceFiles")
+    for name in source_files():
+        if name.endswith(".c"):
+            SubElement(files, "File", name=name)
+
+
+def _add_units(root: Element, units: Iterable[Unit]) -> None:
+    parent = SubElement(root, "UnitDefinitions")
+    for unit in units:
+        element = SubElement(parent, "Unit", name=unit.name)
+        if unit.exponents is not None:
+            SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in unit.exponents.items()})
+        if unit.display is not None:
+            SubElement(element, "DisplayUnit", name=unit.display[0], factor=repr(unit.display[1]))
+
+
+def _add_types(root: Element, enumerations: Iterable[Enumeration]) -> None:
+    parent = SubElement(root, "TypeDefinitions")
+    for enumeration in enumerations:
+        element = SubElement(SubElement(parent, "SimpleType", name=enumeration.name), "Enumeration")
+        for number, (name, text) in enumerate(enumeration.items, start=1):
+            SubElement(element, "Item", name=name, value=str(number), description=text)
+
+
+def _add_provenance(root: Element, interface: Interface) -> None:
+    tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=DISTRIBUTION)
+    SubElement(tool, "Robot", name=interface.robot.name, hash=interface.robot.hash)
+
+
+def _add_variable(parent: Element, variable: Variable, units: Iterable[Unit]) -> None:
+    element = SubElement(parent, "ScalarVariable", {
+        "name": variable.name, "valueReference": str(variable.reference), "causality": variable.causality,
+        "variability": variable.variability, "initial": "calculated" if variable.causality == "output" else "exact",
+        "description": variable.description,
+    })  # fmt: skip
+    if variable.causality == "input":
+        del element.attrib["initial"]  # the standard forbids to state it
+    displays = {unit.name: unit.display[0] for unit in units if unit.display}
+    attributes = {
+        "declaredType": variable.enumeration,
+        "unit": variable.unit,
+        "displayUnit": displays.get(variable.unit or ""),
+        "min": variable.minimum,
+        "max": variable.maximum,
+        "nominal": variable.nominal,
+        "start": variable.start,
+    }
+    SubElement(element, variable.type, {name: _text(value) for name, value in attributes.items() if value is not None})
+
+
+def _text(value: float | int | str) -> str:
+    return value if isinstance(value, str) else repr(value)
+
+
+def _add_structure(root: Element, variables: Iterable[Variable]) -> None:
+    """All outputs, each depending on everything: no dependencies stated."""
+    indices = [index for index, variable in enumerate(variables, start=1) if variable.causality == "output"]
+    structure = SubElement(root, "ModelStructure")
+    for name in ("Outputs", "InitialUnknowns"):
+        parent = SubElement(structure, name)
+        for index in indices:
+            SubElement(parent, "Unknown", index=str(index))

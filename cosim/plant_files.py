@@ -1,0 +1,89 @@
+"""Where the plant's files are: the binaries, the sources and interface.toml, in a source tree or in an installed wheel."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+
+from hexapod_cosim.models.errors import FmuError
+
+MODEL_IDENTIFIER = "hexapod"
+DISTRIBUTION = "hexapod-cosim"
+GENERATED_SOURCES = ("variables.c", "defaults.c")
+BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
+
+_HERE = Path(__file__).resolve().parent
+_TREE = _HERE.parent / "plant_fmu"
+_INSTALLED = _HERE.parent / "plant"
+
+
+def in_source_tree() -> bool:
+    """Whether this package runs from a source tree (an editable install, or build/typing on the path)."""
+    return (_TREE / "interface.toml").is_file()
+
+
+def interface_file() -> Path:
+    """interface.toml."""
+    return (_TREE if in_source_tree() else _INSTALLED) / "interface.toml"
+
+
+def package_version() -> str:
+    """The version that pyproject.toml states, from there if it is at hand (an editable install's metadata may be older)."""
+    if in_source_tree():
+        project = tomllib.loads((_TREE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        return str(project["version"])
+    return metadata.version(DISTRIBUTION)
+
+
+def source_files() -> dict[str, Path]:
+    """The plant's C sources and headers, by their path below an FMU's sources folder; includes resolve with -I sources."""
+    root = _TREE if in_source_tree() else _INSTALLED / "sources"
+    folders = {"src": root / "src", "fmi": root / "fmi"}
+    folders["hexapod"] = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
+    found = {f"{name}/{path.name}": path for name, folder in folders.items() for path in folder.glob("*.[ch]")}
+    found |= {f"generated/{name}": root / "generated" / name for name in GENERATED_SOURCES}
+    return dict(sorted(found.items()))
+
+
+def fmi2_platform() -> str:
+    """The folder of an FMI 2 archive that holds this machine's binary, as importers look for it."""
+    system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
+    return system + ("64" if sys.maxsize > 2**32 else "32")
+
+
+def binary(fmi_platform: str) -> Path:
+    """The FMU's shared library for a platform such as linux64, the newest at hand. Raises FmuError when there is none or it is stale."""
+    found = [path for folder in _plant_folders() for path in (folder / "binaries" / fmi_platform).glob(f"{MODEL_IDENTIFIER}.*")]
+    if not found:
+        expected = "one of: " + ", ".join(platforms) if (platforms := installed_platforms()) else "a built plant"
+        raise FmuError("no plant binary for this platform", got=fmi_platform, expected=expected, fix=BUILD)
+    newest = max(found, key=_built)
+    _refuse_stale(newest)
+    return newest
+
+
+def installed_platforms() -> list[str]:
+    """Platforms whose binary is at hand."""
+    return sorted({path.name for folder in _plant_folders() for path in (folder / "binaries").glob("*") if path.is_dir()})
+
+
+def _built(path: Path) -> float:
+    return path.stat().st_mtime
+
+
+def _refuse_stale(path: Path) -> None:
+    """In a source tree the sources may have moved on since the binary was built."""
+    changed = [name for name, source in source_files().items() if _built(source) > _built(path)] if in_source_tree() else []
+    if changed:
+        raise FmuError(
+            "the plant binary is older than its sources", got=", ".join(changed), expected="none changed", fix=BUILD, where=str(path)
+        )
+
+
+def _plant_folders() -> list[Path]:
+    """Folders laid out like the wheel's hexapod_cosim/plant: an editable install keeps it in site-packages, a build in build/plant."""
+    if not in_source_tree():
+        return [_INSTALLED]
+    return [Path(entry) / "hexapod_cosim" / "plant" for entry in sys.path] + [_TREE.parent / "build" / "plant"]

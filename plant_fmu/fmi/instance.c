@@ -1,0 +1,228 @@
+#include "fmi/instance.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---------------------------------------------------------------------------------------------- log */
+
+void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...) {
+  char text[HX_LOG_SIZE];
+  va_list arguments;
+  if (!(instance->logged & (1u << category | 1u << HX_LOG_ALL))) return;
+  va_start(arguments, format);
+  vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  instance->sink(instance, category, text);
+}
+
+/* ---------------------------------------------------------------------------------------------- opening */
+
+static void return_to_start(hxInstance *instance) {
+  memset(&instance->state, 0, sizeof instance->state);
+  instance->state.mode = HX_MODE_INSTANTIATED;
+  instance->state.model_stale = 1;
+  instance->state.output_stale = 1;
+  instance->state.variables.definition = instance->start_definition;
+  instance->state.variables.input = instance->start_input;
+}
+
+/* an FMU without readable resources can only be the compiled-in robot's */
+static hxStatus check_default_guid(hxInstance *instance, const char *resources) {
+  if (strcmp(instance->guid, hx_default_guid) == 0) return HX_OK;
+  hx_log(instance, HX_LOG_ERROR,
+         "GUID: got '%s', expected '%s', the binary's own, because no start_values.txt was found in the resources '%s'; "
+         "pass the GUID of modelDescription.xml and the URI of the unpacked resources folder",
+         instance->guid, hx_default_guid, resources ? resources : "(NULL)");
+  return HX_INVALID_ARGUMENT;
+}
+
+hxStatus hx_instance_open(hxInstance *instance, const char *name, const char *guid, const char *resources) {
+  int found = 0;
+  if (!name || !name[0] || !guid) {
+    hx_log(instance, HX_LOG_ERROR, "instantiation: got no %s, expected a text; pass one", guid ? "instance name" : "GUID");
+    return HX_INVALID_ARGUMENT;
+  }
+  snprintf(instance->name, sizeof instance->name, "%s", name);
+  snprintf(instance->guid, sizeof instance->guid, "%s", guid);
+  hx_definition_default(&instance->start_definition);
+  hx_input_default(&instance->start_input);
+  hxStatus status = hx_resources_read(instance, resources, &found);
+  if (status == HX_OK && !found) status = check_default_guid(instance, resources);
+  if (status != HX_OK) return status;
+  instance->plant = hx_plant_create();
+  if (!instance->plant) {
+    hx_log(instance, HX_LOG_ERROR, "instantiation: out of memory; free some and try again");
+    return HX_OUT_OF_MEMORY;
+  }
+  return_to_start(instance);
+  hx_log(instance, HX_LOG_EVENT, "instantiated %s, plant %s, start values %s", guid, hx_version(),
+         found ? "from the resources" : "compiled in");
+  return HX_OK;
+}
+
+void hx_instance_close(hxInstance *instance) {
+  if (instance->plant) hx_plant_destroy(instance->plant);
+  instance->plant = NULL;
+}
+
+/* ---------------------------------------------------------------------------------------------- values */
+
+const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality) {
+  for (int k = 0; k < HX_CAUSALITIES; k++) {
+    const hxSection *section = &hx_sections[k];
+    if (reference - section->first < section->count) {
+      *causality = (hxCausality)k;
+      return &section->variable[reference - section->first];
+    }
+  }
+  return NULL;
+}
+
+int hx_variable_takes(const hxVariable *variable, double value) { return value >= variable->min && value <= variable->max; }
+
+static const char *const type_names[] = {[HX_REAL] = "Real", [HX_INTEGER] = "Integer or Enumeration", [HX_BOOLEAN] = "Boolean"};
+
+/* the row of a reference if it is of the type asked for; complains otherwise */
+static const hxVariable *find_typed(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality) {
+  const hxVariable *variable = hx_variable_find(reference, causality);
+  if (!variable)
+    hx_log(instance, HX_LOG_ERROR, "value reference: got %u, expected one of modelDescription.xml; nothing was done", reference);
+  else if (variable->type != type) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got a call for %s, expected one for %s; nothing was done", variable->name, type_names[type],
+           type_names[variable->type]);
+    return NULL;
+  }
+  return variable;
+}
+
+/* brings variables.output to the present time, input and, before the first step, parameters */
+static hxStatus refresh_output(hxInstance *instance) {
+  hxInstanceState *state = &instance->state;
+  if (state->model_stale) {
+    const hxStatus status = hx_instance_initialize(instance);
+    if (status != HX_OK) return status;
+  }
+  if (state->output_stale) hx_plant_output(instance->plant, &state->variables.input, &state->variables.output);
+  state->output_stale = 0;
+  return HX_OK;
+}
+
+hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
+  const char *variables = (const char *)&instance->state.variables;
+  hxCausality causality;
+  int needs_output = 0;
+  for (size_t i = 0; i < n; i++) {
+    if (!find_typed(instance, type, reference[i], &causality)) return HX_INVALID_ARGUMENT;
+    needs_output |= causality == HX_OUTPUT;
+  }
+  if (needs_output) {
+    const hxStatus status = refresh_output(instance);
+    if (status != HX_OK) return status;
+  }
+  for (size_t i = 0; i < n; i++) {
+    const hxVariable *variable = hx_variable_find(reference[i], &causality);
+    if (type == HX_REAL)
+      memcpy((double *)value + i, variables + variable->offset, sizeof(double));
+    else
+      memcpy((int *)value + i, variables + variable->offset, sizeof(int));
+  }
+  return HX_OK;
+}
+
+static double value_at(hxType type, const void *value, size_t i) {
+  return type == HX_REAL ? ((const double *)value)[i] : (double)((const int *)value)[i];
+}
+
+/* whether one value may be set now */
+static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCausality causality, double value) {
+  if (causality == HX_OUTPUT) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got a value for an output, expected an input or a parameter; nothing was set", variable->name);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (causality == HX_PARAMETER && !(instance->state.mode & (HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION))) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got a value after initialisation, expected it before, as it is fixed; nothing was set, reset first",
+           variable->name);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (!hx_variable_takes(variable, value)) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got %.17g, expected a finite number in [%.17g, %.17g] %s; nothing was set, correct the value",
+           variable->name, value, variable->min, variable->max, variable->unit);
+    return HX_INVALID_ARGUMENT;
+  }
+  return HX_OK;
+}
+
+hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value) {
+  char *variables = (char *)&instance->state.variables;
+  hxCausality causality;
+  for (size_t i = 0; i < n; i++) {
+    const hxVariable *variable = find_typed(instance, type, reference[i], &causality);
+    if (!variable) return HX_INVALID_ARGUMENT;
+    const hxStatus status = check_set(instance, variable, causality, value_at(type, value, i));
+    if (status != HX_OK) return status;
+  }
+  for (size_t i = 0; i < n; i++) {
+    const hxVariable *variable = hx_variable_find(reference[i], &causality);
+    if (type == HX_REAL)
+      memcpy(variables + variable->offset, (const double *)value + i, sizeof(double));
+    else
+      memcpy(variables + variable->offset, (const int *)value + i, sizeof(int));
+    instance->state.model_stale |= causality == HX_PARAMETER;
+    instance->state.output_stale = 1;
+  }
+  return HX_OK;
+}
+
+/* ---------------------------------------------------------------------------------------------- time */
+
+double hx_instance_time(const hxInstance *instance) {
+  return instance->state.model_stale ? instance->state.start_time : hx_plant_time(instance->plant);
+}
+
+hxStatus hx_instance_initialize(hxInstance *instance) {
+  const hxStatus status = hx_plant_reset(instance->plant, &instance->state.variables.definition, instance->state.start_time);
+  if (status != HX_OK) {
+    hx_log(instance, HX_LOG_ERROR, "parameters: %s; nothing was initialised, correct them and try again",
+           hx_plant_message(instance->plant));
+    return status;
+  }
+  instance->state.model_stale = 0;
+  instance->state.output_stale = 1;
+  return HX_OK;
+}
+
+/* how far an importer's clock may be from ours: rounding of long sums, nothing more */
+static double clock_tolerance(double t) { return 1e-9 * fmax(1.0, fabs(t)); }
+
+/* the plant goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up */
+hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
+  const double now = hx_instance_time(instance);
+  if (!(h > 0.0 && h <= 1e6)) {
+    hx_log(instance, HX_LOG_ERROR, "communication step size: got %.17g s, expected more than 0 and at most 1e6; the state is unchanged", h);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (!(fabs(t - now) <= clock_tolerance(now))) {
+    hx_log(instance, HX_LOG_ERROR,
+           "communication point: got %.17g s, expected %.17g, where the last step ended; the state is unchanged, "
+           "restore a saved state to go back",
+           t, now);
+    return HX_INVALID_ARGUMENT;
+  }
+  /* an extra step of rounding size may end before our own time: it is done */
+  if (t + h <= now) return HX_OK;
+  const hxStatus status = hx_plant_step(instance->plant, &instance->state.variables.input, t + h);
+  if (status != HX_OK) {
+    hx_log(instance, HX_LOG_DISCARD, "step from %.17g s by %.17g s: %s; the state is unchanged, try a smaller step or a gentler input", t,
+           h, hx_plant_message(instance->plant));
+    return status;
+  }
+  instance->state.output_stale = 1;
+  return HX_OK;
+}
+
+void hx_instance_reset(hxInstance *instance) {
+  return_to_start(instance);
+  hx_log(instance, HX_LOG_EVENT, "reset");
+}

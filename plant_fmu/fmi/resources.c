@@ -1,0 +1,235 @@
+/* resources.c - start values of the robot in the FMU's resources.
+ *
+ * start_values.txt: the GUID; then, for every input and parameter in the order of their references, a line
+ * "reference value name". Reals are hexadecimal (0x1.8p+1), so they are exact and no locale has a say.
+ */
+#include "fmi/instance.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef _WIN32
+#define WIN32_LEAN_AND_MEAN
+#include <windows.h>
+#endif
+
+enum { LINE_SIZE = 256 };
+
+static const char file_name[] = "start_values.txt";
+
+/* ---------------------------------------------------------------------------------------------- URI to path */
+
+static int is_digit(char c) { return c >= '0' && c <= '9'; }
+
+static int hex_digit(char c) {
+  if (is_digit(c)) return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
+}
+
+/* %41 -> A, in place; what is no such triple stays as it is */
+static void percent_decode(char *text) {
+  char *out = text;
+  while (*text) {
+    const int high = text[0] == '%' ? hex_digit(text[1]) : -1;
+    const int low = high >= 0 ? hex_digit(text[2]) : -1;
+    if (low >= 0 && high + low > 0) {
+      *out++ = (char)(16 * high + low);
+      text += 3;
+    } else
+      *out++ = *text++;
+  }
+  *out = '\0';
+}
+
+/* file:///x, file://host/x and file:/x -> /x; NULL when it is no file: URI */
+static const char *skip_scheme(const char *uri) {
+  static const char scheme[] = "file:";
+  for (size_t i = 0; i < sizeof scheme - 1; i++)
+    if (uri[i] != scheme[i] && uri[i] != scheme[i] - 'a' + 'A') return NULL;
+  uri += sizeof scheme - 1;
+  if (uri[0] == '/' && uri[1] == '/') {
+    const char *path = strchr(uri + 2, '/');
+    return path ? path : uri + 2;
+  }
+  return uri;
+}
+
+/* path of start_values.txt below the resources, to be freed; NULL when out of memory */
+static char *start_values_path(const char *resources) {
+  const char *after_scheme = skip_scheme(resources);
+  char *path = malloc(strlen(resources) + sizeof file_name + 1);
+  if (!path) return NULL;
+  strcpy(path, after_scheme ? after_scheme : resources);
+  if (after_scheme) percent_decode(path);
+#ifdef _WIN32
+  /* /C:/x -> C:/x */
+  if (path[0] == '/' && path[1] && (path[2] == ':' || path[2] == '|')) {
+    memmove(path, path + 1, strlen(path));
+    path[1] = ':';
+  }
+#endif
+  size_t length = strlen(path);
+  if (length > 0 && path[length - 1] != '/') path[length++] = '/';
+  strcpy(path + length, file_name);
+  return path;
+}
+
+/* opens a file whose name is UTF-8 */
+static FILE *open_file(const char *path) {
+#ifdef _WIN32
+  wchar_t wide[32768];
+  return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, 32768) > 0 ? _wfopen(wide, L"rb") : NULL;
+#else
+  return fopen(path, "rb");
+#endif
+}
+
+/* ---------------------------------------------------------------------------------------------- lines */
+
+/* hexadecimal floating point, at most 15 digits so that the mantissa is exact; returns 1 if all of the text is one */
+static int parse_real(const char *text, double *value) {
+  const int negative = text[0] == '-';
+  unsigned long long mantissa = 0;
+  int digits = 0, exponent = 0, seen_point = 0;
+  text += negative || text[0] == '+';
+  if (text[0] != '0' || (text[1] != 'x' && text[1] != 'X')) return 0;
+  for (text += 2; hex_digit(*text) >= 0 || (*text == '.' && !seen_point); text++) {
+    if (*text == '.')
+      seen_point = 1;
+    else {
+      mantissa = 16 * mantissa + (unsigned)hex_digit(*text);
+      exponent -= 4 * seen_point;
+      digits++;
+    }
+  }
+  if (digits < 1 || digits > 15 || (*text != 'p' && *text != 'P')) return 0;
+  const int minus = text[1] == '-', sign = minus || text[1] == '+';
+  int power = 0;
+  for (text += 1 + sign; is_digit(*text) && power < 10000; text++) power = 10 * power + (*text - '0');
+  if (*text || !is_digit(text[-1])) return 0;
+  *value = ldexp((double)mantissa, exponent + (minus ? -power : power)) * (negative ? -1.0 : 1.0);
+  return 1;
+}
+
+/* at most 9 decimal digits */
+static int parse_count(const char *text, unsigned *value) {
+  size_t length = 0;
+  for (*value = 0; is_digit(text[length]) && length < 10; length++) *value = 10 * *value + (unsigned)(text[length] - '0');
+  return length > 0 && length < 10 && !text[length];
+}
+
+static int parse_value(const hxVariable *variable, const char *text, double *value) {
+  unsigned count;
+  if (variable->type == HX_REAL) return parse_real(text, value);
+  if (!parse_count(text, &count)) return 0;
+  *value = (double)count;
+  return 1;
+}
+
+/* the next line without its end, or NULL at the end of the file; a line too long comes in pieces and so parses as none */
+static char *next_line(FILE *file, char line[LINE_SIZE]) {
+  if (!fgets(line, LINE_SIZE, file)) return NULL;
+  line[strcspn(line, "\r\n")] = '\0';
+  return line;
+}
+
+/* splits "reference value name" in place; returns 0 if the line has no such form */
+static int split(char *line, char *part[3]) {
+  part[0] = line;
+  for (int k = 1; k < 3; k++) {
+    char *blank = strchr(part[k - 1], ' ');
+    if (!blank) return 0;
+    *blank = '\0';
+    part[k] = blank + 1;
+  }
+  return 1;
+}
+
+static void store(struct hxVariables *variables, const hxVariable *variable, double value) {
+  char *place = (char *)variables + variable->offset;
+  const int number = (int)value;
+  if (variable->type == HX_REAL)
+    memcpy(place, &value, sizeof value);
+  else
+    memcpy(place, &number, sizeof number);
+}
+
+/* one line against the row it must be of; returns 0 if it is not */
+static int read_variable(struct hxVariables *variables, const hxVariable *variable, unsigned reference, char *line) {
+  char *part[3];
+  unsigned given;
+  double value;
+  if (!line || !split(line, part) || !parse_count(part[0], &given) || given != reference || strcmp(part[2], variable->name) != 0) return 0;
+  if (!parse_value(variable, part[1], &value) || !hx_variable_takes(variable, value)) return 0;
+  store(variables, variable, value);
+  return 1;
+}
+
+/* ---------------------------------------------------------------------------------------------- file */
+
+static hxStatus refuse(hxInstance *instance, int line, const char *got, const char *expected) {
+  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew", file_name, line,
+         got ? got : "the end of the file", expected);
+  return HX_INVALID_ARGUMENT;
+}
+
+static hxStatus read_variables(hxInstance *instance, FILE *file, struct hxVariables *variables) {
+  static const hxCausality causalities[] = {HX_INPUT, HX_PARAMETER};
+  char line[LINE_SIZE], shown[LINE_SIZE], expected[LINE_SIZE];
+  int number = 1;
+  for (int k = 0; k < 2; k++) {
+    const hxSection *section = &hx_sections[causalities[k]];
+    for (unsigned i = 0; i < section->count; i++) {
+      const hxVariable *variable = &section->variable[i];
+      char *text = next_line(file, line);
+      number++;
+      if (text) strcpy(shown, text);
+      if (!read_variable(variables, variable, section->first + i, text)) {
+        snprintf(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s", section->first + i, variable->name, variable->min,
+                 variable->max, variable->unit);
+        return refuse(instance, number, text ? shown : NULL, expected);
+      }
+    }
+  }
+  const char *rest = next_line(file, line);
+  return rest ? refuse(instance, number + 1, rest, "the end of the file") : HX_OK;
+}
+
+static hxStatus read_file(hxInstance *instance, FILE *file) {
+  char line[LINE_SIZE];
+  struct hxVariables variables;
+  const char *guid = next_line(file, line);
+  if (!guid) return refuse(instance, 1, NULL, "the FMU's GUID");
+  if (strcmp(guid, instance->guid) != 0) {
+    hx_log(instance, HX_LOG_ERROR, "GUID: got '%s', expected '%s', that of the resources; pass the one in modelDescription.xml",
+           instance->guid, guid);
+    return HX_INVALID_ARGUMENT;
+  }
+  variables.definition = instance->start_definition;
+  variables.input = instance->start_input;
+  const hxStatus status = read_variables(instance, file, &variables);
+  if (status != HX_OK) return status;
+  instance->start_definition = variables.definition;
+  instance->start_input = variables.input;
+  return HX_OK;
+}
+
+hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found) {
+  *found = 0;
+  if (!resources || !resources[0]) return HX_OK;
+  char *path = start_values_path(resources);
+  if (!path) {
+    hx_log(instance, HX_LOG_ERROR, "resources: out of memory; free some and try again");
+    return HX_OUT_OF_MEMORY;
+  }
+  FILE *file = open_file(path);
+  free(path);
+  if (!file) return HX_OK;
+  *found = 1;
+  const hxStatus status = read_file(instance, file);
+  fclose(file);
+  return status;
+}

@@ -1,0 +1,84 @@
+/* state.c - saved states: header, instance, plant, in one block without pointers. */
+#include "fmi/instance.h"
+
+#include <stdint.h>
+#include <string.h>
+
+enum { STATE_FORMAT = 1 };
+
+static const char state_magic[8] = "hexapod";
+
+typedef struct hxStateHeader {
+  char magic[8];
+  uint32_t format;
+  uint32_t size;     /* of the block: another word size or plant makes another one */
+  uint64_t checksum; /* of what follows the header; written by hx_instance_seal */
+  char guid[HX_GUID_SIZE];
+} hxStateHeader;
+
+typedef struct hxStateBlock {
+  hxStateHeader header;
+  hxInstanceState instance;
+  double plant[]; /* hx_plant_state_size bytes */
+} hxStateBlock;
+
+size_t hx_instance_state_size(void) { return sizeof(hxStateBlock) + hx_plant_state_size(); }
+
+void hx_instance_save(const hxInstance *instance, void *bytes) {
+  hxStateBlock *block = bytes;
+  memset(&block->header, 0, sizeof block->header);
+  memcpy(block->header.magic, state_magic, sizeof state_magic);
+  memcpy(block->header.guid, instance->guid, sizeof instance->guid);
+  block->header.format = STATE_FORMAT;
+  block->header.size = (uint32_t)hx_instance_state_size();
+  memcpy(&block->instance, &instance->state, sizeof instance->state);
+  hx_plant_get_state(instance->plant, block->plant);
+}
+
+/* FNV-1a over 64-bit words: every single changed bit changes it */
+static uint64_t checksum(const hxStateBlock *block) {
+  const unsigned char *bytes = (const unsigned char *)block + sizeof block->header;
+  const size_t n = hx_instance_state_size() - sizeof block->header;
+  uint64_t hash = 0xcbf29ce484222325u, word = 0;
+  for (size_t i = 0; i < n; i += sizeof word) {
+    word = 0;
+    memcpy(&word, bytes + i, n - i < sizeof word ? n - i : sizeof word);
+    hash = (hash ^ word) * 0x100000001b3u;
+  }
+  return hash;
+}
+
+void hx_instance_seal(void *bytes) {
+  hxStateBlock *block = bytes;
+  block->header.checksum = checksum(block);
+}
+
+static hxStatus refuse(hxInstance *instance, const char *what) {
+  hx_log(instance, HX_LOG_ERROR, "saved state: got %s, expected one that this FMU (%s) saved; nothing was changed", what, instance->guid);
+  return HX_BAD_STATE;
+}
+
+static const char *fault(const hxInstance *instance, const hxStateHeader *header) {
+  if (memcmp(header->magic, state_magic, sizeof state_magic) != 0) return "bytes that are no saved state";
+  if (header->format != STATE_FORMAT || header->size != hx_instance_state_size()) return "one of another version or platform";
+  return strncmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL : "one of another FMU";
+}
+
+/* bytes may be unaligned: the header is copied out, the checksum reads by copies */
+hxStatus hx_instance_check(hxInstance *instance, const void *bytes, size_t n) {
+  hxStateHeader header;
+  if (n != hx_instance_state_size()) return refuse(instance, n < hx_instance_state_size() ? "too few bytes" : "too many bytes");
+  memcpy(&header, bytes, sizeof header);
+  const char *what = fault(instance, &header);
+  if (what) return refuse(instance, what);
+  return header.checksum == checksum(bytes) ? HX_OK : refuse(instance, "damaged bytes");
+}
+
+hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
+  const hxStateBlock *block = bytes;
+  const char *what = fault(instance, &block->header);
+  if (what) return refuse(instance, what);
+  if (hx_plant_set_state(instance->plant, block->plant, hx_plant_state_size()) != HX_OK) return refuse(instance, "a damaged plant");
+  memcpy(&instance->state, &block->instance, sizeof instance->state);
+  return HX_OK;
+}

@@ -1,0 +1,41 @@
+/* variables.h - the table of variables that generated/variables.c fills in. */
+#ifndef HEXAPOD_FMI_VARIABLES_H
+#define HEXAPOD_FMI_VARIABLES_H
+
+#include "hexapod/hexapod.h"
+
+/* What the variables are fields of. */
+struct hxVariables {
+  hxDefinition definition; /* parameters */
+  hxInput input;
+  hxOutput output;
+};
+
+typedef enum hxType { HX_REAL, HX_INTEGER, HX_BOOLEAN } hxType; /* double, int, int; an enumeration is an HX_INTEGER */
+
+typedef enum hxCausality { HX_INPUT, HX_OUTPUT, HX_PARAMETER, HX_CAUSALITIES } hxCausality;
+
+typedef struct hxVariable {
+  const char *name;
+  const char *unit;  /* "" when it has none */
+  double min, max;   /* inclusive, finite: what lies outside, infinite or NaN is refused */
+  unsigned short offset; /* into struct hxVariables */
+  unsigned char type;    /* hxType */
+} hxVariable;
+
+/* The variables of one causality; their value references are first, first + 1, ... */
+typedef struct hxSection {
+  unsigned first;
+  unsigned count;
+  const hxVariable *variable;
+} hxSection;
+
+extern const hxSection hx_sections[HX_CAUSALITIES];
+
+/* Names of the log categories, in the order of hxLogCategory. */
+extern const char *const hx_log_category_names[];
+
+/* GUID of the model description with the compiled-in robot. */
+extern const char hx_default_guid[];
+
+#endif

@@ -1,0 +1,68 @@
+"""The built plant: one incremental CMake build a session, in build/test, with the probe of internal functions."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "build" / "test"
+
+
+@pytest.fixture(scope="session")
+def plant_build() -> Path:
+    """build/test, up to date; also installed to build/plant, from where the exporter packs."""
+    if _configure().returncode != 0:
+        shutil.rmtree(BUILD, ignore_errors=True)  # configured by a CMake, Python or generator that is gone
+        _succeed(_configure())
+    _succeed(_cmake("--build", "--preset", "test"))
+    _succeed(_cmake("--install", str(BUILD), "--prefix", str(ROOT / "build" / "plant")))
+    return BUILD
+
+
+@pytest.fixture(scope="session")
+def athena_fmu(plant_build: Path) -> Path:
+    """The default robot's FMU as CMake packs it."""
+    return plant_build / "athena.fmu"
+
+
+@pytest.fixture(scope="session")
+def plant_library(plant_build: Path) -> Path:
+    """The FMU's shared library."""
+    return next((plant_build / "plant_fmu").glob("hexapod.[sd]*"))
+
+
+@pytest.fixture(scope="session")
+def core(plant_build: Path) -> ctypes.CDLL:
+    """hexapod.h as a shared library, with the probe's functions."""
+    return ctypes.CDLL(str(next((plant_build / "plant_fmu").glob("libhexapod_c.[sd]*"))))
+
+
+def _configure() -> subprocess.CompletedProcess[str]:
+    fresh = not (BUILD / "CMakeCache.txt").exists()
+    generator = ["-G", "Ninja"] if fresh and shutil.which("ninja", path=_search_path()) else []
+    return _cmake("--preset", "test", f"-DPython_EXECUTABLE={sys.executable}", *generator)
+
+
+def _cmake(*arguments: str) -> subprocess.CompletedProcess[str]:
+    cmake = shutil.which("cmake", path=_search_path())
+    if cmake is None:
+        pytest.fail("no cmake: run `pip install -e .[test]`")
+    environment = os.environ | {"PATH": _search_path()}
+    return subprocess.run([cmake, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+
+
+def _search_path() -> str:
+    """PATH with the running Python's scripts in front: the environment need not be activated."""
+    return os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+
+
+def _succeed(process: subprocess.CompletedProcess[str]) -> None:
+    if process.returncode != 0:
+        pytest.fail(f"{' '.join(process.args)}\n{process.stdout}\n{process.stderr}", pytrace=False)

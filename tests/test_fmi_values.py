@@ -1,0 +1,103 @@
+"""Values through the standard's C interface: what is refused, and that a refusal changes nothing."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fmi_plant import ATHENA, ERROR, OK, Plant
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.fixture
+def plant(plant_library: Path) -> Iterator[Plant]:
+    with Plant(plant_library) as instance:
+        yield instance
+
+
+@pytest.fixture
+def running(plant: Plant) -> Plant:
+    return plant.initialize()
+
+
+@pytest.mark.parametrize("name", [variable.name for variable in ATHENA.of_causality("input", "parameter")[::37] if variable.type == "Real"])
+@pytest.mark.parametrize("value", [NAN, INF, -INF])
+def test_a_value_that_is_no_number_is_refused_by_every_kind_of_variable(plant: Plant, name: str, value: float) -> None:
+    assert plant.set_reals({name: value}) == ERROR
+    assert name in plant.last_message
+    assert plant.real(name) == ATHENA.variable(name).start
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("contact.restitution", 1.01), ("contact.restitution", -0.01), ("torso.mass", -1.0), ("LF.coxa.angle_ref", 45.0)]
+)
+def test_a_value_out_of_range_is_refused_with_the_range(plant: Plant, name: str, value: float) -> None:
+    assert plant.set_reals({name: value}) == ERROR
+    assert f"got {value:.17g}" in plant.last_message
+    assert f"{ATHENA.variable(name).minimum:.17g}" in plant.last_message
+
+
+def test_limits_themselves_are_accepted(plant: Plant) -> None:
+    assert plant.set_reals({"contact.restitution": 1.0, "friction.mu": 0.0}) == OK
+
+
+@pytest.mark.parametrize("bad", [{"torso.push_force[2]": NAN}, {"torso.roll": 0.0}])
+def test_a_batch_is_set_whole_or_not_at_all(running: Plant, bad: dict[str, float]) -> None:
+    before = running.everything()
+    assert running.set_reals({"torso.push_force[1]": 5.0} | bad | {"LF.coxa.angle_ref": 0.3}) == ERROR
+    assert running.everything() == before
+
+
+def test_unknown_references_and_wrong_types_are_refused(running: Plant) -> None:
+    mass, law, contact = ATHENA.references(["torso.mass", "contact.law", "LF.foot.contact"])
+    for unknown in (999, 3999, 100000, 2**32 - 1):
+        assert running.get_references("fmi2GetReal", [mass, unknown])[0] == ERROR
+        assert str(unknown) in running.last_message
+    assert running.get_references("fmi2GetReal", [law])[0] == ERROR
+    assert running.get_references("fmi2GetInteger", [contact])[0] == ERROR
+    assert running.get_references("fmi2GetBoolean", [mass])[0] == ERROR
+    assert running.get_references("fmi2GetInteger", [law]) == (OK, [1])
+    assert running.get_references("fmi2GetBoolean", [contact]) == (OK, [1])
+
+
+def test_an_enumeration_takes_its_numbers_only(plant: Plant) -> None:
+    law = ATHENA.references(["contact.law"])
+    for value, status in ((0, ERROR), (6, OK), (7, ERROR)):
+        assert plant.set_references("fmi2SetInteger", law, [value]) == status
+    assert plant.get_references("fmi2GetInteger", law) == (OK, [6])
+
+
+def test_empty_batches_are_fine_and_missing_arrays_are_not(running: Plant) -> None:
+    none, one = ctypes.c_size_t(0), ctypes.c_size_t(1)
+    for kind in ("Real", "Integer", "Boolean", "String"):
+        assert running.call(f"fmi2Get{kind}", None, none, None) == OK
+        assert running.call(f"fmi2Set{kind}", None, none, None) == OK
+        assert running.call(f"fmi2Get{kind}", None, one, None) == ERROR
+
+
+def test_parameters_are_fixed_after_initialization(running: Plant) -> None:
+    assert running.set_reals({"torso.mass": 3.0}) == ERROR
+    assert "fixed" in running.last_message
+
+
+def test_a_model_that_cannot_be_is_told_at_the_end_of_initialization_and_can_be_corrected(plant: Plant) -> None:
+    assert plant.set_reals({"torso.mass": 0.0}) == OK
+    assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
+    assert plant.call("fmi2EnterInitializationMode") == OK
+    assert plant.call("fmi2ExitInitializationMode") == ERROR
+    assert "mass" in plant.last_message
+    assert plant.set_reals({"torso.mass": 2.0}) == OK
+    assert plant.call("fmi2ExitInitializationMode") == OK
+
+
+def test_outputs_in_initialization_mode_are_those_of_the_values_set_so_far(plant: Plant) -> None:
+    assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
+    assert plant.call("fmi2EnterInitializationMode") == OK
+    assert plant.set_reals({"initial.position[3]": 0.5}) == OK
+    assert plant.real("torso.position[3]") == 0.5
+    assert plant.set_reals({"initial.position[3]": 0.6, "initial.velocity[1]": 0.25}) == OK
+    assert plant.reals(["torso.position[3]", "torso.velocity[1]"]) == [0.6, 0.25]

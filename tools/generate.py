@@ -1,0 +1,115 @@
+"""Writes plant_fmu/generated/ from plant_fmu/interface.toml, models/athena.toml and pyproject.toml's version.
+
+usage: python tools/generate.py [--check]
+
+--check writes nothing, names what is stale and exits with 1 if anything is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from hexapod_cosim.cosim.documentation import render_html
+from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Variable, load_interface
+from hexapod_cosim.cosim.model_description import render_fmi2
+from hexapod_cosim.models.robot import load_robot
+
+GENERATED = Path(__file__).resolve().parents[1] / "plant_fmu" / "generated"
+DEFAULT_ROBOT = "athena"
+TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"}
+
+
+def main() -> int:
+    """Writes or checks; returns the exit code."""
+    parser = argparse.ArgumentParser(description="Generates plant_fmu/generated/.")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a file is stale")
+    check = parser.parse_args().check
+    stale = stale_files()
+    for path, text in stale.items():
+        print(f"{path}: {'stale; run tools/generate.py' if check else 'written'}")
+        if not check:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+    return 1 if check and stale else 0
+
+
+def stale_files() -> dict[Path, str]:
+    """Path and text of the generated files that are missing or differ from what they should be."""
+    return {path: text for path, text in render_all().items() if not path.is_file() or path.read_text(encoding="utf-8") != text}
+
+
+def render_all() -> dict[Path, str]:
+    """Every generated file's path and text."""
+    interface = load_interface(load_robot(DEFAULT_ROBOT))
+    description = render_fmi2(interface)
+    return {
+        GENERATED / "variables.c": render_variables(interface, description.guid),
+        GENERATED / "defaults.c": render_defaults(interface),
+        GENERATED / "modelDescription.xml": description.xml,
+        GENERATED / "index.html": render_html(interface, description.guid),
+    }
+
+
+def render_variables(interface: Interface, guid: str) -> str:
+    """The table of variables as C."""
+    lines = [_head("variables.c - every variable of the FMU: where it is and what it may be."), "#include <float.h>", ""]
+    lines += ['#include "fmi/variables.h"', ""]
+    for causality in CAUSALITIES:
+        lines += [f"static const hxVariable {causality}s[] = {{", *map(_row, interface.of_causality(causality)), "};", ""]
+    lines += ["const hxSection hx_sections[HX_CAUSALITIES] = {"]
+    for causality in CAUSALITIES:
+        first = interface.first_reference[causality]
+        lines += [f"    [HX_{causality.upper()}] = {{{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s}},"]
+    lines += ["};", "", "const char *const hx_log_category_names[] = {"]
+    lines += [f'    "{name}",' for name in interface.log_categories]
+    lines += ["};", "", f'const char hx_default_guid[] = "{guid}";', "", *_enumeration_checks(interface), ""]
+    return "\n".join(lines)
+
+
+def _row(variable: Variable) -> str:
+    low = "-DBL_MAX" if variable.minimum is None else repr(variable.minimum)
+    high = "DBL_MAX" if variable.maximum is None else repr(variable.maximum)
+    place = f"offsetof(struct hxVariables, {variable.field})"
+    return f'    {{"{variable.name}", "{variable.unit or ""}", {low}, {high}, {place}, {TYPES[variable.type]}}},'
+
+
+def _enumeration_checks(interface: Interface) -> Iterable[str]:
+    """The numbers that users give are the ones that the C enumerations have."""
+    for enumeration in interface.enumerations.values():
+        for number in range(1, len(enumeration.items) + 1):
+            yield f'_Static_assert({enumeration.constant(number)} == {number}, "{enumeration.name}");'
+
+
+def render_defaults(interface: Interface) -> str:
+    """The default robot as C."""
+    lines = [_head(f"defaults.c - the robot {interface.robot.name} and the version."), '#include "hexapod/hexapod.h"', ""]
+    lines += ["static const hxDefinition default_definition = {", *_initialisers(interface, "definition"), "};", ""]
+    lines += ["static const hxInput default_input = {", *_initialisers(interface, "input"), "};", ""]
+    lines += ["void hx_definition_default(hxDefinition *definition) {", "  *definition = default_definition;", "}", ""]
+    lines += ["void hx_input_default(hxInput *input) {", "  *input = default_input;", "}", ""]
+    lines += ["const char *hx_version(void) {", f'  return "{interface.version}";', "}", ""]
+    return "\n".join(lines)
+
+
+def _initialisers(interface: Interface, member: str) -> Iterable[str]:
+    for variable in interface.of_causality("input", "parameter"):
+        root, _, field = variable.field.partition(".")
+        if root == member and variable.start is not None:
+            yield f"    .{field} = {_constant(interface, variable)},"
+
+
+def _constant(interface: Interface, variable: Variable) -> str:
+    if variable.enumeration is not None:
+        return interface.enumerations[variable.enumeration].constant(int(variable.start or 0))
+    return repr(variable.start)
+
+
+def _head(purpose: str) -> str:
+    return f"/* {purpose}\n * Generated by tools/generate.py: change interface.toml or the robot's file, not this. */"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
