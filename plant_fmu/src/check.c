@@ -55,7 +55,8 @@ static void body(hxChecker *c, const char *where, double mass, const double com[
   finite_all(c, where, ".com", com, 3);
   finite_all(c, where, ".inertia", inertia, 6);
   if (!is_inertia(inertia))
-    fail(c, where, ".inertia_xx", inertia[0], "an inertia that a body can have: positive, each principal moment at most the sum of the others");
+    fail(c, where, ".inertia_xx", inertia[0],
+         "an inertia that a body can have: positive, each principal moment at most the sum of the others");
 }
 
 static void length_not_zero(hxChecker *c, const char *where, const char *name, const double *x, int n, const char *expected) {
@@ -148,4 +149,3 @@ hxStatus hx_input_check(const hxInput *input, char *message) {
   finite_all(&c, "torso", ".push_torque", input->push_torque, 3);
   return c.status == HX_OK ? HX_OK : HX_INVALID_ARGUMENT;
 }
-

@@ -23,15 +23,14 @@ static void link_force(const hxModel *model, hxJointWork *k) {
 }
 
 /* a_k of eq. 10: u1.dw = c4, u2.dw = c5, s.dw = 0 (or the drive's qdd); c = gamma - 2 alpha dPhi - beta^2 Phi */
-static void joint_bias(const hxModel *model, hxJointWork *k) {
+static hxMotion6 joint_bias(const hxModel *model, const hxJointWork *k) {
   const hxJointKinematics *kin = &k->kin;
   const double alpha2 = 2.0 * model->alpha, beta2 = model->beta * model->beta;
   const hxVec3 c_lin = hx_add_scaled(hx_add_scaled(kin->gamma_lin, hx_splat(-alpha2), kin->dphi_lin), hx_splat(-beta2), kin->phi_lin);
-  const hxReal c4 = kin->gamma[0] - alpha2 * kin->dphi[0] - beta2 * kin->phi[0];
-  const hxReal c5 = kin->gamma[1] - alpha2 * kin->dphi[1] - beta2 * kin->phi[1];
-  hxVec3 dw = hx_scale(kin->inverse_det, hx_add_scaled(hx_scale(c4, kin->u2_s), c5, kin->s_u1));
-  dw = hx_add_scaled(dw, k->driven, kin->s);
-  k->bias = (hxMotion6){dw, hx_add(hx_cross(kin->sP_j, dw), c_lin)};
+  const hxReal c4 = kin->inverse_det * (kin->gamma[0] - alpha2 * kin->dphi[0] - beta2 * kin->phi[0]);
+  const hxReal c5 = kin->inverse_det * (kin->gamma[1] - alpha2 * kin->dphi[1] - beta2 * kin->phi[1]);
+  const hxVec3 dw = hx_add_scaled(hx_add_scaled(hx_scale(c4, kin->u2_s), c5, kin->s_u1), k->driven, kin->s);
+  return (hxMotion6){dw, hx_add(hx_cross(k->P, dw), c_lin)};
 }
 
 /* Servo torque, or the acceleration of the rheonomic constraint q = q_ref + qd_ref (t - t_command) with Baumgarte. */
@@ -49,25 +48,28 @@ static void joint_actuation(const hxModel *model, const hxCommand *command, doub
 
 static void leg_kinematics(const hxModel *model, const hxMotion *motion, int slot, const hxBodyWork *torso, hxLegWork *leg) {
   const hxBodyWork *parent = torso;
+  hxVec3 c = hx_zero3();
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointModel *m = &model->joint[joint];
     hx_joint_kinematics(m, motion, joint, slot, parent, &k->kin);
     k->mass = hx_load(&m->mass[slot]);
     k->J = hx_rotate_sym3(k->kin.body.R, hx_load_sym3(m->inertia, slot));
-    k->sweep.e = hx_sub(k->kin.sP_j, k->kin.sP_i);
-    k->sweep.S = (hxMotion6){k->kin.s, hx_cross(k->kin.sP_j, k->kin.s)};
+    k->P = hx_add(c, k->kin.sP_i);
+    k->c = c = hx_sub(k->P, k->kin.sP_j);
+    k->sweep.S = (hxMotion6){k->kin.s, hx_cross(k->P, k->kin.s)};
     parent = &k->kin.body;
   }
   hx_foot_kinematics(model, slot, parent, &leg->foot.kin);
 }
 
 static void leg_forces(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t, int slot, hxLegWork *leg) {
+  hxMotion6 bias = {hx_zero3(), hx_zero3()};
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];
     link_force(model, k);
     joint_actuation(model, command, t, joint, slot, k);
-    joint_bias(model, k);
+    k->bias = bias = hx_motion_add(bias, joint_bias(model, k));
   }
   foot_force(model, contact, slot, &leg->foot);
   hxForce6 *tibia = &leg->joint[HX_JOINTS - 1].applied;
@@ -75,66 +77,70 @@ static void leg_forces(const hxModel *model, const hxContactState *contact, cons
   tibia->ang = hx_add(tibia->ang, hx_cross(leg->foot.kin.arm, leg->foot.force));
 }
 
-/* ---- the sweeps of eq. 11-12 --------------------------------------------------------------------------------------------- */
+/* ---- the sweeps of eq. 11-12, all about the torso's centre of mass ---------------------------------------------------------- */
 
-/* U = I S, d = S.U + what the joint itself resists with; gives what the parent carries: X^T (I - U U^T/d) X */
-static hxInertia6 sweep_inertia(hxSweep *sweep, hxReal joint_inertia, int driven) {
-  sweep->U = hx_inertia_mul(&sweep->I, sweep->S);
+/* U = I S, d = S.U + what the joint itself resists with; leaves I - U U^T/d, what the parent carries */
+static void sweep_inertia(hxSweep *sweep, hxInertia6 *I, hxReal joint_inertia, int driven) {
+  sweep->U = hx_inertia_mul(I, sweep->S);
   sweep->inverse_d = driven ? hx_splat(0.0) : 1.0 / (hx_power(sweep->U, sweep->S) + joint_inertia);
-  hxInertia6 rest = sweep->I;
-  hx_inertia_downdate(&rest, sweep->inverse_d, sweep->U);
-  return hx_carry_inertia(sweep->e, &rest);
+  hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
 }
 
-static hxInertia6 inertia_add(hxInertia6 a, const hxInertia6 *b) {
-  a.C.xx += b->C.xx, a.C.yy += b->C.yy, a.C.zz += b->C.zz, a.C.xy += b->C.xy, a.C.xz += b->C.xz, a.C.yz += b->C.yz;
-  a.A.xx += b->A.xx, a.A.yy += b->A.yy, a.A.zz += b->A.zz, a.A.xy += b->A.xy, a.A.xz += b->A.xz, a.A.yz += b->A.yz;
-  a.H = (hxMat3){hx_add(a.H.x, b->H.x), hx_add(a.H.y, b->H.y), hx_add(a.H.z, b->H.z)};
-  return a;
+/* u = torque - S.p; leaves p + U u/d, what the parent is handed */
+static hxReal sweep_force(const hxSweep *sweep, hxForce6 *p, hxReal torque) {
+  const hxReal u = torque - hx_power(*p, sweep->S);
+  *p = hx_force_add_scaled(*p, sweep->inverse_d * u, sweep->U);
+  return u;
 }
 
-/* p = -applied + what the child hands down; u = torque - S.p; gives X^T (p + (I - U U^T/d) a + U u/d) for the parent */
-static hxForce6 sweep_force(const hxSweep *sweep, hxMotion6 bias, hxForce6 p, hxReal torque, hxReal *u) {
-  *u = torque - hx_power(p, sweep->S);
-  const hxReal along = sweep->inverse_d * (*u - hx_power(sweep->U, bias));
-  const hxForce6 f = hx_force_add_scaled(hx_force_add(p, hx_inertia_mul(&sweep->I, bias)), along, sweep->U);
-  return hx_carry_force(sweep->e, f);
+/* qdd = (u - U.a)/d; leaves a + S qdd, the child's acceleration but for its bias */
+static hxReal sweep_motion(const hxSweep *sweep, hxMotion6 *a, hxReal u) {
+  const hxReal qdd = sweep->inverse_d * (u - hx_power(sweep->U, *a));
+  *a = hx_motion_add_scaled(*a, qdd, sweep->S);
+  return qdd;
 }
 
-/* qdd = (u - U.(X a_p + a))/d, a_k = X a_p + a + S qdd */
-static hxMotion6 sweep_motion(const hxSweep *sweep, hxMotion6 parent, hxMotion6 bias, hxReal u, hxReal *qdd) {
-  const hxMotion6 carried = hx_motion_add_scaled(hx_carry_motion(sweep->e, parent), hx_splat(1.0), bias);
-  *qdd = sweep->inverse_d * (u - hx_power(sweep->U, carried));
-  return hx_motion_add_scaled(carried, *qdd, sweep->S);
-}
+/* a motion about the torso's centre of mass, at c from it */
+static hxMotion6 motion_at(hxMotion6 a, hxVec3 c) { return (hxMotion6){a.ang, hx_add(a.lin, hx_cross(a.ang, c))}; }
 
-static hxInertia6 leg_sweep_inertia(const hxModel *model, hxLegWork *leg) {
+/* a torque and a force at c, about the torso's centre of mass */
+static hxForce6 force_at(hxForce6 f, hxVec3 c) { return (hxForce6){hx_add(f.ang, hx_cross(c, f.lin)), f.lin}; }
+
+static void leg_sweep_inertia(const hxModel *model, hxLegWork *leg, hxInertia6 *I) {
   const int driven = model->servo_mode == HX_SERVO_KINEMATIC;
-  hxInertia6 carried = hx_rigid_inertia(hx_splat(0.0), (hxSym3){0});
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
-    const hxInertia6 own = hx_rigid_inertia(k->mass, k->J);
-    k->sweep.I = joint == HX_JOINTS - 1 ? own : inertia_add(own, &carried);
-    carried = sweep_inertia(&k->sweep, hx_splat(model->rotor_inertia), driven);
+    k->inertia = hx_rigid_inertia(k->mass, k->J, k->c);
+    if (joint == HX_JOINTS - 1)
+      *I = k->inertia;
+    else
+      hx_inertia_add(I, &k->inertia);
+    sweep_inertia(&k->sweep, I, hx_splat(model->rotor_inertia), driven);
   }
-  return carried;
+}
+
+/* p of a link: what its bias acceleration takes less what is applied */
+static hxForce6 link_bias_force(const hxJointWork *k) {
+  const hxMotion6 a = motion_at(k->bias, k->c);
+  const hxForce6 at_com = {hx_sub(hx_sym_mul(k->J, a.ang), k->applied.ang), hx_sub(hx_scale(k->mass, a.lin), k->applied.lin)};
+  return force_at(at_com, k->c);
 }
 
 static hxForce6 leg_sweep_force(hxLegWork *leg) {
-  hxForce6 carried = {hx_zero3(), hx_zero3()};
+  hxForce6 p = {hx_zero3(), hx_zero3()};
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
-    k->p = hx_force_add_scaled(carried, hx_splat(-1.0), k->applied);
-    carried = sweep_force(&k->sweep, k->bias, k->p, k->torque, &k->u);
+    p = hx_force_add(p, link_bias_force(k));
+    k->u = sweep_force(&k->sweep, &p, k->torque);
   }
-  return carried;
+  return p;
 }
 
-static void leg_sweep_motion(hxLegWork *leg, hxMotion6 parent) {
+static void leg_sweep_motion(hxLegWork *leg, hxMotion6 a) {
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxJointWork *k = &leg->joint[joint];
-    k->acceleration = parent = sweep_motion(&k->sweep, parent, k->bias, k->u, &k->qdd);
-    k->qdd = k->qdd + k->driven;
+    k->qdd = sweep_motion(&k->sweep, &a, k->u) + k->driven;
+    k->acceleration = motion_at(hx_motion_add(a, k->bias), k->c);
   }
 }
 
@@ -280,8 +286,8 @@ static void store_powers(const hxCommand *command, const hxMotion *motion, const
     rate->push_work += command->push_force[i] * motion->torso[HX_V + i] + command->push_torque[i] * motion->torso[HX_W + i];
 }
 
-void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
-                          const hxMotion *motion, int multipliers, hxWork *work, hxMotion *rate) {
+void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t, const hxMotion *motion,
+                          int multipliers, hxWork *work, hxMotion *rate) {
   double inertia[21][HX_SLOTS], force[6][HX_SLOTS], b[6];
   hxTorsoFactor factor;
   torso_kinematics(model, motion, work);
@@ -293,7 +299,8 @@ void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, c
     hxLegWork *leg = &work->pack[pack];
     leg_kinematics(model, motion, slot, &work->torso, leg);
     leg_forces(model, contact, command, t, slot, leg);
-    const hxInertia6 I = leg_sweep_inertia(model, leg);
+    hxInertia6 I;
+    leg_sweep_inertia(model, leg, &I);
     scatter_inertia(&I, inertia, slot);
     scatter_force(leg_sweep_force(leg), force, slot);
   }
@@ -314,14 +321,14 @@ void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, c
 
 /* ---- the linearly implicit solve -------------------------------------------------------------------------------------------- */
 
-/* contact: (z c_n + z^2 k_n) n n^T + z c_t (1 - n n^T) at the contact point, carried to the tibia's centre of mass; z = h gamma */
-static hxInertia6 contact_inertia(const hxFootWork *foot, double z) {
+/* contact: (z c_n + z^2 k_n) n n^T + z c_t (1 - n n^T) at the contact point x from the torso's centre of mass; z = h gamma */
+static hxInertia6 contact_inertia(const hxFootWork *foot, hxVec3 x, double z) {
   const hxVec3 n = foot->kin.normal;
   const hxReal t = z * foot->drag;
   const hxReal d = z * foot->normal.viscosity + z * z * foot->normal.stiffness - t;
-  hxInertia6 I = hx_rigid_inertia(hx_splat(0.0), (hxSym3){0});
+  hxInertia6 I = hx_rigid_inertia(hx_splat(0.0), (hxSym3){0}, hx_zero3());
   I.A = (hxSym3){t + d * n.x * n.x, t + d * n.y * n.y, t + d * n.z * n.z, d * n.x * n.y, d * n.x * n.z, d * n.y * n.z};
-  return hx_carry_inertia(hx_neg(foot->kin.arm), &I);
+  return hx_carry_inertia(hx_neg(x), &I);
 }
 
 void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit) {
@@ -330,31 +337,32 @@ void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_ga
   implicit->torso_p = work->torso.p;
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
-    hxInertia6 carried = contact_inertia(&leg->foot, h_gamma);
+    hxImplicitLeg *to = &implicit->pack[pack];
+    hxInertia6 I = contact_inertia(&leg->foot, hx_add(leg->joint[HX_JOINTS - 1].c, leg->foot.kin.arm), h_gamma);
     for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
       const hxJointWork *k = &leg->joint[joint];
-      hxSweep *sweep = &implicit->pack[pack].joint[joint].sweep;
-      *sweep = k->sweep;
-      sweep->I = inertia_add(hx_rigid_inertia(k->mass, k->J), &carried);
       const hxReal servo = h_gamma * k->servo.damping + (h_gamma * h_gamma) * k->servo.stiffness;
-      carried = sweep_inertia(sweep, model->rotor_inertia + servo, driven);
-      implicit->pack[pack].joint[joint].p = k->kin.body.p;
-      implicit->pack[pack].joint[joint].stiffness = k->servo.stiffness;
-      implicit->pack[pack].joint[joint].damping = k->servo.damping;
+      hx_inertia_add(&I, &k->inertia);
+      to->joint[joint].sweep.S = k->sweep.S;
+      sweep_inertia(&to->joint[joint].sweep, &I, model->rotor_inertia + servo, driven);
+      to->joint[joint].p = k->kin.body.p;
+      to->joint[joint].c = k->c;
+      to->joint[joint].stiffness = k->servo.stiffness;
+      to->joint[joint].damping = k->servo.damping;
     }
-    scatter_inertia(&carried, inertia, pack * HX_LANES);
-    implicit->pack[pack].arm = leg->foot.kin.arm;
-    implicit->pack[pack].normal = leg->foot.kin.normal;
-    implicit->pack[pack].stiffness = leg->foot.normal.stiffness;
-    implicit->pack[pack].viscosity = leg->foot.normal.viscosity;
-    implicit->pack[pack].drag = leg->foot.drag;
+    scatter_inertia(&I, inertia, pack * HX_LANES);
+    to->arm = leg->foot.kin.arm;
+    to->normal = leg->foot.kin.normal;
+    to->stiffness = leg->foot.normal.stiffness;
+    to->viscosity = leg->foot.normal.viscosity;
+    to->drag = leg->foot.drag;
   }
   torso_factorise(model->torso_mass, work->torso_J, inertia, &implicit->torso);
 }
 
 /* a link's displacement (from dx, its quaternion change as a rotation) and velocity change (from dv) */
 static void link_changes(const hxMotion *dx, const hxMotion *dv, int joint, int slot, hxQuat p, hxMotion6 *x, hxMotion6 *v) {
-  const double(*mx)[HX_SLOTS] = dx->link[joint], (*mv)[HX_SLOTS] = dv->link[joint];
+  const double (*mx)[HX_SLOTS] = dx->link[joint], (*mv)[HX_SLOTS] = dv->link[joint];
   const hxQuat dp = {hx_load(&mx[HX_P][slot]), hx_load(&mx[HX_P + 1][slot]), hx_load(&mx[HX_P + 2][slot]), hx_load(&mx[HX_P + 3][slot])};
   *x = (hxMotion6){hx_rotation_of_change(p, dp), hx_load_vec3(&mx[HX_R], slot)};
   *v = (hxMotion6){hx_load_vec3(&mv[HX_W], slot), hx_load_vec3(&mv[HX_V], slot)};
@@ -367,47 +375,45 @@ static void torso_changes(const hxImplicit *implicit, const hxMotion *dx, const 
   *v = (hxMotion6){hx_splat_vec3(&mv[HX_W]), hx_splat_vec3(&mv[HX_V])};
 }
 
-/* G_v dv + G_x dx: the forces that contact and servos answer the changes with */
-static void leg_response(const hxImplicit *implicit, int pack, const hxMotion *dx, const hxMotion *dv, hxForce6 *foot,
-                         hxReal torque[HX_JOINTS]) {
+/* G_v dv + G_x dx: the forces that contact and servos answer the changes with; the foot's about the torso's centre of mass */
+static hxForce6 leg_response(const hxImplicit *implicit, int pack, const hxMotion *dx, const hxMotion *dv, hxReal torque[HX_JOINTS]) {
+  const hxImplicitLeg *leg = &implicit->pack[pack];
   hxMotion6 x_i, v_i, x_j, v_j;
   torso_changes(implicit, dx, dv, &x_i, &v_i);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    const hxVec3 s = implicit->pack[pack].joint[joint].sweep.S.ang;
-    link_changes(dx, dv, joint, pack * HX_LANES, implicit->pack[pack].joint[joint].p, &x_j, &v_j);
-    torque[joint] = -(implicit->pack[pack].joint[joint].stiffness * hx_dot(s, hx_sub(x_j.ang, x_i.ang)) +
-                      implicit->pack[pack].joint[joint].damping * hx_dot(s, hx_sub(v_j.ang, v_i.ang)));
+    const hxVec3 s = leg->joint[joint].sweep.S.ang;
+    link_changes(dx, dv, joint, pack * HX_LANES, leg->joint[joint].p, &x_j, &v_j);
+    torque[joint] = -(leg->joint[joint].stiffness * hx_dot(s, hx_sub(x_j.ang, x_i.ang)) +
+                      leg->joint[joint].damping * hx_dot(s, hx_sub(v_j.ang, v_i.ang)));
     x_i = x_j, v_i = v_j;
   }
-  const hxVec3 n = implicit->pack[pack].normal, e = hx_neg(implicit->pack[pack].arm);
-  const hxVec3 x = hx_carry_motion(e, x_j).lin, v = hx_carry_motion(e, v_j).lin;
-  const hxReal along = (implicit->pack[pack].viscosity - implicit->pack[pack].drag) * hx_dot(n, v) + implicit->pack[pack].stiffness * hx_dot(n, x);
-  const hxVec3 force = hx_add_scaled(hx_scale(-along, n), -implicit->pack[pack].drag, v);
-  *foot = hx_carry_force(e, (hxForce6){hx_zero3(), force});
+  const hxVec3 n = leg->normal, x = motion_at(x_j, leg->arm).lin, v = motion_at(v_j, leg->arm).lin;
+  const hxReal along = (leg->viscosity - leg->drag) * hx_dot(n, v) + leg->stiffness * hx_dot(n, x);
+  const hxVec3 force = hx_add_scaled(hx_scale(-along, n), -leg->drag, v);
+  return force_at((hxForce6){hx_zero3(), force}, hx_add(leg->joint[HX_JOINTS - 1].c, leg->arm));
 }
 
 void hx_implicit_solve(const hxImplicit *implicit, const hxMotion *dx, const hxMotion *dv, hxMotion *u) {
-  const hxMotion6 still = {hx_zero3(), hx_zero3()};
   double force[6][HX_SLOTS], b[6], x[6];
-  hxReal along[HX_PACKS][HX_JOINTS], qdd;
+  hxReal along[HX_PACKS][HX_JOINTS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxReal torque[HX_JOINTS];
-    hxForce6 p;
-    leg_response(implicit, pack, dx, dv, &p, torque);
-    p = (hxForce6){hx_neg(p.ang), hx_neg(p.lin)};
+    const hxForce6 foot = leg_response(implicit, pack, dx, dv, torque);
+    hxForce6 p = {hx_neg(foot.ang), hx_neg(foot.lin)};
     for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
-      p = sweep_force(&implicit->pack[pack].joint[joint].sweep, still, p, torque[joint], &along[pack][joint]);
+      along[pack][joint] = sweep_force(&implicit->pack[pack].joint[joint].sweep, &p, torque[joint]);
     scatter_force(p, force, pack * HX_LANES);
   }
   for (int i = 0; i < 6; ++i) b[i] = -sum_legs(force[i]);
   torso_solve(&implicit->torso, b, x);
   for (int i = 0; i < 3; ++i) u->torso[HX_W + i] = x[i], u->torso[HX_V + i] = x[3 + i];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
-    hxMotion6 motion = torso_motion(x);
+    hxMotion6 a = torso_motion(x);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      motion = sweep_motion(&implicit->pack[pack].joint[joint].sweep, motion, still, along[pack][joint], &qdd);
-      hx_store_vec3(&u->link[joint][HX_V], pack * HX_LANES, motion.lin);
-      hx_store_vec3(&u->link[joint][HX_W], pack * HX_LANES, motion.ang);
+      sweep_motion(&implicit->pack[pack].joint[joint].sweep, &a, along[pack][joint]);
+      const hxMotion6 link = motion_at(a, implicit->pack[pack].joint[joint].c);
+      hx_store_vec3(&u->link[joint][HX_V], pack * HX_LANES, link.lin);
+      hx_store_vec3(&u->link[joint][HX_W], pack * HX_LANES, link.ang);
     }
   }
 }

@@ -6,29 +6,28 @@
 #include "contact.h"
 #include "kinematics.h"
 
-/* What the O(n) sweeps of eq. 10-12 keep of joint k. */
+/* What the O(n) sweeps of eq. 11-12 keep of joint k, about the torso's centre of mass. */
 typedef struct {
-  hxVec3 e;            /* s_j^P - s_i^P: X = [1 0; skew(e) 1] */
-  hxMotion6 S;         /* (s, s_j^P x s) */
-  hxInertia6 I;        /* articulated inertia of the child with all it carries */
-  hxForce6 U;          /* I S */
-  hxReal inverse_d;    /* 1/d; 0 where the joint is driven kinematically */
+  hxMotion6 S;      /* (s, P x s) */
+  hxForce6 U;       /* I S, I the articulated inertia of the child with all it carries */
+  hxReal inverse_d; /* 1/d; 0 where the joint is driven kinematically */
 } hxSweep;
 
 typedef struct {
   hxJointKinematics kin;
+  hxVec3 P, c;         /* the joint's point and the child's centre of mass from the torso's, along the chain: r + sum of s_i^P - s_j^P */
   hxSweep sweep;
   hxServo servo;
   hxReal mass;
-  hxSym3 J;            /* child's inertia, world axes */
+  hxSym3 J;            /* child's inertia, world axes, about its centre of mass */
+  hxInertia6 inertia;  /* the same about the torso's centre of mass */
   hxForce6 applied;    /* on the child at its centre of mass: gravity, gyroscopic, contact; not the servo */
   hxReal torque;       /* N m  on the joint's axis: servo and gear (kinematic mode: gear, then the drive's too) */
-  hxMotion6 bias;      /* a_k of eq. 10, with S qdd in kinematic mode */
   hxReal driven;       /* rad/s2  the drive's qdd in kinematic mode, else 0 */
-  hxForce6 p;          /* bias force of the sweep */
+  hxMotion6 bias;      /* a_k of eq. 10 summed from the hip to here, with S qdd in kinematic mode */
   hxReal u;            /* torque - S.p */
-  hxMotion6 acceleration;
   hxReal qdd;
+  hxMotion6 acceleration; /* of the child at its centre of mass */
   hxVec3 lambda_lin;   /* multipliers, rows 1-3 */
   hxReal lambda[2];    /* rows 4, 5 */
 } hxJointWork;
@@ -59,24 +58,27 @@ typedef struct {
   double L[6][6], inverse_d[6];
 } hxTorsoFactor;
 
+typedef struct {
+  struct {
+    hxQuat p;
+    hxVec3 c;
+    hxSweep sweep;
+    hxReal stiffness, damping; /* servo */
+  } joint[HX_JOINTS];
+  hxVec3 arm, normal;
+  hxReal stiffness, viscosity, drag; /* contact */
+} hxImplicitLeg;
+
 /* (M - h gamma G_v - (h gamma)^2 G_x) on the constraints, factorised: contact and servo stay inside the tree. */
 typedef struct {
   hxQuat torso_p;
   hxTorsoFactor torso;
-  struct {
-    struct {
-      hxQuat p;
-      hxSweep sweep;
-      hxReal stiffness, damping; /* servo */
-    } joint[HX_JOINTS];
-    hxVec3 arm, normal;
-    hxReal stiffness, viscosity, drag; /* contact */
-  } pack[HX_PACKS];
+  hxImplicitLeg pack[HX_PACKS];
 } hxImplicit;
 
 /* Everything at (t, y): work, and dy/dt into rate. The multipliers are found when asked for, and in kinematic mode. */
-void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
-                          const hxMotion *motion, int multipliers, hxWork *work, hxMotion *rate);
+void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t, const hxMotion *motion,
+                          int multipliers, hxWork *work, hxMotion *rate);
 
 /* Factorises W at the evaluated point; h_gamma = h gamma. */
 void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit);

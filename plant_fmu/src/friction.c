@@ -19,6 +19,4 @@ static const hxFrictionRow rows[] = {
     [HX_FRICTION_NONE] = {"none", none},
 };
 
-const hxFrictionRow *hx_friction(int law) {
-  return law >= 1 && law < (int)(sizeof rows / sizeof rows[0]) ? &rows[law] : NULL;
-}
+const hxFrictionRow *hx_friction(int law) { return law >= 1 && law < (int)(sizeof rows / sizeof rows[0]) ? &rows[law] : NULL; }

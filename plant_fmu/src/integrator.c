@@ -87,7 +87,7 @@ static void normalise_quaternions(hxMotion *m) {
   const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
   for (int i = 0; i < 4; ++i) p[i] *= scale;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    double(*q)[HX_SLOTS] = &m->link[joint][HX_P];
+    double (*q)[HX_SLOTS] = &m->link[joint][HX_P];
     for (int slot = 0; slot < HX_SLOTS; ++slot) {
       const double s = 1.0 / sqrt(q[0][slot] * q[0][slot] + q[1][slot] * q[1][slot] + q[2][slot] * q[2][slot] + q[3][slot] * q[3][slot]);
       for (int i = 0; i < 4; ++i) q[i][slot] *= s;
@@ -218,7 +218,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_
   while (state->time < t_end) {
     const double left = t_end - state->time;
     const hxMotion y = state->motion;
-    hxStart start = {.model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .t = state->time, .y = &y};
+    hxStart start = {
+        .model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .t = state->time, .y = &y};
     double taken;
     const hxStatus status = advance(&start, left, state, &taken, message);
     if (status != HX_OK) return status;

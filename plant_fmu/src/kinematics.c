@@ -21,15 +21,13 @@ hxBodyWork hx_torso_work(const hxMotion *motion) {
   return body;
 }
 
-/* q from the half-angle in p_rel = conj(zero) conj(p_i) p_j, dq/dt = s . (w_j - w_i) */
-static void joint_angle(const hxJointModel *model, int slot, const hxBodyWork *i, hxVec3 w_rel, hxJointKinematics *k) {
-  const hxReal zero = hx_splat(0.0);
-  const hxQuat turn = {hx_load(&model->zero[0][slot]), zero, zero, hx_load(&model->zero[1][slot])};
-  const hxQuat from = hx_quat_mul(i->p, turn);
-  const hxQuat p = hx_quat_mul((hxQuat){from.w, -from.x, -from.y, -from.z}, k->body.p);
-  const hxVec3 s_j = hx_load_vec3(model->s_j, slot);
-  k->angle = hx_angle_from_half(s_j.x * p.x + s_j.y * p.y + s_j.z * p.z, p.w);
-  k->speed = hx_dot(k->s, w_rel);
+/* q from the half-angle in p_rel = conj(p_i zero) p_j, of which the real part and the part along the axis are needed */
+static hxReal joint_angle(const hxJointModel *model, int slot, hxQuat p_i, hxQuat p_j) {
+  const hxReal w = hx_load(&model->zero[0][slot]), z = hx_load(&model->zero[1][slot]);
+  const hxQuat from = {w * p_i.w - z * p_i.z, w * p_i.x + z * p_i.y, w * p_i.y - z * p_i.x, w * p_i.z + z * p_i.w};
+  const hxVec3 u_i = {from.x, from.y, from.z}, u_j = {p_j.x, p_j.y, p_j.z};
+  const hxVec3 u = hx_sub(hx_sub(hx_scale(from.w, u_j), hx_scale(p_j.w, u_i)), hx_cross(u_i, u_j));
+  return hx_angle_from_half(hx_dot(u, hx_load_vec3(model->s_j, slot)), from.w * p_j.w + hx_dot(u_i, u_j));
 }
 
 void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int joint, int slot, const hxBodyWork *i,
@@ -42,27 +40,32 @@ void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int 
   const hxVec3 a = hx_mul(j->R, hx_load_vec3(model->a_j, slot));
   const hxVec3 b = hx_mul(j->R, hx_load_vec3(model->b_j, slot));
   const hxVec3 w_rel = hx_sub(j->w, i->w);
-  joint_angle(model, slot, i, w_rel, k);
+  k->angle = joint_angle(model, slot, i->p, j->p);
+  k->speed = hx_dot(k->s, w_rel);
 
-  /* the basis (u1, u2, s) in which a joint sees relative rotation, and its dual */
-  k->u1 = hx_cross(a, k->s);
-  k->u2 = hx_cross(b, k->s);
-  k->u2_s = hx_cross(k->u2, k->s);
-  k->s_u1 = hx_cross(k->s, k->u1);
-  k->inverse_det = 1.0 / hx_dot(k->u1, k->u2_s);
-
-  /* Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s) and its rate */
-  const hxVec3 dsP_i = hx_cross(i->w, k->sP_i), dsP_j = hx_cross(j->w, k->sP_j);
+  /* Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s) */
   k->phi_lin = hx_sub(hx_add(j->r, k->sP_j), hx_add(i->r, k->sP_i));
   k->phi[0] = hx_dot(a, k->s), k->phi[1] = hx_dot(b, k->s);
+
+  /* the basis (u1, u2, s) in which a joint sees relative rotation, and its dual: (b x s) x s = (b.s) s - b, s x (a x s) = a - (a.s) s */
+  k->u1 = hx_cross(a, k->s);
+  k->u2 = hx_cross(b, k->s);
+  k->u2_s = hx_sub(hx_scale(k->phi[1], k->s), b);
+  k->s_u1 = hx_add_scaled(a, -k->phi[0], k->s);
+  k->inverse_det = 1.0 / hx_dot(k->u1, k->u2_s);
+
+  /* its rate */
+  const hxVec3 dsP_i = hx_cross(i->w, k->sP_i), dsP_j = hx_cross(j->w, k->sP_j);
   k->dphi_lin = hx_sub(hx_add(j->v, dsP_j), hx_add(i->v, dsP_i));
   k->dphi[0] = hx_dot(k->u1, w_rel), k->dphi[1] = hx_dot(k->u2, w_rel);
 
-  /* gamma, eq. 3: (-ds_i^P x w_i + ds_j^P x w_j,  -s.(w_j x da) - a.(w_i x ds) - 2 da.ds,  the same with b) */
-  const hxVec3 ds = hx_cross(i->w, k->s), da = hx_cross(j->w, a), db = hx_cross(j->w, b), dds = hx_cross(i->w, ds);
+  /* gamma, eq. 3; its triple products written out in dot products:
+   * -s.(w_j x da) - a.(w_i x ds) - 2 da.ds = (a.s) |w_j - w_i|^2 - (s.w_j)(a.w_j) - (a.w_i)(s.w_i) + 2 (s.w_j)(a.w_i) */
+  const hxReal s_wj = hx_dot(k->s, j->w), s_wi = hx_dot(k->s, i->w), w2 = hx_dot(w_rel, w_rel);
+  const hxReal twice = 2.0 * s_wj - s_wi;
   k->gamma_lin = hx_sub(hx_cross(dsP_j, j->w), hx_cross(dsP_i, i->w));
-  k->gamma[0] = -(hx_dot(k->s, hx_cross(j->w, da)) + hx_dot(a, dds) + 2.0 * hx_dot(da, ds));
-  k->gamma[1] = -(hx_dot(k->s, hx_cross(j->w, db)) + hx_dot(b, dds) + 2.0 * hx_dot(db, ds));
+  k->gamma[0] = k->phi[0] * w2 - s_wj * hx_dot(a, j->w) + twice * hx_dot(a, i->w);
+  k->gamma[1] = k->phi[1] * w2 - s_wj * hx_dot(b, j->w) + twice * hx_dot(b, i->w);
 }
 
 void hx_foot_kinematics(const hxModel *model, int slot, const hxBodyWork *tibia, hxFootKinematics *foot) {

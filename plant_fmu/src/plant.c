@@ -86,7 +86,8 @@ hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
   const hxState before = plant->state;
   hxCommand command;
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
-    snprintf(plant->message, HX_MESSAGE_SIZE, "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end, plant->state.time);
+    snprintf(plant->message, HX_MESSAGE_SIZE, "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
+             plant->state.time);
     return HX_INVALID_ARGUMENT;
   }
   hxStatus status = hx_input_check(input, plant->message);
@@ -120,7 +121,8 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
     return refuse(plant, HX_BAD_STATE, "saved state: not one of this version; save it again with this version");
-  if (saved.checksum != checksum(&saved)) return refuse(plant, HX_BAD_STATE, "saved state: damaged, its checksum does not match; save it again");
+  if (saved.checksum != checksum(&saved))
+    return refuse(plant, HX_BAD_STATE, "saved state: damaged, its checksum does not match; save it again");
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;

@@ -4,15 +4,27 @@
 
 #include "vec3.h"
 
-typedef struct { hxVec3 ang, lin; } hxMotion6; /* angular and linear acceleration (or velocity, or increment) */
-typedef struct { hxVec3 ang, lin; } hxForce6;  /* torque and force */
+typedef struct {
+  hxVec3 ang, lin;
+} hxMotion6; /* angular and linear acceleration (or velocity, or increment) */
+typedef struct {
+  hxVec3 ang, lin;
+} hxForce6;  /* torque and force */
 
 /* [ C  H ; H^T  A ]: torque = C ang + H lin, force = H^T ang + A lin */
-typedef struct { hxSym3 C; hxMat3 H; hxSym3 A; } hxInertia6;
+typedef struct {
+  hxSym3 C;
+  hxMat3 H;
+  hxSym3 A;
+} hxInertia6;
 
-static inline hxInertia6 hx_rigid_inertia(hxReal mass, hxSym3 J) {
+/* a rigid body about a point from which its centre of mass is at c: C = J - m c~ c~, H = m c~, A = m */
+static inline hxInertia6 hx_rigid_inertia(hxReal mass, hxSym3 J, hxVec3 c) {
   const hxReal o = hx_splat(0.0);
-  return (hxInertia6){J, {{o, o, o}, {o, o, o}, {o, o, o}}, {mass, mass, mass, o, o, o}};
+  const hxVec3 h = hx_scale(mass, c);
+  const hxReal xx = h.x * c.x, yy = h.y * c.y, zz = h.z * c.z;
+  const hxSym3 C = {J.xx + (yy + zz), J.yy + (xx + zz), J.zz + (xx + yy), J.xy - h.x * c.y, J.xz - h.x * c.z, J.yz - h.y * c.z};
+  return (hxInertia6){C, {{o, -h.z, h.y}, {h.z, o, -h.x}, {-h.y, h.x, o}}, {mass, mass, mass, o, o, o}};
 }
 
 static inline hxForce6 hx_inertia_mul(const hxInertia6 *I, hxMotion6 a) {
@@ -31,6 +43,14 @@ static inline hxMotion6 hx_motion_add_scaled(hxMotion6 a, hxReal s, hxMotion6 b)
   return (hxMotion6){hx_add_scaled(a.ang, s, b.ang), hx_add_scaled(a.lin, s, b.lin)};
 }
 
+static inline hxMotion6 hx_motion_add(hxMotion6 a, hxMotion6 b) { return (hxMotion6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)}; }
+
+static inline void hx_inertia_add(hxInertia6 *a, const hxInertia6 *b) {
+  a->C.xx += b->C.xx, a->C.yy += b->C.yy, a->C.zz += b->C.zz, a->C.xy += b->C.xy, a->C.xz += b->C.xz, a->C.yz += b->C.yz;
+  a->A.xx += b->A.xx, a->A.yy += b->A.yy, a->A.zz += b->A.zz, a->A.xy += b->A.xy, a->A.xz += b->A.xz, a->A.yz += b->A.yz;
+  a->H = (hxMat3){hx_add(a->H.x, b->H.x), hx_add(a->H.y, b->H.y), hx_add(a->H.z, b->H.z)};
+}
+
 /* I - s U U^T */
 static inline void hx_inertia_downdate(hxInertia6 *I, hxReal s, hxForce6 U) {
   const hxVec3 a = hx_scale(s, U.ang), l = hx_scale(s, U.lin);
@@ -43,30 +63,15 @@ static inline void hx_inertia_downdate(hxInertia6 *I, hxReal s, hxForce6 U) {
   I->A.xy -= l.x * U.lin.y, I->A.xz -= l.x * U.lin.z, I->A.yz -= l.y * U.lin.z;
 }
 
-/* X a of eq. 10: the motion of a parent carried to a child, lin + e x ang... with e = s_j^P - s_i^P */
-static inline hxMotion6 hx_carry_motion(hxVec3 e, hxMotion6 a) {
-  return (hxMotion6){a.ang, hx_add(a.lin, hx_cross(e, a.ang))};
-}
+/* M E, E = skew(e) */
+static inline hxMat3 hx_mul_skew(hxMat3 M, hxVec3 e) { return (hxMat3){hx_cross(M.x, e), hx_cross(M.y, e), hx_cross(M.z, e)}; }
 
-/* X^T f: a force on a child carried to its parent */
-static inline hxForce6 hx_carry_force(hxVec3 e, hxForce6 f) {
-  return (hxForce6){hx_sub(f.ang, hx_cross(e, f.lin)), f.lin};
-}
+static inline hxMat3 hx_sym_full(hxSym3 S) { return (hxMat3){{S.xx, S.xy, S.xz}, {S.xy, S.yy, S.yz}, {S.xz, S.yz, S.zz}}; }
 
-/* E b with E = skew(e), applied to each row of M from the right: M E */
-static inline hxMat3 hx_mul_skew(hxMat3 M, hxVec3 e) {
-  return (hxMat3){hx_cross(M.x, e), hx_cross(M.y, e), hx_cross(M.z, e)};
-}
+static inline hxMat3 hx_transpose(hxMat3 M) { return (hxMat3){{M.x.x, M.y.x, M.z.x}, {M.x.y, M.y.y, M.z.y}, {M.x.z, M.y.z, M.z.z}}; }
 
-static inline hxMat3 hx_sym_full(hxSym3 S) {
-  return (hxMat3){{S.xx, S.xy, S.xz}, {S.xy, S.yy, S.yz}, {S.xz, S.yz, S.zz}};
-}
-
-static inline hxMat3 hx_transpose(hxMat3 M) {
-  return (hxMat3){{M.x.x, M.y.x, M.z.x}, {M.x.y, M.y.y, M.z.y}, {M.x.z, M.y.z, M.z.z}};
-}
-
-/* X^T I X with X = [1 0; E 1]: A' = A, H' = H + E^T A, C' = C + H E + (H E)^T + E^T A E */
+/* an inertia about a point, about another one e away from it: X^T I X with X = [1 0; E 1],
+ * A' = A, H' = H + E^T A, C' = C + H E + (H E)^T + E^T A E */
 static inline hxInertia6 hx_carry_inertia(hxVec3 e, const hxInertia6 *I) {
   const hxMat3 AE = hx_mul_skew(hx_sym_full(I->A), e); /* (E^T A)^T = A E */
   const hxMat3 EtA = hx_transpose(AE);

@@ -14,6 +14,4 @@ static const hxTerrainRow rows[] = {
     [HX_TERRAIN_SLOPE] = {"slope", slope},
 };
 
-const hxTerrainRow *hx_terrain(int kind) {
-  return kind >= 1 && kind < (int)(sizeof rows / sizeof rows[0]) ? &rows[kind] : NULL;
-}
+const hxTerrainRow *hx_terrain(int kind) { return kind >= 1 && kind < (int)(sizeof rows / sizeof rows[0]) ? &rows[kind] : NULL; }

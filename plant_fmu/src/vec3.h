@@ -4,10 +4,18 @@
 
 #include "lanes.h"
 
-typedef struct { hxReal x, y, z; } hxVec3;
-typedef struct { hxReal w, x, y, z; } hxQuat;
-typedef struct { hxVec3 x, y, z; } hxMat3; /* rows */
-typedef struct { hxReal xx, yy, zz, xy, xz, yz; } hxSym3;
+typedef struct {
+  hxReal x, y, z;
+} hxVec3;
+typedef struct {
+  hxReal w, x, y, z;
+} hxQuat;
+typedef struct {
+  hxVec3 x, y, z;
+} hxMat3; /* rows */
+typedef struct {
+  hxReal xx, yy, zz, xy, xz, yz;
+} hxSym3;
 
 /* [component][slot] in memory */
 static inline hxVec3 hx_load_vec3(const double (*m)[HX_SLOTS], int slot) {
@@ -35,13 +43,9 @@ static inline hxVec3 hx_scale(hxReal s, hxVec3 a) { return (hxVec3){s * a.x, s *
 static inline hxReal hx_dot(hxVec3 a, hxVec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 /* a + s b */
-static inline hxVec3 hx_add_scaled(hxVec3 a, hxReal s, hxVec3 b) {
-  return (hxVec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
-}
+static inline hxVec3 hx_add_scaled(hxVec3 a, hxReal s, hxVec3 b) { return (hxVec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z}; }
 
-static inline hxVec3 hx_cross(hxVec3 a, hxVec3 b) {
-  return (hxVec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+static inline hxVec3 hx_cross(hxVec3 a, hxVec3 b) { return (hxVec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
 static inline hxVec3 hx_mul(hxMat3 A, hxVec3 b) { return (hxVec3){hx_dot(A.x, b), hx_dot(A.y, b), hx_dot(A.z, b)}; }
 
@@ -52,8 +56,7 @@ static inline hxVec3 hx_tmul(hxMat3 A, hxVec3 b) {
 }
 
 static inline hxVec3 hx_sym_mul(hxSym3 S, hxVec3 b) {
-  return (hxVec3){S.xx * b.x + S.xy * b.y + S.xz * b.z, S.xy * b.x + S.yy * b.y + S.yz * b.z,
-                  S.xz * b.x + S.yz * b.y + S.zz * b.z};
+  return (hxVec3){S.xx * b.x + S.xy * b.y + S.xz * b.z, S.xy * b.x + S.yy * b.y + S.yz * b.z, S.xz * b.x + S.yz * b.y + S.zz * b.z};
 }
 
 /* R of eq. 7; p need not have unit length */

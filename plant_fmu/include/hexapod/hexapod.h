@@ -229,10 +229,8 @@ HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t siz
 /* For multibody researchers: the bodies' states, drifted joints allowed, and eq. 1 solved for them. */
 HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);
 HX_API hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]);
-HX_API void hx_plant_accelerations(hxPlant *plant, const hxInput *input,
-                                   double acceleration[HX_BODIES][6], /* m/s2 then rad/s2 */
-                                   double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
-                                   double drive_torque[HX_BODIES - 1]); /* N m */
+HX_API void hx_plant_accelerations(hxPlant *plant, const hxInput *input, double acceleration[HX_BODIES][6], /* m/s2 then rad/s2 */
+                                   double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]); /* N m */
 
 #ifdef __cplusplus
 }
