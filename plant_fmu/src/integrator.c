@@ -29,8 +29,17 @@ typedef struct {
   double error; /* of the step over the tolerance; 0 without an estimate */
 } hxTrial;
 
-static void add_scaled(hxMotion *y, double s, const hxMotion *x) {
-  for (int i = 0; i < HX_MOTION_SIZE; ++i) y->y[i] += s * x->y[i];
+/* y += s x, n a multiple of HX_SLOTS */
+static inline void add_range(double *y, double s, const double *x, int n) {
+  for (int i = 0; i < n; i += HX_LANES) hx_store(&y[i], hx_load(&y[i]) + s * hx_load(&x[i]));
+}
+
+static inline void add_scaled(hxMotion *y, double s, const hxMotion *x) { add_range(y->y, s, x->y, HX_MOTION_SIZE); }
+
+/* the same for the entries first to last - 1 of every body's state: positions (HX_R, HX_V) or velocities (HX_V, HX_BODY_STATE) */
+static void add_part(hxMotion *y, double s, const hxMotion *x, int first, int last) {
+  for (int i = first; i < last; ++i) y->torso[i] += s * x->torso[i];
+  for (int joint = 0; joint < HX_JOINTS; ++joint) add_range(y->link[joint][first], s, x->link[joint][first], (last - first) * HX_SLOTS);
 }
 
 static void combine(hxMotion *y, const hxMotion *base, const double *weights, const hxMotion *k, int count) {
@@ -44,40 +53,26 @@ static void combine(hxMotion *y, const hxMotion *base, const double *weights, co
 static void implicit_stage(const hxImplicit *implicit, const hxMotion *y, double h, double gamma, const hxMotion *s, hxMotion *k) {
   hxMotion dv = *s, dx, u, carried;
   add_scaled(&dv, gamma, k);
-  hx_position_rates(y, &dv, &carried);
   dx = dv;
-  for (int i = HX_R; i < HX_V; ++i) {
-    dx.torso[i] += h * gamma * carried.torso[i];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      for (int slot = 0; slot < HX_SLOTS; ++slot) dx.link[joint][i][slot] += h * gamma * carried.link[joint][i][slot];
-  }
-  hx_implicit_solve(implicit, &dx, &dv, &u);
-  for (int i = HX_V; i < HX_BODY_STATE; ++i) {
-    k->torso[i] += h * u.torso[i];
-    dv.torso[i] += gamma * h * u.torso[i];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      for (int slot = 0; slot < HX_SLOTS; ++slot) {
-        k->link[joint][i][slot] += h * u.link[joint][i][slot];
-        dv.link[joint][i][slot] += gamma * h * u.link[joint][i][slot];
-      }
-  }
   hx_position_rates(y, &dv, &carried);
-  for (int i = HX_R; i < HX_V; ++i) {
-    k->torso[i] += h * carried.torso[i];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      for (int slot = 0; slot < HX_SLOTS; ++slot) k->link[joint][i][slot] += h * carried.link[joint][i][slot];
-  }
+  add_part(&dx, h * gamma, &carried, HX_R, HX_V);
+  hx_implicit_solve(implicit, &dx, &dv, &u);
+  add_part(k, h, &u, HX_V, HX_BODY_STATE);
+  add_part(&dv, gamma * h, &u, HX_V, HX_BODY_STATE);
+  hx_position_rates(y, &dv, &carried);
+  add_part(k, h, &carried, HX_R, HX_V);
 }
 
-/* largest error over scale, NaN kept */
+/* largest error over scale; NaN is the caller's to find */
 static double error_norm(const hxMotion *error, double tolerance) {
   double worst = 0.0;
   for (int i = 0; i < HX_BODY_STATE; ++i) {
-    const double weight = 1.0 / (tolerance * error_scale[i]);
-    double e = fabs(error->torso[i]);
+    double largest[HX_SLOTS] = {0.0}, e = fabs(error->torso[i]);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      for (int leg = 0; leg < HX_LEGS; ++leg) e = fabs(error->link[joint][i][leg]) > e ? fabs(error->link[joint][i][leg]) : e;
-    worst = e * weight > worst || isnan(e) ? e * weight : worst;
+      for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
+        hx_store(&largest[slot], hx_max(hx_load(&largest[slot]), hx_abs(hx_load(&error->link[joint][i][slot]))));
+    for (int leg = 0; leg < HX_LEGS; ++leg) e = fmax(e, largest[leg]);
+    worst = fmax(worst, e / (tolerance * error_scale[i]));
   }
   return worst;
 }
@@ -86,13 +81,13 @@ static void normalise_quaternions(hxMotion *m) {
   double *p = &m->torso[HX_P];
   const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
   for (int i = 0; i < 4; ++i) p[i] *= scale;
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    double (*q)[HX_SLOTS] = &m->link[joint][HX_P];
-    for (int slot = 0; slot < HX_SLOTS; ++slot) {
-      const double s = 1.0 / sqrt(q[0][slot] * q[0][slot] + q[1][slot] * q[1][slot] + q[2][slot] * q[2][slot] + q[3][slot] * q[3][slot]);
-      for (int i = 0; i < 4; ++i) q[i][slot] *= s;
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+      double (*q)[HX_SLOTS] = &m->link[joint][HX_P];
+      const hxReal w = hx_load(&q[0][slot]), x = hx_load(&q[1][slot]), y = hx_load(&q[2][slot]), z = hx_load(&q[3][slot]);
+      const hxReal s = 1.0 / hx_sqrt(w * w + x * x + y * y + z * z);
+      hx_store(&q[0][slot], s * w), hx_store(&q[1][slot], s * x), hx_store(&q[2][slot], s * y), hx_store(&q[3][slot], s * z);
     }
-  }
 }
 
 static void fill_motion_slots(hxMotion *m) {
@@ -103,9 +98,10 @@ static void fill_motion_slots(hxMotion *m) {
 /* One step of the method from a start, kept or not. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
-  hxMotion k[HX_STAGES], y, zero = {{0}};
+  hxMotion k[HX_STAGES], y, zero;
   hxImplicit implicit;
   hxWork work;
+  memset(&zero, 0, sizeof zero);
   if (m->gamma > 0.0) hx_implicit_factorise(start->model, &start->work, h * m->gamma, &implicit);
   for (int i = 0; i < m->stages; ++i) {
     k[i] = start->rate;
@@ -114,7 +110,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
       hx_dynamics_evaluate(start->model, start->contact, start->command, start->t + m->c[i] * h, &y, 0, &work, &k[i]);
       state->evaluations += 1.0;
     }
-    for (int j = 0; j < HX_MOTION_SIZE; ++j) k[i].y[j] *= h;
+    for (int j = 0; j < HX_MOTION_SIZE; j += HX_LANES) hx_store(&k[i].y[j], h * hx_load(&k[i].y[j]));
     if (m->gamma > 0.0) {
       combine(&y, &zero, m->g[i], k, i);
       implicit_stage(&implicit, start->y, h, m->gamma, &y, &k[i]);
@@ -176,9 +172,11 @@ static hxStatus give_up(const hxTrial *trial, double t, double h, char *message)
 }
 
 static int all_finite(const hxMotion *y) {
-  double sum = 0.0;
-  for (int i = 0; i < HX_MOTION_SIZE; ++i) sum += 0.0 * y->y[i];
-  return sum == 0.0;
+  hxReal sum = hx_splat(0.0);
+  for (int i = 0; i < HX_MOTION_SIZE; i += HX_LANES) sum = sum + 0.0 * hx_load(&y->y[i]);
+  double total = 0.0;
+  for (int lane = 0; lane < HX_LANES; ++lane) total += hx_lane(sum, lane);
+  return total == 0.0;
 }
 
 /* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is its length. */
@@ -215,12 +213,14 @@ static void switch_contacts(const hxModel *model, hxState *state) {
 
 /* From state->time to t_end; the last step lands on it exactly. */
 static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+  hxMotion y;
+  hxStart start; /* 30 kB: not cleared, evaluated anew at every step */
+  start.model = model, start.command = command, start.contact = &state->contact, start.method = hx_method(model->method), start.y = &y;
   while (state->time < t_end) {
     const double left = t_end - state->time;
-    const hxMotion y = state->motion;
-    hxStart start = {
-        .model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .t = state->time, .y = &y};
     double taken;
+    y = state->motion;
+    start.t = state->time;
     const hxStatus status = advance(&start, left, state, &taken, message);
     if (status != HX_OK) return status;
     const double t = state->time + taken;
