@@ -321,6 +321,16 @@ void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, c
 
 /* ---- the linearly implicit solve -------------------------------------------------------------------------------------------- */
 
+void hx_foot_ahead(const hxModel *model, const hxContactState *contact, double h, hxWork *work) {
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const int slot = pack * HX_LANES;
+    hxFootWork *foot = &work->pack[pack].foot;
+    const hxReal deeper = foot->kin.delta + h * hx_max(foot->kin.ddelta, hx_splat(0.0));
+    foot->normal = hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), deeper, foot->kin.ddelta);
+    foot->drag = model->mu * foot->normal.force * hx_friction(model->friction_law)->per_speed(model, foot->slip_speed);
+  }
+}
+
 /* contact: (z c_n + z^2 k_n) n n^T + z c_t (1 - n n^T) at the contact point x from the torso's centre of mass; z = h gamma */
 static hxInertia6 contact_inertia(const hxFootWork *foot, hxVec3 x, double z) {
   const hxVec3 n = foot->kin.normal;

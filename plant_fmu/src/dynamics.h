@@ -80,6 +80,10 @@ typedef struct {
 void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t, const hxMotion *motion,
                           int multipliers, hxWork *work, hxMotion *rate);
 
+/* Puts the feet's stiffness, viscosity and drag where they will be after h: a foot that has just touched down has none yet, and a W without
+ * them lets go of the very contact that it is there for. For hx_implicit_factorise only; forces and rates are not touched. */
+void hx_foot_ahead(const hxModel *model, const hxContactState *contact, double h, hxWork *work);
+
 /* Factorises W at the evaluated point; h_gamma = h gamma. */
 void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit);
 

@@ -96,13 +96,16 @@ static void fill_motion_slots(hxMotion *m) {
 }
 
 /* One step of the method from a start, kept or not. */
-static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
+static void try_step(hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
   hxMotion k[HX_STAGES], y, zero;
   hxImplicit implicit;
   hxWork work;
   memset(&zero, 0, sizeof zero);
-  if (m->gamma > 0.0) hx_implicit_factorise(start->model, &start->work, h * m->gamma, &implicit);
+  if (m->gamma > 0.0) {
+    hx_foot_ahead(start->model, start->contact, h, &start->work);
+    hx_implicit_factorise(start->model, &start->work, h * m->gamma, &implicit);
+  }
   for (int i = 0; i < m->stages; ++i) {
     k[i] = start->rate;
     if (i > 0) {
@@ -133,7 +136,7 @@ static double open_depth(const hxStart *start, const hxMotion *y) {
 }
 
 /* Shortens a step that ends below the ground to one that ends on it: false position (Illinois) on the step itself. */
-static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial) {
+static double find_touchdown(hxStart *start, double h, hxState *state, hxTrial *trial) {
   double low = 0.0, high = h, depth_low = open_depth(start, start->y), depth_high = open_depth(start, &trial->y);
   int side = 0;
   while (depth_high > touch_depth && high - low > step_floor) {
