@@ -2,7 +2,7 @@
 
 static const double gear_speed = 0.05; /* rad/s, where the gear's dry friction saturates */
 
-hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
+HX_LOCAL hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal wanted = model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
   const hxReal load = speed * (1.0 / model->speed_max);

@@ -13,6 +13,6 @@ typedef struct {
 } hxServo;
 
 /* motor: clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line; gear: -tau_c tanh(qd / 0.05) (eq. 13) */
-hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref, hxReal torque_ref);
+HX_LOCAL hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref, hxReal torque_ref);
 
 #endif

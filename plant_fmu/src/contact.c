@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-double hx_exact_restitution_chi(double e) {
+HX_LOCAL double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
   /* g(chi) = ln(1 + chi) - ln(1 - chi e) - chi (1 + e) falls from 0, then rises to infinity at 1/e: one root in between */
   double low = 0.0, high = 1.0 / e;
@@ -37,7 +37,7 @@ static double whatever_the_speed(const hxModel *model, double impact_speed) {
   return model->damping_scale;
 }
 
-static const hxContactRow rows[] = {
+static const hxContactRow contact_rows[] = {
     [HX_CONTACT_EXACT_RESTITUTION] = {"exact_restitution", exact, over_impact_speed},
     [HX_CONTACT_FLORES] = {"flores", flores, over_impact_speed},
     [HX_CONTACT_LANKARANI_NIKRAVESH] = {"lankarani_nikravesh", lankarani_nikravesh, over_impact_speed},
@@ -46,9 +46,11 @@ static const hxContactRow rows[] = {
     [HX_CONTACT_HERTZ] = {"hertz", hertz, whatever_the_speed},
 };
 
-const hxContactRow *hx_contact(int law) { return law >= 1 && law < (int)(sizeof rows / sizeof rows[0]) ? &rows[law] : NULL; }
+HX_LOCAL const hxContactRow *hx_contact(int law) {
+  return law >= 1 && law < (int)(sizeof contact_rows / sizeof contact_rows[0]) ? &contact_rows[law] : NULL;
+}
 
-hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta) {
+HX_LOCAL hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta) {
   const hxReal zero = hx_splat(0.0);
   const hxReal depth = closed * hx_max(delta, zero);
   const hxReal root = hx_sqrt(depth);
@@ -80,7 +82,7 @@ static void fill_contact_slots(hxContactState *contact) {
   hx_fill_slots(contact->impact_speed);
 }
 
-void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
+HX_LOCAL void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     open_foot(contact, leg);
     contact->impact_speed[leg] = 0.0;
@@ -89,7 +91,7 @@ void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxCont
   fill_contact_slots(contact);
 }
 
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact) {
+HX_LOCAL int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact) {
   int touchdowns = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (contact->closed[leg] == 0.0 && delta[leg] > 0.0) {

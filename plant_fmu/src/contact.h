@@ -19,17 +19,17 @@ typedef struct {
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
 } hxNormalForce;
 
-const hxContactRow *hx_contact(int law); /* NULL when there is no such law */
+HX_LOCAL const hxContactRow *hx_contact(int law); /* NULL when there is no such law */
 
 /* chi of the law that gives back exactly the restitution e: chi (1 + e) = ln[(1 + chi)/(1 - chi e)]; e in (0, 1]. */
-double hx_exact_restitution_chi(double e);
+HX_LOCAL double hx_exact_restitution_chi(double e);
 
-hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta);
+HX_LOCAL hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta);
 
 /* The contact states of a motion that starts here: feet in the ground are closed and count as put down slowly. */
-void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
+HX_LOCAL void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
 
 /* Touch-down of open feet in the ground, lift-off of closed ones out of it; returns the number of touch-downs. */
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact);
+HX_LOCAL int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact);
 
 #endif

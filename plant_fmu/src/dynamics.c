@@ -286,8 +286,8 @@ static void store_powers(const hxCommand *command, const hxMotion *motion, const
     rate->push_work += command->push_force[i] * motion->torso[HX_V + i] + command->push_torque[i] * motion->torso[HX_W + i];
 }
 
-void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t, const hxMotion *motion,
-                          int multipliers, hxWork *work, hxMotion *rate) {
+HX_LOCAL void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
+                                   const hxMotion *motion, int multipliers, hxWork *work, hxMotion *rate) {
   double inertia[21][HX_SLOTS], force[6][HX_SLOTS], b[6];
   hxTorsoFactor factor;
   torso_kinematics(model, motion, work);
@@ -321,7 +321,7 @@ void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, c
 
 /* ---- the linearly implicit solve -------------------------------------------------------------------------------------------- */
 
-void hx_foot_ahead(const hxModel *model, const hxContactState *contact, double h, hxWork *work) {
+HX_LOCAL void hx_foot_ahead(const hxModel *model, const hxContactState *contact, double h, hxWork *work) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const int slot = pack * HX_LANES;
     hxFootWork *foot = &work->pack[pack].foot;
@@ -341,7 +341,7 @@ static hxInertia6 contact_inertia(const hxFootWork *foot, hxVec3 x, double z) {
   return hx_carry_inertia(hx_neg(x), &I);
 }
 
-void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit) {
+HX_LOCAL void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit) {
   const int driven = model->servo_mode == HX_SERVO_KINEMATIC;
   double inertia[21][HX_SLOTS];
   implicit->torso_p = work->torso.p;
@@ -403,7 +403,7 @@ static hxForce6 leg_response(const hxImplicit *implicit, int pack, const hxMotio
   return force_at((hxForce6){hx_zero3(), force}, hx_add(leg->joint[HX_JOINTS - 1].c, leg->arm));
 }
 
-void hx_implicit_solve(const hxImplicit *implicit, const hxMotion *dx, const hxMotion *dv, hxMotion *u) {
+HX_LOCAL void hx_implicit_solve(const hxImplicit *implicit, const hxMotion *dx, const hxMotion *dv, hxMotion *u) {
   double force[6][HX_SLOTS], b[6], x[6];
   hxReal along[HX_PACKS][HX_JOINTS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {

@@ -77,17 +77,17 @@ typedef struct {
 } hxImplicit;
 
 /* Everything at (t, y): work, and dy/dt into rate. The multipliers are found when asked for, and in kinematic mode. */
-void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t, const hxMotion *motion,
-                          int multipliers, hxWork *work, hxMotion *rate);
+HX_LOCAL void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
+                                   const hxMotion *motion, int multipliers, hxWork *work, hxMotion *rate);
 
 /* Puts the feet's stiffness, viscosity and drag where they will be after h: a foot that has just touched down has none yet, and a W without
  * them lets go of the very contact that it is there for. For hx_implicit_factorise only; forces and rates are not touched. */
-void hx_foot_ahead(const hxModel *model, const hxContactState *contact, double h, hxWork *work);
+HX_LOCAL void hx_foot_ahead(const hxModel *model, const hxContactState *contact, double h, hxWork *work);
 
 /* Factorises W at the evaluated point; h_gamma = h gamma. */
-void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit);
+HX_LOCAL void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit);
 
 /* u of W u + D^T mu = G_v dv + G_x dx, D u = 0, in the velocity entries of u. dx and dv: positions of dx, velocities of dv. */
-void hx_implicit_solve(const hxImplicit *implicit, const hxMotion *dx, const hxMotion *dv, hxMotion *u);
+HX_LOCAL void hx_implicit_solve(const hxImplicit *implicit, const hxMotion *dx, const hxMotion *dv, hxMotion *u);
 
 #endif

@@ -14,9 +14,11 @@ static hxReal none(const hxModel *model, hxReal speed) {
   return hx_splat(0.0);
 }
 
-static const hxFrictionRow rows[] = {
+static const hxFrictionRow friction_rows[] = {
     [HX_FRICTION_TANH] = {"tanh", tanh_law},
     [HX_FRICTION_NONE] = {"none", none},
 };
 
-const hxFrictionRow *hx_friction(int law) { return law >= 1 && law < (int)(sizeof rows / sizeof rows[0]) ? &rows[law] : NULL; }
+HX_LOCAL const hxFrictionRow *hx_friction(int law) {
+  return law >= 1 && law < (int)(sizeof friction_rows / sizeof friction_rows[0]) ? &friction_rows[law] : NULL;
+}

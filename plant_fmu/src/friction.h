@@ -11,6 +11,6 @@ typedef struct {
   hxReal (*per_speed)(const hxModel *model, hxReal speed); /* g, s/m, with its limit at rest */
 } hxFrictionRow;
 
-const hxFrictionRow *hx_friction(int law); /* NULL when there is no such law */
+HX_LOCAL const hxFrictionRow *hx_friction(int law); /* NULL when there is no such law */
 
 #endif

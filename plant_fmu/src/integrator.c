@@ -233,7 +233,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_
   return HX_OK;
 }
 
-hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+HX_LOCAL hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
   if (model->step == 0.0) return run_to(model, command, t_end, state, message);
   const double t_start = state->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));

@@ -5,6 +5,6 @@
 #include "state.h"
 
 /* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
-hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message);
+HX_LOCAL hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message);
 
 #endif

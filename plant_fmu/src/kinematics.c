@@ -10,7 +10,7 @@ static hxBodyWork load_link(const double (*m)[HX_SLOTS], int slot) {
   return body;
 }
 
-hxBodyWork hx_torso_work(const hxMotion *motion) {
+HX_LOCAL hxBodyWork hx_torso_work(const hxMotion *motion) {
   const double *m = motion->torso;
   hxBodyWork body;
   body.r = hx_splat_vec3(&m[HX_R]);
@@ -30,8 +30,8 @@ static hxReal joint_angle(const hxJointModel *model, int slot, hxQuat p_i, hxQua
   return hx_angle_from_half(hx_dot(u, hx_load_vec3(model->s_j, slot)), from.w * p_j.w + hx_dot(u_i, u_j));
 }
 
-void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int joint, int slot, const hxBodyWork *i,
-                         hxJointKinematics *k) {
+HX_LOCAL void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int joint, int slot, const hxBodyWork *i,
+                                  hxJointKinematics *k) {
   k->body = load_link(motion->link[joint], slot);
   const hxBodyWork *j = &k->body;
   k->sP_i = hx_mul(i->R, hx_load_vec3(model->sP_i, slot));
@@ -68,7 +68,7 @@ void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int 
   k->gamma[1] = k->phi[1] * w2 - s_wj * hx_dot(b, j->w) + twice * hx_dot(b, i->w);
 }
 
-void hx_foot_kinematics(const hxModel *model, int slot, const hxBodyWork *tibia, hxFootKinematics *foot) {
+HX_LOCAL void hx_foot_kinematics(const hxModel *model, int slot, const hxBodyWork *tibia, hxFootKinematics *foot) {
   const hxVec3 to_centre = hx_mul(tibia->R, hx_load_vec3(model->foot_centre, slot));
   const hxGround ground = hx_terrain(model->terrain_kind)->ground(model, hx_add(tibia->r, to_centre));
   foot->normal = ground.normal;
@@ -79,7 +79,7 @@ void hx_foot_kinematics(const hxModel *model, int slot, const hxBodyWork *tibia,
   foot->ddelta = -hx_dot(foot->velocity, ground.normal);
 }
 
-void hx_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
+HX_LOCAL void hx_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     const hxBodyWork tibia = load_link(motion->link[HX_JOINTS - 1], slot);
     hxFootKinematics foot;
@@ -100,7 +100,7 @@ static void position_rates(const double (*p)[HX_SLOTS], const double (*m)[HX_SLO
   }
 }
 
-void hx_position_rates(const hxMotion *at, const hxMotion *velocities, hxMotion *rate) {
+HX_LOCAL void hx_position_rates(const hxMotion *at, const hxMotion *velocities, hxMotion *rate) {
   const double *p = at->torso, *m = velocities->torso;
   const hxQuat torso = {hx_splat(p[HX_P]), hx_splat(p[HX_P + 1]), hx_splat(p[HX_P + 2]), hx_splat(p[HX_P + 3])};
   const hxQuat dp = hx_quaternion_rate(torso, hx_splat_vec3(&m[HX_W]));

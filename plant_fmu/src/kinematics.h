@@ -32,15 +32,15 @@ typedef struct {
   hxReal delta, ddelta; /* penetration, approach speed */
 } hxFootKinematics;
 
-hxBodyWork hx_torso_work(const hxMotion *motion);
-void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int joint, int slot, const hxBodyWork *parent,
-                         hxJointKinematics *k);
-void hx_foot_kinematics(const hxModel *model, int slot, const hxBodyWork *tibia, hxFootKinematics *foot);
+HX_LOCAL hxBodyWork hx_torso_work(const hxMotion *motion);
+HX_LOCAL void hx_joint_kinematics(const hxJointModel *model, const hxMotion *motion, int joint, int slot, const hxBodyWork *parent,
+                                  hxJointKinematics *k);
+HX_LOCAL void hx_foot_kinematics(const hxModel *model, int slot, const hxBodyWork *tibia, hxFootKinematics *foot);
 
 /* Penetration and approach speed of every foot. */
-void hx_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]);
+HX_LOCAL void hx_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]);
 
 /* Rates of the positions, dr/dt = v and dp/dt = (0, w) p / 2, with p from one motion and v, w from another (or the same). */
-void hx_position_rates(const hxMotion *at, const hxMotion *velocities, hxMotion *rate);
+HX_LOCAL void hx_position_rates(const hxMotion *at, const hxMotion *velocities, hxMotion *rate);
 
 #endif

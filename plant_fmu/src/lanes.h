@@ -22,6 +22,11 @@
 #endif
 #endif
 
+/* Linkage of the functions on lanes: ordinary in files compiled by themselves, static where a kernel includes them (kernel_avx2.c). */
+#ifndef HX_LOCAL
+#define HX_LOCAL
+#endif
+
 enum { HX_SLOTS = 8 }; /* legs in memory, padded: slots past the last leg mirror leg 0 */
 
 #if HX_LANES == 1

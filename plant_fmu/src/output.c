@@ -8,7 +8,7 @@ static void get3(hxVec3 a, int lane, double out[3]) {
   out[2] = hx_lane(a.z, lane);
 }
 
-/* calls for one leg: which pack and lane hold it */
+/* the pack and lane that hold a leg */
 static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
   *lane = leg % HX_LANES;
   return &work->pack[leg / HX_LANES];
@@ -18,7 +18,7 @@ static hxReal body_kinetic(hxReal mass, hxSym3 J, const hxBodyWork *body) {
   return 0.5 * (mass * hx_dot(body->v, body->v) + hx_dot(body->w, hx_sym_mul(J, body->w)));
 }
 
-double hx_kinetic_energy(const hxModel *model, const hxWork *work) {
+HX_LOCAL double hx_kinetic_energy(const hxModel *model, const hxWork *work) {
   double sum = hx_lane(body_kinetic(hx_splat(model->torso_mass), work->torso_J, &work->torso), 0);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
@@ -32,7 +32,7 @@ double hx_kinetic_energy(const hxModel *model, const hxWork *work) {
   return sum;
 }
 
-double hx_potential_energy(const hxModel *model, const hxWork *work) {
+HX_LOCAL double hx_potential_energy(const hxModel *model, const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
   double sum = -model->torso_mass * hx_lane(hx_dot(g, work->torso.r), 0);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -111,7 +111,7 @@ static void fill_energy(const hxModel *model, const hxState *state, const hxWork
   o->energy.residual = o->energy.kinetic + o->energy.potential - state->stored_at_start - m->actuator_work - m->push_work + m->dissipated;
 }
 
-void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
+HX_LOCAL void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
   o->time = state->time;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
@@ -126,4 +126,21 @@ void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *wo
   o->solver.steps = state->steps;
   o->solver.rejected = state->rejected;
   o->solver.touchdowns = state->touchdowns;
+}
+
+HX_LOCAL void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, double acceleration[HX_BODIES][6],
+                                    double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
+  for (int i = 0; i < 6; ++i) acceleration[0][i] = rate->torso[HX_V + i];
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    int lane;
+    const hxLegWork *w = leg_work(work, leg, &lane);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointWork *k = &w->joint[joint];
+      const int row = HX_JOINTS * leg + joint;
+      for (int i = 0; i < 6; ++i) acceleration[1 + row][i] = rate->link[joint][HX_V + i][leg];
+      get3(k->lambda_lin, lane, multiplier[row]);
+      for (int i = 0; i < 2; ++i) multiplier[row][3 + i] = hx_lane(k->lambda[i], lane);
+      drive_torque[row] = hx_lane(k->servo.torque, lane);
+    }
+  }
 }

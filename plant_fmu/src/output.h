@@ -5,11 +5,15 @@
 #include "dynamics.h"
 
 /* kinetic energy of bodies and rotors */
-double hx_kinetic_energy(const hxModel *model, const hxWork *work);
+HX_LOCAL double hx_kinetic_energy(const hxModel *model, const hxWork *work);
 
 /* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
-double hx_potential_energy(const hxModel *model, const hxWork *work);
+HX_LOCAL double hx_potential_energy(const hxModel *model, const hxWork *work);
 
-void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *output);
+HX_LOCAL void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *output);
+
+/* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's bodies */
+HX_LOCAL void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, double acceleration[HX_BODIES][6],
+                                    double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]);
 
 #endif

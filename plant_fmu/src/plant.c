@@ -6,12 +6,8 @@
 #include <string.h>
 
 #include "check.h"
-#include "dynamics.h"
-#include "integrator.h"
-#include "output.h"
+#include "kernel.h"
 #include "robot.h"
-
-static const double first_step = 1e-4; /* s  tried after a reset */
 
 /* A saved state: the plant's model and state behind what it takes to recognise them. */
 typedef struct {
@@ -34,22 +30,6 @@ static uint64_t checksum(const hxSaved *saved) {
 static hxStatus refuse(hxPlant *plant, hxStatus status, const char *text) {
   snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);
   return status;
-}
-
-/* Contacts, energy and counters of a motion that starts here and now. */
-static void start_motion(const hxModel *model, hxState *state, double t) {
-  static const hxCommand no_command;
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  hxMotion rate;
-  hxWork work;
-  state->time = t;
-  state->next_step = fmin(first_step, model->step_max);
-  state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
-  state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
-  hx_feet(model, &state->motion, delta, ddelta);
-  hx_contact_start(model, delta, &state->contact);
-  hx_dynamics_evaluate(model, &state->contact, &no_command, t, &state->motion, 0, &work, &rate);
-  state->stored_at_start = hx_kinetic_energy(model, &work) + hx_potential_energy(model, &work);
 }
 
 const char *hx_plant_message(const hxPlant *plant) { return plant->message; }
@@ -77,7 +57,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   hx_model_compile(&plant->model, definition);
   hx_initial_bodies(definition, body);
   hx_motion_from_bodies(&plant->state.motion, body);
-  start_motion(&plant->model, &plant->state, t);
+  hx_kernel()->start(&plant->model, t, &plant->state);
   plant->message[0] = '\0';
   return HX_OK;
 }
@@ -93,18 +73,15 @@ hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
   hx_command_from_input(&command, input, plant->state.time);
-  status = hx_integrate(&plant->model, &command, t_end, &plant->state, plant->message);
+  status = hx_kernel()->integrate(&plant->model, &command, t_end, &plant->state, plant->message);
   if (status != HX_OK) plant->state = before;
   return status;
 }
 
 void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
   hxCommand command;
-  hxMotion rate;
-  hxWork work;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time, &plant->state.motion, 1, &work, &rate);
-  hx_output_fill(&plant->model, &plant->state, &work, output);
+  hx_kernel()->output(&plant->model, &plant->state, &command, output);
 }
 
 size_t hx_plant_state_size(void) { return sizeof(hxSaved); }
@@ -135,25 +112,13 @@ hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BOD
     for (int i = 0; i < HX_BODY_STATE; ++i)
       if (!isfinite(body[b][i])) return refuse(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
   hx_motion_from_bodies(&plant->state.motion, body);
-  start_motion(&plant->model, &plant->state, plant->state.time);
+  hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
   return HX_OK;
 }
 
 void hx_plant_accelerations(hxPlant *plant, const hxInput *input, double acceleration[HX_BODIES][6],
                             double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
   hxCommand command;
-  hxMotion rate;
-  hxWork work;
-  double body[HX_BODIES][HX_BODY_STATE];
   hx_command_from_input(&command, input, plant->state.time);
-  hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time, &plant->state.motion, 1, &work, &rate);
-  hx_bodies_from_motion(&rate, body);
-  for (int b = 0; b < HX_BODIES; ++b) memcpy(acceleration[b], &body[b][HX_V], 6 * sizeof(double));
-  for (int j = 0; j < HX_BODIES - 1; ++j) {
-    const int leg = j / HX_JOINTS, lane = leg % HX_LANES;
-    const hxJointWork *k = &work.pack[leg / HX_LANES].joint[j % HX_JOINTS];
-    const hxReal row[HX_MULTIPLIERS] = {k->lambda_lin.x, k->lambda_lin.y, k->lambda_lin.z, k->lambda[0], k->lambda[1]};
-    for (int i = 0; i < HX_MULTIPLIERS; ++i) multiplier[j][i] = hx_lane(row[i], lane);
-    drive_torque[j] = hx_lane(k->servo.torque, lane);
-  }
+  hx_kernel()->accelerations(&plant->model, &plant->state, &command, acceleration, multiplier, drive_torque);
 }

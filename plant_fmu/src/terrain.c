@@ -9,9 +9,11 @@ static hxGround slope(const hxModel *model, hxVec3 point) {
   return (hxGround){hx_dot(n, hx_sub(point, hx_splat_vec3(model->ground_point))), n};
 }
 
-static const hxTerrainRow rows[] = {
+static const hxTerrainRow terrain_rows[] = {
     [HX_TERRAIN_FLAT] = {"flat", flat},
     [HX_TERRAIN_SLOPE] = {"slope", slope},
 };
 
-const hxTerrainRow *hx_terrain(int kind) { return kind >= 1 && kind < (int)(sizeof rows / sizeof rows[0]) ? &rows[kind] : NULL; }
+HX_LOCAL const hxTerrainRow *hx_terrain(int kind) {
+  return kind >= 1 && kind < (int)(sizeof terrain_rows / sizeof terrain_rows[0]) ? &terrain_rows[kind] : NULL;
+}

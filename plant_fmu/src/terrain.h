@@ -16,6 +16,6 @@ typedef struct {
   hxGround (*ground)(const hxModel *model, hxVec3 point);
 } hxTerrainRow;
 
-const hxTerrainRow *hx_terrain(int kind); /* NULL when there is no such kind */
+HX_LOCAL const hxTerrainRow *hx_terrain(int kind); /* NULL when there is no such kind */
 
 #endif

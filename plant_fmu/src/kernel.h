@@ -1,0 +1,33 @@
+/* kernel.h - the physics of one instruction set behind a table of functions
+ *
+ * The files on lanes are compiled by themselves for the baseline, and once more, included by kernel_avx2.c, with wider lanes. All kernels give
+ * the same bits (lanes.h), so a state saved under one goes on under another.
+ */
+#ifndef HX_KERNEL_H
+#define HX_KERNEL_H
+
+#include "state.h"
+
+typedef struct hxKernel {
+  const char *name;
+  int (*runs_here)(void); /* whether this processor has its instructions */
+
+  /* Sets contacts, energy, counters and time of a motion that starts here and now. */
+  void (*start)(const hxModel *model, double t, hxState *state);
+
+  /* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
+  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message);
+
+  void (*output)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output);
+
+  void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],
+                        double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]);
+} hxKernel;
+
+/* All kernels of this build, fastest first, ended by NULL. */
+extern const hxKernel *const hx_kernels[];
+
+/* The fastest kernel that this processor runs. */
+const hxKernel *hx_kernel(void);
+
+#endif

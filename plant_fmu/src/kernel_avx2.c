@@ -1,0 +1,46 @@
+/* kernel_avx2.c - the files on lanes once more, four legs at a time */
+#include "kernel_avx2.h"
+
+#if HX_HAS_AVX2_KERNEL
+
+/* what follows is compiled for AVX2 without the build knowing, so that an importer's plain compiler call does it too */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2")
+#endif
+
+#define HX_LANES 4
+#define HX_LOCAL static
+
+#include "actuator.c"
+#include "contact.c"
+#include "dynamics.c"
+#include "friction.c"
+#include "integrator.c"
+#include "kinematics.c"
+#include "output.c"
+#include "terrain.c"
+
+#include "kernel_functions.h"
+
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+
+static int has_avx2(void) { return __builtin_cpu_supports("avx2"); }
+
+extern const hxKernel hx_kernel_avx2;
+const hxKernel hx_kernel_avx2 = HX_KERNEL_TABLE("avx2", has_avx2);
+
+#else
+typedef int hx_no_avx2_kernel; /* a file must not be empty */
+#endif

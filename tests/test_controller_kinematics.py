@@ -1,0 +1,140 @@
+"""The legs' closed-form kinematics against the twin's rotations, differences and each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.controller import LegSolver
+from hexapod_cosim.models import ReachError, Robot, RobotError, foot_positions, load_robot
+
+ROUND_OFF = 1e-12  # m, rad    of a dozen operations on numbers of order 1
+STEP = 1e-6  # rad    of central differences: truncation 1e-12, round-off 1e-10
+DIFFERENCE_ERROR = 1e-8  # m/rad
+POSES = 200
+
+
+def robots() -> list[Robot]:
+    """The two packaged robots and one whose legs differ, with sideways offsets."""
+    athena = load_robot("athena")
+    legs = list(athena.legs)
+    coxa, femur, tibia = legs[1].links
+    odd = (replace(coxa, offset_y=0.01, offset_z=-0.02), replace(femur, length=0.13, offset_y=-0.03), replace(tibia, offset_z=0.02))
+    legs[1] = replace(legs[1], links=odd)
+    return [athena, load_robot("phantomx_mk4"), replace(athena, name="odd", legs=tuple(legs))]
+
+
+@pytest.fixture(params=robots(), ids=lambda robot: robot.name)
+def robot(request: pytest.FixtureRequest) -> Robot:
+    found: Robot = request.param
+    return found
+
+
+def reachable_poses(robot: Robot, count: int = POSES) -> np.ndarray:
+    """Random joint angles within the limits, knee up and the foot outside the coxa axis: where the inverse is unique."""
+    solver, generator = LegSolver(robot), np.random.default_rng(7)
+    found: list[np.ndarray] = []
+    while len(found) < count:
+        angle = generator.uniform(solver.angle_min, solver.angle_max)
+        knee = angle[:, 2] + solver.femur_tilt - solver.tibia_tilt
+        outward = solver.coxa_length + solver.femur * np.cos(angle[:, 1] + solver.femur_tilt)
+        outward += solver.tibia * np.cos(angle[:, 1] - angle[:, 2] + solver.tibia_tilt)
+        good = (knee > 0.05) & (knee < np.pi - 0.05) & (outward > 0.02)
+        angle[~good] = solver.inverse(solver.forward(robot.stance))[~good]
+        found.append(angle)
+    return np.array(found)
+
+
+def test_forward_kinematics_are_the_twins(robot: Robot) -> None:
+    for angle in reachable_poses(robot, 20):
+        np.testing.assert_allclose(LegSolver(robot).forward(angle), foot_positions(robot, angle), atol=ROUND_OFF)
+
+
+def test_the_inverse_of_forward_is_the_identity(robot: Robot) -> None:
+    solver = LegSolver(robot)
+    for angle in reachable_poses(robot):
+        np.testing.assert_allclose(solver.inverse(solver.forward(angle)), angle, atol=1e-9)  # arccos near a straight leg
+
+
+def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
+    solver = LegSolver(robot)
+    for angle in reachable_poses(robot, 20):
+        jacobian = solver.jacobian(angle)
+        for joint in range(3):
+            nudge = np.zeros((6, 3))
+            nudge[:, joint] = STEP
+            slope = (solver.forward(angle + nudge) - solver.forward(angle - nudge)) / (2.0 * STEP)
+            np.testing.assert_allclose(jacobian[:, :, joint], slope, atol=DIFFERENCE_ERROR)
+
+
+def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot) -> None:
+    solver, generator = LegSolver(robot), np.random.default_rng(3)
+    angle, speed, flag = np.empty((6, 3)), np.empty((6, 3)), np.empty(6, dtype=bool)
+    compared = 0
+    for pose in reachable_poses(robot, 50):
+        foot, velocity = solver.forward(pose), generator.normal(size=(6, 3)) * 0.02
+        solver.solve(foot[:, 0] + 1j * foot[:, 1], foot[:, 2], velocity[:, 0] + 1j * velocity[:, 1], velocity[:, 2], angle, speed, flag)
+        expected = np.linalg.solve(solver.jacobian(pose), velocity[:, :, None])[:, :, 0]
+        slow = np.abs(expected).max(axis=1) < robot.servo.speed_max
+        compared += int(slow.sum())
+        np.testing.assert_allclose(speed[slow], expected[slow], rtol=1e-7, atol=1e-9)
+        assert not flag.any()
+    assert compared > 100
+
+
+def test_the_stance_is_found_again(robot: Robot) -> None:
+    solver = LegSolver(robot)
+    np.testing.assert_allclose(solver.inverse(solver.forward(robot.stance)), robot.stance, atol=ROUND_OFF)
+
+
+@pytest.mark.parametrize(("leg", "name"), [(0, "LF"), (4, "RM")])
+def test_a_foot_out_of_reach_is_refused_with_leg_target_and_reach(leg: int, name: str) -> None:
+    robot = load_robot("athena")
+    solver = LegSolver(robot)
+    foot = solver.forward(robot.stance)
+    foot[leg] = [0.6, 0.1, 0.0]
+    with pytest.raises(ReachError, match=f"leg {name}.*0\\.6, 0\\.1, 0\\.0.*0\\.0600 to 0\\.2600 m") as caught:
+        solver.inverse(foot)
+    assert caught.value.got == (0.6, 0.1, 0.0)
+
+
+def test_a_foot_beyond_a_joint_limit_is_refused() -> None:
+    robot = load_robot("athena")
+    solver = LegSolver(robot)
+    angle = robot.stance
+    angle[2, 0] = solver.angle_max[2, 0] + 0.1
+    with pytest.raises(ReachError, match="leg LR"):
+        solver.inverse(solver.forward(angle))
+
+
+def test_a_foot_that_is_not_a_number_is_refused() -> None:
+    robot = load_robot("athena")
+    foot = LegSolver(robot).forward(robot.stance)
+    foot[3, 2] = np.nan
+    with pytest.raises(ReachError, match="leg RF"):
+        LegSolver(robot).inverse(foot)
+
+
+def test_solve_stays_within_the_limits_and_flags_the_leg() -> None:
+    robot = load_robot("athena")
+    solver = LegSolver(robot)
+    foot = solver.forward(robot.stance)
+    foot[0] *= 3.0
+    foot[5] = solver.hip[:, 5]  # on the coxa's axis
+    angle, speed, flag = np.empty((6, 3)), np.empty((6, 3)), np.empty(6, dtype=bool)
+    solver.solve(foot[:, 0] + 1j * foot[:, 1], foot[:, 2], np.full(6, 0.1 + 0j), np.zeros(6), angle, speed, flag)
+    assert flag.tolist() == [True, False, False, False, False, True]
+    assert (angle >= solver.angle_min).all()
+    assert (angle <= solver.angle_max).all()
+    assert np.isfinite(speed).all()
+
+
+def test_another_axis_pattern_is_refused() -> None:
+    robot = load_robot("athena")
+    legs = list(robot.legs)
+    coxa, femur, tibia = legs[3].links
+    legs[3] = replace(legs[3], links=(coxa, replace(femur, axis=(0.0, 1.0, 0.0)), tibia))
+    with pytest.raises(RobotError, match=r"leg RF, joint 2.*\(0\.0, -1\.0, 0\.0\)"):
+        LegSolver(replace(robot, legs=tuple(legs)))
