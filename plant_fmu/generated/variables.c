@@ -773,7 +773,7 @@ const char *const hx_log_category_names[] = {
     "logAll",
 };
 
-const char hx_default_guid[] = "{03d4bf15-3452-4ba2-b629-63d98a5043d3}";
+const char hx_default_guid[] = "{5eb212fb-122a-4c5c-94b8-6526535ae9f0}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -7,10 +7,13 @@
 #include "method.h"
 
 static const double step_floor = 1e-11;     /* s  below this the error control gives up */
+static const double steps_at_least = 1e5;   /* 1  a call may take this many steps and */
+static const double steps_a_second = 1e7;   /* 1/s  this many more for each second it covers: no call runs on for ever */
 static const double touch_depth = 1e-10;    /* m  a touch-down is found when the foot is in by less than this */
 
-/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s. */
+/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 0.1 J for the energy audit. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
+static const double work_scale = 0.1;
 
 /* Where a step starts, evaluated once however often the step is tried. */
 typedef struct {
@@ -19,6 +22,7 @@ typedef struct {
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
+  double last_step; /* count of steps, kept and rejected, at which the error control gives up */
   const hxMotion *y;
   hxWork work;
   hxMotion rate;
@@ -65,7 +69,8 @@ static void implicit_stage(const hxImplicit *implicit, const hxMotion *y, double
 
 /* largest error over scale; NaN is the caller's to find */
 static double error_norm(const hxMotion *error, double tolerance) {
-  double worst = 0.0;
+  const double work = fmax(fmax(fabs(error->actuator_work), fabs(error->push_work)), fabs(error->dissipated));
+  double worst = work / (tolerance * work_scale);
   for (int i = 0; i < HX_BODY_STATE; ++i) {
     double largest[HX_SLOTS] = {0.0}, e = fabs(error->torso[i]);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
@@ -163,13 +168,14 @@ static double step_factor(const hxMethodRow *method, double error) {
   return fmin(5.0, fmax(0.2, factor));
 }
 
+/* Why a step of h from t cannot be had. */
 static hxStatus give_up(const hxTrial *trial, double t, double h, char *message) {
   const int lost = isnan(trial->error);
   snprintf(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, stiffness and inputs, or let the error "
                   "control choose the step (solver.step = 0)"
-                : "the error control asks for steps below its floor at t = %.9g s (got %.3g s, expected at least 1e-11 s); raise "
-                  "solver.tolerance or use a linearly implicit solver.method",
+                : "the error control gives up at t = %.9g s (step %.3g s), where it finds no step that takes the motion on in reasonable "
+                  "time; check the inputs for extreme values, raise solver.tolerance or use a linearly implicit solver.method",
            t, h);
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
 }
@@ -189,7 +195,9 @@ static hxStatus advance(hxStart *start, double h_max, hxState *state, double *ta
   hx_dynamics_evaluate(model, start->contact, start->command, start->t, start->y, 0, &start->work, &start->rate);
   state->evaluations += 1.0;
   double h = model->step > 0.0 ? h_max : fmin(h_max, state->next_step);
+  trial.error = 0.0;
   for (;;) {
+    if (model->step == 0.0 && state->steps + state->rejected >= start->last_step) return give_up(&trial, start->t, h, message);
     try_step(start, h, state, &trial);
     if (!all_finite(&trial.y)) trial.error = NAN;
     if (trial.error <= 1.0) break;
@@ -219,6 +227,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_
   hxMotion y;
   hxStart start; /* 30 kB: not cleared, evaluated anew at every step */
   start.model = model, start.command = command, start.contact = &state->contact, start.method = hx_method(model->method), start.y = &y;
+  start.last_step = state->steps + state->rejected + steps_at_least + steps_a_second * (t_end - state->time);
   while (state->time < t_end) {
     const double left = t_end - state->time;
     double taken;

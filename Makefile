@@ -1,0 +1,63 @@
+# make demo   set-up, the paper's comparison, and where its report is
+# make test   set-up and every test
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+TYPING := build/typing/hexapod_cosim
+SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h)
+
+.PHONY: help setup demo test check format generate fmu typing clean
+
+help:
+	@echo "make setup     the hexapod command in $(BIN)"
+	@echo "make demo      the paper's comparison; says where its report is"
+	@echo "make test      every test"
+	@echo "make check     formatters, linters, types, generated files"
+	@echo "make format    formats C and Python"
+	@echo "make generate  plant_fmu/generated/ from plant_fmu/interface.toml"
+	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
+	@echo "make clean     removes what these made"
+
+setup: $(STAMP)
+
+# installed anew whenever the C sources or the project's description change
+$(STAMP): $(SOURCES)
+	$(PYTHON) tools/make_venv.py $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	@touch $@
+
+demo: setup
+	$(BIN)/hexapod compare walk_flat -o out/demo
+
+test: setup typing
+	$(BIN)/python -m pytest
+
+check: setup typing
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy --package hexapod_cosim
+	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
+	$(BIN)/python tools/generate.py --check
+
+format: setup
+	$(BIN)/ruff check --fix-only --quiet .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(C_FILES)
+
+generate: setup
+	$(BIN)/python tools/generate.py
+
+fmu: setup
+	$(BIN)/hexapod export --robot athena -o out/athena.fmu
+	$(BIN)/hexapod export --robot phantomx_mk4 -o out/phantomx_mk4.fmu
+
+# the folders under the name they are imported by, for type checkers
+typing:
+	@mkdir -p $(TYPING)
+	@for part in models controller cosim; do ln -sfn ../../../$$part $(TYPING)/$$part; done
+
+clean:
+	rm -rf $(VENV) build out dist .pytest_cache .mypy_cache .ruff_cache

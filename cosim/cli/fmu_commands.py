@@ -1,0 +1,81 @@
+"""`hexapod export`, `validate` and `design`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.controller import save_gains
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json
+from hexapod_cosim.cosim.export import export_fmu
+from hexapod_cosim.cosim.files import not_writable
+from hexapod_cosim.cosim.validation import find_problems
+from hexapod_cosim.models import FmuError, HexapodError, load_robot
+
+RobotName = Annotated[str, typer.Option("--robot", metavar="FILE", help="A robot file, or a name of `hexapod list robots`.")]
+DEFAULT_PERIOD = 0.005  # s, the default macro-step
+
+
+def export(
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.fmu", help="The file to write; default ROBOT.fmu.")] = None,
+    robot: RobotName = "athena",
+    fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard.")] = 2,
+    platforms: Annotated[
+        str | None,
+        typer.Option("--platforms", help="Platforms, separated by commas; default: this machine's; all: every one that is installed."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Pack the plant FMU of a robot."""
+    made = load_robot(robot)
+    path = output or Path(f"{made.name}.fmu")
+    if path.suffix != ".fmu":
+        raise HexapodError(
+            "not an FMU's name", got=path.name, expected="a name that ends in .fmu", fix=f"write -o {path.with_suffix('.fmu')}"
+        )
+    chosen = [name.strip() for name in platforms.split(",")] if platforms else None
+    export_fmu(made, path, fmi=fmi, platforms=chosen)
+    if json:
+        show_json({"fmu": str(path), "robot": made.name, "hash": made.hash})
+        return
+    show_files([path])
+
+
+def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")], json: Json = False) -> None:
+    """Check an FMU of ours and say what is wrong."""
+    problems = find_problems(fmu)
+    if json:
+        show_json({"fmu": str(fmu), "valid": not problems, "problems": problems})
+    else:
+        print("\n".join([*problems, f"{len(problems)} problems"]) if problems else f"{fmu}: no problems found")
+    if problems:
+        fix = "export it again with `hexapod export`"
+        raise FmuError("the FMU is not sound", got=f"{len(problems)} problems, the first: {problems[0]}", fix=fix, where=str(fmu))
+
+
+def design(
+    robot: RobotName = "athena",
+    macro_step: Annotated[float, typer.Option("--macro-step", help="Period of the controller [s].")] = DEFAULT_PERIOD,
+    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/design.")] = None,
+    json: Json = False,
+) -> None:
+    """Design the gains of the compliant control, with plots."""
+    from hexapod_cosim.controller.design import design_gains, plot_design  # noqa: PLC0415  slow to import: python-control, matplotlib
+
+    made = load_robot(robot)
+    folder = output or Path("out") / "design"
+    gains = design_gains(made, period=macro_step)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [save_gains(gains, folder / "gains.toml"), *plot_design(gains, folder)]
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    if json:
+        show_json({"gains": asdict(gains), "files": [str(file) for file in files]})
+        return
+    margins = asdict(gains.margins)
+    print("\n".join(f"{name.replace('_', ' ')}: {value:.4g}" for name, value in margins.items()))
+    show_files(files)

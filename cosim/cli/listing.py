@@ -1,0 +1,70 @@
+"""`hexapod list`: what there is."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from hexapod_cosim.controller import PATTERNS
+from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table
+from hexapod_cosim.cosim.interface import load_interface
+from hexapod_cosim.cosim.scenario import list_scenarios
+from hexapod_cosim.models import LEG_NAMES, list_robots, load_robot, unknown_name
+
+Rows = list[dict[str, Any]]
+
+
+def robots() -> Rows:
+    """The robots that come with the package; mass in kg."""
+    loaded = [load_robot(name) for name in list_robots()]
+    return [{"name": robot.name, "mass": round(robot.total_mass, 6), "about": robot.source.get("robot", "")} for robot in loaded]
+
+
+def scenarios() -> Rows:
+    """The scenarios that come with the package."""
+    return [
+        {"name": name, "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))}
+        for name, path in list_scenarios().items()
+    ]
+
+
+def gaits() -> Rows:
+    """The gaits with their natural duty factor and the phase of each leg."""
+    return [{"name": name, "duty": gait.duty, **dict(zip(LEG_NAMES, gait.offsets, strict=True))} for name, gait in PATTERNS.items()]
+
+
+def terrains() -> Rows:
+    """The kinds of ground."""
+    return _choices("TerrainKind")
+
+
+def laws() -> Rows:
+    """The laws of the normal and the tangential contact force."""
+    kinds = {"ContactLaw": "contact.law", "FrictionLaw": "friction.law"}
+    return [{"key": key} | row for kind, key in kinds.items() for row in _choices(kind)]
+
+
+def _choices(enumeration: str) -> Rows:
+    interface = load_interface(load_robot(list_robots()[0]))
+    return [{"name": name, "about": text} for name, text in interface.enumerations[enumeration].items]
+
+
+LISTS: dict[str, Callable[[], Rows]] = {"robots": robots, "scenarios": scenarios, "gaits": gaits, "terrains": terrains, "laws": laws}
+
+
+def list_what(what: Annotated[str, typer.Argument(metavar="|".join(LISTS), help="What to list.")], json: Json = False) -> None:
+    """List robots, scenarios, gaits, terrains or laws."""
+    if what not in LISTS:
+        raise unknown_name("list", what, LISTS)
+    rows = LISTS[what]()
+    if json:
+        show_json(rows)
+        return
+    show_table(list(rows[0]), [[_text(value) for value in row.values()] for row in rows])
+
+
+def _text(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"

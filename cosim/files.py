@@ -1,0 +1,117 @@
+"""Files that appear whole or not at all, and the folder a command writes into."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+from hexapod_cosim.models import HexapodError
+
+RUN_FILE = "run.json"  # marks a folder as ours
+RUNNING = "running"
+OUR_FILES = (
+    "results.csv", "results.partial.csv", "metrics.json", "scenario.toml", "report.html", "plots", "kinematic", "compliant",
+)  # fmt: skip
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """A path beside `path` to write to, which takes its place when the block ends well and vanishes when it does not."""
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise not_writable(path.parent, error) from error
+    os.close(handle)
+    try:
+        yield Path(name)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except OSError as error:
+        raise not_writable(path, error) from error
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+@contextmanager
+def atomic_text(path: Path) -> Iterator[TextIO]:
+    """The same as an open text file in UTF-8."""
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        yield file
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a text file, whole or not at all."""
+    with atomic_text(path) as file:
+        file.write(text)
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Writes a JSON file, whole or not at all; numbers that are none become null."""
+    write_text(path, to_json(content) + "\n")
+
+
+def to_json(content: Any) -> str:
+    """JSON that every reader takes: NaN and infinities, which JSON lacks, become null."""
+    return json.dumps(_finite(content), indent=2, ensure_ascii=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def not_writable(path: Path, error: OSError) -> HexapodError:
+    """The error for a place that cannot be written to."""
+    return HexapodError("cannot write", got=error.strerror or str(error), fix="choose another place with -o", where=str(path))
+
+
+def prepare_folder(folder: Path) -> Path:
+    """An empty place for results: made when missing, cleared of an earlier run's files. Raises HexapodError when it is someone else's."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        entries = [entry.name for entry in folder.iterdir()]
+        if entries and RUN_FILE not in entries:
+            expected = f"a new or empty folder, or an earlier run's (it has {RUN_FILE})"
+            raise HexapodError(
+                "the folder holds other files", got=sorted(entries)[0], expected=expected, fix="choose another with -o", where=str(folder)
+            )
+        for name in OUR_FILES:
+            _remove(folder / name)
+        write_json(folder / RUN_FILE, {"status": RUNNING})
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    return folder
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def read_json(path: Path) -> Any:
+    """A JSON file of ours. Raises HexapodError when it is missing or damaged."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        fix = "give a folder written by `hexapod simulate` or `hexapod compare`"
+        raise HexapodError("not a results folder", got=str(path.parent), expected=f"a folder with {path.name}", fix=fix) from error
+    except ValueError as error:
+        raise HexapodError("damaged file", got=str(error), expected="JSON", fix="run the scenario again", where=str(path)) from error

@@ -1,0 +1,266 @@
+"""A co-simulation FMU opened through fmpy: parameters by name, variables in blocks whose arrays are made once.
+
+The master needs only what the protocols `Plant` and `Block` say, so anything that can do the same may stand in for an FMU.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import zipfile
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import chdir
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.logging import addLoggerProxy
+from numpy.typing import NDArray
+
+from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
+
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+WARNING = STATUS.index("warning")
+LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
+SUFFIX = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}  # of fmi2Get..., fmi2Set...
+
+
+class Block(Protocol):
+    """Variables of one type, moved in one call."""
+
+    @property
+    def names(self) -> tuple[str, ...]: ...
+    @property
+    def values(self) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer the calls fill and read
+    def get(self) -> None: ...
+    def set(self) -> None: ...
+
+
+class Plant(Protocol):
+    """What the master asks of a plant. Times in s."""
+
+    def names(self, causality: str, kind: str = "Real") -> list[str]: ...
+    def block(self, names: Sequence[str]) -> Block: ...
+    def parameters(self) -> dict[str, float]: ...
+    def set_parameters(self, values: Mapping[str, Any]) -> None: ...
+    def initialise(self, start: float, stop: float) -> None: ...
+    def step(self, t: float, h: float) -> None: ...
+
+
+class StepError(FmuError):
+    """A step that the FMU discarded or refused; `reached` is the last time it vouches for [s], NaN when it does not say."""
+
+    def __init__(self, what: str, *, reached: float, **facts: Any) -> None:
+        super().__init__(what, **facts)
+        self.reached = reached
+
+
+class FmuBlock:
+    """A block of an FMU; the ctypes arrays live as long as it does, so a call allocates nothing of note."""
+
+    def __init__(self, fmu: Fmu, names: Sequence[str], kind: str, references: Sequence[int]) -> None:
+        count, element = len(names), ctypes.c_double if kind == "Real" else ctypes.c_int
+        buffer: Any = (element * count)()
+        self._fmu = fmu
+        self._get, self._set = fmu.function(f"fmi2Get{SUFFIX[kind]}"), fmu.function(f"fmi2Set{SUFFIX[kind]}")
+        self._arguments = (fmu.component, (ctypes.c_uint * count)(*references), count, buffer)
+        self.names = tuple(names)
+        self.values: NDArray[Any] = np.frombuffer(buffer, dtype=np.float64 if kind == "Real" else np.int32)
+
+    def get(self) -> None:
+        """Reads all values from the FMU. Raises FmuError."""
+        status = self._get(*self._arguments)
+        if status > WARNING:
+            raise self._fmu.failure("the FMU does not give its outputs", status)
+
+    def set(self) -> None:
+        """Hands all values to the FMU. Raises FmuError."""
+        status = self._set(*self._arguments)
+        if status > WARNING:
+            raise self._fmu.failure("the FMU does not take its inputs", status)
+
+
+class Fmu:
+    """One instance of an FMI 2.0 co-simulation FMU; a context manager that frees it. Raises FmuError when it is none."""
+
+    def __init__(self, path: str | Path, *, name: str = "plant") -> None:
+        self.path = Path(path)
+        self.description = read_description(self.path)
+        self.variables = {variable.name: variable for variable in self.description.modelVariables}
+        self._log: deque[str] = deque(maxlen=20)
+        self._callbacks = self._make_callbacks()
+        self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
+        self._slave: Any = None
+        try:
+            self._instantiate(name)
+        except Exception as error:
+            self.close()
+            raise self._not_loaded(error) from error
+
+    def _instantiate(self, name: str) -> None:
+        """Unpacks, loads the binary and makes the instance, every message of which lands in our log."""
+        extract(self.path, self._directory.name)
+        identifier = self.description.coSimulation.modelIdentifier
+        facts = {"guid": self.description.guid, "modelIdentifier": identifier, "unzipDirectory": self._directory.name}
+        with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
+            slave = FMU2Slave(instanceName=name, **facts)
+        try:
+            slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+        except Exception:
+            slave.freeLibrary()
+            raise
+        self._slave = slave
+        self.component = slave.component
+        self._do_step = self.function("fmi2DoStep")
+
+    def _make_callbacks(self) -> fmi2CallbackFunctions:
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(self._write_log)
+        callbacks.allocateMemory = defaultCallbacks.allocateMemory
+        callbacks.freeMemory = defaultCallbacks.freeMemory
+        addLoggerProxy(ctypes.byref(callbacks))  # formats the variadic message in C
+        return callbacks
+
+    def _write_log(self, _environment: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+        if status >= WARNING:
+            self._log.append(message.decode("utf-8", errors="replace"))
+
+    def _not_loaded(self, error: Exception) -> FmuError:
+        said = self._log[-1] if self._log else str(error)
+        fix = "export it again on this machine with `hexapod export`"
+        return FmuError("the FMU cannot be loaded", got=said, fix=fix, where=str(self.path))
+
+    def function(self, name: str) -> Any:
+        """The C function of this name, with its argument types."""
+        return getattr(self._slave.dll, name)
+
+    def failure(self, what: str, status: int) -> FmuError:
+        """The error for a call that came back with `status`, in the FMU's own words where it gave any."""
+        return FmuError(what, got=self._said(status), where=self.path.name)
+
+    def _said(self, status: int) -> str:
+        return self._log[-1] if self._log else f"status {STATUS[status]} without a message"
+
+    def names(self, causality: str, kind: str = "Real") -> list[str]:
+        """Names of all variables of a causality and an FMI type, in the order of the model description."""
+        return [name for name, variable in self.variables.items() if variable.causality == causality and variable.type == kind]
+
+    def block(self, names: Sequence[str]) -> FmuBlock:
+        """The named variables, all of one type, as a block. Raises FmuError for a name the FMU lacks."""
+        for name in names:
+            if name not in self.variables:
+                raise self._unknown(name)
+        kinds = {self.variables[name].type for name in names} or {"Real"}
+        if len(kinds) != 1:
+            raise FmuError("a block holds variables of one type", got=sorted(kinds), where=str(self.path))
+        return FmuBlock(self, names, kinds.pop(), [self.variables[name].valueReference for name in names])
+
+    def parameters(self) -> dict[str, float]:
+        """All parameters with the values that hold now; an enumeration's is the number of its item."""
+        found: dict[str, float] = {}
+        for kind in ("Real", "Integer", "Enumeration", "Boolean"):
+            block = self.block(self.names("parameter", kind))
+            if block.names:
+                block.get()
+                found |= dict(zip(block.names, block.values.tolist(), strict=True))
+        return found
+
+    def set_parameters(self, values: Mapping[str, Any]) -> None:
+        """Sets parameters by name, enumerations by the name of their item. Before `initialise`. Raises FmuError, naming the parameter."""
+        for name, value in values.items():
+            block = self.block([self._parameter(name)])
+            block.values[0] = self._number(name, value)
+            status = block._set(*block._arguments)
+            if status > WARNING:
+                raise FmuError(f"parameter {name} is refused", got=value, expected=self._said(status), where=self.path.name)
+
+    def _parameter(self, name: str) -> str:
+        if name not in self.variables or self.variables[name].causality != "parameter":
+            raise self._unknown(name)
+        return name
+
+    def _number(self, name: str, value: Any) -> float:
+        """The value as the FMU takes it."""
+        variable = self.variables[name]
+        items = {item.name: item.value for item in variable.declaredType.items} if variable.type == "Enumeration" else {}
+        if isinstance(value, str) and items:
+            if value not in items:
+                raise unknown_name(f"choice for {name}", value, items, error=FmuError)
+            return int(items[value])
+        if not isinstance(value, int | float):
+            raise FmuError(f"parameter {name} is refused", got=value, expected=f"a number [{variable.unit or '1'}]", fix="give a number")
+        return value
+
+    def _unknown(self, name: str) -> FmuError:
+        near = nearest_name(name, self.variables)
+        fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names it has"
+        return FmuError("the FMU has no such variable", got=name, fix=fix, where=str(self.path))
+
+    def initialise(self, start: float, stop: float) -> None:
+        """Compiles the parameters and puts the robot into its initial state at time `start` [s]. Raises FmuError."""
+        calls = (
+            lambda: self._slave.setupExperiment(startTime=start, stopTime=stop),
+            self._slave.enterInitializationMode,
+            self._slave.exitInitializationMode,
+        )
+        for call in calls:
+            try:
+                call()
+            except Exception as error:
+                said = self._log[-1] if self._log else str(error)
+                raise FmuError("the FMU cannot be initialised", got=said, where=str(self.path)) from error
+
+    def step(self, t: float, h: float) -> None:
+        """Steps from t to t + h [s]. Raises StepError."""
+        status = self._do_step(self.component, t, h, 1)
+        if status > WARNING:
+            said, reached = self._said(status), self._reached(status)
+            raise StepError(f"the FMU {STATUS[status]}s the step from {t:.6g} s", reached=reached, got=said, where=self.path.name)
+
+    def _reached(self, status: int) -> float:
+        if STATUS[status] != "discard":
+            return math.nan
+        try:
+            return float(self._slave.getRealStatus(LAST_SUCCESSFUL_TIME))
+        except Exception:  # fmpy's own error type: the FMU does not say
+            return math.nan
+
+    def close(self) -> None:
+        """Frees the instance and what was unpacked; harmless when called twice."""
+        slave, self._slave = self._slave, None
+        if slave is not None:
+            slave.fmiCallLogger = None
+            slave.freeInstance()
+        self._directory.cleanup()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+def read_description(path: Path) -> Any:
+    """Model description, as fmpy reads it, of an FMI 2.0 co-simulation FMU. Raises FmuError for anything else."""
+    fix = "make one with `hexapod export -o FILE.fmu`"
+    if not path.is_file():
+        raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=fix)
+    try:
+        description = read_model_description(path, validate=False)
+    except (zipfile.BadZipFile, KeyError) as error:
+        raise FmuError(
+            "not an FMU", got=error.args[0], expected="a ZIP file with a modelDescription.xml", fix=fix, where=str(path)
+        ) from error
+    except Exception as error:
+        raise FmuError("the FMU's modelDescription.xml cannot be read", got=str(error), fix=fix, where=str(path)) from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        kind = "co-simulation" if description.coSimulation else "model exchange only"
+        raise FmuError(
+            "wrong kind of FMU", got=f"FMI {description.fmiVersion}, {kind}", expected="FMI 2.0 for co-simulation", fix=fix, where=str(path)
+        )
+    return description

@@ -1,0 +1,100 @@
+"""The co-simulation loop: at t_k = start + k h read outputs -> controller -> set inputs -> record -> step to t_k + h."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.cosim.fmu import Plant
+from hexapod_cosim.cosim.recorder import Recorder, Recording
+from hexapod_cosim.cosim.schedule import Schedule
+from hexapod_cosim.cosim.signals import Signals, vector_names
+from hexapod_cosim.models import LEG_NAMES, HexapodError
+
+COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
+PROGRESS_STEPS = 20  # macro-steps between two calls of the progress function
+
+Progress = Callable[[float], None]  # simulated time since the start [s]
+
+
+class JointController(Protocol):
+    """What the master asks of a controller."""
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand: ...
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended. A run that did not complete keeps what it recorded up to then."""
+
+    status: str  # COMPLETED, FAILED or INTERRUPTED
+    reason: str  # in words, "" when completed
+    simulated: float  # s
+    wall: float  # s, the whole loop
+    recording: Recording
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated over wall time."""
+        return self.simulated / self.wall if self.wall > 0.0 else 0.0
+
+
+def run(
+    plant: Plant, signals: Signals, controller: JointController, schedule: Schedule, recorder: Recorder, *, h: float,
+    progress: Progress | None = None,
+) -> Outcome:  # fmt: skip
+    """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
+
+    A step that the plant refuses, a controller that cannot go on and Ctrl-C end the run; the outcome says which.
+    """
+    status, reason, begin = COMPLETED, "", perf_counter()
+    try:
+        _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
+    except HexapodError as error:
+        status, reason = FAILED, str(error)
+    except KeyboardInterrupt:
+        status, reason = INTERRUPTED, "interrupted from the keyboard"
+    wall, recording = perf_counter() - begin, recorder.recording
+    simulated = float(recording.time[-1] - schedule.times[0]) if len(recording.time) else 0.0
+    return Outcome(status, reason, simulated, wall, recording)
+
+
+def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
+    """What the controller shows of itself, if it is ours: planned swing, legs that could not follow, corrections of the feet [m]."""
+    shown = getattr(controller, "diagnostics", None)
+    if not isinstance(shown, Diagnostics):
+        return {}
+    six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift")}
+    shift = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2))  # x + i y in memory is x, y
+    return {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()} | {shift: shown.shift.view(float)}
+
+
+def _loop(
+    plant: Plant,
+    signals: Signals,
+    controller: JointController,
+    schedule: Schedule,
+    recorder: Recorder,
+    *,
+    h: float,
+    progress: Progress | None,
+) -> None:
+    pushes = schedule.pushes
+    signals.read()
+    for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
+        if pushes is not None:
+            signals.push[:] = pushes[k]
+        signals.write(controller.step(t, command, signals.measurement))
+        recorder.record()
+        plant.step(t, h)
+        signals.read()
+        if progress is not None and k % PROGRESS_STEPS == 0:
+            progress((k + 1) * h)
+    recorder.record()
+    if progress is not None:
+        progress(len(schedule.commands) * h)

@@ -1,0 +1,202 @@
+"""Static figures of one run or of several laid over each other.
+
+Colours are told apart by colour-blind readers (Okabe and Ito), and lines by their dashes too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hexapod_cosim.cosim.files import atomic_path
+from hexapod_cosim.cosim.metrics import CONTACT_SHARE, Array, View, body_height, commanded_path, robot_weight
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+
+STYLES: dict[str, dict[str, Any]] = {
+    "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.3},
+    "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.3},
+}
+PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#000000")
+STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
+SETTINGS = {
+    "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+    "svg.fonttype": "none", "svg.hashsalt": "hexapod", "path.simplify": True, "figure.constrained_layout.use": True,
+}  # fmt: skip
+
+
+Views = Mapping[str, View]  # by control
+
+
+def foot_forces(views: Views) -> Figure:
+    """Normal force of each foot over the last cycles, in body weights."""
+    figure = Figure(figsize=(10, 5.2))
+    axes = figure.subplots(2, 3, sharex=True, sharey=True)
+    for label, view in views.items():
+        end = view.last_cycles()
+        force = end.recording.feet("normal_force") / robot_weight(view.parameters)
+        for leg, axis in enumerate(axes.flat):
+            axis.plot(end.recording.time, force[:, leg], label=label, **STYLES[label])
+            axis.set_title(LEG_NAMES[leg])
+    _label(axes[-1], "time [s]", axes[:, 0], "normal force [body weights]")
+    _legend(figure, axes.flat[0])
+    return figure
+
+
+def slip(views: Views) -> Figure:
+    """Way slipped by all feet since the start, and the slip speed of each foot over the last cycles."""
+    figure = Figure(figsize=(10, 6.4))
+    grid = figure.add_gridspec(3, 3)
+    top = figure.add_subplot(grid[0, :])
+    axes = [figure.add_subplot(grid[1 + leg // 3, leg % 3]) for leg in range(len(LEG_NAMES))]
+    for label, view in views.items():
+        time, speed = view.recording.time, _loaded_slip(view)
+        way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]).sum(axis=1) * np.diff(time))])
+        top.plot(time, 1e3 * way, label=label, **STYLES[label])
+        end = view.last_cycles()
+        for leg, axis in enumerate(axes):
+            axis.plot(end.recording.time, 1e3 * _loaded_slip(end)[:, leg], **STYLES[label])
+            axis.set_title(LEG_NAMES[leg])
+    top.set_xlabel("time [s]")
+    top.set_ylabel("slipped way [mm]")
+    _label(axes[3:], "time [s]", axes[::3], "slip speed [mm/s]")
+    _legend(figure, top)
+    return figure
+
+
+def _loaded_slip(view: View) -> Array:
+    loaded = view.recording.feet("normal_force") > CONTACT_SHARE * robot_weight(view.parameters)
+    return np.where(loaded, view.recording.feet("slip_speed"), 0.0)
+
+
+def posture(views: Views) -> Figure:
+    """Height, roll, pitch and yaw of the torso."""
+    figure = Figure(figsize=(10, 7.2))
+    axes = figure.subplots(4, 1, sharex=True)
+    for label, view in views.items():
+        recording = view.recording
+        axes[0].plot(recording.time, 1e3 * body_height(recording, view.parameters), label=label, **STYLES[label])
+        for axis, name in zip(axes[1:], ("roll", "pitch", "yaw"), strict=True):
+            axis.plot(recording.time, np.degrees(np.unwrap(recording.column(f"torso.{name}"))), **STYLES[label])
+    for axis, text in zip(axes, ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"), strict=True):
+        axis.set_ylabel(text)
+    axes[-1].set_xlabel("time [s]")
+    _legend(figure, axes[0])
+    return figure
+
+
+def path(views: Views) -> Figure:
+    """The torso's way seen from above, with the commanded one."""
+    figure = Figure(figsize=(10, 4.0))
+    axis = figure.subplots()
+    for label, view in views.items():
+        position = view.recording.vector("torso.position")
+        axis.plot(position[:, 0], position[:, 1], label=label, **STYLES[label])
+        axis.plot(*position[-1, :2], marker="o", color=STYLES[label]["color"])
+    commanded = commanded_path(next(iter(views.values())).recording)
+    axis.plot(commanded[:, 0], commanded[:, 1], color="0.45", linestyle=":", label="commanded, without its ramps")
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")
+    if np.ptp(commanded[:, 1]) > STRAIGHT * np.ptp(commanded[:, 0]):
+        axis.set_aspect("equal", adjustable="datalim")
+    _legend(figure, axis)
+    return figure
+
+
+def torques(views: Views) -> Figure:
+    """Largest torque among the six legs, joint by joint, over the last cycles."""
+    figure = Figure(figsize=(10, 5.6))
+    axes = figure.subplots(3, 1, sharex=True)
+    for label, view in views.items():
+        end = view.last_cycles().recording
+        largest = np.abs(end.joints("torque")).max(axis=1)
+        for joint, axis in enumerate(axes):
+            axis.plot(end.time, largest[:, joint], label=label, **STYLES[label])
+            axis.set_ylabel(f"{JOINT_NAMES[joint]} [N m]")
+    axes[-1].set_xlabel("time [s]")
+    _legend(figure, axes[0])
+    return figure
+
+
+def energy(views: Views) -> Figure:
+    """The energy audit: what went in, where it is, where it went, and what the books do not explain."""
+    figure = Figure(figsize=(10, 3.4 * len(views)))
+    axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
+    for axis, (label, view) in zip(axes, views.items(), strict=True):
+        recording = view.recording
+        for color, name in zip(PALETTE, ("actuator_work", "dissipated", "potential", "kinetic", "push_work", "residual"), strict=True):
+            values = recording.column(f"energy.{name}")
+            axis.plot(recording.time, values - values[0], color=color, label=name.replace("_", " "), linewidth=1.2)
+        axis.set_title(label)
+        axis.set_ylabel("since the start [J]")
+        axis.legend(loc="upper left", ncols=3)
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def footfall(views: Views) -> Figure:
+    """Which foot is on the ground when, over the last cycles; a grey band is where the gait wants it in the air."""
+    figure = Figure(figsize=(10, 2.4 * len(views)))
+    axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
+    for axis, (label, view) in zip(axes, views.items(), strict=True):
+        end = view.last_cycles().recording
+        for leg, name in enumerate(LEG_NAMES):
+            swinging = f"controller.{name}.swinging"
+            if swinging in end.names:
+                _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color="0.85")
+            _bars(axis, end.time, end.feet("contact")[:, leg] > 0.5, leg, height=0.5, color=STYLES[label]["color"])
+        axis.set_yticks(range(len(LEG_NAMES)), LEG_NAMES)
+        axis.invert_yaxis()
+        axis.set_title(label)
+        axis.grid(visible=False)
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def _bars(axis: Axes, time: Array, on: Any, row: int, *, height: float, color: str) -> None:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
+    last = len(time) - 1
+    spans = [(time[begin], time[min(end, last)] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+    axis.broken_barh(spans, (row - height / 2, height), color=color, linewidth=0)
+
+
+def _label(bottom: Any, x: str, left: Any, y: str) -> None:
+    for axis in bottom:
+        axis.set_xlabel(x)
+    for axis in left:
+        axis.set_ylabel(y)
+
+
+def _legend(figure: Figure, axis: Axes) -> None:
+    handles, labels = axis.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+
+
+FIGURES: dict[str, tuple[str, Callable[[Views], Figure]]] = {
+    "foot_forces": ("Foot forces", foot_forces),
+    "slip": ("Slip", slip),
+    "posture": ("Height and attitude", posture),
+    "path": ("Path of the torso", path),
+    "torques": ("Torques", torques),
+    "energy": ("Energy audit", energy),
+    "footfall": ("Footfall", footfall),
+}
+
+
+def save_figures(views: Views, folder: Path) -> list[Path]:
+    """Draws every figure of FIGURES into a folder, as PNG and SVG. Returns the files."""
+    folder.mkdir(exist_ok=True)
+    saved = []
+    with matplotlib.rc_context(SETTINGS):
+        for name, (_, draw) in FIGURES.items():
+            figure = draw(views)
+            for kind, metadata in (("png", {}), ("svg", {"Date": None})):  # no date: equal runs, equal files
+                saved.append(folder / f"{name}.{kind}")
+                with atomic_path(saved[-1]) as temporary:
+                    figure.savefig(temporary, format=kind, dpi=130, metadata=metadata)
+    return saved

@@ -1,0 +1,43 @@
+"""Numbers with units in scenario files: `duration = 10` is SI, `macro_step = "5 ms"` is the same with its unit said and checked."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from hexapod_cosim.models.errors import ScenarioError
+from hexapod_cosim.models.schema import Number, Spec, Vector
+
+# unit of a key -> what may be written for it, and how much of the SI unit that is
+SCALES: dict[str, dict[str, float]] = {
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6},
+    "rad": {"rad": 1.0, "deg": math.pi / 180.0},
+    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0},
+    "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
+    "N m": {"N m": 1.0, "mN m": 1e-3},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    "s/m": {"s/m": 1.0, "s/mm": 1e3},
+}
+QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*")
+
+
+def to_si(value: Any, spec: Spec, where: str) -> Any:
+    """The value with a quantity in a string turned into SI; anything else is left for the spec to judge. Raises ScenarioError."""
+    if isinstance(spec, Vector) and isinstance(value, list | tuple):
+        return [to_si(item, Number(spec.unit), f"{where}[{k}]") for k, item in enumerate(value)]
+    if not isinstance(spec, Number | Vector) or not isinstance(value, str):
+        return value
+    match = QUANTITY.fullmatch(value)
+    if match is None:
+        return value
+    scales = SCALES.get(spec.unit, {spec.unit: 1.0})
+    unit = " ".join((match[2] or "").replace("*", " ").replace("N.m", "N m").replace("Nm", "N m").split())
+    if unit not in scales:
+        raise ScenarioError(
+            "wrong unit", got=value, expected=f"a value in {' or '.join(scales)}", fix=f"a plain number is in {spec.unit}", where=where
+        )
+    return float(match[1]) * scales[unit]

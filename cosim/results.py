@@ -1,0 +1,94 @@
+"""A run on disk: what is written when it completes, what when it does not, and how it is read again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, prepare_folder, read_json, write_json, write_text
+from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED
+from hexapod_cosim.cosim.metrics import View
+from hexapod_cosim.cosim.recorder import read_csv, write_csv
+from hexapod_cosim.cosim.run import Result
+from hexapod_cosim.cosim.toml_text import to_toml
+from hexapod_cosim.models import HexapodError
+
+RESULTS, PARTIAL, METRICS_FILE, SCENARIO = "results.csv", "results.partial.csv", "metrics.json", "scenario.toml"
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A completed run, as a report needs it."""
+
+    view: View
+    metrics: Mapping[str, float | None]
+    facts: Mapping[str, Any]
+    scenario: str  # TOML
+
+
+@contextmanager
+def results_folder(path: Path) -> Iterator[Path]:
+    """A prepared folder whose run.json says so when the block does not come to its end. Raises HexapodError when it cannot be."""
+    folder = prepare_folder(path)
+    try:
+        yield folder
+    except (HexapodError, KeyboardInterrupt) as error:
+        if read_json(folder / RUN_FILE)["status"] == RUNNING:
+            write_json(folder / RUN_FILE, {"status": FAILED if isinstance(error, HexapodError) else INTERRUPTED, "reason": str(error)})
+        raise
+
+
+def write_result(result: Result, folder: Path) -> list[Path]:
+    """Writes a run into a prepared folder; one that did not complete leaves `results.partial.csv` and no figures. Returns the files."""
+    outcome = result.outcome
+    patterns = result.scenario.outputs.csv if result.completed else ("*",)
+    recording = outcome.recording.chosen(patterns)
+    files = [folder / SCENARIO, folder / (RESULTS if result.completed else PARTIAL)]
+    write_text(files[0], to_toml(result.scenario.to_table()))
+    write_csv(recording, files[1])
+    if result.completed:
+        files.append(folder / METRICS_FILE)
+        write_json(files[-1], dict(result.metrics))
+    write_json(folder / RUN_FILE, run_facts(result))
+    return [*files, folder / RUN_FILE]
+
+
+def run_facts(result: Result) -> dict[str, Any]:
+    """The content of run.json."""
+    outcome, scenario = result.outcome, result.scenario
+    return {
+        "kind": "simulate",
+        "status": outcome.status,
+        "reason": outcome.reason,
+        "title": scenario.title,
+        "control": scenario.control,
+        "simulated": outcome.simulated,
+        "wall": outcome.wall,
+        "realtime_factor": outcome.realtime_factor,
+        "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+        **result.facts,
+        "parameters": dict(result.parameters),
+    }
+
+
+def read_result(folder: Path) -> Stored:
+    """A completed run from its folder. Raises HexapodError when there is none, or it did not complete."""
+    facts = read_json(folder / RUN_FILE)
+    if facts.get("status") != COMPLETED:
+        got = f"{facts.get('status')}: {facts.get('reason')}" if facts.get("reason") else facts.get("status")
+        raise HexapodError("the run did not complete", got=got, expected="a completed run", fix="run it again", where=str(folder))
+    view = View(read_csv(folder / RESULTS), facts["parameters"], facts["gait_period"])
+    scenario = (folder / SCENARIO).read_text(encoding="utf-8")
+    return Stored(view, read_json(folder / METRICS_FILE), facts, scenario)
+
+
+def stored(result: Result) -> Stored:
+    """The same, straight from a run."""
+    facts = run_facts(result)
+    return Stored(
+        View(result.outcome.recording, result.parameters, facts["gait_period"]), result.metrics, facts, to_toml(result.scenario.to_table())
+    )

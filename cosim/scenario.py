@@ -1,0 +1,223 @@
+"""What is run: robot, walk, laws, disturbances and outputs, read from a TOML file and judged key by key.
+
+A value is a number in SI or a quantity with its unit ("5 ms"). The settings of gait, terrain, contact, friction, servo, solver and
+baumgarte are those of robot files; a scenario gives only what differs from the robot's own.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.cosim.quantities import to_si
+from hexapod_cosim.cosim.scenario_records import (
+    KEYS,
+    PLAIN_KEYS,
+    SECTIONS,
+    SETTINGS,
+    UNUSED,
+    Command,
+    Outputs,
+    Push,
+    Scenario,
+    Sensors,
+)
+from hexapod_cosim.models import Robot, RobotError, ScenarioError, check_robot, load_robot, unknown_name
+from hexapod_cosim.models.schema import expect_table, read_given, refuse_unknown_keys, require, specs
+
+WHOLE_STEPS_TOLERANCE = 1e-6  # of a macro-step: round-off of a decimal duration, no more
+
+
+def list_scenarios() -> dict[str, Path]:
+    """The scenarios that come with the package, by name."""
+    return {path.stem: path for path in sorted((Path(__file__).parent / "scenarios").glob("*.toml"))}
+
+
+def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:
+    """Reads a scenario file, or a bundled one by name, with `overrides` "NAME=VALUE" put over it. Raises ScenarioError."""
+    path = _scenario_path(path_or_name)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        fix = "give the path of a scenario file, or one of: " + ", ".join(list_scenarios())
+        raise ScenarioError("cannot read the scenario", got=error.strerror, fix=fix, where=str(path)) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(
+            "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
+        ) from error
+    if "robot" in table and (path.parent / str(table["robot"])).is_file():
+        table["robot"] = str((path.parent / table["robot"]).resolve())  # a robot file beside the scenario
+    where = path.name if path in list_scenarios().values() else str(path)
+    return scenario_from_table(with_overrides(table, overrides), where=where)
+
+
+def _scenario_path(path_or_name: str | Path) -> Path:
+    path, bundled = Path(path_or_name), list_scenarios()
+    if path.suffix or len(path.parts) != 1 or path.is_file():
+        return path
+    if str(path_or_name) not in bundled:
+        raise unknown_name("scenario", str(path_or_name), bundled, error=ScenarioError)
+    return bundled[str(path_or_name)]
+
+
+def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """A copy of the tables with each "NAME=VALUE" set: a scenario's key, or else an FMU parameter. Raises ScenarioError."""
+    changed = deepcopy(dict(table))
+    for text in overrides:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not name or not value:
+            fix = "write --set gait.period=0.8"
+            raise ScenarioError("not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set")
+        _set(changed, name, _parse(value))
+    return changed
+
+
+def _parse(value: str) -> Any:
+    """The value as TOML reads it; what TOML does not know is a string, so names and quantities need no quotes."""
+    try:
+        return tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return value
+
+
+def _set(table: dict[str, Any], name: str, value: Any) -> None:
+    section, dot, key = name.partition(".")
+    if dot and section in SECTIONS:
+        inner = table.setdefault(section, {})
+        if not isinstance(inner, dict):
+            fix = f"set the whole list: --set '{section}=[...]'"
+            raise ScenarioError("the scenario has a list here", got=name, expected=f"a table [{section}]", fix=fix, where="--set")
+        inner[key] = value
+    elif dot or "[" in name:
+        table.setdefault("parameters", {})[name] = value
+    elif name in KEYS:
+        table[name] = value
+    else:
+        raise unknown_name("setting", name, KEYS, where="--set", error=ScenarioError)
+
+
+def scenario_from_table(table: Mapping[str, Any], *, where: str) -> Scenario:
+    """A checked scenario from the tables of a file; `where` names the file in messages. Raises ScenarioError."""
+    with _scenario_errors():
+        refuse_unknown_keys(table, list(KEYS), where)
+        plain = require(Scenario, _read(Scenario, {key: value for key, value in table.items() if key in PLAIN_KEYS}, where), where)
+        scenario = Scenario(
+            title=_text(table, "title", Path(where).stem, where),
+            robot=_text(table, "robot", "athena", where),
+            seed=_seed(table.get("seed", 0), where),
+            settings={name: _read_setting(name, table[name], f"{where}: {name}") for name in SETTINGS if name in table},
+            commands=_read_commands(table.get("command", {}), f"{where}: command"),
+            events=tuple(
+                _record(Push, entry, f"{where}: events[{k}]") for k, entry in enumerate(_list(table.get("events", []), where, "events"))
+            ),
+            sensors=_record(Sensors, table.get("sensors", {}), f"{where}: sensors"),
+            outputs=_read_outputs(table.get("outputs", {}), f"{where}: outputs"),
+            parameters=dict(expect_table(table.get("parameters", {}), f"{where}: parameters")),
+            where=where,
+            **plain,
+        )
+    _check_steps(scenario)
+    return scenario
+
+
+@contextmanager
+def _scenario_errors() -> Iterator[None]:
+    """The shared schema speaks of robots; here it judges a scenario."""
+    try:
+        yield
+    except RobotError as error:
+        raise ScenarioError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=error.where) from error
+
+
+def _read(record: type[Any], table: Any, where: str) -> dict[str, Any]:
+    known = specs(record)
+    table = expect_table(table, where)
+    return read_given(
+        record, {key: to_si(value, known[key], f"{where}.{key}") if key in known else value for key, value in table.items()}, where
+    )
+
+
+def _record(record: type[Any], table: Any, where: str) -> Any:
+    return record(**require(record, _read(record, table, where), where))
+
+
+def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
+    record = SETTINGS[name]
+    refuse_unknown_keys(expect_table(table, where), [key for key in specs(record) if key not in UNUSED.get(name, ())], where)
+    return _read(record, table, where)
+
+
+def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
+    entries = value if isinstance(value, list | tuple) else [value]
+    commands = [_record(Command, entry, f"{where}[{k}]" if len(entries) > 1 else where) for k, entry in enumerate(entries)]
+    times = [command.time for command in commands]
+    if times != sorted(set(times)):
+        raise ScenarioError(
+            "commands out of order", got=times, expected="times that grow", fix="sort the [[command]] entries by time", where=where
+        )
+    return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
+
+
+def _read_outputs(table: Any, where: str) -> Outputs:
+    refuse_unknown_keys(expect_table(table, where), ["csv", "plots"], where)
+    patterns, plots = table.get("csv", ["*"]), table.get("plots", True)
+    if not isinstance(patterns, list | tuple) or not all(isinstance(item, str) for item in patterns):
+        fix = 'write csv = ["torso.*", "*.foot.normal_force"]'
+        raise ScenarioError("wrong type", got=patterns, expected="a list of name patterns", fix=fix, where=f"{where}.csv")
+    if not isinstance(plots, bool):
+        raise ScenarioError("wrong type", got=plots, expected="true or false", where=f"{where}.plots")
+    return Outputs(csv=tuple(patterns), plots=plots)
+
+
+def _text(table: Mapping[str, Any], key: str, default: str, where: str) -> str:
+    value = table.get(key, default)
+    if not isinstance(value, str):
+        raise ScenarioError("wrong type", got=value, expected="a text in quotes", where=f"{where}.{key}")
+    return value
+
+
+def _list(value: Any, where: str, key: str) -> Sequence[Any]:
+    if not isinstance(value, list | tuple):
+        raise ScenarioError(
+            "wrong type", got=value, expected=f"entries [[{key}]]", fix=f"write [[{key}]] with two brackets", where=f"{where}.{key}"
+        )
+    return value
+
+
+def _seed(value: Any, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ScenarioError("value not allowed", got=value, expected="a whole number >= 0", where=f"{where}.seed")
+    return value
+
+
+def _check_steps(scenario: Scenario) -> None:
+    h, steps = scenario.macro_step, scenario.steps
+    if steps < 1 or abs(scenario.duration / h - steps) > WHOLE_STEPS_TOLERANCE * steps:
+        expected, near = f"a multiple of macro_step = {h:g} s", max(steps, 1) * h
+        raise ScenarioError(
+            "not a whole number of macro-steps",
+            got=scenario.duration,
+            expected=expected,
+            fix=f"{near:g} is the nearest",
+            where=f"{scenario.where}.duration",
+        )
+
+
+def scenario_robot(scenario: Scenario) -> Robot:
+    """The robot with the scenario's settings put over its own, but for the gait, which the controller makes.
+
+    Raises RobotError when they do not fit together.
+    """
+    robot = load_robot(scenario.robot)
+    changes = {name: replace(getattr(robot, name), **dict(values)) for name, values in scenario.settings.items() if name != "gait"}
+    if "friction" in changes and "mu_static" not in scenario.settings["friction"]:
+        friction = changes["friction"]
+        changes["friction"] = replace(friction, mu_static=max(friction.mu_static, friction.mu))  # static is never below kinetic
+    robot = replace(robot, **changes)
+    check_robot(robot, where=f"{scenario.where} with robot {robot.name}")
+    return robot

@@ -1,0 +1,97 @@
+"""What a scenario says, as frozen records: fields with units, ranges and defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Any
+
+from hexapod_cosim.models import Baumgarte, Contact, Friction, Gait, Servo, Solver, Terrain
+from hexapod_cosim.models.schema import Choice, Number, Vector, specs
+
+CONTROLS = ("kinematic", "compliant")
+SETTINGS: dict[str, type[Any]] = {
+    "gait": Gait, "terrain": Terrain, "contact": Contact, "friction": Friction, "servo": Servo, "solver": Solver, "baumgarte": Baumgarte,
+}  # fmt: skip
+UNUSED = {"gait": ("stride",)}  # the body velocity of the command says it
+ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A body command that holds from `time` on, counted from the start of the run."""
+
+    time: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
+    vx: Annotated[float, Number("m/s", default=0.0)] = 0.0
+    vy: Annotated[float, Number("m/s", default=0.0)] = 0.0
+    yaw_rate: Annotated[float, Number("rad/s", default=0.0)] = 0.0
+    height: Annotated[float, Number("m", default=0.0)] = 0.0
+    roll: Annotated[float, Number("rad", default=0.0)] = 0.0
+    pitch: Annotated[float, Number("rad", default=0.0)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Push:
+    """A force and torque on the torso, world axes, from `time` (counted from the start of the run) for `duration`."""
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    duration: Annotated[float, Number("s", above=0.0)]
+    force: Annotated[tuple[float, ...], Vector("N", 3, default=ZERO)] = ZERO
+    torque: Annotated[tuple[float, ...], Vector("N m", 3, default=ZERO)] = ZERO
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """What is wrong with what the controller is told."""
+
+    foot_force_noise: Annotated[float, Number("1", at_least=0.0, below=1.0, default=0.0)] = 0.0  # standard deviation, share of the force
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outputs:
+    """What is written."""
+
+    csv: tuple[str, ...] = ("*",)  # patterns of variable names
+    plots: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """One run, complete but for the robot file it names."""
+
+    title: str = "walk"
+    robot: str = "athena"  # a name of `hexapod list robots`, or a path
+    control: Annotated[str, Choice(CONTROLS, default="kinematic")] = "kinematic"
+    start: Annotated[float, Number("s", default=0.0)] = 0.0
+    duration: Annotated[float, Number("s", above=0.0, default=10.0)] = 10.0
+    macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1, default=0.005)] = 0.005
+    seed: int = 0
+    settings: Mapping[str, Mapping[str, Any]]  # what differs from the robot's own, by section
+    commands: tuple[Command, ...]  # in order of time
+    events: tuple[Push, ...] = ()
+    sensors: Sensors = Sensors()
+    outputs: Outputs = Outputs()
+    parameters: Mapping[str, Any]  # further FMU parameters by name
+    where: str = "scenario"
+
+    @property
+    def steps(self) -> int:
+        """Number of macro-steps."""
+        return round(self.duration / self.macro_step)
+
+    def to_table(self) -> dict[str, Any]:
+        """The scenario as tables of a file that says the same."""
+        plain = {key: getattr(self, key) for key in ("title", "robot", *PLAIN_KEYS, "seed")}
+        tables = {key: dict(value) for key, value in self.settings.items() if value}
+        lists = {"command": [_as_table(entry) for entry in self.commands], "events": [_as_table(entry) for entry in self.events]}
+        tail = {"sensors": _as_table(self.sensors), "outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
+        return plain | tables | {key: value for key, value in lists.items() if value} | {key: value for key, value in tail.items() if value}
+
+
+PLAIN_KEYS = tuple(specs(Scenario))  # control, start, duration, macro_step
+SECTIONS = ("command", "sensors", "outputs", "parameters", *SETTINGS)
+KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "events", *SECTIONS)
+
+
+def _as_table(record: Any) -> dict[str, Any]:
+    return {item.name: getattr(record, item.name) for item in fields(record)}

@@ -1,0 +1,52 @@
+"""Commands and disturbances of a scenario, laid out by macro-step before the run."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand
+from hexapod_cosim.cosim.scenario_records import Command, Push, Scenario
+
+ROUND_OFF = 5e-10  # s    of a macro-step's time
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """What is commanded and what pushes, step by step."""
+
+    times: NDArray[np.float64]  # s    (steps + 1,) start + k h, never a running sum
+    commands: tuple[BodyCommand, ...]  # (steps,)
+    rows: NDArray[np.float64]  # (steps + 1, 6) the same, the last one twice: vx vy yaw_rate height roll pitch
+    pushes: NDArray[np.float64] | None  # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: never any
+
+
+def make_schedule(scenario: Scenario) -> Schedule:
+    """Lays a scenario's commands and events out over its macro-steps."""
+    times = scenario.macro_step * np.arange(scenario.steps + 1, dtype=np.float64)
+    begins, h = times[:-1], scenario.macro_step
+    rows = command_rows(scenario.commands, begins)
+    distinct = {row: BodyCommand(*row) for row in set(map(tuple, rows.tolist()))}
+    commands = tuple(distinct[row] for row in map(tuple, rows.tolist()))
+    pushes = push_rows(scenario.events, begins, h) if scenario.events else None
+    return Schedule(scenario.start + times, commands, np.vstack([rows, rows[-1:]]), pushes)
+
+
+def command_rows(commands: Sequence[Command], times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(steps, 6) the command in force at each time [s] from the start: the last one that has begun, but for round-off."""
+    begins = [command.time for command in commands]
+    values = np.array([astuple(command)[1:] for command in commands])
+    return values[[max(bisect_right(begins, t + ROUND_OFF) - 1, 0) for t in times]]
+
+
+def push_rows(events: Sequence[Push], times: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+    """(steps, 6) mean push over each step of h [s], so that the impulse is exact even when a push begins within a step."""
+    rows = np.zeros((len(times), 6))
+    for event in events:
+        overlap = np.minimum(times + h, event.time + event.duration) - np.maximum(times, event.time)
+        rows += np.outer(np.clip(overlap / h, 0.0, 1.0), [*event.force, *event.torque])
+    return rows

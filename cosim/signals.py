@@ -1,0 +1,110 @@
+"""Which variable is what: the plant's outputs seen as arrays (leg, joint, axis), its inputs as arrays to write. No copies: all are views.
+
+The outputs a controller needs come first in the block, so that each is one contiguous piece of the buffer the FMU fills.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import JointCommand, Measurement
+from hexapod_cosim.cosim.fmu import Plant
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
+
+LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
+AXES = (1, 2, 3)
+
+
+def joint_names(quantity: str) -> list[str]:
+    """Names of a quantity of all joints, legs slowest."""
+    return [f"{leg}.{joint}.{quantity}" for leg in LEG_NAMES for joint in JOINT_NAMES]
+
+
+def foot_names(quantity: str) -> list[str]:
+    """Names of a scalar quantity of all feet."""
+    return [f"{leg}.foot.{quantity}" for leg in LEG_NAMES]
+
+
+def vector_names(stem: str, size: int = 3) -> list[str]:
+    """Names of a vector's entries."""
+    return [f"{stem}[{k}]" for k in range(1, size + 1)]
+
+
+def foot_vector_names(quantity: str) -> list[str]:
+    """Names of a vector quantity of all feet, axes fastest."""
+    return [name for stem in foot_names(quantity) for name in vector_names(stem)]
+
+
+MEASURED = {
+    "angle": joint_names("angle"),
+    "speed": joint_names("speed"),
+    "foot_force": foot_vector_names("force"),
+    "quaternion": vector_names("torso.quaternion", 4),
+    "angular_velocity": vector_names("torso.angular_velocity"),
+}
+COMMANDED = {quantity: joint_names(quantity) for quantity in ("angle_ref", "speed_ref", "torque_ref")}
+PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
+CONTACT = foot_names("contact")
+
+
+class Signals:
+    """The plant's blocks and the views on them. `noise` is the standard deviation of the measured foot forces, as a share of them."""
+
+    def __init__(self, plant: Plant, *, noise: float = 0.0, seed: int = 0) -> None:
+        outputs, inputs, flags = plant.names("output"), plant.names("input"), plant.names("output", "Boolean")
+        _refuse_foreign(outputs, inputs, flags)
+        first = [name for names in MEASURED.values() for name in names]
+        taken = set(first)
+        self.outputs = plant.block([*first, *(name for name in outputs if name not in taken)])
+        self.flags = plant.block([*CONTACT, *(name for name in flags if name not in CONTACT)])
+        self.inputs = plant.block([*(name for names in COMMANDED.values() for name in names), *PUSH])
+        self._commanded = self.inputs.values[: 3 * LEGS * JOINTS].reshape(3, LEGS, JOINTS)
+        self.push: NDArray[np.float64] = self.inputs.values[3 * LEGS * JOINTS :]  # (6,) force [N] and torque [N m], world
+        self._contact = np.zeros(LEGS, dtype=bool)
+        self._touching = self.flags.values[:LEGS]
+        self._noise, self._generator = noise, np.random.default_rng(seed)
+        self.measurement = self._make_measurement()
+
+    def _make_measurement(self) -> Measurement:
+        views, at = {}, 0
+        for key, names in MEASURED.items():
+            views[key] = self.outputs.values[at : at + len(names)]
+            at += len(names)
+        self._force = views["foot_force"].reshape(LEGS, len(AXES))
+        return Measurement(
+            angle=views["angle"].reshape(LEGS, JOINTS),
+            speed=views["speed"].reshape(LEGS, JOINTS),
+            foot_force=self._force.copy() if self._noise else self._force,
+            contact=self._contact,
+            quaternion=views["quaternion"],
+            angular_velocity=views["angular_velocity"],
+        )
+
+    def read(self) -> None:
+        """Brings outputs and measurement up to date."""
+        self.outputs.get()
+        self.flags.get()
+        np.not_equal(self._touching, 0, out=self._contact)
+        if self._noise:
+            scale = 1.0 + self._noise * self._generator.standard_normal(self._force.shape)
+            np.multiply(self._force, scale, out=self.measurement.foot_force)
+
+    def write(self, command: JointCommand) -> None:
+        """Hands a joint command, and the push as it stands, to the plant."""
+        self._commanded[0] = command.angle_ref
+        self._commanded[1] = command.speed_ref
+        self._commanded[2] = command.torque_ref
+        self.inputs.set()
+
+
+def _refuse_foreign(outputs: list[str], inputs: list[str], flags: list[str]) -> None:
+    """Raises FmuError when the plant lacks a variable that every hexapod FMU has."""
+    have = {*outputs, *inputs, *flags}
+    need = [name for names in (*MEASURED.values(), *COMMANDED.values(), PUSH, CONTACT) for name in names]
+    missing = [name for name in need if name not in have]
+    if missing:
+        got = f"no {missing[0]}" + (f" and {len(missing) - 1} more missing" if len(missing) > 1 else "")
+        raise FmuError(
+            "not a hexapod plant", got=got, expected="the variables of every hexapod FMU", fix="use an FMU made by `hexapod export`"
+        )

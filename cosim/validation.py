@@ -1,0 +1,89 @@
+"""Is this FMU one of ours, and sound? fmpy's checks, then what no general checker sees."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from fmpy.validation import validate_fmu
+
+from hexapod_cosim.cosim.fmu import Fmu, read_description
+from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.models import HexapodError
+
+START_VALUES = "resources/start_values.txt"
+TRIAL_STEP = 0.001  # s
+
+
+def find_problems(path: Path) -> list[str]:
+    """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when it is no FMU at all."""
+    read_description(path)
+    return [*map(str, validate_fmu(str(path))), *find_own_problems(path)]
+
+
+def find_own_problems(path: Path) -> list[str]:
+    """The same without fmpy's checks. Raises FmuError when it is no FMU at all."""
+    description, problems = read_description(path), []
+    with zipfile.ZipFile(path) as archive:
+        problems += _start_value_problems(archive, description)
+        problems += _archive_problems(archive)
+    return problems + _run_problems(path)
+
+
+def _archive_problems(archive: zipfile.ZipFile) -> list[str]:
+    damaged = archive.testzip()
+    return [f"{damaged} is damaged: its checksum is wrong"] if damaged else []
+
+
+def _start_value_problems(archive: zipfile.ZipFile, description: Any) -> list[str]:
+    """The binary takes its robot from start_values.txt, importers see modelDescription.xml: both must say the same."""
+    if START_VALUES not in archive.namelist():
+        return []  # the binary's built-in robot, whose GUID the trial run confirms
+    guid, *lines = archive.read(START_VALUES).decode("utf-8", errors="replace").split("\n")
+    problems = (
+        [] if guid.strip() == description.guid else [f"{START_VALUES} has GUID {guid.strip()!r}, modelDescription.xml {description.guid!r}"]
+    )
+    known = {variable.valueReference: variable for variable in description.modelVariables}
+    for number, line in enumerate(lines, start=2):
+        problems += _line_problems(f"{START_VALUES} line {number}", line.split(), known)
+    return problems
+
+
+def _line_problems(where: str, words: list[str], known: dict[int, Any]) -> list[str]:
+    if not words:
+        return []
+    try:
+        reference, value = int(words[0]), _number(words[1])
+    except (ValueError, IndexError):
+        return [f"{where}: got {' '.join(words)!r}, expected a value reference and a value"]
+    if reference not in known:
+        return [f"{where}: value reference {reference} is not in modelDescription.xml"]
+    variable = known[reference]
+    stated = _start(variable)
+    same = stated is not None and math.isclose(stated, value, rel_tol=1e-12, abs_tol=1e-300)
+    return [] if same else [f"{where}: {variable.name} is {value!r}, modelDescription.xml says {variable.start!r}"]
+
+
+def _number(word: str) -> float:
+    return float.fromhex(word) if "x" in word else float(word)
+
+
+def _start(variable: Any) -> float | None:
+    if variable.start in ("true", "false"):
+        return float(variable.start == "true")
+    return None if variable.start is None else float(variable.start)
+
+
+def _run_problems(path: Path) -> list[str]:
+    """Loads the binary, starts it, takes a step."""
+    try:
+        with Fmu(path, name="validate") as plant:
+            plant.initialise(0.0, 1.0)
+            signals = Signals(plant)
+            signals.read()
+            plant.step(0.0, TRIAL_STEP)
+    except HexapodError as error:
+        return [str(error)]
+    return []

@@ -1,0 +1,102 @@
+"""hexapod.h in ctypes: its structures, constants and statuses. test_plant_functions.py compares them with the compiler's layout."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from typing import Any
+
+LEGS, JOINTS, BODIES, BODY_STATE, MULTIPLIERS, MESSAGE_SIZE = 6, 3, 19, 13, 5, 512
+
+OK, INVALID_ARGUMENT, INVALID_MODEL, STEP_TOO_SMALL, NOT_FINITE, OUT_OF_MEMORY, BAD_STATE = range(7)
+
+Real = ct.c_double
+Doubles = ct.POINTER(Real)
+Vector3, Vector4, Vector6 = Real * 3, Real * 4, Real * 6
+PerLeg, PerJoint = Real * LEGS, (Real * JOINTS) * LEGS
+LegVectors, JointVectors = (Real * 3) * LEGS, ((Real * 3) * JOINTS) * LEGS
+
+
+def record(name: str, *fields: tuple[str, Any]) -> type[ct.Structure]:
+    """A structure type with these fields."""
+    return type(name, (ct.Structure,), {"_fields_": list(fields)})
+
+
+def reals(names: str) -> list[tuple[str, Any]]:
+    """Fields of one double each, by names between spaces."""
+    return [(name, Real) for name in names.split()]
+
+
+HxLink = record("HxLink", *reals("mass length offset_y offset_z"), ("com", Vector3), ("inertia", Vector6), ("axis", Vector3))
+HxLeg = record("HxLeg", ("hip_position", Vector3), ("hip_yaw", Real), ("link", HxLink * JOINTS))
+HxDefinition = record(
+    "HxDefinition",
+    ("torso", record("Torso", ("mass", Real), ("com", Vector3), ("inertia", Vector6))),
+    ("leg", HxLeg * LEGS),
+    ("foot_radius", Real),
+    ("contact", record("Contact", ("law", ct.c_int), *reals("stiffness restitution damping_factor impact_speed_floor"))),
+    ("friction", record("Friction", ("law", ct.c_int), *reals("mu slope"))),
+    ("servo", record("Servo", ("mode", ct.c_int), *reals("kp kd torque_max speed_max rotor_inertia coulomb_friction"))),
+    ("baumgarte", record("Baumgarte", *reals("alpha beta"))),
+    ("gravity", Vector3),
+    ("solver", record("Solver", ("method", ct.c_int), *reals("step tolerance step_max"))),
+    ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading"))),
+    (
+        "initial",
+        record(
+            "Initial",
+            ("position", Vector3),
+            ("quaternion", Vector4),
+            ("velocity", Vector3),
+            ("angular_velocity", Vector3),
+            ("angle", PerJoint),
+            ("speed", PerJoint),
+        ),
+    ),
+)
+HxInput = record(
+    "HxInput",
+    ("angle_ref", PerJoint),
+    ("speed_ref", PerJoint),
+    ("torque_ref", PerJoint),
+    ("push_force", Vector3),
+    ("push_torque", Vector3),
+)
+HxOutput = record(
+    "HxOutput",
+    ("time", Real),
+    ("angle", PerJoint),
+    ("speed", PerJoint),
+    ("torque", PerJoint),
+    ("reaction_force", JointVectors),
+    ("reaction_torque", JointVectors),
+    (
+        "foot",
+        record(
+            "FootOutput",
+            ("force", LegVectors),
+            ("normal_force", PerLeg),
+            ("tangential_force", PerLeg),
+            ("position", LegVectors),
+            ("velocity", LegVectors),
+            ("slip_speed", PerLeg),
+            ("penetration", PerLeg),
+            ("impact_speed", PerLeg),
+            ("contact", ct.c_int * LEGS),
+        ),
+    ),
+    (
+        "torso",
+        record(
+            "TorsoOutput",
+            ("position", Vector3),
+            ("quaternion", Vector4),
+            *reals("roll pitch yaw"),
+            ("velocity", Vector3),
+            ("angular_velocity", Vector3),
+        ),
+    ),
+    ("imu", record("ImuOutput", ("specific_force", Vector3), ("angular_velocity", Vector3))),
+    ("energy", record("EnergyOutput", *reals("kinetic potential actuator_work push_work dissipated residual"))),
+    ("constraint", record("ConstraintOutput", *reals("position_error velocity_error"))),
+    ("solver", record("SolverOutput", *reals("evaluations steps rejected touchdowns"))),
+)

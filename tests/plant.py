@@ -1,0 +1,236 @@
+"""The C plant from Python: `Plant` around one instance, robots made into definitions, and calls of the probe's functions."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Iterable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from mirror import BODIES, BODY_STATE, JOINTS, LEGS, MULTIPLIERS, OK, Doubles, HxDefinition, HxInput, HxOutput, Real
+
+from hexapod_cosim.models import (
+    CONTACT_LAWS,
+    FRICTION_LAWS,
+    METHODS,
+    SERVO_MODES,
+    TERRAINS,
+    Leg,
+    Link,
+    Robot,
+)
+from hexapod_cosim.models.dynamics import Accelerations, Command
+from hexapod_cosim.models.records import Array
+
+
+class PlantError(Exception):
+    """A call that the plant refused: its status and message."""
+
+    def __init__(self, status: int, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+def bound(core: ct.CDLL) -> ct.CDLL:
+    """The library with its functions' types declared; harmless to repeat."""
+    plant, status = ct.c_void_p, ct.c_int
+    signatures: dict[str, tuple[Any, list[Any]]] = {
+        "hx_version": (ct.c_char_p, []),
+        "hx_status_name": (ct.c_char_p, [ct.c_int]),
+        "hx_definition_default": (None, [ct.POINTER(HxDefinition)]),
+        "hx_input_default": (None, [ct.POINTER(HxInput)]),
+        "hx_definition_check": (status, [ct.POINTER(HxDefinition), ct.c_char_p]),
+        "hx_plant_create": (plant, []),
+        "hx_plant_destroy": (None, [plant]),
+        "hx_plant_reset": (status, [plant, ct.POINTER(HxDefinition), Real]),
+        "hx_plant_step": (status, [plant, ct.POINTER(HxInput), Real]),
+        "hx_plant_output": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxOutput)]),
+        "hx_plant_time": (Real, [plant]),
+        "hx_plant_message": (ct.c_char_p, [plant]),
+        "hx_plant_state_size": (ct.c_size_t, []),
+        "hx_plant_get_state": (None, [plant, ct.c_char_p]),
+        "hx_plant_set_state": (status, [plant, ct.c_char_p, ct.c_size_t]),
+        "hx_plant_get_bodies": (None, [plant, Doubles]),
+        "hx_plant_set_bodies": (status, [plant, Doubles]),
+        "hx_plant_accelerations": (None, [plant, ct.POINTER(HxInput), Doubles, Doubles, Doubles]),
+    }
+    for name, (result, arguments) in signatures.items():
+        function = getattr(core, name)
+        function.restype, function.argtypes = result, arguments
+    return core
+
+
+def pointer(array: Array) -> Any:
+    """double * of a contiguous array; the array must outlive its use."""
+    return array.ctypes.data_as(Doubles)
+
+
+def passed(argument: Any) -> Any:
+    """An argument of a probe function as C takes it."""
+    if isinstance(argument, np.ndarray):
+        return pointer(np.ascontiguousarray(argument))
+    if isinstance(argument, ct.Structure):
+        return ct.byref(argument)
+    if isinstance(argument, Plant):
+        return ct.c_void_p(argument.handle)
+    return Real(argument) if isinstance(argument, float) else argument
+
+
+def probed(function: Any, *arguments: Any, size: int) -> Array:
+    """The `size` doubles that a probe function writes into its last argument."""
+    out = np.full(size, np.nan)
+    function(*map(passed, arguments), pointer(out))
+    return out
+
+
+def asked(function: Any, *arguments: Any) -> float:
+    """The double that a probe function returns."""
+    function.restype = Real
+    return float(function(*map(passed, arguments)))
+
+
+def put(target: Any, values: Any) -> None:
+    """Copies numbers, nested as the ctypes array is, into it."""
+    for index, value in enumerate(values):
+        if isinstance(value, Iterable):
+            put(target[index], value)
+        else:
+            target[index] = value
+
+
+def seen(value: Any) -> Any:
+    """A structure as a namespace, arrays in it as numpy arrays (copies)."""
+    if isinstance(value, ct.Structure):
+        names = [field[0] for field in value._fields_]
+        return SimpleNamespace(**{name: seen(getattr(value, name)) for name in names})
+    return np.array(value) if isinstance(value, ct.Array) else value
+
+
+def definition(robot: Robot, **initial: Any) -> Any:
+    """The HxDefinition of a robot, whether or not it could exist.
+
+    initial: position, quaternion, velocity, angular_velocity, angle, speed; at rest in the stance 1 m up unless given.
+    """
+    d: Any = HxDefinition()
+    d.torso.mass = robot.torso.mass
+    put(d.torso.com, robot.torso.com)
+    put(d.torso.inertia, robot.torso.inertia)
+    for target, leg in zip(d.leg, robot.legs, strict=True):
+        _put_leg(target, leg)
+    d.foot_radius = robot.foot.radius
+    _put_settings(d, robot)
+    start = {"position": (0.0, 0.0, 1.0), "quaternion": (1.0, 0.0, 0.0, 0.0), "angle": robot.stance} | initial
+    for name, values in start.items():
+        put(getattr(d.initial, name), values)
+    return d
+
+
+def _put_leg(target: Any, leg: Leg) -> None:
+    put(target.hip_position, leg.hip_position)
+    target.hip_yaw = leg.hip_yaw
+    for place, link in zip(target.link, leg.links, strict=True):
+        _put_link(place, link)
+
+
+def _put_link(target: Any, link: Link) -> None:
+    target.mass, target.length, target.offset_y, target.offset_z = link.mass, link.length, link.offset_y, link.offset_z
+    put(target.com, link.com)
+    put(target.inertia, link.inertia)
+    put(target.axis, link.axis)
+
+
+def _put_settings(d: Any, robot: Robot) -> None:
+    d.contact.law = 1 + CONTACT_LAWS.index(robot.contact.law)
+    d.friction.law = 1 + FRICTION_LAWS.index(robot.friction.law)
+    d.servo.mode = 1 + SERVO_MODES.index(robot.servo.mode)
+    d.solver.method = 1 + METHODS.index(robot.solver.method)
+    d.terrain.kind = 1 + TERRAINS.index(robot.terrain.kind)
+    for section in ("contact", "friction", "servo", "baumgarte", "solver", "terrain"):
+        target, source = getattr(d, section), getattr(robot, section)
+        for name, kind in target._fields_:
+            if kind is Real:
+                setattr(target, name, getattr(source, name))
+    put(d.gravity, robot.gravity)
+
+
+def inputs(command: Command) -> Any:
+    """The HxInput of a command; its age is the plant's business."""
+    i: Any = HxInput()
+    for name in ("angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque"):
+        put(getattr(i, name), getattr(command, name))
+    return i
+
+
+class Plant:
+    """One plant of a robot. Refused calls raise PlantError; the plant is then as it was."""
+
+    def __init__(self, core: ct.CDLL, robot: Robot, **initial: Any) -> None:
+        self.core = bound(core)
+        self.robot = robot
+        self.handle = self.core.hx_plant_create()
+        self.reset(definition(robot, **initial))
+
+    def __del__(self) -> None:
+        self.core.hx_plant_destroy(self.handle)
+
+    def _check(self, status: int) -> None:
+        if status != OK:
+            raise PlantError(status, self.message)
+
+    @property
+    def message(self) -> str:
+        """Of the last failure."""
+        return bytes(self.core.hx_plant_message(self.handle)).decode()
+
+    @property
+    def time(self) -> float:
+        """s"""
+        return float(self.core.hx_plant_time(self.handle))
+
+    def reset(self, start: Any, t: float = 0.0) -> None:
+        """Puts the robot of an HxDefinition at its start."""
+        self._check(self.core.hx_plant_reset(self.handle, start, t))
+
+    def hold(self) -> Command:
+        """The command that holds the stance."""
+        return Command(angle_ref=self.robot.stance)
+
+    def step(self, t_end: float, command: Command | None = None) -> None:
+        """Integrates to t_end [s] under a command (default: hold the stance)."""
+        self._check(self.core.hx_plant_step(self.handle, inputs(command or self.hold()), t_end))
+
+    def output(self, command: Command | None = None) -> Any:
+        """Everything in hxOutput, as a namespace of floats and arrays."""
+        result = HxOutput()
+        self.core.hx_plant_output(self.handle, inputs(command or self.hold()), result)
+        return seen(result)
+
+    def save(self) -> bytes:
+        """The plant's bytes."""
+        buffer = ct.create_string_buffer(self.core.hx_plant_state_size())
+        self.core.hx_plant_get_state(self.handle, buffer)
+        return buffer.raw
+
+    def restore(self, saved: bytes) -> None:
+        """Takes a saved plant's bytes."""
+        self._check(self.core.hx_plant_set_state(self.handle, saved, len(saved)))
+
+    @property
+    def bodies(self) -> Array:
+        """(19, 13)"""
+        body = np.zeros((BODIES, BODY_STATE))
+        self.core.hx_plant_get_bodies(self.handle, pointer(body))
+        return body
+
+    @bodies.setter
+    def bodies(self, body: Array) -> None:
+        self._check(self.core.hx_plant_set_bodies(self.handle, pointer(np.ascontiguousarray(body))))
+
+    def accelerations(self, command: Command | None = None) -> Accelerations:
+        """Eq. 1 solved at the present state; the gear torque, which the plant does not tell, is left at 0."""
+        dv, multipliers = np.zeros((BODIES, 6)), np.zeros((BODIES - 1, MULTIPLIERS))
+        drive, gear = np.zeros((LEGS, JOINTS)), np.zeros((LEGS, JOINTS))
+        places = [pointer(array) for array in (dv, multipliers, drive)]
+        self.core.hx_plant_accelerations(self.handle, inputs(command or self.hold()), *places)
+        return Accelerations(dv, multipliers, drive, gear)

@@ -1,0 +1,133 @@
+"""Robots, motions and commands for the plant's tests: random but seeded, and as general as the equations allow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from plant import Plant
+
+from hexapod_cosim.models import Leg, Link, Robot, load_robot
+from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.kinematics import body_states
+from hexapod_cosim.models.records import Array, Vector6
+from hexapod_cosim.models.terrain import ground_normal
+
+LEGS, JOINTS = 6, 3
+MACRO = 0.004  # s  of a trail
+
+
+def changed(robot: Robot, **sections: dict[str, Any]) -> Robot:
+    """The robot with fields of some of its sections replaced: changed(robot, servo={"mode": "torque"})."""
+    return replace(robot, **{name: replace(getattr(robot, name), **fields) for name, fields in sections.items()})
+
+
+def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
+    """The robot with fields of one link of every leg replaced."""
+    legs = []
+    for leg in robot.legs:
+        links = list(leg.links)
+        links[joint] = replace(links[joint], **fields)
+        legs.append(replace(leg, links=(links[0], links[1], links[2])))
+    return replace(robot, legs=tuple(legs))
+
+
+def lopsided(seed: int = 0) -> Robot:
+    """A robot no two parts of which are alike: skew axes, offsets, products of inertia, a centre of mass off the torso's origin."""
+    robot, rng = load_robot("phantomx_mk4"), np.random.default_rng(seed)
+    torso = replace(robot.torso, com=tuple(rng.normal(0.0, 0.02, 3)), inertia=random_inertia(rng, robot.torso.mass, 0.08))
+    return replace(robot, torso=torso, legs=tuple(_lopsided_leg(leg, rng) for leg in robot.legs))
+
+
+def _lopsided_leg(leg: Leg, rng: np.random.Generator) -> Leg:
+    coxa, femur, tibia = (_lopsided_link(link, rng) for link in leg.links)
+    hip = tuple(np.add(leg.hip_position, rng.normal(0.0, 0.02, 3)))
+    return replace(leg, links=(coxa, femur, tibia), hip_position=hip, hip_yaw=leg.hip_yaw + rng.normal(0.0, 0.2))
+
+
+def _lopsided_link(link: Link, rng: np.random.Generator) -> Link:
+    mass, axis = link.mass * rng.uniform(0.5, 2.0), np.add(link.axis, rng.normal(0.0, 0.2, 3))
+    return replace(
+        link,
+        mass=mass,
+        length=link.length * rng.uniform(0.8, 1.2),
+        offset_y=rng.normal(0.0, 0.01),
+        offset_z=rng.normal(0.0, 0.01),
+        com=tuple(np.add(link.com, rng.normal(0.0, 0.005, 3))),
+        inertia=random_inertia(rng, mass, 0.03),
+        axis=tuple(axis / np.linalg.norm(axis)),
+    )
+
+
+def random_inertia(rng: np.random.Generator, mass: float, size: float) -> Vector6:
+    """Entries xx yy zz xy xz yz of the inertia of a random cloud of mass points of this size [m]."""
+    points = rng.normal(0.0, size, (8, 3))
+    second = mass / 8.0 * points.T @ points
+    J = np.trace(second) * np.eye(3) - second
+    return (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+
+
+def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
+    """Initial state near the stance, moving, three of its feet in the ground, the third by half a millimetre."""
+    rng = np.random.default_rng(seed)
+    pose = {
+        "position": np.array([0.3, -0.2, 0.0]),
+        "quaternion": np.array([1.0, 0.0, 0.0, 0.0]) + rng.normal(0.0, 0.05, 4),
+        "velocity": rng.normal(0.0, 0.3, 3),
+        "angular_velocity": rng.normal(0.0, 1.0, 3),
+        "angle": robot.stance + rng.normal(0.0, 0.2, (LEGS, JOINTS)),
+        "speed": rng.normal(0.0, 1.0, (LEGS, JOINTS)),
+    }
+    pose["position"][2] = lift(robot, body_states(robot, **pose))
+    return pose
+
+
+def lift(robot: Robot, body: Array) -> float:
+    """How far up [m] bodies must go for the third deepest foot to be half a millimetre in the ground."""
+    depth = sorted(foot.penetration for foot in foot_contacts(robot, body))
+    return (depth[-3] - 5e-4) / float(ground_normal(robot.terrain)[2])
+
+
+def random_bodies(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
+    """(19, 13) bodies of a random pose, pulled off their joints by about `drift` (m, m/s and so on)."""
+    body = body_states(robot, **random_pose(robot, seed))
+    body = body + drift * np.random.default_rng(seed + 500).normal(0.0, 1.0, body.shape)
+    body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
+    body[:, 2] += lift(robot, body)
+    return body
+
+
+def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:
+    """A command near the stance, some of whose torques are beyond the servos' limit; pushes in every direction."""
+    rng = np.random.default_rng(seed + 1000)
+    return Command(
+        angle_ref=robot.stance + size * rng.normal(0.0, 0.1, (LEGS, JOINTS)),
+        speed_ref=size * rng.normal(0.0, 0.5, (LEGS, JOINTS)),
+        torque_ref=size * rng.normal(0.0, 1.0, (LEGS, JOINTS)),
+        push_force=size * rng.normal(0.0, 20.0, 3),
+        push_torque=size * rng.normal(0.0, 2.0, 3),
+    )
+
+
+def landing(robot: Robot, seed: int = 3) -> dict[str, Array]:
+    """A start with the lowest foot 2 mm above the ground, falling: feet touch down one after the other within some 50 ms."""
+    pose = random_pose(robot, seed) | {"velocity": np.array([0.1, 0.0, -0.5])}
+    clearance = -max(foot.penetration for foot in foot_contacts(robot, body_states(robot, **pose)))
+    pose["position"][2] += 2e-3 - clearance
+    return pose
+
+
+def trail(plant: Plant, count: int, *, first: int = 0) -> list[bytes]:
+    """The plant's bytes after each of some macro-steps with a different command each."""
+    saved = []
+    for k in range(first, first + count):
+        plant.step((k + 1) * MACRO, random_command(plant.robot, k, size=0.2))
+        saved.append(plant.save())
+    return saved
+
+
+def distance(a: Any, b: Any) -> float:
+    """Largest difference of two arrays over the largest entry of the second, or over 1 where that is less."""
+    return float(np.max(np.abs(np.subtract(a, b)))) / max(1.0, float(np.max(np.abs(b))))

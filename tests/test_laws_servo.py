@@ -1,0 +1,186 @@
+"""Servos through the whole plant: limits, rotor inertia, gear friction, the kinematic drive.
+
+On legs whose coxas and femurs are too heavy to move, each tibia is a link on a wall: closed forms hold for its joint alone.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from plant import Plant
+from states import changed, landing, random_command, with_links
+
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.contact import standing_damping
+from hexapod_cosim.models.dynamics import Command, accelerations
+from hexapod_cosim.models.statics import standing
+
+CLOSED = 1e-6  # relative, of closed forms: a tibia's inertia over that of its wall is 1e-7; and an error control of 1e-10 a step
+WEIGHTLESS = (0.0, 0.0, 0.0)
+FLIGHT: dict[str, Any] = {"method": "dp54", "tolerance": 1e-10, "step_max": 1.0}
+HEAVY: dict[str, Any] = {"mass": 1e5, "inertia": (1e4, 1e4, 1e4, 0.0, 0.0, 0.0), "com": (0.0, 0.0, 0.0)}
+STRETCHED = np.zeros((6, 3))
+
+
+def walled(**servo: Any) -> Robot:
+    """No gravity; tibias on femurs that do not answer."""
+    robot = changed(load_robot("athena"), servo={"coulomb_friction": 0.0} | servo, torso={"mass": 1e6}, solver=FLIGHT)
+    robot = changed(robot, torso={"inertia": (1e6, 1e6, 1e6, 0.0, 0.0, 0.0)})
+    return replace(with_links(with_links(robot, 0, **HEAVY), 1, **HEAVY), gravity=WEIGHTLESS)
+
+
+def tibia_inertia(robot: Robot) -> float:
+    """kg m2 about the knee, with the rotor's."""
+    tibia = robot.legs[0].links[2]
+    return tibia.inertia[1] + tibia.mass * tibia.com[0] ** 2 + robot.servo.rotor_inertia
+
+
+def tibias(value: float) -> Any:
+    """(6, 3) with this value at every knee."""
+    return np.array([0.0, 0.0, value]) * np.ones((6, 1))
+
+
+def test_a_servo_without_damping_swings_a_tibia_at_its_natural_frequency(core: ct.CDLL) -> None:
+    robot = walled(kd=0.0, torque_max=100.0, speed_max=1e6)
+    plant = Plant(core, robot, angle=tibias(0.1))
+    period = 2.0 * math.pi * math.sqrt(tibia_inertia(robot) / robot.servo.kp)
+    for share, angle in ((0.25, 0.0), (0.5, -0.1), (1.0, 0.1), (3.25, 0.0)):
+        plant.step(share * period, Command(angle_ref=STRETCHED))
+        assert plant.output().angle[:, 2] == pytest.approx(np.full(6, angle), abs=0.1 * CLOSED)
+
+
+def test_a_damped_servo_decays_as_a_linear_oscillator(core: ct.CDLL) -> None:
+    robot = walled(kp=40.0, kd=0.3, torque_max=100.0, speed_max=1e6)
+    plant, inertia, t = Plant(core, robot, angle=tibias(0.1)), tibia_inertia(robot), 0.08
+    decay, stiffness = robot.servo.kd / (2.0 * inertia), robot.servo.kp / inertia
+    w = math.sqrt(stiffness - decay**2)
+    plant.step(t, Command(angle_ref=STRETCHED))
+    exact = 0.1 * math.exp(-decay * t) * (math.cos(w * t) + decay / w * math.sin(w * t))
+    assert plant.output().angle[:, 2] == pytest.approx(np.full(6, exact), abs=0.1 * CLOSED)
+
+
+def test_a_torque_meets_the_link_and_its_rotor(core: ct.CDLL) -> None:
+    robot = walled(mode="torque", torque_max=100.0, speed_max=1e6)
+    plant, command = Plant(core, robot, angle=STRETCHED), Command(angle_ref=STRETCHED, torque_ref=tibias(0.02))
+    plant.step(0.3, command)
+    rate = 0.02 / tibia_inertia(robot)
+    assert plant.output(command).speed[:, 2] == pytest.approx(np.full(6, 0.3 * rate), rel=CLOSED)
+    assert plant.output(command).energy.actuator_work == pytest.approx(6.0 * 0.02 * 0.5 * rate * 0.3**2, rel=CLOSED)
+    assert plant.output(command).energy.kinetic == pytest.approx(plant.output(command).energy.actuator_work, rel=CLOSED)
+
+
+def test_torque_is_limited_at_stall_and_by_the_torque_speed_line(core: ct.CDLL) -> None:
+    """Full command from rest: w = w0 (1 - exp(-tau t / (I w0))) along the line, and never faster than no-load."""
+    robot = walled(mode="torque")
+    plant, command = Plant(core, robot, angle=STRETCHED), Command(angle_ref=STRETCHED, torque_ref=tibias(50.0))
+    assert plant.output(command).torque[:, 2] == pytest.approx(np.full(6, robot.servo.torque_max), rel=1e-14)
+    constant = tibia_inertia(robot) * robot.servo.speed_max / robot.servo.torque_max
+    for t in (0.5 * constant, constant, 3.0 * constant):
+        plant.step(t, command)
+        speed = robot.servo.speed_max * (1.0 - math.exp(-t / constant))
+        assert plant.output(command).speed[:, 2] == pytest.approx(np.full(6, speed), rel=CLOSED)
+        line = robot.servo.torque_max * (1.0 - speed / robot.servo.speed_max)
+        assert plant.output(command).torque[:, 2] == pytest.approx(np.full(6, line), rel=10.0 * CLOSED)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_no_torque_is_left_beyond_the_no_load_speed_but_full_braking_is(core: ct.CDLL, sign: float) -> None:
+    robot = walled(mode="torque")
+    plant = Plant(core, robot, angle=STRETCHED, speed=tibias(sign * 9.0))
+    forward, back = (Command(angle_ref=STRETCHED, torque_ref=tibias(way * sign * 50.0)) for way in (1.0, -1.0))
+    assert plant.output(forward).torque[:, 2] == pytest.approx(np.zeros(6), abs=1e-14)
+    assert plant.output(back).torque[:, 2] == pytest.approx(np.full(6, -sign * robot.servo.torque_max), rel=1e-14)
+
+
+def test_gear_friction_stops_a_tibia_at_its_closed_rate(core: ct.CDLL) -> None:
+    """-tau tanh(w / 0.05): sinh(w / 0.05) decays exponentially; fast, that is a constant rate."""
+    robot = walled(mode="torque", coulomb_friction=0.05)
+    plant = Plant(core, robot, angle=STRETCHED, speed=tibias(1.0))
+    rate = 0.05 / tibia_inertia(robot)
+    for t in (0.1, 0.24):
+        plant.step(t, Command(angle_ref=STRETCHED))
+        exact = 0.05 * math.asinh(math.sinh(1.0 / 0.05) * math.exp(-rate * t / 0.05))
+        assert plant.output().speed[:, 2] == pytest.approx(np.full(6, exact), rel=10.0 * CLOSED)
+    energy = plant.output().energy
+    lost = 6.0 * 0.5 * tibia_inertia(robot) * (1.0 - plant.output().speed[0, 2] ** 2)
+    assert energy.dissipated == pytest.approx(lost, rel=10.0 * CLOSED)
+    assert energy.actuator_work == 0.0
+
+
+# the kinematic drive
+
+
+def driven(robot: Robot) -> Robot:
+    return changed(robot, servo={"mode": "kinematic"})
+
+
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(core: ct.CDLL, name: str) -> None:
+    """References that fit together, q + qd h from macro-step to macro-step: the joints are where they are told to be."""
+    robot = driven(load_robot(name))
+    start = landing(robot)
+    angle, speed = start["angle"].copy(), start["speed"]
+    plant, h = Plant(core, robot, **start), 4e-3
+    for k in range(25):
+        plant.step((k + 1) * h, Command(angle_ref=angle, speed_ref=speed))
+        angle = angle + h * speed
+        output = plant.output(Command(angle_ref=angle, speed_ref=speed))
+        assert output.angle == pytest.approx(angle, abs=1e-5)
+        assert output.speed == pytest.approx(speed, abs=1e-3)
+    assert output.solver.touchdowns > 0
+
+
+def test_a_drive_off_its_reference_returns_at_the_rate_of_its_stabilisation(core: ct.CDLL) -> None:
+    """alpha = beta: critically damped, error (1 + alpha t) exp(-alpha t)."""
+    robot = changed(driven(load_robot("athena")), solver=FLIGHT)
+    plant, alpha = Plant(core, robot, angle=robot.stance + 0.1), robot.baumgarte.alpha
+    assert robot.baumgarte.beta == alpha
+    for t in (0.01, 0.03, 0.1):
+        plant.step(t)
+        assert plant.output().angle - robot.stance == pytest.approx(
+            np.full((6, 3), 0.1 * (1.0 + alpha * t) * math.exp(-alpha * t)), abs=1e-8
+        )
+
+
+def test_drive_torque_is_that_of_inverse_dynamics(core: ct.CDLL) -> None:
+    """As the twin's dense system has it; and torque servos given it move the same way."""
+    robot = driven(load_robot("athena"))
+    plant = Plant(core, robot, **landing(robot))
+    command = replace(random_command(robot, 2, size=0.3), torque_ref=np.zeros((6, 3)))
+    plant.step(0.03, command)
+    body = plant.bodies
+    plant.bodies = body  # contacts as if put down slowly, as the twin takes them
+    solved = plant.accelerations(command)
+    dense = accelerations(robot, body, command, standing_damping(robot, body))
+    assert solved.drive_torque == pytest.approx(dense.drive_torque, rel=1e-9, abs=1e-9)
+    assert np.array_equal(plant.output(command).torque, solved.drive_torque)
+
+    strong = Plant(core, changed(robot, servo={"mode": "torque", "torque_max": 1e5, "speed_max": 1e9}))
+    strong.bodies = body
+    by_torque = strong.accelerations(replace(command, torque_ref=solved.drive_torque)).dv
+    assert float(np.max(np.abs(by_torque - solved.dv))) < 1e-8 * float(np.max(np.abs(solved.dv)))
+
+
+def test_drives_that_hold_a_standing_robot_give_the_torques_that_servos_give(core: ct.CDLL) -> None:
+    robot = load_robot("athena")
+    pose = standing(robot)
+    start = {"position": pose.position, "quaternion": pose.quaternion, "angle": pose.angle}
+    servo, drive = Plant(core, robot, **start), Plant(core, driven(robot), **start)
+    still = Command(angle_ref=pose.angle)
+    assert drive.output(still).torque == pytest.approx(servo.output().torque, abs=1e-6)
+
+
+def test_drive_work_is_what_the_robot_gains(core: ct.CDLL) -> None:
+    """Legs swung in free fall without gravity: the multiplier times the speed is all the power there is."""
+    robot = replace(changed(driven(load_robot("athena")), servo={"coulomb_friction": 0.0}, solver=FLIGHT), gravity=WEIGHTLESS)
+    plant = Plant(core, robot)
+    command = Command(angle_ref=robot.stance, speed_ref=np.tile([0.5, -1.0, 1.5], (6, 1)))
+    plant.step(0.1, command)
+    energy = plant.output(command).energy
+    assert energy.kinetic > 0.05
+    assert energy.actuator_work == pytest.approx(energy.kinetic, rel=1e-6)

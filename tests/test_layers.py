@@ -1,0 +1,90 @@
+"""The arrows between the folders: models <- controller <- cosim; plant_fmu/src sees no FMI, plant_fmu/fmi no physics."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = "hexapod_cosim"
+SEES = {"models": {"models"}, "controller": {"models", "controller"}, "cosim": {"models", "controller", "cosim"}}
+# third-party packages by folder; cosim may use what pyproject lists
+MAY_USE = {"models": {"numpy"}, "controller": {"numpy", "scipy", "control", "matplotlib"}}
+RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
+INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
+STANDARD_C = {"float.h", "math.h", "stdarg.h", "stddef.h", "stdint.h", "stdio.h", "stdlib.h", "string.h", "stdbool.h", "limits.h"}
+
+
+def python_files(folder: str) -> list[Path]:
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Dotted names of all modules a file imports, wherever in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: a relative import"
+            yield node.module or ""
+
+
+@pytest.mark.parametrize("folder", SEES)
+def test_a_folder_imports_only_what_lies_below_it(folder: str) -> None:
+    for path in python_files(folder):
+        for name in imports(path):
+            parts = name.split(".")
+            if parts[0] == PACKAGE:
+                assert len(parts) > 1, f"{path.relative_to(ROOT)} imports the bare {PACKAGE}"
+                assert parts[1] in SEES[folder], f"{path.relative_to(ROOT)} imports {name}"
+
+
+@pytest.mark.parametrize("folder", MAY_USE)
+def test_a_folder_uses_only_the_packages_it_may(folder: str) -> None:
+    for path in python_files(folder):
+        allowed = RUN_TIME_ONLY if folder == "controller" and "design" not in path.relative_to(ROOT).parts else MAY_USE[folder]
+        foreign = {name.split(".")[0] for name in imports(path)} - set(sys.stdlib_module_names) - {PACKAGE}
+        assert foreign <= allowed, f"{path.relative_to(ROOT)} imports {sorted(foreign - allowed)}"
+
+
+def test_no_folder_is_imported_under_a_second_name() -> None:
+    files = [
+        path for folder in ("models", "controller", "cosim", "tests", "examples", "tools", "benchmarks") for path in python_files(folder)
+    ]
+    assert files
+    for path in files:
+        second = {name for name in imports(path) if name.split(".")[0] in SEES}
+        assert not second, f"{path.relative_to(ROOT)} imports {sorted(second)}: a copy of {PACKAGE}'s"
+
+
+def c_files(*folders: str) -> list[Path]:
+    return [path for folder in folders for path in sorted((ROOT / "plant_fmu" / folder).glob("*.[ch]"))]
+
+
+def test_the_physics_includes_itself_its_header_and_the_c_library() -> None:
+    own = {path.name for path in c_files("src")} | {"hexapod/hexapod.h"}
+    files = c_files("src", "include/hexapod")
+    assert files
+    for path in files:
+        foreign = set(INCLUDE.findall(path.read_text(encoding="utf-8"))) - own - STANDARD_C
+        assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
+
+
+def test_the_fmi_layer_includes_no_physics() -> None:
+    physics = {path.name for path in c_files("src")}
+    files = c_files("fmi", "generated")
+    assert files
+    for path in files:
+        included = set(INCLUDE.findall(path.read_text(encoding="utf-8")))
+        inside = {name for name in included if Path(name).name in physics and not name.startswith("fmi/")}
+        assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
+
+
+def test_only_the_fmi_layer_names_the_standard() -> None:
+    for path in c_files("src", "include/hexapod"):
+        assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), f"{path.relative_to(ROOT)} names an FMI type or function"

@@ -1,0 +1,274 @@
+"""The C plant equals the readable twin, function by function, on random states with drifted joints."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import math
+from typing import Any
+
+import mirror
+import numpy as np
+import pytest
+from plant import Plant, asked, inputs, pointer, probed
+from states import changed, distance, lopsided, random_bodies
+
+from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
+from hexapod_cosim.models.actuator import gear_friction, servo_torque
+from hexapod_cosim.models.contact import (
+    contact_damping,
+    exact_restitution_chi,
+    foot_contacts,
+    foot_force,
+    friction_force,
+    normal_force,
+)
+from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
+from hexapod_cosim.models.kinematics import (
+    axis_normals,
+    body_states,
+    cross,
+    joint_angle,
+    joint_models,
+    joint_speed,
+    quaternion_product,
+    quaternion_rate,
+    rotation_matrix,
+    skew,
+)
+from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.terrain import ground
+
+SAME = 1e-13  # relative: the same formula, its operations in another order, some hundred roundings long
+CONTACT_SAME = 1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+DRIFT = 0.02
+LEG_JOINTS = [(leg, joint) for leg in range(6) for joint in range(3)]
+TERRAINS: dict[str, dict[str, Any]] = {
+    "flat": {"kind": "flat", "height": 0.013, "incline": 0.4, "heading": 1.0},
+    "slope": {"kind": "slope", "height": -0.02, "incline": 0.3, "heading": 2.1},
+}
+
+
+def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
+    plant = Plant(core, robot)
+    body = random_bodies(robot, seed, drift=DRIFT)
+    plant.bodies = body
+    return plant, body
+
+
+def test_the_mirrors_of_the_header_have_the_compilers_layout(core: ct.CDLL) -> None:
+    core.hx_probe_field.restype = ct.c_char_p
+    offset, size, index, names = ct.c_size_t(), ct.c_size_t(), 0, set()
+    while name := core.hx_probe_field(ct.c_size_t(index), ct.byref(offset), ct.byref(size)):
+        kind, _, path = name.decode().partition(".")
+        structure, at = getattr(mirror, "Hx" + kind[2:]), 0
+        for part in filter(None, path.split(".")):
+            at += getattr(structure, part).offset
+            structure = dict(structure._fields_)[part]
+        assert (at, ct.sizeof(structure)) == (offset.value, size.value), name
+        names.add(name.decode())
+        index += 1
+    assert {f"hx{kind}" for kind in ("Link", "Leg", "Definition", "Input", "Output")} <= names
+    assert len(names) == index > 80
+
+
+# rotations and frames
+
+
+def test_rotation_and_quaternion_functions_are_the_twins(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(1)
+    for p, w, dp in zip(rng.normal(size=(50, 4)), rng.normal(size=(50, 3)), rng.normal(size=(50, 4)), strict=True):
+        unit = p / np.linalg.norm(p)
+        assert distance(probed(core.hx_probe_rotation_matrix, p, size=9), rotation_matrix(p).ravel()) < SAME
+        assert distance(probed(core.hx_probe_quaternion_rate, p, w, size=4), quaternion_rate(p, w)) < SAME
+        change = probed(core.hx_probe_rotation_of_change, unit, dp, size=3)
+        assert distance(change, 2.0 * quaternion_product(dp, unit * [1.0, -1.0, -1.0, -1.0])[1:]) < SAME
+        assert distance(probed(core.hx_probe_rotation_of_change, unit, quaternion_rate(unit, w), size=3), w) < SAME
+
+
+def test_axis_normals_are_the_twins(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(2)
+    for axis in [*np.eye(3), -np.eye(3)[1], np.array([0.6, 0.0, 0.8]), *rng.normal(size=(50, 3))]:
+        unit, a, b = axis / np.linalg.norm(axis), np.zeros(3), np.zeros(3)
+        core.hx_probe_axis_normals(pointer(unit), pointer(a), pointer(b))
+        assert distance([a, b], axis_normals(unit)) < SAME
+
+
+def test_an_inertia_is_carried_to_the_parent_by_the_congruence(core: ct.CDLL) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        e, U, s, root = rng.normal(size=3), rng.normal(size=6), float(rng.normal()), rng.normal(size=(6, 6))
+        inertia, X = root @ root.T, np.eye(6)
+        X[3:6, 0:3] = skew(e)
+        got = probed(core.hx_probe_carry_inertia, e, s, U, inertia, size=36).reshape(6, 6)
+        assert distance(got, X.T @ (inertia - s * np.outer(U, U)) @ X) < SAME
+
+
+# joints, eq. 2-3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_joint_kinematics_are_the_twins_on_drifted_joints(core: ct.CDLL, seed: int) -> None:
+    robot = lopsided(seed)
+    plant, body = drifted(core, robot, seed)
+    inertias = world_inertias(robot, body)
+    for (leg, joint), model in zip(LEG_JOINTS, joint_models(robot), strict=True):
+        parent, child = body[model.parent], body[model.child]
+        ours = joint_kinematics(model, parent, child)
+        J, R_j = inertias[model.child], rotation_matrix(child[3:7])
+        u1, u2 = cross(R_j @ model.a_j, ours.s), cross(R_j @ model.b_j, ours.s)
+        expected = np.concatenate(
+            [
+                ours.phi,
+                ours.dphi,
+                ours.gamma,
+                ours.s,
+                u1,
+                u2,
+                rotation_matrix(parent[3:7]) @ model.point_i,
+                R_j @ model.point_j,
+                [joint_angle(model, parent, child), joint_speed(model, parent, child)],
+                J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+            ]
+        )
+        got = probed(core.hx_probe_joint, plant, inputs(plant.hold()), leg, joint, size=38)
+        assert distance(got, expected) < SAME
+        assert float(np.max(np.abs(ours.phi))) > DRIFT / 10.0
+
+
+def test_bodies_start_on_their_joints_where_the_twin_puts_them(core: ct.CDLL) -> None:
+    robot, rng = lopsided(4), np.random.default_rng(4)
+    start = {
+        "position": rng.normal(size=3),
+        "quaternion": rng.normal(size=4),
+        "velocity": rng.normal(size=3),
+        "angular_velocity": rng.normal(size=3),
+        "angle": rng.uniform(-3.1, 3.1, (6, 3)),
+        "speed": rng.normal(0.0, 5.0, (6, 3)),
+    }
+    plant = Plant(core, robot, **start)
+    assert distance(plant.bodies, body_states(robot, **start)) < SAME
+    output = plant.output()
+    assert distance(output.angle, start["angle"]) < SAME
+    assert distance(output.speed, start["speed"]) < SAME
+
+
+def test_bodies_come_back_as_they_were_set(core: ct.CDLL) -> None:
+    plant, body = drifted(core, load_robot("athena"), 5)
+    assert np.array_equal(plant.bodies, body)
+
+
+# ground and feet, eq. 4-5
+
+
+@pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
+def test_the_ground_is_the_twins(core: ct.CDLL, terrain: dict[str, Any]) -> None:
+    robot = changed(load_robot("athena"), terrain=terrain)
+    plant = Plant(core, robot)
+    for point in np.random.default_rng(6).normal(size=(20, 3)):
+        height, normal = ground(robot.terrain, point)
+        assert distance(probed(core.hx_probe_ground, plant, point, size=4), [height, *normal]) < SAME
+
+
+@pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
+@pytest.mark.parametrize("law", CONTACT_LAWS)
+@pytest.mark.parametrize("friction", ["tanh", "none"])
+def test_foot_kinematics_and_forces_are_the_twins(core: ct.CDLL, terrain: dict[str, Any], law: str, friction: str) -> None:
+    robot = changed(
+        lopsided(7), terrain=terrain, contact={"law": law, "impact_speed_floor": 2.0, "damping_factor": 0.5}, friction={"law": friction}
+    )
+    plant, body = drifted(core, robot, 7)
+    damping, touching = contact_damping(robot.contact, 0.0), 0
+    output = plant.output()
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        got = probed(core.hx_probe_foot, plant, inputs(plant.hold()), leg, 0.0, size=17)
+        seen = np.concatenate([foot.point, foot.velocity, foot.normal, [foot.penetration, foot.approach_speed]])
+        force = foot_force(robot, foot, damping if foot.penetration > 0.0 else math.nan)
+        assert distance(got[:11], seen) < SAME
+        assert distance(got[11:14], force) < CONTACT_SAME
+        assert np.array_equal(output.foot.force[leg], got[11:14])
+        touching += foot.penetration > 0.0
+    assert touching == np.count_nonzero(output.foot.normal_force) == 3
+    assert list(output.foot.contact) == [foot.penetration > 0.0 for foot in foot_contacts(robot, body)]
+
+
+def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) -> None:
+    """The implicit part of a step is to be stiff enough for its end: slopes at delta + h ddelta while the foot approaches."""
+    robot = changed(lopsided(7), contact={"impact_speed_floor": 2.0})
+    plant, body = drifted(core, robot, 7)
+    damping, approaching = contact_damping(robot.contact, 0.0), 0
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        got = probed(core.hx_probe_foot, plant, inputs(plant.hold()), leg, 2e-3, size=17)
+        delta, ddelta = foot.penetration + 2e-3 * max(foot.approach_speed, 0.0), foot.approach_speed
+        closed = 1.0 if foot.penetration > 0.0 else 0.0
+        force, _, stiffness, viscosity = normal_probe(core, plant, damping if closed else 0.0, delta, ddelta, closed=closed)
+        slip = float(np.linalg.norm(foot.velocity + foot.approach_speed * foot.normal))
+        drag = robot.friction.mu * force * asked(core.hx_probe_friction, plant, slip)
+        assert got[14:] == pytest.approx([stiffness, viscosity, drag], rel=SAME)
+        approaching += closed > 0.0 and foot.approach_speed > 0.0
+    assert approaching > 0
+
+
+@pytest.mark.parametrize("law", CONTACT_LAWS)
+def test_the_normal_force_is_the_twins_and_its_slopes_are_its_derivatives(core: ct.CDLL, law: str) -> None:
+    robot = changed(load_robot("athena"), contact={"law": law, "restitution": 0.6, "damping_factor": 2.0})
+    plant, rng = Plant(core, robot), np.random.default_rng(8)
+    for impact in (0.0, 0.005, 0.3):
+        damping = contact_damping(robot.contact, impact)
+        assert asked(core.hx_probe_contact_damping, plant, impact) == pytest.approx(damping, rel=SAME)
+        for delta, ddelta in zip(rng.uniform(-1e-3, 2e-3, 20).tolist(), rng.normal(0.0, 0.3, 20).tolist(), strict=True):
+            force, elastic, stiffness, viscosity = normal_probe(core, plant, damping, delta, ddelta)
+            assert force == pytest.approx(normal_force(robot.contact, damping, delta, ddelta), rel=SAME)
+            assert elastic == pytest.approx(normal_force(robot.contact, 0.0, delta, 0.0), rel=SAME)
+            ends = [
+                [normal_force(robot.contact, damping, delta + sign * h, ddelta + sign * k) for sign in (1.0, -1.0)]
+                for h, k in ((1e-9, 0.0), (0.0, 1e-7))
+            ]
+            slopes = [(up - down) / width for (up, down), width in zip(ends, (2e-9, 2e-7), strict=True)]
+            assert [stiffness, viscosity] == pytest.approx(slopes, rel=1e-5, abs=1e-4)
+            assert normal_probe(core, plant, damping, delta, ddelta, closed=0.0)[:2] == pytest.approx([0.0, 0.0], abs=0.0)
+
+
+def normal_probe(core: ct.CDLL, plant: Plant, damping: float, delta: float, ddelta: float, *, closed: float = 1.0) -> Array:
+    return probed(core.hx_probe_normal_force, plant, closed, damping, delta, ddelta, size=4)
+
+
+def test_friction_is_the_twins_through_its_limit_at_rest(core: ct.CDLL) -> None:
+    robot = changed(load_robot("athena"), friction={"slope": 60.0})
+    plant = Plant(core, robot)
+    for speed in (0.0, 1e-12, 0.99e-5 / 60.0, 1.01e-5 / 60.0, 1e-3, 0.05, 3.0):
+        per_speed = asked(core.hx_probe_friction, plant, speed)
+        slip = np.array([0.6, -0.8, 0.0]) * speed
+        assert distance(-robot.friction.mu * 10.0 * per_speed * slip, friction_force(robot.friction, 10.0, slip)) < SAME
+        assert per_speed == pytest.approx(math.tanh(60.0 * speed) / speed if speed else 60.0, rel=SAME)
+
+
+@pytest.mark.parametrize("e", [1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999, 1.0])
+def test_the_exact_restitution_factor_is_the_twins(core: ct.CDLL, e: float) -> None:
+    rounding = 3e-8  # both sides of its equation are of the size of chi and differ by chi^3: near e = 1 half the digits are lost
+    assert asked(core.hx_probe_exact_restitution_chi, e) == pytest.approx(exact_restitution_chi(e), rel=1e-9, abs=rounding)
+
+
+# servos
+
+
+@pytest.mark.parametrize("mode", ["position", "torque"])
+def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(core: ct.CDLL, mode: str) -> None:
+    robot = changed(load_robot("athena"), servo={"mode": mode})
+    servo, plant, rng, clipped = robot.servo, Plant(core, robot), np.random.default_rng(9), 0
+    for q, qd, command in zip(
+        rng.normal(0.0, 0.1, 200), rng.normal(0.0, 4.0, 200), rng.normal(0.0, 1.0, (200, 3)) * [0.1, 4.0, 2.0], strict=True
+    ):
+
+        def torque(angle: float, speed: float, refs: Array = command) -> float:
+            return float(servo_torque(servo, *np.array([[angle], [speed], *refs[:, None]]))[0])
+
+        def total(speed: float, angle: float = q) -> float:
+            return torque(angle, speed) + float(gear_friction(servo, np.array([speed]))[0])
+
+        got = probed(core.hx_probe_servo, plant, float(q), float(qd), command, size=4)
+        assert got[:2] == pytest.approx([torque(q, qd), float(gear_friction(servo, np.array([qd]))[0])], rel=SAME)
+        assert got[2] == pytest.approx((torque(q - 1e-6, qd) - torque(q + 1e-6, qd)) / 2e-6, rel=1e-6, abs=1e-6)
+        clipped += got[2] == 0.0
+        if got[2] > 0.0:  # on the torque-speed line the damping is left out on purpose: the line is no spring
+            assert got[3] == pytest.approx((total(qd - 1e-6) - total(qd + 1e-6)) / 2e-6, rel=1e-5, abs=1e-5)
+    assert clipped > 20

@@ -1,0 +1,179 @@
+"""Misuse of the plant: every bad call is told what it gave and what was expected, and leaves the plant as it was."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from mirror import BAD_STATE, INVALID_ARGUMENT, INVALID_MODEL, MESSAGE_SIZE
+from plant import Plant, PlantError, bound, definition, put
+from states import MACRO, landing, trail
+
+from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.dynamics import Command
+
+
+def refused(plant: Plant, call: Callable[[], Any], status: int, pattern: str) -> None:
+    """The call fails with this status and message, and the plant is as it was."""
+    before = plant.save()
+    with pytest.raises(PlantError, match=pattern) as caught:
+        call()
+    assert caught.value.status == status
+    assert plant.save() == before
+    plant.step(plant.time + 1e-4)
+
+
+def midway(core: ct.CDLL) -> Plant:
+    robot = load_robot("athena")
+    plant = Plant(core, robot, **landing(robot))
+    trail(plant, 5)
+    return plant
+
+
+@pytest.mark.parametrize("share", [0.0, 0.005, 0.01, 0.2, 0.5, 0.9, 0.9999])
+def test_a_damaged_state_is_refused(core: ct.CDLL, share: float) -> None:
+    plant = midway(core)
+    bad = bytearray(plant.save())
+    bad[int(share * len(bad))] ^= 0x10
+    refused(plant, lambda: plant.restore(bytes(bad)), BAD_STATE, "saved state: .*; save it again")
+
+
+@pytest.mark.parametrize("size", [0, 8, -1, +8])
+def test_a_state_of_another_size_is_refused(core: ct.CDLL, size: int) -> None:
+    plant = midway(core)
+    saved = plant.save() + bytes(16)
+    cut = size if size in (0, 8) and size != +8 else len(saved) - 16 + size
+    refused(plant, lambda: plant.restore(saved[:cut]), BAD_STATE, "saved state: its size")
+
+
+BAD_NUMBERS = (math.nan, math.inf, -math.inf)
+
+
+@pytest.mark.parametrize("number", BAD_NUMBERS)
+@pytest.mark.parametrize("name", ["angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque"])
+@pytest.mark.parametrize("last", [False, True])
+def test_an_input_that_is_no_number_is_refused(core: ct.CDLL, name: str, number: float, last: bool) -> None:
+    plant = midway(core)
+    values = {"angle_ref": plant.robot.stance} | {name: np.array(getattr(plant.hold(), name))}
+    values[name].ravel()[-1 if last else 0] = number
+    pattern = rf"{name}: got -?(nan|inf), expected finite numbers"
+    refused(plant, lambda: plant.step(plant.time + MACRO, Command(**values)), INVALID_ARGUMENT, pattern)
+
+
+@pytest.mark.parametrize("end", [0.0, -1.0, 0.0199, *BAD_NUMBERS])
+def test_an_end_that_is_past_or_no_number_is_refused(core: ct.CDLL, end: float) -> None:
+    plant = midway(core)
+    refused(plant, lambda: plant.step(end), INVALID_ARGUMENT, r"end of step: got \S+ s, expected a finite time of at least 0\.02\d* s")
+
+
+def test_a_step_to_the_present_time_does_nothing(core: ct.CDLL) -> None:
+    plant = midway(core)
+    before = plant.save()
+    plant.step(plant.time)
+    assert plant.save() == before
+
+
+@pytest.mark.parametrize("number", BAD_NUMBERS)
+def test_bodies_or_a_start_time_that_are_no_numbers_are_refused(core: ct.CDLL, number: float) -> None:
+    plant = midway(core)
+    body = plant.bodies
+    body[7, 4] = number
+    refused(plant, lambda: setattr(plant, "bodies", body), INVALID_ARGUMENT, "body state: got a number that is not finite")
+    start = definition(plant.robot)
+    refused(plant, lambda: plant.reset(start, number), INVALID_ARGUMENT, "start time: got .* not finite")
+
+
+def field(d: Any, path: str) -> tuple[Any, str]:
+    *above, last = path.split(".")
+    for name in above:
+        part, _, index = name.partition("[")
+        d = getattr(d, part)
+        d = d[int(index[:-1])] if index else d
+    return d, last
+
+
+IMPOSSIBLE: list[tuple[str, Any, str]] = [
+    ("torso.mass", 0.0, r"torso\.mass: got 0, expected a positive number"),
+    ("torso.mass", math.nan, r"torso\.mass: got -?nan"),
+    ("torso.com", (0.0, math.inf, 0.0), r"torso\.com: got inf, expected finite"),
+    ("torso.inertia", (1.0, 1.0, 2.1, 0.0, 0.0, 0.0), r"torso\.inertia_xx: got 1, expected an inertia that a body can have"),
+    ("torso.inertia", (1.0, 1.0, 1.0, 0.9, 0.9, -0.9), r"torso\.inertia_xx: .* a body can have"),
+    ("torso.inertia", (-1.0, 1.0, 1.0, 0.0, 0.0, 0.0), r"torso\.inertia_xx: got -1"),
+    ("leg[4].hip_position", (math.nan, 0.0, 0.0), r"RM\.hip_position: got -?nan"),
+    ("leg[5].hip_yaw", math.inf, r"RR\.hip_yaw: got inf"),
+    ("leg[2].link[1].mass", -0.1, r"LR\.femur\.mass: got -0\.1, expected a positive number"),
+    ("leg[0].link[0].length", 0.0, r"LF\.coxa\.length: got 0, expected a positive number"),
+    ("leg[1].link[2].offset_z", math.nan, r"LM\.tibia\.offset: got -?nan"),
+    ("leg[3].link[2].axis", (0.0, 0.0, 0.0), r"RF\.tibia\.axis: got 0, expected a direction"),
+    ("leg[3].link[1].inertia", (1e-4, 1e-4, 3e-4, 0.0, 0.0, 0.0), r"RF\.femur\.inertia_xx: got 0\.0001"),
+    ("foot_radius", 0.0, r"foot\.radius: got 0"),
+    ("contact.law", 0, r"contact\.law: got 0, expected 1 to 6"),
+    ("contact.law", 7, r"contact\.law: got 7, expected 1 to 6"),
+    ("contact.stiffness", -1.0, r"contact\.stiffness: got -1, expected a positive"),
+    ("contact.restitution", 0.0, r"contact\.restitution: got 0, expected 0\.001 to 1"),
+    ("contact.restitution", 1.1, r"contact\.restitution: got 1\.1, expected 0 to 1"),
+    ("contact.damping_factor", -1.0, r"contact\.damping_factor: got -1"),
+    ("contact.impact_speed_floor", 0.0, r"contact\.impact_speed_floor: got 0"),
+    ("friction.law", 3, r"friction\.law: got 3, expected 1 or 2"),
+    ("friction.mu", -0.1, r"friction\.mu: got -0\.1"),
+    ("friction.slope", math.nan, r"friction\.slope: got -?nan"),
+    ("servo.mode", 4, r"servo\.mode: got 4, expected 1 to 3"),
+    ("servo.kp", -1.0, r"servo\.kp: got -1"),
+    ("servo.kd", -1.0, r"servo\.kd: got -1"),
+    ("servo.torque_max", -1.0, r"servo\.torque_max: got -1"),
+    ("servo.speed_max", 0.0, r"servo\.speed_max: got 0"),
+    ("servo.rotor_inertia", -1.0, r"servo\.rotor_inertia: got -1"),
+    ("servo.coulomb_friction", -1.0, r"servo\.coulomb_friction: got -1"),
+    ("baumgarte.alpha", -1.0, r"baumgarte\.alpha: got -1"),
+    ("baumgarte.beta", math.inf, r"baumgarte\.beta: got inf"),
+    ("gravity", (0.0, 0.0, math.nan), r"gravity: got -?nan"),
+    ("solver.method", 6, r"solver\.method: got 6, expected 1 to 5"),
+    ("solver.step", -1e-3, r"solver\.step: got -0\.001, expected 0 \(error control\) or"),
+    ("solver.step", 2.0, r"solver\.step: got 2"),
+    ("solver.tolerance", 0.0, r"solver\.tolerance: got 0"),
+    ("solver.step_max", 0.0, r"solver\.step_max: got 0"),
+    ("solver.method", 5, r"solver\.step: got 0, expected a fixed step > 0 with this solver\.method"),
+    ("terrain.kind", 3, r"terrain\.kind: got 3, expected 1 or 2"),
+    ("terrain.height", math.nan, r"terrain\.height: got -?nan"),
+    ("terrain.incline", 1.6, r"terrain\.incline: got 1\.6"),
+    ("terrain.heading", math.nan, r"terrain\.heading: got -?nan"),
+    ("initial.position", (math.nan, 0.0, 0.0), r"initial\.position: got -?nan"),
+    ("initial.quaternion", (0.0, 0.0, 0.0, 0.0), r"initial\.quaternion: got 0, expected a quaternion"),
+    ("initial.velocity", (0.0, math.inf, 0.0), r"initial\.velocity: got inf"),
+    ("initial.angular_velocity", (0.0, 0.0, -math.inf), r"initial\.angular_velocity: got -inf"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "pattern"), IMPOSSIBLE, ids=[f"{path}={value}" for path, value, _ in IMPOSSIBLE])
+def test_a_definition_no_robot_can_have_is_refused(core: ct.CDLL, path: str, value: Any, pattern: str) -> None:
+    plant = midway(core)
+    bad = definition(plant.robot)
+    owner, name = field(bad, path)
+    if isinstance(value, tuple):
+        put(getattr(owner, name), value)
+    else:
+        setattr(owner, name, value)
+    refused(plant, lambda: plant.reset(bad), INVALID_MODEL, "^" + pattern)
+    message = ct.create_string_buffer(MESSAGE_SIZE)
+    assert bound(core).hx_definition_check(bad, message) == INVALID_MODEL
+    assert core.hx_definition_check(bad, None) == INVALID_MODEL
+    assert message.value
+
+
+def test_every_joint_angle_and_speed_at_start_is_looked_at(core: ct.CDLL) -> None:
+    plant = midway(core)
+    for name in ("angle", "speed"):
+        bad = definition(plant.robot)
+        getattr(bad.initial, name)[5][2] = math.nan
+        refused(plant, partial(plant.reset, bad), INVALID_MODEL, rf"^initial\.{name}: got -?nan")
+
+
+def test_every_status_has_a_name(core: ct.CDLL) -> None:
+    names = [bound(core).hx_status_name(status) for status in range(7)]
+    assert len(set(names)) == 7
+    assert core.hx_status_name(7) == core.hx_status_name(-1) == b"unknown status"

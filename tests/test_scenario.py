@@ -1,0 +1,182 @@
+"""Scenario files: what they may say, what --set does, and that every mistake is told by file, key, what was got and what is allowed."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.controller import Controller, make_gait
+from hexapod_cosim.cosim.scenario import list_scenarios, load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.toml_text import to_toml
+from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_a_bundled_scenario_loads_and_fits_its_robot(name: str) -> None:
+    scenario = load_scenario(name)
+    robot = scenario_robot(scenario)
+    gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
+    Controller(robot, period=scenario.macro_step, gait=gait, gains=None)
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_the_scenario_as_run_reads_back_as_the_same(name: str) -> None:
+    scenario = load_scenario(name)
+    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+
+
+def test_the_default_scenario_is_the_papers_walk() -> None:
+    scenario = load_scenario("walk_flat")
+    assert (scenario.robot, scenario.control, scenario.duration, scenario.macro_step, scenario.seed) == (
+        "athena",
+        "kinematic",
+        10.0,
+        0.005,
+        0,
+    )
+    assert scenario.commands[0].vx == 0.08
+    assert scenario.settings["gait"] == {"name": "tripod"}
+    assert scenario.steps == 2000
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [("macro_step=5 ms", 0.005), ("macro_step=0.004", 0.004), ("duration=1 min", 60.0), ("duration=2", 2.0), ("start=-3", -3.0)],
+)
+def test_a_quantity_may_say_its_unit(setting: str, value: float) -> None:
+    key = setting.partition("=")[0]
+    assert getattr(load_scenario("walk_flat", overrides=[setting]), key) == value
+
+
+def test_units_reach_into_commands_events_and_settings() -> None:
+    overrides = [
+        "command.yaw_rate=10 deg/s",
+        "command.height=-5 mm",
+        "terrain.kind=slope",
+        "terrain.incline=5 deg",
+        "events=[{time='10 ms', duration=1, force=['1 kN', 0, 0]}]",
+    ]
+    scenario = load_scenario("walk_flat", overrides=overrides)
+    assert scenario.commands[0].yaw_rate == pytest.approx(math.radians(10.0))
+    assert scenario.commands[0].height == -0.005
+    assert scenario.settings["terrain"]["incline"] == pytest.approx(math.radians(5.0))
+    assert (scenario.events[0].time, scenario.events[0].force) == (0.01, (1000.0, 0.0, 0.0))
+
+
+def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
+    overrides = ["robot=phantomx_mk4", "contact.law=hertz", "LF.femur.mass=0.3", "gravity[3]=-1.62", "outputs.csv=['torso.*']"]
+    scenario = load_scenario("walk_flat", overrides=overrides)
+    assert scenario.robot == "phantomx_mk4"
+    assert scenario.settings["contact"] == {"law": "hertz"}
+    assert scenario.parameters == {"LF.femur.mass": 0.3, "gravity[3]": -1.62}
+    assert scenario.outputs.csv == ("torso.*",)
+
+
+def test_static_friction_follows_a_higher_kinetic_one() -> None:
+    robot = scenario_robot(load_scenario("walk_flat", overrides=["friction.mu=0.9"]))
+    assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.9)
+
+
+def test_a_first_command_later_than_the_start_is_preceded_by_standing() -> None:
+    scenario = load_scenario("walk_flat", overrides=["command=[{time=1, vx=0.1}]"])
+    assert [(command.time, command.vx) for command in scenario.commands] == [(0.0, 0.0), (1.0, 0.1)]
+
+
+def test_a_robot_file_is_found_beside_its_scenario(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('robot = "robot.toml"\n')
+    (tmp_path / "robot.toml").write_text("name = 3\n")
+    scenario = load_scenario(tmp_path / "mine.toml")
+    assert Path(scenario.robot) == tmp_path / "robot.toml"
+    with pytest.raises(RobotError, match=r"robot\.toml"):
+        scenario_robot(scenario)
+
+
+MISTAKES = {
+    "duraton=3": ["--set", "'duraton'", "did you mean 'duration'"],
+    "duration": ["'duration'", "expected NAME=VALUE"],
+    "duration=": ["expected NAME=VALUE"],
+    "contact.stifness=1": ["walk_flat.toml", "contact", "'stifness'", "did you mean 'stiffness'"],
+    "contact.law=herz": ["contact.law", "'herz'", "did you mean 'hertz'"],
+    "control=complaint": ["control", "'complaint'", "did you mean 'compliant'"],
+    "macro_step=5 mm": ["macro_step", "'5 mm'", "a value in s or ms"],
+    "macro_step=0": ["macro_step", "got 0", "> 0"],
+    "macro_step=-0.005": ["macro_step", "got -0.005", "> 0"],
+    "macro_step=1": ["macro_step", "<= 0.1"],
+    "macro_step=0.003": ["duration", "multiple of macro_step = 0.003", "9.999"],
+    "duration=-1": ["duration", "got -1"],
+    "duration=nan": ["duration", "got nan", "finite"],
+    "duration=ten": ["duration", "'ten'", "number"],
+    "seed=-1": ["seed", "got -1", "whole number"],
+    "seed=0.5": ["seed", "got 0.5", "whole number"],
+    "robot=3": ["robot", "got 3", "text"],
+    "gait.stride=0.1": ["gait", "'stride'", "period"],
+    "gait.duty=1": ["gait.duty", "got 1", "< 1"],
+    "command.vz=1": ["command", "'vz'", "vx"],
+    "command=[{time=1},{time=0}]": ["command", "order", "time"],
+    "command=3": ["command", "got 3", "table"],
+    "events={time=1}": ["events", "[[events]]"],
+    "events=[{time=1}]": ["events[0].duration", "missing key"],
+    "events=[{time=1, duration=1, force=[1, 2]}]": ["events[0].force", "3 numbers"],
+    "events=[{time=1, duration=1, force=['1 N', '2 Nm', 0]}]": ["events[0].force[1]", "'2 Nm'", "N"],
+    "sensors.foot_force_noise=2": ["foot_force_noise", "got 2", "< 1"],
+    "outputs.csv=torso": ["outputs.csv", "list"],
+    "outputs.plots=1": ["outputs.plots", "true or false"],
+    "outputs.png=true": ["outputs", "'png'", "plots"],
+    "contact=3": ["contact", "got 3", "table"],
+}
+
+
+@pytest.mark.parametrize("setting", MISTAKES)
+def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("walk_flat", overrides=[setting])
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in MISTAKES[setting]:
+        assert part in message
+
+
+def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'walk_flat'"):
+        load_scenario("walk_flt")
+    with pytest.raises(RobotError, match="did you mean 'athena'"):
+        scenario_robot(load_scenario("walk_flat", overrides=["robot=atena"]))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("duration = ", "not a TOML file"), ("durration = 1", "did you mean 'duration'"), ("\udc80", "not a TOML file")]
+)
+def test_a_bad_file_is_told_by_its_name(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_bytes(text.encode("utf-8", errors="surrogateescape"))
+    with pytest.raises(ScenarioError, match=message) as caught:
+        load_scenario(path)
+    assert "mine.toml" in str(caught.value)
+    with pytest.raises(ScenarioError, match="cannot read the scenario"):
+        load_scenario(tmp_path / "missing.toml")
+
+
+def test_all_errors_share_the_one_base() -> None:
+    with pytest.raises(HexapodError):
+        load_scenario("walk_flat", overrides=["duration=0"])
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"a": 1, "b": 0.1, "c": True, "d": 'say "ü"\n', "e": [1, 2.5, "x"], "f": []},
+        {"plain": 1, "table": {"inner": {"deep": -1e-300}}, "list": [{"a": 1}, {"a": 2, "b": {"c": [1]}}]},
+        {"dotted.key": {"torso.com[1]": 0.5}, "spaced key": 1},
+    ],
+)
+def test_toml_text_reads_back_as_the_table(table: dict[str, object]) -> None:
+    assert tomllib.loads(to_toml(table)) == table
+
+
+def test_the_robots_gait_is_used_where_the_scenario_gives_none() -> None:
+    robot = load_robot("phantomx_mk4")
+    scenario = load_scenario("phantomx_walk")
+    assert make_gait(robot, **dict(scenario.settings.get("gait", {}))).period == robot.gait.period
