@@ -200,11 +200,15 @@ class Plant:
         """Integrates to t_end [s] under a command (default: hold the stance)."""
         self._check(self.core.hx_plant_step(self.handle, inputs(command or self.hold()), t_end))
 
-    def output(self, command: Command | None = None) -> Any:
-        """Everything in hxOutput, as a namespace of floats and arrays."""
+    def output_record(self, command: Command | None = None) -> Any:
+        """The HxOutput of the present state under a command."""
         result = HxOutput()
         self.core.hx_plant_output(self.handle, inputs(command or self.hold()), result)
-        return seen(result)
+        return result
+
+    def output(self, command: Command | None = None) -> Any:
+        """The same as a namespace of floats and arrays."""
+        return seen(self.output_record(command))
 
     def save(self) -> bytes:
         """The plant's bytes."""

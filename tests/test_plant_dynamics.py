@@ -8,14 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror import LEGS
-from plant import Plant, inputs, pointer
-from states import changed, distance, lopsided, random_bodies, random_command
-from test_twin_pinocchio import pinocchio_accelerations
 
 from hexapod_cosim.models import CONTACT_LAWS, METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction
-from hexapod_cosim.models.contact import contact_damping, foot_contact, foot_contacts, foot_force, standing_damping
+from hexapod_cosim.models.contact import contact_damping, foot_contacts, foot_force, standing_damping
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -24,17 +20,16 @@ from hexapod_cosim.models.dynamics import (
     mass_matrix,
 )
 from hexapod_cosim.models.kinematics import (
-    body_states,
-    cross,
-    foot_centres,
-    joint_models,
     joint_speeds,
-    quaternion_product,
     quaternion_rate,
-    rotation_matrix,
     skew,
 )
 from hexapod_cosim.models.records import Array
+from mirror import LEGS
+from plant import Plant, inputs, pointer
+from slopes import resting, slopes
+from states import changed, distance, lopsided, random_bodies, random_command
+from test_twin_pinocchio import pinocchio_accelerations
 
 DENSE = 1e-10  # relative: what the dense solve itself loses; its condition number is some 1e6
 PINOCCHIO = 1e-9  # relative: a foot's force, 1e-4 m deep, amplifies the rounding of its height
@@ -136,73 +131,8 @@ def test_forward_dynamics_agree_with_pinocchio(core: ct.CDLL, robot: Robot, mode
 
 # the linearly implicit solve: W u + D^T mu = G_v dv + G_x dx, D u = 0, W = M - z G_v - z^2 G_x
 
-STEP = 1e-7  # m, rad, m/s: of central differences
-DIFFERENCES = 1e-5  # relative: what they leave of a force of 10 N whose slope is 1e5 N/m
+DIFFERENCES = 1e-5  # relative: what differences leave of a force of 10 N whose slope is 1e5 N/m
 Z = 7e-4  # s: h gamma of a step that the stiff terms rule
-
-
-def resting(robot: Robot, seed: int) -> Array:
-    """Bodies on their joints and at rest, feet in the ground: there W's approximate slopes are exact, save for geometric stiffness."""
-    rng = np.random.default_rng(seed)
-    still = np.zeros(3)
-    place = [robot.stance + rng.normal(0.0, 0.03, (6, 3)), np.zeros((6, 3))]
-    body = body_states(robot, still, rng.normal(0.0, 0.02, 4) + np.eye(4)[0], still, still, *place)
-    body[:, 2] -= sorted(body_height(robot, body))[3] + 2e-4
-    return body
-
-
-def body_height(robot: Robot, body: Array) -> Array:
-    return np.array([-foot.penetration for foot in foot_contacts(robot, body)])
-
-
-def foot_slopes(robot: Robot, body: Array, leg: int, damping: float) -> tuple[Array, Array]:
-    """(3, 6) twice: slopes of a foot's force by its tibia's displacement and velocity, linear then angular, by differences."""
-    tibia, centre = body[3 * (leg + 1)], foot_centres(robot, body)[leg]
-
-    def force(displacement: Array, velocity: Array) -> Array:
-        moved = tibia.copy()
-        moved[0:3] += displacement[0:3]
-        moved[7:13] += velocity
-        moved[3:7] = quaternion_product(np.concatenate([[1.0], displacement[3:6] / 2.0]), tibia[3:7])
-        return foot_force(
-            robot, foot_contact(robot, moved, centre + displacement[0:3] + cross(displacement[3:6], centre - tibia[0:3])), damping
-        )
-
-    still = np.zeros(6)
-    by_x = [(force(STEP * unit, still) - force(-STEP * unit, still)) / (2.0 * STEP) for unit in np.eye(6)]
-    by_v = [(force(still, STEP * unit) - force(still, -STEP * unit)) / (2.0 * STEP) for unit in np.eye(6)]
-    return np.array(by_x).T, np.array(by_v).T
-
-
-def joint_slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
-    """(18,) twice: slopes of the joints' torques by their angle and speed, by differences."""
-
-    def torque(angle: float, speed: float) -> Array:
-        turned = replace(command, angle_ref=command.angle_ref - angle)
-        moving = body.copy()
-        for model in joint_models(robot):
-            s = rotation_matrix(body[model.parent, 3:7]) @ model.s_i
-            moving[model.child, 10:13] = moving[model.parent, 10:13] + speed * s
-        motor, gear = joint_torques(robot, moving, turned)
-        return (motor + gear).ravel()
-
-    by_angle = (torque(STEP, 0.0) - torque(-STEP, 0.0)) / (2.0 * STEP)
-    return by_angle, (torque(0.0, STEP) - torque(0.0, -STEP)) / (2.0 * STEP)
-
-
-def slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of contacts and servos, geometric stiffness left out as W leaves it out."""
-    G, (by_angle, by_speed) = constraints(robot, body).G, joint_slopes(robot, command, body)
-    G_x, G_v = G.T @ np.diag(by_angle) @ G, G.T @ np.diag(by_speed) @ G
-    damping = standing_damping(robot, body)
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        if foot.penetration > 0.0:
-            rows = slice(6 * 3 * (leg + 1), 6 * 3 * (leg + 1) + 6)
-            wrench = np.vstack([np.eye(3), skew(foot.point - body[3 * (leg + 1), 0:3])])
-            by_x, by_v = foot_slopes(robot, body, leg, float(damping[leg]))
-            G_x[rows, rows] += wrench @ by_x
-            G_v[rows, rows] += wrench @ by_v
-    return G_x, G_v
 
 
 def implicit(core: ct.CDLL, plant: Plant, command: Command, dx: Array, dv: Array) -> Array:

@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror import NOT_FINITE
-from plant import Plant, PlantError
-from states import changed, random_command
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts
-from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.kinematics import body_states
+from hexapod_cosim.models.dynamics import Command, constraints, mass_matrix
+from hexapod_cosim.models.kinematics import body_states, quaternion_rate
 from hexapod_cosim.models.records import Array
+from mirror import NOT_FINITE
+from plant import Plant, PlantError, inputs, pointer
+from slopes import resting, slopes
+from states import changed, random_command
 
 ORDER = {"ros34pw2": 3, "ros2": 2, "dp54": 5, "bs32": 3, "rk4": 4}
 EMBEDDED = ("ros34pw2", "ros2", "dp54", "bs32")
@@ -172,3 +173,59 @@ def test_an_explicit_method_that_blows_up_says_so_and_leaves_the_plant_alone(cor
         plant.step(20.0)
     assert caught.value.status == NOT_FINITE
     assert plant.save() == before
+
+
+# one linearly implicit step against the textbook's formula
+
+
+def coefficients(core: ct.CDLL, method: str) -> tuple[int, float, Array, Array, Array]:
+    """Stages, gamma, a, g and b of a method."""
+    shape, gamma = (ct.c_int * 3)(), ct.c_double()
+    a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
+    core.hx_probe_method(METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e)))
+    return shape[0], gamma.value, a, g, b
+
+
+def inexact_jacobian(robot: Robot, command: Command, body: Array) -> Array:
+    """(247, 247) A: velocities change positions (at this attitude), contacts and servos answer both through eq. 1."""
+    G_x, G_v = slopes(robot, command, body)
+    D = constraints(robot, body).D
+    system = np.block([[mass_matrix(robot, body), D.T], [D, np.zeros((90, 90))]])
+    answer = np.linalg.solve(system, np.vstack([np.hstack([G_x, G_v]), np.zeros((90, 228))]))[:114]
+    A = np.zeros((19, 13, 19, 13))
+    for k, p in enumerate(body[:, 3:7]):
+        turn = np.array([quaternion_rate(p, unit) for unit in np.eye(3)]).T
+        A[k, 0:3, k, 7:10], A[k, 3:7, k, 10:13] = np.eye(3), turn
+        # a quaternion's change is a rotation by the inverse of its rate: 4 turn^T turn = 1
+        A[:, 7:13, k, 0:3] = answer[:, 6 * k : 6 * k + 3].reshape(19, 6, 3)
+        A[:, 7:13, k, 3:7] = (answer[:, 6 * k + 3 : 6 * k + 6] @ (4.0 * turn.T)).reshape(19, 6, 4)
+        A[:, 7:13, k, 7:13] = answer[:, 114 + 6 * k : 114 + 6 * k + 6].reshape(19, 6, 6)
+    return A.reshape(247, 247)
+
+
+@pytest.mark.parametrize("method", ["ros34pw2", "ros2"])
+def test_an_implicit_step_is_that_of_the_textbook_with_the_dense_jacobian(core: ct.CDLL, method: str) -> None:
+    """(1 - h gamma A) k_i = h f(y_i) + h A sum_j g_ij k_j, in a step of many time constants of the contacts."""
+    h, robot = 2e-3, changed(load_robot("athena"), solver={"method": method, "step": 2e-3})
+    body, command = resting(robot, 1), Command(angle_ref=robot.stance)
+    body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
+    plant, there = Plant(core, robot), Plant(core, robot)
+    plant.bodies = body
+
+    def rate(y: Array) -> Array:
+        there.bodies = y.reshape(19, 13)
+        result, power = np.zeros((19, 13)), np.zeros(3)
+        core.hx_probe_rate(ct.c_void_p(there.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(result), pointer(power))
+        return result.ravel()
+
+    stages, gamma, a, g, b = coefficients(core, method)
+    A, y0, k = inexact_jacobian(robot, command, body), body.ravel(), np.zeros((7, 247))
+    for i in range(stages):
+        right = h * rate(y0 + a[i] @ k) + h * A @ (g[i] @ k)
+        k[i] = np.linalg.solve(np.eye(247) - h * gamma * A, right)
+    exact = (y0 + b @ k).reshape(19, 13)
+    exact[:, 3:7] /= np.linalg.norm(exact[:, 3:7], axis=1, keepdims=True)
+    plant.step(h, command)
+    moved = np.max(np.abs(exact - body), axis=0)
+    assert np.all(np.max(np.abs(plant.bodies - exact), axis=0) < 1e-5 * moved)
+    assert h * float(np.max(np.abs(np.linalg.eigvals(A)))) > 10.0
