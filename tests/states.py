@@ -12,7 +12,7 @@ from hexapod_cosim.models import Leg, Link, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import body_states
-from hexapod_cosim.models.records import Array, Vector6
+from hexapod_cosim.models.records import Array, Vector3, Vector6
 from hexapod_cosim.models.terrain import ground_normal
 
 LEGS, JOINTS = 6, 3
@@ -32,6 +32,29 @@ def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
         links[joint] = replace(links[joint], **fields)
         legs.append(replace(leg, links=(links[0], links[1], links[2])))
     return replace(robot, legs=tuple(legs))
+
+
+def scaled(robot: Robot, size: float) -> Robot:
+    """The robot with every length in proportion, and inertias with lengths squared; masses are kept."""
+
+    def lengths(values: Vector3) -> Vector3:
+        return (size * values[0], size * values[1], size * values[2])
+
+    def inertia(values: Vector6) -> Vector6:
+        xx, yy, zz, xy, xz, yz = (size * size * value for value in values)
+        return (xx, yy, zz, xy, xz, yz)
+
+    def link(part: Link) -> Link:
+        x, y, z = lengths(part.tip)
+        return replace(part, length=x, offset_y=y, offset_z=z, com=lengths(part.com), inertia=inertia(part.inertia))
+
+    legs = []
+    for leg in robot.legs:
+        coxa, femur, tibia = (link(part) for part in leg.links)
+        legs.append(replace(leg, hip_position=lengths(leg.hip_position), links=(coxa, femur, tibia)))
+    torso = replace(robot.torso, com=lengths(robot.torso.com), inertia=inertia(robot.torso.inertia))
+    rotor = size * size * robot.servo.rotor_inertia
+    return changed(replace(robot, torso=torso, legs=tuple(legs)), servo={"rotor_inertia": rotor})
 
 
 def lopsided(seed: int = 0) -> Robot:

@@ -8,6 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mirror import LEGS
+from plant import Plant, inputs, pointer
+from slopes import resting, slopes
+from states import changed, distance, lopsided, random_bodies, random_command
+from test_twin_pinocchio import pinocchio_accelerations
 
 from hexapod_cosim.models import CONTACT_LAWS, METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction
@@ -25,11 +30,6 @@ from hexapod_cosim.models.kinematics import (
     skew,
 )
 from hexapod_cosim.models.records import Array
-from mirror import LEGS
-from plant import Plant, inputs, pointer
-from slopes import resting, slopes
-from states import changed, distance, lopsided, random_bodies, random_command
-from test_twin_pinocchio import pinocchio_accelerations
 
 DENSE = 1e-10  # relative: what the dense solve itself loses; its condition number is some 1e6
 PINOCCHIO = 1e-9  # relative: a foot's force, 1e-4 m deep, amplifies the rounding of its height

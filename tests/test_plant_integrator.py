@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mirror import NOT_FINITE
+from plant import Plant, PlantError, inputs, pointer
+from slopes import resting, slopes
+from states import changed, random_command, scaled
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.dynamics import Command, constraints, mass_matrix
 from hexapod_cosim.models.kinematics import body_states, quaternion_rate
 from hexapod_cosim.models.records import Array
-from mirror import NOT_FINITE
-from plant import Plant, PlantError, inputs, pointer
-from slopes import resting, slopes
-from states import changed, random_command
 
 ORDER = {"ros34pw2": 3, "ros2": 2, "dp54": 5, "bs32": 3, "rk4": 4}
 EMBEDDED = ("ros34pw2", "ros2", "dp54", "bs32")
@@ -178,12 +178,35 @@ def test_an_explicit_method_that_blows_up_says_so_and_leaves_the_plant_alone(cor
 # one linearly implicit step against the textbook's formula
 
 
-def coefficients(core: ct.CDLL, method: str) -> tuple[int, float, Array, Array, Array]:
-    """Stages, gamma, a, g and b of a method."""
+@dataclass(frozen=True)
+class Tableau:
+    """A row of the plant's methods."""
+
+    stages: int
+    gamma: float
+    a: Array
+    g: Array
+    b: Array
+    e: Array
+
+
+def coefficients(core: ct.CDLL, method: str) -> Tableau:
     shape, gamma = (ct.c_int * 3)(), ct.c_double()
     a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
     core.hx_probe_method(METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e)))
-    return shape[0], gamma.value, a, g, b
+    return Tableau(shape[0], gamma.value, a, g, b, e)
+
+
+def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Array]:
+    """dy/dt of bodies (247,), by the plant put there."""
+
+    def rate(y: Array) -> Array:
+        plant.bodies = y.reshape(19, 13)
+        result, power = np.zeros((19, 13)), np.zeros(3)
+        core.hx_probe_rate(ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(result), pointer(power))
+        return result.ravel()
+
+    return rate
 
 
 def inexact_jacobian(robot: Robot, command: Command, body: Array) -> Array:
@@ -212,20 +235,43 @@ def test_an_implicit_step_is_that_of_the_textbook_with_the_dense_jacobian(core: 
     plant, there = Plant(core, robot), Plant(core, robot)
     plant.bodies = body
 
-    def rate(y: Array) -> Array:
-        there.bodies = y.reshape(19, 13)
-        result, power = np.zeros((19, 13)), np.zeros(3)
-        core.hx_probe_rate(ct.c_void_p(there.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(result), pointer(power))
-        return result.ravel()
-
-    stages, gamma, a, g, b = coefficients(core, method)
+    m, rate = coefficients(core, method), rates(core, there, command)
     A, y0, k = inexact_jacobian(robot, command, body), body.ravel(), np.zeros((7, 247))
-    for i in range(stages):
-        right = h * rate(y0 + a[i] @ k) + h * A @ (g[i] @ k)
-        k[i] = np.linalg.solve(np.eye(247) - h * gamma * A, right)
-    exact = (y0 + b @ k).reshape(19, 13)
+    for i in range(m.stages):
+        right = h * rate(y0 + m.a[i] @ k) + h * A @ (m.g[i] @ k)
+        k[i] = np.linalg.solve(np.eye(247) - h * m.gamma * A, right)
+    exact = (y0 + m.b @ k).reshape(19, 13)
     exact[:, 3:7] /= np.linalg.norm(exact[:, 3:7], axis=1, keepdims=True)
     plant.step(h, command)
     moved = np.max(np.abs(exact - body), axis=0)
     assert np.all(np.max(np.abs(plant.bodies - exact), axis=0) < 1e-5 * moved)
     assert h * float(np.max(np.abs(np.linalg.eigvals(A)))) > 10.0
+
+
+# the error control's measure
+
+
+@pytest.mark.parametrize("margin", [0.99, 1.01])
+@pytest.mark.parametrize(("size", "deciding"), [(1.0, range(7, 10)), (0.05, range(10, 13))], ids=["velocity", "angular velocity"])
+def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
+    core: ct.CDLL, size: float, deciding: range, margin: float
+) -> None:
+    """Scales 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s; the smaller a robot, the more its turning counts. The first step tried is 1e-4 s."""
+    h, robot = 1e-4, scaled(PROBLEMS["tumbling"].robot, size)
+    start = PROBLEMS["tumbling"].start | {"speed": 20.0 * np.random.default_rng(1).normal(size=(6, 3))}
+    plant, command = Plant(core, robot, **start), Command(angle_ref=robot.stance)
+    m, k, y0, rate = coefficients(core, "bs32"), np.zeros((7, 247)), plant.bodies.ravel(), rates(core, plant, command)
+    for i in range(m.stages):
+        k[i] = h * rate(y0 + m.a[i] @ k)
+    largest = np.max(np.abs(m.e @ k).reshape(19, 13), axis=0) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3)
+    assert int(np.argmax(largest)) in deciding
+    solver = {"method": "bs32", "step": 0.0, "tolerance": margin * float(np.max(largest)), "step_max": 1.0}
+    tried = Plant(core, changed(robot, solver=solver), **start)
+    tried.step(h, command)
+    assert (tried.output().solver.rejected > 0) == (margin < 1.0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_quaternions_keep_their_length(core: ct.CDLL, method: str) -> None:
+    lengths = np.linalg.norm(end(core, PROBLEMS["tumbling"], method=method, step=1e-3)[:, 3:7], axis=1)
+    assert float(np.max(np.abs(lengths - 1.0))) < 1e-15

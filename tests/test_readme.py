@@ -1,0 +1,81 @@
+"""What the README says to type works as typed."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.cosim.scenario import load_scenario
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```(\w*)\n(.*?)```", README, flags=re.DOTALL)
+
+
+def commands(program: str) -> list[str]:
+    """The lines of plain blocks that call a program, without their comments."""
+    lines = [line.split("#")[0].strip() for kind, text in BLOCKS if not kind for line in text.splitlines()]
+    return [line for line in lines if line.startswith(program + " ")]
+
+
+def run(folder: Path, *arguments: str) -> str:
+    """Runs a program of this environment in a folder; fails with what it printed."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False, env=os.environ | {"PATH": path})
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the README's reader is: the FMU is there from the first command on."""
+    folder = tmp_path_factory.mktemp("reader")
+    run(folder, *shlex.split(commands("hexapod export")[0]))
+    return folder
+
+
+@pytest.mark.parametrize("command", [line for line in commands("hexapod") if "simulate" in line or "list" in line or "design" in line])
+def test_a_command_of_the_readme_works(folder: Path, command: str) -> None:
+    shorter = ["--set", "duration=4"] if "simulate" in command else []
+    assert run(folder, *shlex.split(command), *shorter)
+
+
+def test_the_readme_compares_and_simulates_the_bare_fmu_too() -> None:
+    assert commands("hexapod compare")  # run in full by tests/test_cli.py
+    assert commands("fmpy simulate")
+
+
+def test_the_bare_fmu_simulates(folder: Path) -> None:
+    command = shlex.split(commands("fmpy simulate")[0].replace("--show-plot", "--output-file result.csv"))
+    run(folder, *command)
+    assert (folder / "result.csv").stat().st_size > 0
+
+
+def test_the_python_of_the_readme_prints_a_standing_height(folder: Path) -> None:
+    (snippet,) = (text for kind, text in BLOCKS if kind == "python")
+    assert 0.12 < float(run(folder, sys.executable, "-c", snippet)) < 0.14
+
+
+def test_the_scenario_of_the_readme_is_valid(folder: Path) -> None:
+    (text,) = (text for kind, text in BLOCKS if kind == "toml")
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    assert load_scenario(str(path)).settings["gait"]["name"] == "ripple"
+
+
+def test_every_link_of_the_documents_leads_somewhere() -> None:
+    for document in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")):
+        for target in re.findall(r"\]\(([^)#:]+)\)", document.read_text(encoding="utf-8")):
+            assert (document.parent / target).exists(), f"{document.name} links to {target}"
+
+
+def test_the_make_targets_of_the_readme_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for line in commands("make"):
+        assert f"\n{line.split()[1]}:" in makefile
