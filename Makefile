@@ -39,6 +39,7 @@ check: setup typing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
+	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 

@@ -123,7 +123,7 @@ def test_a_command_holds_from_its_time_on() -> None:
 @pytest.mark.parametrize("h", [0.001, 0.003, 0.005, 0.02])
 def test_the_impulse_of_a_push_does_not_depend_on_the_macro_step(h: float) -> None:
     push = Push(time=0.0512, duration=0.0371, force=(0.0, 40.0, 0.0), torque=(0.0, 0.0, 2.0))
-    rows = push_rows([push], h * np.arange(100), h)
+    rows = push_rows([push], h * np.arange(100.0, dtype=np.float64), h)
     np.testing.assert_allclose(rows.sum(axis=0) * h, 0.0371 * np.array([0, 40, 0, 0, 0, 2]), rtol=1e-12)
 
 

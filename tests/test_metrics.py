@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from hexapod_cosim.models import energy as twin
 from hexapod_cosim.models.kinematics import body_states
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.floating[Any]] | NDArray[np.bool_]
 
 H, PERIOD, CYCLES = 0.005, 1.0, 10
 SPEED = 0.08  # m/s
@@ -42,7 +44,7 @@ class Walk:
         self.set("torso.position[1]", speed * self.time)
         self.set("command.vx", SPEED)
 
-    def set(self, name: str, values: Array | float) -> None:
+    def set(self, name: str, values: Numbers | float) -> None:
         self.data[:, self.names.index(name)] = values
 
     @property
@@ -170,7 +172,7 @@ def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> No
 
 
 def test_loading_rate_looks_at_twenty_milliseconds_after_touch_down_only() -> None:
-    time = H * np.arange(41)
+    time: Array = H * np.arange(41.0)
     force, contact = np.zeros((41, 1)), np.zeros((41, 1), dtype=bool)
     contact[10:30] = True
     force[10:30, 0] = np.minimum(np.arange(1, 21), 5) * 2.0  # 2 per row until 10
@@ -282,7 +284,7 @@ def poses(robot: Robot, rows: int) -> tuple[Recording, list[Array]]:
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     zero = np.zeros(3)
     bodies = [
-        body_states(robot, *pose, zero, zero, joints, np.zeros((6, 3))) for *pose, joints in zip(position, quaternion, angle, strict=True)
+        body_states(robot, r, p, zero, zero, joints, np.zeros((6, 3))) for r, p, joints in zip(position, quaternion, angle, strict=True)
     ]
     return Recording(names, np.column_stack([np.arange(rows), angle.reshape(rows, -1), position, quaternion])), bodies
 
