@@ -93,14 +93,16 @@ def test_axis_normals_are_the_twins(core: ct.CDLL) -> None:
         assert distance([a, b], axis_normals(unit)) < SAME
 
 
-def test_an_inertia_is_carried_to_the_parent_by_the_congruence(core: ct.CDLL) -> None:
+def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) -> None:
     rng = np.random.default_rng(3)
     for _ in range(20):
-        e, U, s, root = rng.normal(size=3), rng.normal(size=6), float(rng.normal()), rng.normal(size=(6, 6))
-        inertia, X = root @ root.T, np.eye(6)
-        X[3:6, 0:3] = skew(e)
-        got = probed(core.hx_probe_carry_inertia, e, s, U, inertia, size=36).reshape(6, 6)
-        assert distance(got, X.T @ (inertia - s * np.outer(U, U)) @ X) < SAME
+        c, U, s, mass = rng.normal(size=3), rng.normal(size=6), float(rng.normal()), float(rng.uniform(0.1, 2.0))
+        J, A = (root @ root.T for root in rng.normal(size=(2, 3, 3)))
+        X = np.eye(6)
+        X[3:6, 0:3] = -skew(c)  # v at c = v + w x c
+        at_c = np.block([[J, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3) + A]])
+        got = probed(core.hx_probe_inertia, mass, J, A, c, s, U, size=36).reshape(6, 6)
+        assert distance(got, X.T @ at_c @ X - s * np.outer(U, U)) < SAME
 
 
 # joints, eq. 2-3

@@ -38,12 +38,12 @@ static double whatever_the_speed(const hxModel *model, double impact_speed) {
 }
 
 static const hxContactRow contact_rows[] = {
-    [HX_CONTACT_EXACT_RESTITUTION] = {"exact_restitution", exact, over_impact_speed},
-    [HX_CONTACT_FLORES] = {"flores", flores, over_impact_speed},
-    [HX_CONTACT_LANKARANI_NIKRAVESH] = {"lankarani_nikravesh", lankarani_nikravesh, over_impact_speed},
-    [HX_CONTACT_HUNT_CROSSLEY] = {"hunt_crossley", hunt_crossley, over_impact_speed},
-    [HX_CONTACT_CONSTANT_DAMPING] = {"constant_damping", constant, whatever_the_speed},
-    [HX_CONTACT_HERTZ] = {"hertz", hertz, whatever_the_speed},
+    [HX_CONTACT_EXACT_RESTITUTION] = {exact, over_impact_speed},
+    [HX_CONTACT_FLORES] = {flores, over_impact_speed},
+    [HX_CONTACT_LANKARANI_NIKRAVESH] = {lankarani_nikravesh, over_impact_speed},
+    [HX_CONTACT_HUNT_CROSSLEY] = {hunt_crossley, over_impact_speed},
+    [HX_CONTACT_CONSTANT_DAMPING] = {constant, whatever_the_speed},
+    [HX_CONTACT_HERTZ] = {hertz, whatever_the_speed},
 };
 
 HX_LOCAL const hxContactRow *hx_contact(int law) {

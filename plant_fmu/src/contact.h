@@ -7,7 +7,6 @@
 
 /* One row per hxContactLaw; the only place a law is chosen. */
 typedef struct {
-  const char *name;
   double (*scale)(const hxDefinition *definition);              /* the law's constant, compiled into the model */
   double (*damping)(const hxModel *model, double impact_speed); /* d, s/m, at touch-down */
 } hxContactRow;

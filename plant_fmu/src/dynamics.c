@@ -336,9 +336,8 @@ static hxInertia6 contact_inertia(const hxFootWork *foot, hxVec3 x, double z) {
   const hxVec3 n = foot->kin.normal;
   const hxReal t = z * foot->drag;
   const hxReal d = z * foot->normal.viscosity + z * z * foot->normal.stiffness - t;
-  hxInertia6 I = hx_rigid_inertia(hx_splat(0.0), (hxSym3){0}, hx_zero3());
-  I.A = (hxSym3){t + d * n.x * n.x, t + d * n.y * n.y, t + d * n.z * n.z, d * n.x * n.y, d * n.x * n.z, d * n.y * n.z};
-  return hx_carry_inertia(hx_neg(x), &I);
+  const hxSym3 A = {t + d * n.x * n.x, t + d * n.y * n.y, t + d * n.z * n.z, d * n.x * n.y, d * n.x * n.z, d * n.y * n.z};
+  return hx_inertia_at(A, x);
 }
 
 HX_LOCAL void hx_implicit_factorise(const hxModel *model, const hxWork *work, double h_gamma, hxImplicit *implicit) {

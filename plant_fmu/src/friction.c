@@ -15,8 +15,8 @@ static hxReal none(const hxModel *model, hxReal speed) {
 }
 
 static const hxFrictionRow friction_rows[] = {
-    [HX_FRICTION_TANH] = {"tanh", tanh_law},
-    [HX_FRICTION_NONE] = {"none", none},
+    [HX_FRICTION_TANH] = {tanh_law},
+    [HX_FRICTION_NONE] = {none},
 };
 
 HX_LOCAL const hxFrictionRow *hx_friction(int law) {

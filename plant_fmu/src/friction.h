@@ -7,7 +7,6 @@
 
 /* One row per hxFrictionLaw; the only place a law is chosen. */
 typedef struct {
-  const char *name;
   hxReal (*per_speed)(const hxModel *model, hxReal speed); /* g, s/m, with its limit at rest */
 } hxFrictionRow;
 

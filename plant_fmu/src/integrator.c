@@ -7,8 +7,7 @@
 #include "method.h"
 
 static const double step_floor = 1e-11;     /* s  below this the error control gives up */
-static const double steps_at_least = 1e5;   /* 1  a call may take this many steps and */
-static const double steps_a_second = 1e7;   /* 1/s  this many more for each second it covers: no call runs on for ever */
+static const double most_steps[3] = {1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
 static const double touch_depth = 1e-10;    /* m  a touch-down is found when the foot is in by less than this */
 
 /* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 0.1 J for the energy audit. */
@@ -168,6 +167,9 @@ static double step_factor(const hxMethodRow *method, double error) {
   return fmin(5.0, fmax(0.2, factor));
 }
 
+/* Steps that a call over a time may take: no call runs on for ever. */
+static double steps_allowed(double time) { return fmin(most_steps[0] + most_steps[1] * time, most_steps[2]); }
+
 /* Why a step of h from t cannot be had. */
 static hxStatus give_up(const hxTrial *trial, double t, double h, char *message) {
   const int lost = isnan(trial->error);
@@ -227,7 +229,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_
   hxMotion y;
   hxStart start; /* 30 kB: not cleared, evaluated anew at every step */
   start.model = model, start.command = command, start.contact = &state->contact, start.method = hx_method(model->method), start.y = &y;
-  start.last_step = state->steps + state->rejected + steps_at_least + steps_a_second * (t_end - state->time);
+  start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   while (state->time < t_end) {
     const double left = t_end - state->time;
     double taken;
@@ -246,6 +248,13 @@ HX_LOCAL hxStatus hx_integrate(const hxModel *model, const hxCommand *command, d
   if (model->step == 0.0) return run_to(model, command, t_end, state, message);
   const double t_start = state->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
+  if (count > steps_allowed(t_end - t_start)) {
+    snprintf(message, HX_MESSAGE_SIZE,
+             "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; raise solver.step "
+             "or make shorter calls",
+             model->step, count, steps_allowed(t_end - t_start));
+    return HX_STEP_TOO_SMALL;
+  }
   for (double i = 1.0; i <= count; i += 1.0) {
     const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
     const hxStatus status = run_to(model, command, t, state, message);

@@ -9,10 +9,6 @@ static int anywhere(void) { return 1; }
 
 static const hxKernel baseline = HX_KERNEL_TABLE("baseline", anywhere);
 
-#if HX_HAS_AVX2_KERNEL
-extern const hxKernel hx_kernel_avx2;
-#endif
-
 const hxKernel *const hx_kernels[] = {
 #if HX_HAS_AVX2_KERNEL
     &hx_kernel_avx2,

@@ -38,7 +38,6 @@
 
 static int has_avx2(void) { return __builtin_cpu_supports("avx2"); }
 
-extern const hxKernel hx_kernel_avx2;
 const hxKernel hx_kernel_avx2 = HX_KERNEL_TABLE("avx2", has_avx2);
 
 #else

@@ -4,6 +4,7 @@
 
 #if defined(__GNUC__) && defined(__x86_64__) && !defined(HX_BASELINE_ONLY)
 #define HX_HAS_AVX2_KERNEL 1
+extern const struct hxKernel hx_kernel_avx2;
 #else
 #define HX_HAS_AVX2_KERNEL 0
 #endif

@@ -6,8 +6,7 @@
 
 static const hxMethodRow rows[] = {
     /* Rang and Angermann, BIT 45 (2005): order 3(2) with any A, L-stable with the exact one */
-    [HX_METHOD_ROS34PW2] = {.name = "ros34pw2",
-                            .stages = 4,
+    [HX_METHOD_ROS34PW2] = {.stages = 4,
                             .order = 3,
                             .error_order = 2,
                             .gamma = 4.3586652150845900e-01,
@@ -21,8 +20,7 @@ static const hxMethodRow rows[] = {
                             .e = {2.4212380706095346e-01 - 3.7810903145819369e-01, -1.2232505839045147e+00 + 9.6042292212423178e-02,
                                   1.5452602553351020e+00 - 0.5, 4.3586652150845900e-01 - 2.1793326075422950e-01}},
     /* Verwer, Spee, Blom and Hundsdorfer, SIAM J. Sci. Comput. 20 (1999): order 2(1) with any A, L-stable; gamma = 1 - 1/sqrt(2) */
-    [HX_METHOD_ROS2] = {.name = "ros2",
-                        .stages = 2,
+    [HX_METHOD_ROS2] = {.stages = 2,
                         .order = 2,
                         .error_order = 1,
                         .gamma = 2.9289321881345248e-01,
@@ -32,8 +30,7 @@ static const hxMethodRow rows[] = {
                         .b = {0.5, 0.5},
                         .e = {-0.5, 0.5}},
     /* Dormand and Prince, J. Comput. Appl. Math. 6 (1980) */
-    [HX_METHOD_DP54] = {.name = "dp54",
-                        .stages = 7,
+    [HX_METHOD_DP54] = {.stages = 7,
                         .order = 5,
                         .error_order = 4,
                         .a = {{0},
@@ -47,16 +44,14 @@ static const hxMethodRow rows[] = {
                         .b = {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84, 0},
                         .e = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40}},
     /* Bogacki and Shampine, Appl. Math. Lett. 2 (1989) */
-    [HX_METHOD_BS32] = {.name = "bs32",
-                        .stages = 4,
+    [HX_METHOD_BS32] = {.stages = 4,
                         .order = 3,
                         .error_order = 2,
                         .a = {{0}, {1.0 / 2}, {0, 3.0 / 4}, {2.0 / 9, 1.0 / 3, 4.0 / 9}},
                         .c = {0, 1.0 / 2, 3.0 / 4, 1},
                         .b = {2.0 / 9, 1.0 / 3, 4.0 / 9, 0},
                         .e = {2.0 / 9 - 7.0 / 24, 1.0 / 3 - 1.0 / 4, 4.0 / 9 - 1.0 / 3, -1.0 / 8}},
-    [HX_METHOD_RK4] = {.name = "rk4",
-                       .stages = 4,
+    [HX_METHOD_RK4] = {.stages = 4,
                        .order = 4,
                        .error_order = 0,
                        .a = {{0}, {1.0 / 2}, {0, 1.0 / 2}, {0, 0, 1}},

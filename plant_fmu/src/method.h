@@ -8,7 +8,6 @@ enum { HX_STAGES = 7 };
  *   (1 - h gamma A) k_i = h f(t_0 + c_i h, y_i) + h A sum_{j<i} g_ij k_j      gamma = 0: explicit
  *   y_1 = y_0 + sum b_i k_i,   error estimate sum e_i k_i                     e = b - b of the embedded method */
 typedef struct hxMethodRow {
-  const char *name;
   int stages;
   int order;
   int error_order; /* of the embedded method; 0: none, fixed step only */

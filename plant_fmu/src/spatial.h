@@ -63,29 +63,13 @@ static inline void hx_inertia_downdate(hxInertia6 *I, hxReal s, hxForce6 U) {
   I->A.xy -= l.x * U.lin.y, I->A.xz -= l.x * U.lin.z, I->A.yz -= l.y * U.lin.z;
 }
 
-/* M E, E = skew(e) */
-static inline hxMat3 hx_mul_skew(hxMat3 M, hxVec3 e) { return (hxMat3){hx_cross(M.x, e), hx_cross(M.y, e), hx_cross(M.z, e)}; }
-
-static inline hxMat3 hx_sym_full(hxSym3 S) { return (hxMat3){{S.xx, S.xy, S.xz}, {S.xy, S.yy, S.yz}, {S.xz, S.yz, S.zz}}; }
-
-static inline hxMat3 hx_transpose(hxMat3 M) { return (hxMat3){{M.x.x, M.y.x, M.z.x}, {M.x.y, M.y.y, M.z.y}, {M.x.z, M.y.z, M.z.z}}; }
-
-/* an inertia about a point, about another one e away from it: X^T I X with X = [1 0; E 1],
- * A' = A, H' = H + E^T A, C' = C + H E + (H E)^T + E^T A E */
-static inline hxInertia6 hx_carry_inertia(hxVec3 e, const hxInertia6 *I) {
-  const hxMat3 AE = hx_mul_skew(hx_sym_full(I->A), e); /* (E^T A)^T = A E */
-  const hxMat3 EtA = hx_transpose(AE);
-  const hxMat3 HE = hx_mul_skew(I->H, e);
-  const hxMat3 EtAE = hx_mul_skew(EtA, e);
-  hxInertia6 out = *I;
-  out.H = (hxMat3){hx_add(I->H.x, EtA.x), hx_add(I->H.y, EtA.y), hx_add(I->H.z, EtA.z)};
-  out.C.xx += 2.0 * HE.x.x + EtAE.x.x;
-  out.C.yy += 2.0 * HE.y.y + EtAE.y.y;
-  out.C.zz += 2.0 * HE.z.z + EtAE.z.z;
-  out.C.xy += (HE.x.y + HE.y.x) + EtAE.x.y;
-  out.C.xz += (HE.x.z + HE.z.x) + EtAE.x.z;
-  out.C.yz += (HE.y.z + HE.z.y) + EtAE.y.z;
-  return out;
+/* a symmetric block A that acts at c: [ -c~ A c~  c~ A ; .  A ], as seen about the point that c is from */
+static inline hxInertia6 hx_inertia_at(hxSym3 A, hxVec3 c) {
+  const hxVec3 x = {A.xx, A.xy, A.xz}, y = {A.xy, A.yy, A.yz}, z = {A.xz, A.yz, A.zz};
+  const hxVec3 cx = hx_cross(c, x), cy = hx_cross(c, y), cz = hx_cross(c, z); /* columns of c~ A */
+  const hxMat3 H = {{cx.x, cy.x, cz.x}, {cx.y, cy.y, cz.y}, {cx.z, cy.z, cz.z}};
+  const hxVec3 Cx = hx_cross(c, H.x), Cy = hx_cross(c, H.y), Cz = hx_cross(c, H.z); /* rows of -c~ A c~ = c~ (c~ A)^T */
+  return (hxInertia6){{Cx.x, Cy.y, Cz.z, Cx.y, Cx.z, Cy.z}, H, A};
 }
 
 #endif

@@ -17,7 +17,7 @@ enum {
 /* Where a body state's parts begin. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
 
-/* y of y' = f(t, y). The same 328 doubles as a vector for the integrator and by name for the physics. */
+/* y of y' = f(t, y). The same doubles as a vector for the integrator and by name for the physics. */
 typedef union hxMotion {
   double y[HX_MOTION_SIZE];
   struct {

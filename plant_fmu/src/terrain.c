@@ -10,8 +10,8 @@ static hxGround slope(const hxModel *model, hxVec3 point) {
 }
 
 static const hxTerrainRow terrain_rows[] = {
-    [HX_TERRAIN_FLAT] = {"flat", flat},
-    [HX_TERRAIN_SLOPE] = {"slope", slope},
+    [HX_TERRAIN_FLAT] = {flat},
+    [HX_TERRAIN_SLOPE] = {slope},
 };
 
 HX_LOCAL const hxTerrainRow *hx_terrain(int kind) {

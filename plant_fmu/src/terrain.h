@@ -12,7 +12,6 @@ typedef struct {
 
 /* One row per hxTerrainKind; the only place a terrain is chosen. */
 typedef struct {
-  const char *name;
   hxGround (*ground)(const hxModel *model, hxVec3 point);
 } hxTerrainRow;
 

@@ -177,28 +177,31 @@ HX_API void hx_probe_rotation_of_change(const double p[4], const double dp[4], d
 
 HX_API void hx_probe_axis_normals(const double axis[3], double a[3], double b[3]) { hx_axis_normals(axis, a, b); }
 
-/* X^T (I - s U U^T) X of a 6 x 6 inertia, angular part first */
-HX_API void hx_probe_carry_inertia(const double e[3], double s, const double U[6], const double I[6][6], double out[6][6]) {
-  static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
-  double entry[18];
-  for (int i = 0; i < 6; ++i) entry[i] = I[row[i]][column[i]], entry[6 + i] = I[3 + row[i]][3 + column[i]];
-  const hxSym3 C = {hx_splat(entry[0]), hx_splat(entry[1]), hx_splat(entry[2]), hx_splat(entry[3]), hx_splat(entry[4]), hx_splat(entry[5])};
-  const hxSym3 A = {hx_splat(entry[6]), hx_splat(entry[7]),  hx_splat(entry[8]),
-                    hx_splat(entry[9]), hx_splat(entry[10]), hx_splat(entry[11])};
-  const hxMat3 H = {hx_splat_vec3(&I[0][3]), hx_splat_vec3(&I[1][3]), hx_splat_vec3(&I[2][3])};
-  hxInertia6 inertia = {C, H, A};
-  hx_inertia_downdate(&inertia, hx_splat(s), (hxForce6){hx_splat_vec3(U), hx_splat_vec3(U + 3)});
-  inertia = hx_carry_inertia(hx_splat_vec3(e), &inertia);
+static void put_inertia(const hxInertia6 *inertia, double out[6][6]) {
   for (int j = 0; j < 6; ++j) {
     const hxVec3 o = hx_zero3();
     hxMotion6 unit = {o, o};
     hxReal *component[6] = {&unit.ang.x, &unit.ang.y, &unit.ang.z, &unit.lin.x, &unit.lin.y, &unit.lin.z};
     *component[j] = hx_splat(1.0);
-    const hxForce6 f = hx_inertia_mul(&inertia, unit);
+    const hxForce6 f = hx_inertia_mul(inertia, unit);
     double column_j[6];
     put3(f.ang, 0, column_j), put3(f.lin, 0, column_j + 3);
     for (int i = 0; i < 6; ++i) out[i][j] = column_j[i];
   }
+}
+
+static hxSym3 take_sym3(const double S[3][3]) {
+  return (hxSym3){hx_splat(S[0][0]), hx_splat(S[1][1]), hx_splat(S[2][2]), hx_splat(S[0][1]), hx_splat(S[0][2]), hx_splat(S[1][2])};
+}
+
+/* (the inertia of a body with mass, J at c, and of a block A at c, as seen from the origin) - s U U^T; angular part first */
+HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3][3], const double c[3], double s, const double U[6],
+                             double out[6][6]) {
+  hxInertia6 inertia = hx_rigid_inertia(hx_splat(mass), take_sym3(J), hx_splat_vec3(c));
+  const hxInertia6 block = hx_inertia_at(take_sym3(A), hx_splat_vec3(c));
+  hx_inertia_add(&inertia, &block);
+  hx_inertia_downdate(&inertia, hx_splat(s), (hxForce6){hx_splat_vec3(U), hx_splat_vec3(U + 3)});
+  put_inertia(&inertia, out);
 }
 
 /* ---- laws -------------------------------------------------------------------------------------------------------------------- */
