@@ -25,6 +25,9 @@ setup: $(STAMP)
 
 # installed anew whenever the C sources or the project's description change
 $(STAMP): $(SOURCES)
+	@for cc in "$${CC:-cc}" gcc clang; do command -v $$cc >/dev/null && exit 0; done; \
+	echo "no C compiler: looked for $${CC:-cc}, gcc and clang, found none; install one (Debian, Ubuntu: apt-get install gcc libc6-dev)" \
+	"or name yours with CC=..." >&2; exit 1
 	$(PYTHON) tools/make_venv.py $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $@
