@@ -31,7 +31,8 @@ DETERMINANT_FLOOR = 1e-9  # m4    feet on one line share no moment
 class Compliance:
     """The two laws of all feet. Horizontal shifts and forces are complex numbers x + i y.
 
-    Attributes, (6,) each: shift, shift_rate: horizontal correction and its rate [m, m/s]; lift, lift_rate: the vertical one;
+    Attributes: tangential: (2, 6) shift and shift_rate; normal: (2, 6) lift and lift_rate;
+    (6,) each: shift, shift_rate: horizontal correction and its rate [m, m/s]; lift, lift_rate: the vertical one;
     squeeze: tangential force the feet give way to [N]; excess: normal force beyond the preload [N]; share: of the weight [N].
     """
 
@@ -39,12 +40,15 @@ class Compliance:
         """weight [N] and centre of mass x + i y [m] of the robot in the walking frame."""
         self.pid = SlipPid(gains.slip, period=period)
         self.suspension = Suspension(gains.suspension, period=period)
-        self.lift, self.lift_rate = self.suspension.state
+        self.normal = self.suspension.state
+        self.lift, self.lift_rate = self.normal
         self._weight, self._centre = weight, centre
         self._preloads, self._per_share = np.full(LEGS, gains.suspension.preload), np.full(LEGS, TRIPOD_LEGS / weight)
         self._follow = np.full(LEGS, 1.0 - math.exp(-period / gains.slip.load_time))
         self._largest, self._per_second = np.full(LEGS, LARGEST_LOAD), np.full(LEGS, 1.0 / period)
-        self.shift, self.shift_rate, self.squeeze = np.zeros((3, LEGS), dtype=np.complex128)
+        self.squeeze = np.zeros(LEGS, dtype=np.complex128)
+        self.tangential = np.zeros((2, LEGS), dtype=np.complex128)
+        self.shift, self.shift_rate = self.tangential
         self._new, self._common = np.zeros((2, LEGS), dtype=np.complex128)
         self.excess, self.share, self._load, self._scale, self._t, self._zero = np.zeros((6, LEGS))
         self._stance, self._gone = np.empty((2, LEGS), dtype=np.bool_)
@@ -110,11 +114,13 @@ def even_shares(feet: list[complex], standing: list[bool], weight: float, centre
     (n sx sy; sx sxx sxy; sy sxy syy) (a b c) = (weight 0 0), with sums s over the standing feet.
     Plain numbers: six legs are too few for arrays to pay.
     """
-    arms = [foot - centre for foot, stands in zip(feet, standing, strict=True) if stands]
-    n, total = len(arms), sum(arms)
-    sx, sy = total.real, total.imag
-    sxx, syy = sum([p.real * p.real for p in arms]), sum([p.imag * p.imag for p in arms])
-    sxy = sum([p.real * p.imag for p in arms])
+    n, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for foot, stands in zip(feet, standing, strict=True):
+        if stands:
+            arm = foot - centre
+            x, y = arm.real, arm.imag
+            n, sx, sy = n + 1, sx + x, sy + y
+            sxx, sxy, syy = sxx + x * x, sxy + x * y, syy + y * y
     a, b, c = sxx * syy - sxy * sxy, sxy * sy - sx * syy, sx * sxy - sxx * sy
     determinant = n * a + sx * b + sy * c
     if determinant < DETERMINANT_FLOOR:
@@ -122,4 +128,5 @@ def even_shares(feet: list[complex], standing: list[bool], weight: float, centre
         return [each if stands else 0.0 for stands in standing]
     per = weight / determinant
     a, b, c = (a - b * centre.real - c * centre.imag) * per, b * per, c * per
-    return [max(a + b * p.real + c * p.imag, 0.0) if stands else 0.0 for p, stands in zip(feet, standing, strict=True)]
+    shares = [a + b * p.real + c * p.imag if stands else 0.0 for p, stands in zip(feet, standing, strict=True)]
+    return [0.0 if share < 0.0 else share for share in shares]

@@ -101,12 +101,14 @@ class Controller:
 
     def _allocate(self) -> None:
         self._out = JointCommand()
-        self._plane, self._plane_velocity = np.empty(LEGS, dtype=np.complex128), np.empty(LEGS, dtype=np.complex128)
-        self._height, self._rise = np.empty(LEGS), np.empty(LEGS)
+        # rows: position and velocity
+        self._horizontal, self._vertical = np.empty((2, LEGS), dtype=np.complex128), np.empty((2, LEGS))
+        (self._plane, self._plane_velocity), (self._height, self._rise) = self._horizontal, self._vertical
         # rows (x y z 0) of forces, seen as x + i y and z without a copy
         self._force, self._rotation = np.zeros((LEGS, 4)), np.zeros((3, 4))
         self._push, self._normal = self._force.view(np.complex128)[:, 0], self._force[:, 2]
-        self._rolled, self._roll_rate = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS, dtype=np.complex128)
+        self._rolling = np.zeros((2, LEGS), dtype=np.complex128)
+        self._rolled, self._roll_rate = self._rolling
         self._pitch, self._stance_pitch = np.empty(LEGS), self.stance[:, 2] - self.stance[:, 1]
         self._per_second = np.full(LEGS, 1.0 / self.period)
         self._unreachable = np.zeros(LEGS, dtype=np.bool_)
@@ -152,20 +154,18 @@ class Controller:
         """
         self._advance(t, command)
         paths, laws = self.paths, self.compliance
-        plane, velocity, height, rise = self._plane, self._plane_velocity, self._height, self._rise
         if laws is None:
-            plane[:], velocity[:], height[:], rise[:] = paths.plane, paths.plane_velocity, paths.height, paths.rise
+            self._horizontal[:], self._vertical[:] = paths.horizontal, paths.vertical
         else:
             self._sense(measurement)
             laws.step(self._push, self._normal, measurement.contact, swinging=paths.swinging, plane=paths.plane)
-            np.add(paths.plane, laws.shift, plane)
-            np.add(paths.plane_velocity, laws.shift_rate, velocity)
-            np.add(paths.height, laws.lift, height)
-            np.add(paths.rise, laws.lift_rate, rise)
+            np.add(paths.horizontal, laws.tangential, self._horizontal)
+            np.add(paths.vertical, laws.normal, self._vertical)
         if self._count:
             self._roll()
         self._pose()
-        self.legs.solve(plane, height, velocity, rise, self._out.angle_ref, self._out.speed_ref, self._unreachable)
+        out = self._out
+        self.legs.solve(self._plane, self._height, self._plane_velocity, self._rise, out.angle_ref, out.speed_ref, self._unreachable)
         return self._out
 
     def _advance(self, t: float, command: BodyCommand) -> None:
@@ -198,12 +198,10 @@ class Controller:
         np.subtract(angle[:, 2], angle[:, 1], self._pitch)
         np.subtract(self._pitch, self._stance_pitch, self._pitch)
         np.multiply(self._pitch, self._radius, self._pitch)
-        np.conjugate(self.legs.heading, roll)
-        np.multiply(roll, self._pitch, roll)
+        np.multiply(self.legs.heading, self._pitch, roll)
         np.subtract(roll, rate, rate)
         np.multiply(rate, self._per_second, rate)
-        np.add(self._plane, roll, self._plane)
-        np.add(self._plane_velocity, rate, self._plane_velocity)
+        np.add(self._horizontal, self._rolling, self._horizontal)
 
     def _sense(self, measurement: Measurement) -> None:
         """Foot forces in the walking frame K: rows f_K = f_W R_WT R_TK, the transpose of R_KT R_TW f_W."""

@@ -8,10 +8,15 @@ sideways by the sum Y of the y offsets:
     z = oz_1 + a sin A + b sin B        B = q_2 - q_3 + atan2(offset_z, length) of the tibia   b = |tibia tip|
 
 The knee angle gamma = A - B in [0, pi] (knee up) makes the inverse unique. `LegSolver.solve`, which runs at every period, writes
-points of a plane as complex numbers: a turn is one product, all six legs are one operation, and only the results need arc functions.
+points of a plane as complex numbers: a turn is one product, and only the results need arc functions. It takes leg by leg in Python's own
+numbers: on arrays of six, numpy's cost per call is several times that of the six sums.
 """
 
 from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +47,59 @@ def _check_axes(robot: Robot) -> None:
                 )  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class LegInverse:
+    """Inverse kinematics of one leg. Points of a plane are x + i y seen from above, u + i w in the leg's own plane.
+
+    Formulas in products instead of powers and `abs`, which raise on overflow: whatever comes in, something comes out.
+    """
+
+    hip: complex  # m    of the coxa axis, torso frame
+    height: float  # m    of the femur joint, torso frame
+    coxa: float  # m    from the coxa axis to the femur joint
+    side: float  # m    Y
+    femur: float  # m    a
+    tibia: float  # m    b
+    yaw: complex  # e^-i hip_yaw
+    tilt: complex  # e^-i tilt_2
+    knee_tilt: float  # rad    tilt_2 - tilt_3
+
+    def solve(self, plane: complex, height: float, velocity: complex, rise: float) -> tuple[complex, bool, tuple[float, ...]]:
+        """e^i psi of the leg's outward direction, whether the foot is within reach, and q_1 to q_3, dq_1 to dq_3 [rad, rad/s]."""
+        a, b, side = self.femur, self.tibia, self.side
+        # rho^2 = x^2 + y^2 - Y^2: the foot's distance along the coxa's x axis;  e^i psi = (x + i y) / (rho + i Y)
+        point = plane - self.hip
+        x, y = point.real, point.imag
+        square = x * x + y * y - side * side
+        within = square >= RADIUS_FLOOR
+        rho = math.sqrt(square if within else RADIUS_FLOOR)
+        heading = point / (rho + 1j * side)
+        # from the femur joint to the foot: r + i z = e^i B (b + a e^i gamma), so cos gamma = (r^2 + z^2 - a^2 - b^2) / (2 a b)
+        r, z = rho - self.coxa, height - self.height
+        cosine = (r * r + z * z - a * a - b * b) / (2.0 * a * b)
+        if not FOLDED_COSINE <= cosine <= 1.0:
+            wanted, cosine = cosine, min(max(cosine, FOLDED_COSINE), 1.0)
+            within = within and abs(wanted - cosine) <= FLAG_TOLERANCE
+        gamma = math.acos(cosine)
+        sine = math.sin(gamma)
+        knee = cosine + 1j * sine
+        lower = (r + 1j * z) / (b + a * knee)  # e^i B
+        # velocity in the coxa frame v e^-i psi: dq_1 = v_y / rho; then u + i rise, u = v_x + Y dq_1, is left for the leg's plane
+        v = velocity * heading.conjugate()
+        turn = v.imag / rho
+        u = v.real + side * turn
+        # dq_2 = -Re((u + i rise)^* e^i B) / (a sin gamma);  dq_3 = -Re((u + i rise)^* (r + i z)) / (a b sin gamma)
+        lever = -a * (sine if sine > SINGULAR_SINE else SINGULAR_SINE)
+        angles = cmath.phase(heading * self.yaw), cmath.phase(lower * knee * self.tilt), gamma - self.knee_tilt
+        speeds = turn, (u * lower.real + rise * lower.imag) / lever, (u * r + rise * z) / (lever * b)
+        return heading, within, angles + speeds
+
+
 class LegSolver:
-    """Forward and inverse kinematics of a robot's legs in the torso frame. Raises RobotError on another axis pattern."""
+    """Forward and inverse kinematics of a robot's legs in the torso frame. Raises RobotError on another axis pattern.
+
+    Attribute `heading`: (6,) the legs' outward directions e^(i psi) in the torso frame at the last solve.
+    """
 
     def __init__(self, robot: Robot) -> None:
         _check_axes(robot)
@@ -60,28 +116,17 @@ class LegSolver:
         self._prepare()
 
     def _prepare(self) -> None:
-        # constants as full arrays: numpy is faster with them than with Python numbers
-        self._hip_plane, self._hip_height = self.hip[0] + 1j * self.hip[1], self.hip[2] + self.coxa_height
-        self._side2, self._floor, self._one = self.offset_y**2, np.full(LEGS, RADIUS_FLOOR), np.ones(LEGS)
-        self._squares, self._product = self.femur**2 + self.tibia**2, 0.5 / (self.femur * self.tibia)
-        self._knee_tilt = self.femur_tilt - self.tibia_tilt
-        self._zero_turn = np.exp(-1j * np.stack([self.hip_yaw, self.femur_tilt]))  # turns e^i psi, e^i A into e^i q
-        self._divisor = np.stack([-self.femur, -self.femur * self.tibia])
-        self._sine_floor = np.full(LEGS, SINGULAR_SINE)
-        self._folded = np.full(LEGS, FOLDED_COSINE)
-        self._low, self._high = np.ascontiguousarray(self.angle_min.T), np.ascontiguousarray(self.angle_max.T)
-        self._fastest = np.full((3, LEGS), self.speed_max)
-        self._slowest = -self._fastest
-        self._rows = np.empty((6, LEGS))
-        self._point, self._knee, self._reach, self._heading = (np.empty(LEGS, dtype=np.complex128) for _ in range(4))
-        self._arm, self._turn = (np.empty((2, LEGS), dtype=np.complex128) for _ in range(2))
-        self._q, self._bounded, self._speed = (np.empty((3, LEGS)) for _ in range(3))
-        self._short, self._far = np.empty((2, LEGS), dtype=np.bool_)
-
-    @property
-    def heading(self) -> Plane:
-        """(6,) the legs' outward directions e^(i psi) in the torso frame, conjugated, at the last solve."""
-        return self._heading
+        zero = np.exp(-1j * np.stack([self.hip_yaw, self.femur_tilt]))  # turns e^i psi, e^i A into e^i q
+        columns = (
+            self.hip[0] + 1j * self.hip[1], self.hip[2] + self.coxa_height, self.coxa_length, self.offset_y, self.femur, self.tibia,
+            *zero, self.femur_tilt - self.tibia_tilt,
+        )  # fmt: skip
+        self._legs = [LegInverse(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
+        # one row per leg: three angles, three speeds
+        self._high = np.hstack([self.angle_max, np.full((LEGS, 3), self.speed_max)])
+        self._low = np.hstack([self.angle_min, np.full((LEGS, 3), -self.speed_max)])
+        self._wanted, self._bounded = np.empty((2, LEGS, 6))
+        self.heading: Plane = np.empty(LEGS, dtype=np.complex128)
 
     def forward(self, angle: Array) -> Array:
         """(6, 3) feet's centres in the torso frame [m] at joint angles (6, 3) [rad]."""
@@ -149,75 +194,16 @@ class LegSolver:
             angle, speed: (6, 3) results [rad, rad/s]; a joint held by its limit has speed 0, none is faster than the servo.
             unreachable: (6,) result: this leg's angles do not put the foot on its target.
         """
-        self._angles(plane, height)
-        q, bounded = self._q, self._bounded
-        np.maximum(q, self._low, out=bounded)
+        feet = zip(self._legs, plane.tolist(), height.tolist(), plane_velocity.tolist(), rise.tolist(), strict=True)
+        heading, within, rows = zip(*[leg.solve(p, z, v, w) for leg, p, z, v, w in feet], strict=True)
+        self.heading[:] = heading
+        unreachable[:] = [not reached for reached in within]
+        wanted, bounded = self._wanted, self._bounded
+        wanted[:] = rows
+        np.maximum(wanted, self._low, out=bounded)
         np.minimum(bounded, self._high, out=bounded)
-        self._speeds(plane_velocity, rise)
-        unreachable[:] = self._short
-        if q.tobytes() != bounded.tobytes():
-            held = np.abs(q - bounded) > FLAG_TOLERANCE
-            unreachable |= held.any(axis=0)
-            self._speed[held] = 0.0
-        angle[...] = bounded.T
-        speed[...] = self._speed.T
-
-    def _angles(self, plane: Plane, height: Array) -> None:
-        """q from the foot. Complex numbers stand for points of a plane: x + i y from above, u + i w in the leg's own plane."""
-        rho, square, sine, t = self._rows[:4]
-        point, knee, reach, (arm, chord), turn, q = self._point, self._knee, self._reach, self._arm, self._turn, self._q
-        # rho^2 = x^2 + y^2 - Y^2: the foot's distance along the coxa's x axis;  e^i psi = (x + i y) / (rho + i Y)
-        np.subtract(plane, self._hip_plane, point)
-        np.absolute(point, square)
-        np.multiply(square, square, square)
-        np.subtract(square, self._side2, square)
-        np.maximum(square, self._floor, out=rho)
-        np.not_equal(rho, square, self._short)
-        np.sqrt(rho, rho)
-        reach.real, reach.imag = rho, self.offset_y
-        np.divide(point, reach, turn[0])
-        np.conjugate(turn[0], self._heading)
-        # chord = u + i w: from the femur joint to the foot;  cos gamma = (|chord|^2 - a^2 - b^2) / (2 a b)
-        np.subtract(rho, self.coxa_length, chord.real)
-        np.subtract(height, self._hip_height, chord.imag)
-        np.absolute(chord, square)
-        np.multiply(square, square, square)
-        np.subtract(square, self._squares, square)
-        np.multiply(square, self._product, square)
-        np.minimum(square, self._one, out=t)
-        np.maximum(t, self._folded, out=t)
-        np.not_equal(square, t, self._far)
-        if True in self._far.tolist():
-            self._short |= np.abs(square - t) > FLAG_TOLERANCE
-        # chord = e^i B (b + a e^i gamma)
-        np.arccos(t, q[2])
-        np.sin(q[2], sine)
-        knee.real, knee.imag = t, sine
-        np.multiply(knee, self.femur, reach)
-        np.add(reach, self.tibia, reach)
-        np.divide(chord, reach, arm)
-        np.multiply(arm, knee, turn[1])
-        # q_1 = psi - hip_yaw, q_2 = A - tilt_2, q_3 = gamma - tilt_2 + tilt_3
-        np.multiply(turn, self._zero_turn, turn)
-        np.arctan2(turn.imag, turn.real, q[:2])
-        np.subtract(q[2], self._knee_tilt, q[2])
-
-    def _speeds(self, plane_velocity: Plane, rise: Array) -> None:
-        """dq from the foot's velocity, with what `_angles` left behind."""
-        rho, _, sine, t, radial = self._rows[:5]
-        point, reach, arm, turn, speed = self._point, self._reach, self._arm, self._turn, self._speed
-        # velocity in the coxa frame: v e^-i psi
-        np.multiply(plane_velocity, self._heading, reach)
-        # dq_1 = v_y / rho; then v = v_x + Y dq_1 + i v_z is left for the plane
-        np.divide(reach.imag, rho, speed[0])
-        np.multiply(speed[0], self.offset_y, t)
-        np.add(reach.real, t, radial)
-        point.real, point.imag = radial, rise
-        # dq_2 = -Re(v / e^i B) / (a sin gamma);  dq_3 = -Re(v^* chord) / (a b sin gamma)
-        np.conjugate(arm, turn)
-        np.multiply(turn, point, turn)
-        np.maximum(sine, self._sine_floor, out=sine)
-        np.multiply(self._divisor, sine, self._rows[4:6])
-        np.divide(turn.real, self._rows[4:6], speed[1:])
-        np.maximum(speed, self._slowest, out=speed)
-        np.minimum(speed, self._fastest, out=speed)
+        angle[...], speed[...] = bounded[:, :3], bounded[:, 3:]
+        if wanted.tobytes() != bounded.tobytes():
+            held = np.abs(wanted[:, :3] - angle) > FLAG_TOLERANCE
+            unreachable |= held.any(axis=1)
+            speed[held] = 0.0

@@ -48,8 +48,7 @@ class SlipPid:
 
     def reset(self, legs: Mask | None = None) -> None:
         """Forgets everything, of the legs (6,) given or of all."""
-        chosen = np.ones(LEGS, dtype=np.bool_) if legs is None else legs
-        self._after[:, chosen] = 0.0
+        np.copyto(self._after, 0.0, where=True if legs is None else legs)
 
     def step(self, force: Plane) -> Plane:
         """One period. force: (6,) tangential force to give way to [N]. Returns `output`, the foot shift [m]."""

@@ -104,6 +104,7 @@ class FootPaths:
 
     Attributes, (6,) each, in the walking frame:
         plane, height: feet's centres, x + i y and z [m];  plane_velocity, rise: their velocity [m/s];
+        horizontal, vertical: (2, 6) the same in two blocks, each of position and velocity;
         landing: where swinging feet will touch down [m];  phase: in [0, 1);  swinging;  lifted: lift-off in the last step;
         progress, blend: tau and s of swinging feet, else 0.
     walking: the gait clock runs.
@@ -114,10 +115,11 @@ class FootPaths:
         self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
         self.swing_time = gait.period * (1.0 - gait.duty)
         self._landing_lead = 0.5 * gait.period * gait.duty + self.swing_time  # s    from lift-off to the middle of the next stance
-        self._points = np.empty((2, LEGS), dtype=np.complex128)
-        self.plane, self.landing = self._points
-        self.plane_velocity = np.empty(LEGS, dtype=np.complex128)
-        self.height, self.rise, self.phase, self.progress, self.blend = (np.empty(LEGS) for _ in range(5))
+        rows = np.empty((3, LEGS), dtype=np.complex128)
+        self.landing, self.plane, self.plane_velocity = rows
+        self._points, self.horizontal, self.vertical = rows[:2], rows[1:], np.empty((2, LEGS))
+        self.height, self.rise = self.vertical
+        self.phase, self.progress, self.blend = (np.empty(LEGS) for _ in range(3))
         self.swinging, self.lifted, self._standing = (np.empty(LEGS, dtype=np.bool_) for _ in range(3))
         self._homes: list[complex] = self.home.tolist()
         self._home_heights: list[float] = self.home_height.tolist()
@@ -147,7 +149,7 @@ class FootPaths:
             twist: (vx + i vy, yaw rate) at the end of the period [m/s, rad/s]; mean_twist: its mean over the period.
             going: the body moves or is commanded to; when False, feet step home and the clock then stops.
         """
-        self.lifted[:] = False
+        self.lifted.fill(False)
         if not self.walking:
             if not going:
                 self.plane_velocity[:] = 0.0
@@ -157,9 +159,10 @@ class FootPaths:
         self._tick(going)
         # a foot on the ground: dp/dt = -(v + i w p)
         v, yaw_rate = twist
-        np.multiply(self.plane, -1j * yaw_rate, self.plane_velocity)
-        np.subtract(self.plane_velocity, v, self.plane_velocity)
-        self.rise[:] = 0.0
+        self.plane_velocity.fill(-v)
+        if yaw_rate != 0.0:
+            self.plane_velocity -= 1j * yaw_rate * self.plane
+        self.rise.fill(0.0)
         if True in self.swinging.tolist():
             self._swing(twist)
         elif not going and self._at_home().all():
@@ -201,7 +204,7 @@ class FootPaths:
         """The feet in the air. Plain numbers: the few legs that swing are too few for arrays to pay."""
         duty, time = self.gait.duty, self.swing_time
         phase, before, lifted = self.phase.tolist(), self.blend.tolist(), self.lifted.tolist()
-        plane, landing = self._points.tolist()
+        landing, plane = self._points.tolist()
         for leg, swings in enumerate(self.swinging.tolist()):
             if not swings:
                 continue
@@ -237,11 +240,12 @@ def blend(tau: float) -> tuple[float, float]:
     if y >= 1.0:
         return 1.0, 0.0
     y4 = y * y * y * y
-    return 0.5 + y * (45.0 + y4 * (5.0 * y4 - 18.0)) / 64.0, 45.0 / 32.0 * (1.0 - y4) ** 2 / (1.0 - 2.0 * DWELL)
+    flat = 1.0 - y4
+    return 0.5 + y * (45.0 + y4 * (5.0 * y4 - 18.0)) / 64.0, 45.0 / 32.0 * flat * flat / (1.0 - 2.0 * DWELL)
 
 
 def hop(tau: float, *, top: float, down: float) -> tuple[float, float]:
     """z and dz/dtau [m]: 64 top (tau (1 - tau))^3 + down tau^3 (1 - tau), down the touch-down speed times the swing's time."""
     arch = tau * (1.0 - tau)
-    z = 64.0 * top * arch**3 + down * tau**3 * (1.0 - tau)
-    return z, 192.0 * top * arch * arch * (1.0 - 2.0 * tau) + down * tau * tau * (3.0 - 4.0 * tau)
+    bow, fall = 64.0 * top * arch * arch, down * tau * tau
+    return (bow + fall) * arch, 3.0 * bow * (1.0 - 2.0 * tau) + fall * (3.0 - 4.0 * tau)
