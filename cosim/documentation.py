@@ -19,7 +19,7 @@ td, th {{ text-align: left; vertical-align: top; padding: 0.2em 0.8em 0.2em 0; b
 </head>
 <body>
 <h1>{name}: hexapod plant</h1>
-<p>A six-legged robot of 19 rigid bodies and 18 servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation, version
+<p>A six-legged robot of {bodies} rigid bodies and {joints} servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation, version
 {version}, GUID {guid}.</p>
 <h2>First run</h2>
 <p>Without any input the robot stands in its pose, settled on the ground, and stays there. Drive it by the joint commands
@@ -64,8 +64,11 @@ def render_html(interface: Interface, guid: str) -> str:
         for pattern in interface.patterns
     ]
     sources = [f"<li>{escape(key)}: {escape(text)}</li>" for key, text in sorted(interface.robot.source.items())]
+    joints = sum(len(leg.links) for leg in interface.robot.legs)
     return PAGE.format(
         name=escape(interface.robot.name),
+        bodies=1 + joints,
+        joints=joints,
         mass=interface.robot.total_mass,
         version=interface.version,
         guid=guid,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import zipfile
 from collections.abc import Iterable
+from functools import reduce
 from pathlib import Path
 
 from hexapod_cosim.cosim.documentation import render_html
+from hexapod_cosim.cosim.files import atomic_path, not_writable
 from hexapod_cosim.cosim.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
 from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, binary, fmi2_platform, installed_platforms, source_files
@@ -17,6 +17,7 @@ from hexapod_cosim.models.records import Robot
 
 FMI_VERSIONS = (2,)
 ALL_PLATFORMS = "all"
+FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
 
 
@@ -29,7 +30,7 @@ def export_fmu(robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Itera
         fmi: version of the standard.
         platforms: folders such as linux64; by default this machine's. "all": every one whose binary is installed.
 
-    Raises FmuError: no binary, a path that cannot be written, a version that is not offered.
+    Raises FmuError: no binary, a version that is not offered; HexapodError: a path that cannot be written.
     """
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
@@ -60,8 +61,9 @@ def _members(interface: Interface, platforms: Iterable[str]) -> dict[str, bytes]
 
 
 def start_values(interface: Interface, guid: str) -> str:
-    """What the binary reads at instantiation: the GUID, then "reference value name" of every input and parameter, exactly."""
-    return "\n".join([guid, *map(_start_line, interface.of_causality("input", "parameter"))]) + "\n"
+    """What the binary reads at instantiation: the GUID, then "reference value name" of every input and parameter, exactly; a checksum."""
+    lines = [guid, *map(_start_line, interface.of_causality("input", "parameter"))]
+    return "\n".join([*lines, f"checksum {reduce(checksum, (line.encode() for line in lines), 0):016x}"]) + "\n"
 
 
 def _start_line(variable: Variable) -> str:
@@ -69,21 +71,23 @@ def _start_line(variable: Variable) -> str:
     return f"{variable.reference} {value} {variable.name}"
 
 
+def checksum(seed: int, data: bytes) -> int:
+    """hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, its high bits mixed into the low ones."""
+    value = seed ^ FNV_BASIS
+    for place in range(0, len(data), WORD):
+        value = (value ^ int.from_bytes(data[place : place + WORD], "little")) * FNV_PRIME & MASK
+        value ^= value >> 32
+    return (value ^ len(data)) * FNV_PRIME & MASK
+
+
 def _write_atomically(path: Path, members: dict[str, bytes]) -> Path:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with zipfile.ZipFile(part, "w") as archive:
-            for name, content in members.items():
-                archive.writestr(_member(name), content)
-        os.replace(part, path)
     except OSError as error:
-        raise FmuError(
-            "cannot write the FMU", got=error.strerror, expected="a writable file", fix="choose another path", where=str(path)
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
+        raise not_writable(path, error) from error
+    with atomic_path(path) as part, zipfile.ZipFile(part, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(_member(name), content)
     return path
 
 

@@ -23,7 +23,12 @@ OUR_FILES = (
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to, which takes its place when the block ends well and vanishes when it does not."""
+    """A path beside `path` to write to, which takes its place when the block ends well and vanishes when it does not.
+
+    Raises HexapodError for a folder, and for a place that cannot be written to.
+    """
+    if path.is_dir():
+        raise HexapodError("cannot write", got="a folder", expected="the name of a file", fix="name a file in it with -o", where=str(path))
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
     except OSError as error:
@@ -78,25 +83,43 @@ def _finite(value: Any) -> Any:
 
 def not_writable(path: Path, error: OSError) -> HexapodError:
     """The error for a place that cannot be written to."""
-    return HexapodError("cannot write", got=error.strerror or str(error), fix="choose another place with -o", where=str(path))
+    fix = "choose another place with -o"
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        return HexapodError("cannot write", got="a file where a folder should be", expected="a folder", fix=fix, where=str(path))
+    expected = "a place that can be written to"
+    return HexapodError("cannot write", got=error.strerror or str(error), expected=expected, fix=fix, where=str(path))
 
 
-def prepare_folder(folder: Path) -> Path:
-    """An empty place for results: made when missing, cleared of an earlier run's files. Raises HexapodError when it is someone else's."""
+def claim_folder(folder: Path) -> list[Path]:
+    """Sees that results can go here, and touches no file. Returns the folders made for it, the innermost first.
+
+    Raises HexapodError when the folder is someone else's, or cannot be written to.
+    """
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         entries = [entry.name for entry in folder.iterdir()]
-        if entries and RUN_FILE not in entries:
-            expected = f"a new or empty folder, or an earlier run's (it has {RUN_FILE})"
-            raise HexapodError(
-                "the folder holds other files", got=sorted(entries)[0], expected=expected, fix="choose another with -o", where=str(folder)
-            )
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    if entries and RUN_FILE not in entries:
+        expected = f"a new or empty folder, or an earlier run's (it has {RUN_FILE})"
+        raise HexapodError(
+            "the folder holds other files", got=sorted(entries)[0], expected=expected, fix="choose another with -o", where=str(folder)
+        )
+    return made
+
+
+def clear_folder(folder: Path) -> None:
+    """Clears a claimed folder of an earlier run's files and marks it as a run's. Raises HexapodError."""
+    try:
+        folder.mkdir(exist_ok=True)
         for name in OUR_FILES:
             _remove(folder / name)
         write_json(folder / RUN_FILE, {"status": RUNNING})
     except OSError as error:
         raise not_writable(folder, error) from error
-    return folder
 
 
 def _remove(path: Path) -> None:

@@ -74,13 +74,17 @@ class FmuBlock:
 
     def get(self) -> None:
         """Reads all values from the FMU. Raises FmuError."""
-        status = self._get(*self._arguments)
+        status = self._fmu.call(self._get, *self._arguments)
         if status > WARNING:
             raise self._fmu.failure("the FMU does not give its outputs", status)
 
+    def put(self) -> int:
+        """Hands all values to the FMU. Returns its status."""
+        return self._fmu.call(self._set, *self._arguments)
+
     def set(self) -> None:
         """Hands all values to the FMU. Raises FmuError."""
-        status = self._set(*self._arguments)
+        status = self.put()
         if status > WARNING:
             raise self._fmu.failure("the FMU does not take its inputs", status)
 
@@ -139,6 +143,11 @@ class Fmu:
         """The C function of this name, with its argument types."""
         return getattr(self._slave.dll, name)
 
+    def call(self, function: Any, *arguments: Any) -> int:
+        """Calls a C function; what the FMU said before is no longer of interest. Returns the status."""
+        self._log.clear()
+        return int(function(*arguments))
+
     def failure(self, what: str, status: int) -> FmuError:
         """The error for a call that came back with `status`, in the FMU's own words where it gave any."""
         return FmuError(what, got=self._said(status), where=self.path.name)
@@ -175,13 +184,19 @@ class Fmu:
         for name, value in values.items():
             block = self.block([self._parameter(name)])
             block.values[0] = self._number(name, value)
-            status = block._set(*block._arguments)
+            status = block.put()
+            if status > WARNING and self._log:
+                raise FmuError(self._said(status), where=self.path.name)  # its sentence has name, value and range
             if status > WARNING:
-                raise FmuError(f"parameter {name} is refused", got=value, expected=self._said(status), where=self.path.name)
+                raise FmuError(f"{name}: the FMU refuses the value", got=value, where=self.path.name)
 
     def _parameter(self, name: str) -> str:
-        if name not in self.variables or self.variables[name].causality != "parameter":
-            raise self._unknown(name)
+        if name not in self.variables:
+            raise self._unknown(name, [known for known, variable in self.variables.items() if variable.causality == "parameter"])
+        kind = self.variables[name].causality
+        if kind != "parameter":
+            fix = "[[events]] push the torso" if name.startswith("torso.push") else "set a parameter"
+            raise FmuError("not a parameter", got=name, expected=f"a parameter, and this is an {kind}", fix=fix, where=self.path.name)
         return name
 
     def _number(self, name: str, value: Any) -> float:
@@ -196,8 +211,8 @@ class Fmu:
             raise FmuError(f"parameter {name} is refused", got=value, expected=f"a number [{variable.unit or '1'}]", fix="give a number")
         return value
 
-    def _unknown(self, name: str) -> FmuError:
-        near = nearest_name(name, self.variables)
+    def _unknown(self, name: str, valid: Sequence[str] = ()) -> FmuError:
+        near = nearest_name(name, valid or self.variables)
         fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names it has"
         return FmuError("the FMU has no such variable", got=name, fix=fix, where=str(self.path))
 
@@ -209,6 +224,7 @@ class Fmu:
             self._slave.exitInitializationMode,
         )
         for call in calls:
+            self._log.clear()
             try:
                 call()
             except Exception as error:
@@ -217,7 +233,7 @@ class Fmu:
 
     def step(self, t: float, h: float) -> None:
         """Steps from t to t + h [s]. Raises StepError."""
-        status = self._do_step(self.component, t, h, 1)
+        status = self.call(self._do_step, self.component, t, h, 1)
         if status > WARNING:
             said, reached = self._said(status), self._reached(status)
             raise StepError(f"the FMU {STATUS[status]}s the step from {t:.6g} s", reached=reached, got=said, where=self.path.name)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.fmu import Plant
+from hexapod_cosim.cosim.interrupts import interruptible
 from hexapod_cosim.cosim.recorder import Recorder, Recording
 from hexapod_cosim.cosim.schedule import Schedule
 from hexapod_cosim.cosim.signals import Signals, vector_names
@@ -37,6 +38,7 @@ class Outcome:
     simulated: float  # s
     wall: float  # s, the whole loop
     recording: Recording
+    cause: Exception | None = None  # of a failure
 
     @property
     def realtime_factor(self) -> float:
@@ -50,18 +52,19 @@ def run(
 ) -> Outcome:  # fmt: skip
     """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
 
-    A step that the plant refuses, a controller that cannot go on and Ctrl-C end the run; the outcome says which.
+    A step that the plant refuses, whatever a controller raises and an interrupt end the run; the outcome says which.
     """
-    status, reason, begin = COMPLETED, "", perf_counter()
+    status, reason, begin, cause = COMPLETED, "", perf_counter(), None
     try:
-        _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
-    except HexapodError as error:
-        status, reason = FAILED, str(error)
+        with interruptible():
+            _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
     except KeyboardInterrupt:
-        status, reason = INTERRUPTED, "interrupted from the keyboard"
+        status, reason = INTERRUPTED, "interrupted"
+    except Exception as error:  # a controller may raise anything: the rows before it are kept
+        status, reason, cause = FAILED, str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}", error
     wall, recording = perf_counter() - begin, recorder.recording
     simulated = float(recording.time[-1] - schedule.times[0]) if len(recording.time) else 0.0
-    return Outcome(status, reason, simulated, wall, recording)
+    return Outcome(status, reason, simulated, wall, recording, cause)
 
 
 def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:

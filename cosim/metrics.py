@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.signals import vector_names
 from hexapod_cosim.cosim.support import stability_margins
+from hexapod_cosim.models import TERRAINS
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,7 @@ LOADING_TIME = 0.020  # s after touch-down
 LEAST_DISTANCE = 0.01  # m    less is standing, not walking
 SHOWN_CYCLES = 3  # in figures of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
+FLAT = TERRAINS.index("flat") + 1  # the FMU's number of it
 
 # name -> unit, whether less is better (None: neither), meaning
 METRICS: dict[str, tuple[str, bool | None, str]] = {
@@ -42,6 +44,15 @@ METRICS: dict[str, tuple[str, bool | None, str]] = {
     "stability_margin": ("m", False, "least distance of the centre of mass from the support polygon's edge"),
     "realtime_factor": ("1", None, "simulated over wall time of the whole loop"),
 }
+
+# name -> the least change, in the metric's unit, that means anything: less than this no one could measure on the robot
+# (a tenth of a millimetre, a tenth of a milliradian, the resolution of its force and torque sensing), so it reads "same"
+FLOORS: dict[str, float] = {
+    "slip_per_metre": 1e-4, "slip_net_per_metre": 1e-4, "path_error": 1e-3, "yaw_drift": 1e-3, "height_rms": 1e-4, "roll_rms": 1e-4,
+    "pitch_rms": 1e-4, "peak_force": 5e-3, "force_p95": 5e-3, "loading_rate": 5e-2, "torque_rms": 5e-3, "cost_of_transport": 1e-3,
+    "stability_margin": 1e-4, "realtime_factor": 0.0,
+}  # fmt: skip
+DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
 
 
 @dataclass(frozen=True)
@@ -168,7 +179,7 @@ def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
     """(rows,) height of the torso above the ground along z [m]."""
     x, y, z = part.vector("torso.position").T
     heading, incline = parameters.get("terrain.heading", 0.0), parameters.get("terrain.incline", 0.0)
-    slope = 0.0 if parameters.get("terrain.kind", 1) == 1 else np.tan(incline)  # 1: flat
+    slope = 0.0 if parameters.get("terrain.kind", FLAT) == FLAT else np.tan(incline)
     ground: Array = parameters.get("terrain.height", 0.0) + slope * (x * np.cos(heading) + y * np.sin(heading))
     return np.asarray(z - ground)
 

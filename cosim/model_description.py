@@ -47,9 +47,10 @@ def render_fmi2(interface: Interface) -> ModelDescription:
 
 def _document(interface: Interface) -> Element:
     robot = interface.robot
+    joints = sum(len(leg.links) for leg in robot.legs)
     root = Element("fmiModelDescription", {
         "fmiVersion": "2.0", "modelName": robot.name, "guid": "", "version": interface.version,
-        "description": "Hexapod robot of 19 rigid bodies and 18 servo joints, walking on compliant ground",
+        "description": f"Hexapod robot of {1 + joints} rigid bodies and {joints} servo joints, walking on compliant ground",
         "license": "MIT", "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
     })  # fmt: skip
     _add_co_simulation(root)

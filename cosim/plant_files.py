@@ -59,7 +59,7 @@ def binary(fmi_platform: str) -> Path:
     if not found:
         expected = "one of: " + ", ".join(platforms) if (platforms := installed_platforms()) else "a built plant"
         raise FmuError("no plant binary for this platform", got=fmi_platform, expected=expected, fix=BUILD)
-    newest = max(found, key=_built)
+    newest = max(found, key=lambda path: path.stat().st_mtime)
     _refuse_stale(newest)
     return newest
 
@@ -69,8 +69,9 @@ def installed_platforms() -> list[str]:
     return sorted({path.name for folder in _plant_folders() for path in (folder / "binaries").glob("*") if path.is_dir()})
 
 
-def _built(path: Path) -> float:
-    return path.stat().st_mtime
+def _built(path: Path) -> int:
+    """Whole seconds: an installation drops the rest, and would be older than sources written in the same second."""
+    return int(path.stat().st_mtime)
 
 
 def _refuse_stale(path: Path) -> None:

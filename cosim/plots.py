@@ -6,6 +6,7 @@ Colours are told apart by colour-blind readers (Okabe and Ito), and lines by the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from hexapod_cosim.cosim.files import atomic_path
 from hexapod_cosim.cosim.metrics import CONTACT_SHARE, Array, View, body_height, commanded_path, robot_weight
+from hexapod_cosim.cosim.recorder import ColumnError
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 STYLES: dict[str, dict[str, Any]] = {
@@ -23,6 +26,8 @@ STYLES: dict[str, dict[str, Any]] = {
     "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.3},
 }
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#000000")
+PLANNED = "0.85"  # grey of the swing that the gait plans
+LEAST_WIDTH = 2.0  # mm of the sideways axis: less would show round-off as a drift
 STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
 SETTINGS = {
     "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
@@ -96,20 +101,32 @@ def path(views: Views) -> Figure:
     axis = figure.subplots()
     for label, view in views.items():
         position = view.recording.vector("torso.position")
-        axis.plot(position[:, 0], position[:, 1], label=label, **STYLES[label])
-        axis.plot(*position[-1, :2], marker="o", color=STYLES[label]["color"])
+        axis.plot(position[:, 0], 1e3 * position[:, 1], label=label, **STYLES[label])
+        axis.plot(position[-1, 0], 1e3 * position[-1, 1], marker="o", color=STYLES[label]["color"])
     commanded = commanded_path(next(iter(views.values())).recording)
-    axis.plot(commanded[:, 0], commanded[:, 1], color="0.45", linestyle=":", label="commanded, without its ramps")
+    axis.plot(commanded[:, 0], 1e3 * commanded[:, 1], color="0.45", linestyle=":", label="commanded, without its ramps")
     axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
-    if np.ptp(commanded[:, 1]) > STRAIGHT * np.ptp(commanded[:, 0]):
-        axis.set_aspect("equal", adjustable="datalim")
+    axis.set_ylabel("y [mm]")
     _legend(figure, axis)
+    if np.ptp(commanded[:, 1]) > STRAIGHT * np.ptp(commanded[:, 0]):
+        axis.set_aspect(1e-3, adjustable="datalim")
+        axis.set_title("to scale", loc="right", fontsize="small")
+        return figure
+    low, high = axis.get_ylim()
+    missing = max(LEAST_WIDTH - (high - low), 0.0)
+    axis.set_ylim(low - missing / 2, high + missing / 2)
+    figure.draw_without_rendering()  # lays out: the size of the axes is known after it
+    enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height))
+    axis.set_title(f"not to scale: y is drawn about {enlarged:.2g} times larger than x", loc="right", fontsize="small")
     return figure
 
 
+def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
+    return (limits[1] - limits[0]) / pixels
+
+
 def torques(views: Views) -> Figure:
-    """Largest torque among the six legs, joint by joint, over the last cycles."""
+    """Largest absolute torque among the six legs, joint by joint, over the last cycles."""
     figure = Figure(figsize=(10, 5.6))
     axes = figure.subplots(3, 1, sharex=True)
     for label, view in views.items():
@@ -117,7 +134,7 @@ def torques(views: Views) -> Figure:
         largest = np.abs(end.joints("torque")).max(axis=1)
         for joint, axis in enumerate(axes):
             axis.plot(end.time, largest[:, joint], label=label, **STYLES[label])
-            axis.set_ylabel(f"{JOINT_NAMES[joint]} [N m]")
+            axis.set_ylabel(f"{JOINT_NAMES[joint]}: largest\n|torque| of six legs [N m]")
     axes[-1].set_xlabel("time [s]")
     _legend(figure, axes[0])
     return figure
@@ -126,16 +143,21 @@ def torques(views: Views) -> Figure:
 def energy(views: Views) -> Figure:
     """The energy audit: what went in, where it is, where it went, and what the books do not explain."""
     figure = Figure(figsize=(10, 3.4 * len(views)))
-    axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
-    for axis, (label, view) in zip(axes, views.items(), strict=True):
+    axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
+    for (axis, rest), (label, view) in zip(axes, views.items(), strict=True):
         recording = view.recording
-        for color, name in zip(PALETTE, ("actuator_work", "dissipated", "potential", "kinetic", "push_work", "residual"), strict=True):
+        residual = recording.column("energy.residual")
+        rest.plot(recording.time, 1e3 * (residual - residual[0]), color=PALETTE[-1], linewidth=1.2)
+        rest.set_title(f"{label}: residual")
+        rest.set_ylabel("since the start [mJ]")
+        for color, name in zip(PALETTE, ("actuator_work", "dissipated", "potential", "kinetic", "push_work"), strict=False):
             values = recording.column(f"energy.{name}")
             axis.plot(recording.time, values - values[0], color=color, label=name.replace("_", " "), linewidth=1.2)
         axis.set_title(label)
         axis.set_ylabel("since the start [J]")
         axis.legend(loc="upper left", ncols=3)
-    axes[-1].set_xlabel("time [s]")
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
     return figure
 
 
@@ -148,13 +170,16 @@ def footfall(views: Views) -> Figure:
         for leg, name in enumerate(LEG_NAMES):
             swinging = f"controller.{name}.swinging"
             if swinging in end.names:
-                _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color="0.85")
+                _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color=PLANNED)
             _bars(axis, end.time, end.feet("contact")[:, leg] > 0.5, leg, height=0.5, color=STYLES[label]["color"])
         axis.set_yticks(range(len(LEG_NAMES)), LEG_NAMES)
         axis.invert_yaxis()
         axis.set_title(label)
         axis.grid(visible=False)
     axes[-1].set_xlabel("time [s]")
+    keys = {f"on the ground, {label}": STYLES[label]["color"] for label in views} | {"swing the gait plans": PLANNED}
+    patches = [Patch(color=color, linewidth=0) for color in keys.values()]
+    figure.legend(patches, list(keys), loc="outside upper center", ncols=len(keys))
     return figure
 
 
@@ -177,26 +202,40 @@ def _legend(figure: Figure, axis: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
 
-FIGURES: dict[str, tuple[str, Callable[[Views], Figure]]] = {
-    "foot_forces": ("Foot forces", foot_forces),
-    "slip": ("Slip", slip),
-    "posture": ("Height and attitude", posture),
-    "path": ("Path of the torso", path),
-    "torques": ("Torques", torques),
-    "energy": ("Energy audit", energy),
-    "footfall": ("Footfall", footfall),
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of the report."""
+
+    title: str
+    caption: str
+    draw: Callable[[Views], Figure]
+
+
+FIGURES: dict[str, Drawing] = {
+    "foot_forces": Drawing("Foot forces", "Normal force of each foot over the last gait cycles, in body weights.", foot_forces),
+    "slip": Drawing("Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.", slip),
+    "posture": Drawing("Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", posture),
+    "path": Drawing("Path of the torso", "The torso from above, its end marked by a dot, and where the command leads.", path),
+    "torques": Drawing("Torques", "The largest absolute torque over the six legs, joint by joint, over the last gait cycles.", torques),
+    "energy": Drawing("Energy audit", "Work, loss and stored energy; on its own axis, the residual that the books leave.", energy),
+    "footfall": Drawing("Footfall", "Coloured: the foot is on the ground. Grey: the gait plans it to swing.", footfall),
 }
 
 
-def save_figures(views: Views, folder: Path) -> list[Path]:
-    """Draws every figure of FIGURES into a folder, as PNG and SVG. Returns the files."""
+def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]]:
+    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that lacks its columns is not drawn."""
     folder.mkdir(exist_ok=True)
-    saved = []
+    saved: list[Path] = []
+    skipped: dict[str, str] = {}
     with matplotlib.rc_context(SETTINGS):
-        for name, (_, draw) in FIGURES.items():
-            figure = draw(views)
+        for name, item in FIGURES.items():
+            try:
+                figure = item.draw(views)
+            except ColumnError as error:
+                skipped[name] = f"{error.got} was not recorded"
+                continue
             for kind, metadata in (("png", {}), ("svg", {"Date": None})):  # no date: equal runs, equal files
                 saved.append(folder / f"{name}.{kind}")
                 with atomic_path(saved[-1]) as temporary:
                     figure.savefig(temporary, format=kind, dpi=130, metadata=metadata)
-    return saved
+    return saved, skipped

@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 COMMAND_COLUMNS = ("command.vx", "command.vy", "command.yaw_rate", "command.height", "command.roll", "command.pitch")
 
 
+class ColumnError(HexapodError):
+    """A variable that was not recorded."""
+
+
 @dataclass(frozen=True)
 class Recording:
     """Rows of a run. Row k: outputs read at time[k], and the inputs set then, which hold until time[k + 1]."""
@@ -48,7 +52,7 @@ class Recording:
             if name not in self._index:
                 near = nearest_name(name, self.names)
                 fix = f"did you mean {near!r}?" if near else "record it: outputs.csv names the columns that are kept"
-                raise HexapodError("no such column in the recording", got=name, fix=fix)
+                raise ColumnError("no such column in the recording", got=name, fix=fix)
         return self.data[:, [self._index[name] for name in names]]
 
     def joints(self, quantity: str) -> Array:
@@ -79,13 +83,13 @@ class Recording:
         return Recording(tuple(self.names[k] for k in keep), self.data[:, keep])
 
 
-def chosen_columns(names: Sequence[str], patterns: Sequence[str]) -> list[int]:
+def chosen_columns(names: Sequence[str], patterns: Sequence[str], *, where: str = "outputs.csv") -> list[int]:
     """Places of time and of the names that match a pattern (`*` any text). Raises ScenarioError when a pattern matches nothing."""
     for pattern in patterns:
         if not any(_matches(name, pattern) for name in names):
             near = nearest_name(pattern, names)
             fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names"
-            raise ScenarioError("no output has this name", got=pattern, fix=fix, where="outputs.csv")
+            raise ScenarioError("no output has this name", got=pattern, fix=fix, where=where)
     return [k for k, name in enumerate(names) if k == 0 or any(_matches(name, pattern) for pattern in patterns)]
 
 
@@ -129,11 +133,8 @@ def write_csv(recording: Recording, path: Path) -> None:
     with atomic_text(path) as file:
         file.write(",".join(f'"{name}"' for name in recording.names) + "\n")
         for row in recording.data:
-            file.write(",".join(map(_number, row.tolist())) + "\n")
-
-
-def _number(value: float) -> str:
-    return repr(value).removesuffix(".0")  # the shortest text that reads back the same
+            line = repr(row.tolist())[1:-1] + ","  # each number in the shortest text that reads back the same
+            file.write(line.replace(", ", ",").replace(".0,", ",")[:-1] + "\n")
 
 
 def read_csv(path: Path) -> Recording:

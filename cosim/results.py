@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, prepare_folder, read_json, write_json, write_text
+from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, claim_folder, clear_folder, read_json, write_json, write_text
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.metrics import View
 from hexapod_cosim.cosim.recorder import read_csv, write_csv
@@ -30,16 +30,36 @@ class Stored:
     scenario: str  # TOML
 
 
+class Folder:
+    """A place for results, in which an earlier run's stay until this one has begun."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.begun = False
+
+    def begin(self) -> None:
+        """Clears the folder, once."""
+        if not self.begun:
+            clear_folder(self.path)
+            self.begun = True
+
+
 @contextmanager
-def results_folder(path: Path) -> Iterator[Path]:
-    """A prepared folder whose run.json says so when the block does not come to its end. Raises HexapodError when it cannot be."""
-    folder = prepare_folder(path)
+def results_folder(path: Path) -> Iterator[Folder]:
+    """A folder whose run.json says so when a run began and the block does not come to its end. Raises HexapodError when it cannot be."""
+    made = claim_folder(path)
+    folder = Folder(path)
     try:
         yield folder
-    except (HexapodError, KeyboardInterrupt) as error:
-        if read_json(folder / RUN_FILE)["status"] == RUNNING:
-            write_json(folder / RUN_FILE, {"status": FAILED if isinstance(error, HexapodError) else INTERRUPTED, "reason": str(error)})
+    except BaseException as error:
+        if folder.begun and read_json(path / RUN_FILE)["status"] == RUNNING:
+            status, reason = (INTERRUPTED, "interrupted") if isinstance(error, KeyboardInterrupt) else (FAILED, str(error))
+            write_json(path / RUN_FILE, {"status": status, "reason": reason})
         raise
+    finally:
+        for place in () if folder.begun else made:
+            with suppress(OSError):  # not empty any more
+                place.rmdir()
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:

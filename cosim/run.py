@@ -6,9 +6,9 @@ import hashlib
 import math
 import platform
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,9 +21,10 @@ from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.interface import load_interface
 from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
-from hexapod_cosim.cosim.metrics import View, compute_metrics, cut_walk
+from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
 from hexapod_cosim.cosim.plant_files import package_version
-from hexapod_cosim.cosim.recorder import Recorder, Recording, chosen_columns
+from hexapod_cosim.cosim.reach import check_commands
+from hexapod_cosim.cosim.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import make_schedule
@@ -33,6 +34,7 @@ from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, load_robot
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
 SAME = 1e-9  # relative, of a parameter printed and read again
 UPRIGHT = 0.6  # rad    of roll or pitch: beyond it the robot has fallen
+SUNK = 0.5  # of the height it is commanded to hold: below it the robot has fallen too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,13 +52,22 @@ class Result:
         return self.outcome.status == COMPLETED
 
 
-def simulate(scenario: Scenario, *, fmu: Path | None = None, gains: Gains | None = None, progress: Progress | None = None) -> Result:
+def simulate(
+    scenario: Scenario,
+    *,
+    fmu: Path | None = None,
+    gains: Gains | None = None,
+    progress: Progress | None = None,
+    begin: Callable[[], None] | None = None,
+) -> Result:
     """Runs a scenario on the robot's own FMU, exported for it, or on a given one; compliant gains are designed when not given.
 
-    Raises HexapodError for anything that keeps the run from starting; how a run that started ended is in the result.
+    `begin` is called once nothing can be refused any more, before the first step. Raises HexapodError for anything that keeps the run
+    from starting; how a run that started ended is in the result.
     """
     robot = load_robot(scenario.robot)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
+    check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     if scenario.control == "kinematic":
         gains = None
     elif gains is None:
@@ -71,12 +82,16 @@ def simulate(scenario: Scenario, *, fmu: Path | None = None, gains: Gains | None
         parameters = plant.parameters()
         signals = Signals(plant, noise=scenario.sensors.foot_force_noise, seed=scenario.seed)
         recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
-        chosen_columns(recorder.names, scenario.outputs.csv)  # a misspelt column is told before the run, not after it
+        chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")  # told before the run, not after it
+        if begin is not None:
+            begin()
         outcome = run(plant, signals, controller, schedule, recorder, h=scenario.macro_step, progress=progress)
-        facts = describe(robot, plant, gait.period) | {"warnings": [*controller.warnings, *doubts(outcome.recording, robot)]}
+        facts = describe(robot, plant, gait.period)
     view = View(outcome.recording, parameters, gait.period)
+    facts["warnings"] = [*controller.warnings, *idle_settings(scenario, robot), *doubts(view, robot)]
     metrics = compute_metrics(view, realtime_factor=outcome.realtime_factor)
-    facts["walk"] = describe_walk(view)
+    facts["gains"] = None if gains is None else asdict(gains)
+    facts["walk"] = describe_walk(view, robot)
     return Result(scenario=scenario, outcome=outcome, metrics=metrics, parameters=parameters, facts=facts)
 
 
@@ -127,22 +142,49 @@ def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
     }
 
 
-def describe_walk(view: View) -> dict[str, Any]:
+def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
     """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), and whether the robot stayed upright."""
     walk = cut_walk(view)
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
-    return {"distance": distance, "mean_speed": distance / lasted, "upright": is_upright(view.recording)}
+    return {"distance": distance, "mean_speed": distance / lasted, "upright": not fall(view, robot)}
 
 
-def is_upright(recording: Recording) -> bool:
-    """Whether roll and pitch stayed within bounds."""
-    return bool(np.all(np.abs(recording.columns(["torso.roll", "torso.pitch"])) < UPRIGHT))
+def fall(view: View, robot: Robot) -> str:
+    """When and how the robot fell, "" when it stayed upright: roll and pitch within bounds, the torso off the ground and not sunk."""
+    recording = view.recording
+    if not len(recording.time):
+        return ""
+    height = body_height(recording, view.parameters)
+    commanded = height[0] + recording.column("command.height")
+    tilted = np.abs(recording.columns(["torso.roll", "torso.pitch"])).max(axis=1) >= UPRIGHT
+    low = (height < SUNK * commanded) | (height < 0.5 * robot.torso.size[2])
+    fallen = tilted | low
+    if not fallen.any():
+        return ""
+    k = int(np.argmax(fallen))
+    how = f"roll or pitch beyond {UPRIGHT} rad" if tilted[k] else f"the torso only {height[k]:.3g} m above the ground"
+    return f"the robot fell at {recording.time[k]:.3f} s: {how}"
 
 
-def doubts(recording: Recording, robot: Robot) -> list[str]:
+def idle_settings(scenario: Scenario, robot: Robot) -> list[str]:
+    """Settings that this run does not use."""
+    late = [event.time for event in scenario.events if event.time >= scenario.duration]
+    found = [f"the event at {time:g} s does nothing: the run ends at {scenario.duration:g} s" for time in late]
+    late = [command.time for command in scenario.commands if command.time >= scenario.duration]
+    found += [f"the command at {time:g} s does nothing: the run ends at {scenario.duration:g} s" for time in late]
+    terrain = replace(robot.terrain, **scenario.settings.get("terrain", {}))
+    given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
+    sloped = [key for key in ("incline", "heading") if given.get(key) or given.get(f"terrain.{key}")]
+    if terrain.kind == "flat":
+        found += [f"terrain.{key} does nothing on flat ground; set terrain.kind=slope" for key in sloped]
+    return found
+
+
+def doubts(view: View, robot: Robot) -> list[str]:
     """What a reader of the results should know: a fall, legs out of reach, servos hotter than they may be for long."""
-    found = [] if is_upright(recording) else [f"the robot fell: roll or pitch beyond {UPRIGHT} rad"]
+    recording, fell = view.recording, fall(view, robot)
+    found = [fell] if fell else []
     unreachable = [f"controller.{leg}.unreachable" for leg in LEG_NAMES]
     if len(recording.time) and set(unreachable) <= set(recording.names):
         share = float(np.mean(recording.columns(unreachable).max(axis=1)))

@@ -7,7 +7,7 @@ baumgarte are those of robot files; a scenario gives only what differs from the 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import replace
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.cosim.quantities import to_si
+from hexapod_cosim.cosim.scenario_checks import check_parameters, check_steps
 from hexapod_cosim.cosim.scenario_records import (
     KEYS,
     PLAIN_KEYS,
@@ -29,8 +30,6 @@ from hexapod_cosim.cosim.scenario_records import (
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, check_robot, load_robot, unknown_name
 from hexapod_cosim.models.schema import expect_table, read_given, refuse_unknown_keys, require, specs
-
-WHOLE_STEPS_TOLERANCE = 1e-6  # of a macro-step: round-off of a decimal duration, no more
 
 
 def list_scenarios() -> dict[str, Path]:
@@ -53,7 +52,8 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
     if "robot" in table and (path.parent / str(table["robot"])).is_file():
         table["robot"] = str((path.parent / table["robot"]).resolve())  # a robot file beside the scenario
     where = path.name if path in list_scenarios().values() else str(path)
-    return scenario_from_table(with_overrides(table, overrides), where=where)
+    given = [text.partition("=")[0].strip() for text in overrides]
+    return scenario_from_table(with_overrides(table, overrides), where=where, given=given)
 
 
 def _scenario_path(path_or_name: str | Path) -> Path:
@@ -101,37 +101,38 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         raise unknown_name("setting", name, KEYS, where="--set", error=ScenarioError)
 
 
-def scenario_from_table(table: Mapping[str, Any], *, where: str) -> Scenario:
-    """A checked scenario from the tables of a file; `where` names the file in messages. Raises ScenarioError."""
-    with _scenario_errors():
-        refuse_unknown_keys(table, list(KEYS), where)
-        plain = require(Scenario, _read(Scenario, {key: value for key, value in table.items() if key in PLAIN_KEYS}, where), where)
+def scenario_from_table(table: Mapping[str, Any], *, where: str, given: Collection[str] = ()) -> Scenario:
+    """A checked scenario from the tables of a file; `where` names the file in messages, `given` what --set set. Raises ScenarioError."""
+    with _errors_of(where):
+        refuse_unknown_keys(table, list(KEYS), "")
+        plain = require(Scenario, _read(Scenario, {key: value for key, value in table.items() if key in PLAIN_KEYS}, ""), "")
         scenario = Scenario(
-            title=_text(table, "title", Path(where).stem, where),
-            robot=_text(table, "robot", "athena", where),
-            seed=_seed(table.get("seed", 0), where),
-            settings={name: _read_setting(name, table[name], f"{where}: {name}") for name in SETTINGS if name in table},
-            commands=_read_commands(table.get("command", {}), f"{where}: command"),
-            events=tuple(
-                _record(Push, entry, f"{where}: events[{k}]") for k, entry in enumerate(_list(table.get("events", []), where, "events"))
-            ),
-            sensors=_record(Sensors, table.get("sensors", {}), f"{where}: sensors"),
-            outputs=_read_outputs(table.get("outputs", {}), f"{where}: outputs"),
-            parameters=dict(expect_table(table.get("parameters", {}), f"{where}: parameters")),
+            title=_text(table, "title", Path(where).stem),
+            robot=_text(table, "robot", "athena"),
+            seed=_seed(table.get("seed", 0)),
+            settings={name: _read_setting(name, table[name], name) for name in SETTINGS if name in table},
+            commands=_read_commands(table.get("command", {}), "command"),
+            events=tuple(_record(Push, entry, f"events[{k}]") for k, entry in enumerate(_list(table.get("events", []), "events"))),
+            sensors=_record(Sensors, table.get("sensors", {}), "sensors"),
+            outputs=_read_outputs(table.get("outputs", {}), "outputs"),
+            parameters=dict(expect_table(table.get("parameters", {}), "parameters")),
             where=where,
             **plain,
         )
-    _check_steps(scenario)
+    check_steps(scenario)
+    check_parameters(scenario, given=given)
     return scenario
 
 
 @contextmanager
-def _scenario_errors() -> Iterator[None]:
-    """The shared schema speaks of robots; here it judges a scenario."""
+def _errors_of(file: str) -> Iterator[None]:
+    """The readers name a key, and the shared schema speaks of robots; a scenario's message says "file: key"."""
     try:
         yield
-    except RobotError as error:
-        raise ScenarioError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=error.where) from error
+    except (RobotError, ScenarioError) as error:
+        key = (error.where or "").removeprefix(".")  # of a key in no section
+        where = f"{file}: {key}" if key else file
+        raise ScenarioError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
 
 
 def _read(record: type[Any], table: Any, where: str) -> dict[str, Any]:
@@ -174,38 +175,24 @@ def _read_outputs(table: Any, where: str) -> Outputs:
     return Outputs(csv=tuple(patterns), plots=plots)
 
 
-def _text(table: Mapping[str, Any], key: str, default: str, where: str) -> str:
+def _text(table: Mapping[str, Any], key: str, default: str) -> str:
     value = table.get(key, default)
     if not isinstance(value, str):
-        raise ScenarioError("wrong type", got=value, expected="a text in quotes", where=f"{where}.{key}")
+        raise ScenarioError("wrong type", got=value, expected="a text in quotes", where=key)
     return value
 
 
-def _list(value: Any, where: str, key: str) -> Sequence[Any]:
+def _list(value: Any, key: str) -> Sequence[Any]:
     if not isinstance(value, list | tuple):
-        raise ScenarioError(
-            "wrong type", got=value, expected=f"entries [[{key}]]", fix=f"write [[{key}]] with two brackets", where=f"{where}.{key}"
-        )
+        fix = f"write [[{key}]] with two brackets"
+        raise ScenarioError("wrong type", got=value, expected=f"entries [[{key}]]", fix=fix, where=key)
     return value
 
 
-def _seed(value: Any, where: str) -> int:
+def _seed(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ScenarioError("value not allowed", got=value, expected="a whole number >= 0", where=f"{where}.seed")
+        raise ScenarioError("value not allowed", got=value, expected="a whole number >= 0", where="seed")
     return value
-
-
-def _check_steps(scenario: Scenario) -> None:
-    h, steps = scenario.macro_step, scenario.steps
-    if steps < 1 or abs(scenario.duration / h - steps) > WHOLE_STEPS_TOLERANCE * steps:
-        expected, near = f"a multiple of macro_step = {h:g} s", max(steps, 1) * h
-        raise ScenarioError(
-            "not a whole number of macro-steps",
-            got=scenario.duration,
-            expected=expected,
-            fix=f"{near:g} is the nearest",
-            where=f"{scenario.where}.duration",
-        )
 
 
 def scenario_robot(scenario: Scenario) -> Robot:

@@ -15,6 +15,7 @@ SETTINGS: dict[str, type[Any]] = {
 }  # fmt: skip
 UNUSED = {"gait": ("stride",)}  # the body velocity of the command says it
 ZERO = (0.0, 0.0, 0.0)
+MAX_STEPS = 1_000_000  # a row of the recording is about 3 kB, and all rows are in memory
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.models import HexapodError
 
 START_VALUES = "resources/start_values.txt"
+CHECKSUM = "checksum "
 TRIAL_STEP = 0.001  # s
 
 
@@ -40,8 +41,9 @@ def _archive_problems(archive: zipfile.ZipFile) -> list[str]:
 def _start_value_problems(archive: zipfile.ZipFile, description: Any) -> list[str]:
     """The binary takes its robot from start_values.txt, importers see modelDescription.xml: both must say the same."""
     if START_VALUES not in archive.namelist():
-        return []  # the binary's built-in robot, whose GUID the trial run confirms
+        return [f"{START_VALUES} is missing: the binary takes the robot from it"]
     guid, *lines = archive.read(START_VALUES).decode("utf-8", errors="replace").split("\n")
+    lines = [line for line in lines if not line.startswith(CHECKSUM)]  # which the binary checks as it loads
     problems = (
         [] if guid.strip() == description.guid else [f"{START_VALUES} has GUID {guid.strip()!r}, modelDescription.xml {description.guid!r}"]
     )

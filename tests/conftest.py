@@ -1,4 +1,4 @@
-"""The built plant: one incremental CMake build a session, in build/test, with the probe of internal functions."""
+"""The built plant: one incremental CMake build a session, in build/test, with the probe of internal functions; the command."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import Call
+
+from hexapod_cosim.cosim.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build" / "test"
@@ -42,6 +45,19 @@ def plant_library(plant_build: Path) -> Path:
 def core(plant_build: Path) -> ctypes.CDLL:
     """hexapod.h as a shared library, with the probe's functions."""
     return ctypes.CDLL(str(next((plant_build / "plant_fmu").glob("libhexapod_c.[sd]*"))))
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str], plant_build: Path) -> Call:
+    """Runs the command in this process: exit code, stdout, stderr."""
+
+    def run(*arguments: str | Path) -> tuple[int, str, str]:
+        capsys.readouterr()
+        code = main([str(argument) for argument in arguments])
+        streams = capsys.readouterr()
+        return code, streams.out, streams.err
+
+    return run
 
 
 def _configure() -> subprocess.CompletedProcess[str]:

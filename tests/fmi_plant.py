@@ -41,6 +41,7 @@ class Plant:
         kind: int = CO_SIMULATION, logging: bool = False, callbacks: bool = True,
     ) -> None:  # fmt: skip
         self.messages: list[tuple[int, str, str]] = []
+        self.speakers: set[str] = set()  # instance names that came with messages
         self._functions = Callbacks(logger=_LOGGER(self._log))
         self._library = ctypes.CDLL(str(library))
         self._library.fmi2Instantiate.restype = ctypes.c_void_p
@@ -53,7 +54,8 @@ class Plant:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._library.fmi2FreeInstance(ctypes.c_void_p(self.component))
 
-    def _log(self, _environment: int, _name: bytes, status: int, category: bytes, text: bytes) -> None:
+    def _log(self, _environment: int, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        self.speakers.add(name.decode())
         self.messages.append((status, category.decode(), text.decode()))
 
     @property

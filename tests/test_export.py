@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import dataclasses
+import os
 import zipfile
 from pathlib import Path
 from urllib.parse import quote
@@ -14,7 +17,8 @@ import numpy as np
 import pytest
 from fmi_plant import ATHENA, GUID, OK, Plant
 
-from hexapod_cosim.cosim.export import export_fmu, start_values
+from hexapod_cosim.cosim import plant_files
+from hexapod_cosim.cosim.export import checksum, export_fmu, start_values
 from hexapod_cosim.cosim.interface import load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
 from hexapod_cosim.models.errors import HexapodError
@@ -103,6 +107,14 @@ def test_every_form_of_the_resources_uri_is_understood(plant_library: Path, tmp_
         assert plant.real("torso.mass") == heavy.torso.mass
 
 
+def test_a_folder_whose_name_looks_encoded_is_found(plant_library: Path, tmp_path: Path, heavy: Robot) -> None:
+    folder = tmp_path / "%41%20b"
+    guid = write_resources(folder, heavy)
+    for uri in (f"file://{folder.as_posix()}", folder.as_uri()):
+        with Plant(plant_library, guid=guid, resources=uri) as plant:
+            assert plant.component, plant.messages
+
+
 @pytest.mark.parametrize("resources", [None, "", "file:///nowhere/at/all", "http://example.org/resources"])
 def test_without_resources_only_the_default_robot_is_there(plant_library: Path, heavy: Robot, resources: str | None) -> None:
     with Plant(plant_library, resources=resources) as plant:
@@ -148,6 +160,34 @@ def test_malformed_start_values_are_refused_with_the_line(plant_library: Path, t
         assert "start_values.txt: line " in plant.last_message
 
 
+@pytest.mark.parametrize(("old", "new"), [("p+1 torso.mass", "p+0 torso.mass"), ("}\n", "}\0tail\n"), ("1 contact.law", "2 contact.law")])
+def test_start_values_other_than_the_exported_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
+    guid = write_resources(tmp_path, heavy)
+    file = tmp_path / "start_values.txt"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
+        assert plant.component is None
+        assert "checksum" in plant.last_message
+
+
+def test_an_impossible_robot_is_refused_at_instantiation(plant_library: Path, tmp_path: Path) -> None:
+    robot = load_robot("athena")
+    flat = dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, inertia=(0.01, 0.01, 1.0, 0.0, 0.0, 0.0)))
+    guid = write_resources(tmp_path, flat)
+    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
+        assert plant.component is None
+        assert "torso.inertia_xx" in plant.last_message
+
+
+@pytest.mark.parametrize("data", [b"", b"a", b"12345678", b"123456789", bytes(range(256))])
+def test_the_exporter_s_checksum_is_the_plant_s(core: ctypes.CDLL, data: bytes) -> None:
+    core.hx_checksum.restype = ctypes.c_uint64
+    for seed in (0, 1, 2**64 - 1):
+        assert core.hx_checksum(ctypes.c_uint64(seed), data, ctypes.c_size_t(len(data))) == checksum(seed, data)
+
+
 @pytest.mark.parametrize("keep", [0, 1, 100, 400])
 def test_truncated_or_continued_start_values_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, keep: int) -> None:
     guid = write_resources(tmp_path, heavy)
@@ -166,6 +206,20 @@ def test_an_unwritable_place_is_one_clear_error_and_leaves_nothing(plant_build: 
         with pytest.raises(HexapodError, match="cannot write"):
             export_fmu(load_robot("athena"), path)
     assert list(tmp_path.iterdir()) == [blocker]
+
+
+@pytest.mark.parametrize(("age", "stale"), [(0, False), (1, True)])
+def test_a_binary_is_stale_a_second_before_its_newest_source(
+    plant_library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, age: int, stale: bool
+) -> None:
+    built = int(max(path.stat().st_mtime for path in plant_files.source_files().values())) - age
+    library = tmp_path / "binaries" / plant_files.fmi2_platform() / plant_library.name
+    library.parent.mkdir(parents=True)
+    library.write_bytes(b"")
+    os.utime(library, (built, built))
+    monkeypatch.setattr(plant_files, "_plant_folders", lambda: [tmp_path])
+    with pytest.raises(HexapodError, match="older than its sources") if stale else contextlib.nullcontext():
+        assert plant_files.binary(plant_files.fmi2_platform()) == library
 
 
 def test_what_is_not_offered_is_refused_by_name(plant_build: Path, tmp_path: Path) -> None:

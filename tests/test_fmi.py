@@ -97,6 +97,7 @@ def test_a_wrong_instantiation_is_refused_with_a_message(plant_library: Path, ar
         assert plant.component is None
         assert "got" in plant.last_message
         assert "expected" in plant.last_message
+        assert plant.speakers == {arguments.get("name", "plant") or ""}
 
 
 def test_missing_callbacks_are_tolerated(plant_library: Path) -> None:
@@ -138,6 +139,18 @@ def test_terminating_twice_is_tolerated(running: Plant) -> None:
     assert running.call("fmi2Terminate") == OK
 
 
+def test_no_step_goes_past_a_stop_time(plant: Plant) -> None:
+    assert plant.call("fmi2SetupExperiment", 0, 0.0, 5.0, 1, 6.0) == OK
+    assert plant.call("fmi2EnterInitializationMode") == OK
+    assert plant.call("fmi2ExitInitializationMode") == OK
+    assert plant.step(5.0, 0.5) == OK
+    before = plant.everything()
+    assert plant.step(5.5, 0.6) == ERROR
+    assert "stop time, 6 s" in plant.last_message
+    assert plant.everything() == before
+    assert plant.step(5.5, 0.5 + 1e-16) == OK
+
+
 @pytest.mark.parametrize(("start", "stop"), [(NAN, 1.0), (INF, 1.0), (0.0, -1.0), (0.0, NAN)])
 def test_an_impossible_experiment_is_refused(plant: Plant, start: float, stop: float) -> None:
     assert plant.call("fmi2SetupExperiment", 0, 0.0, start, 1, stop) == ERROR
@@ -174,8 +187,40 @@ def test_last_bit_differences_of_the_clock_are_adopted(running: Plant) -> None:
     assert running.step(time.value - 1e-16, 1e-17) == OK
 
 
+@pytest.mark.parametrize(
+    ("start", "offset", "status"),
+    [(0.0, 5e-10, OK), (0.0, 2e-9, ERROR), (1e6, 2e-6, OK), (1e6, 1e-5, ERROR), (1e6, -1e-5, ERROR), (1e9, 2e-3, OK), (1e9, 4e-3, ERROR),
+     (-1e9, -4e-3, ERROR)],
+)  # fmt: skip
+def test_a_late_clock_is_held_to_its_rounding_and_half_a_step(plant: Plant, start: float, offset: float, status: int) -> None:
+    assert plant.initialize(start=start).step(start + offset, H) == status
+
+
+def test_the_clock_is_never_off_by_more_than_half_a_step(running: Plant) -> None:
+    assert running.step(8e-10, 1e-9) == ERROR
+    assert running.step(4e-10, 1e-9) == OK
+
+
+@pytest.mark.parametrize("start", [1.1e9, -1.1e9, 1.7e9, 1e300])
+def test_a_start_too_late_for_the_clock_is_refused(plant: Plant, start: float) -> None:
+    assert plant.call("fmi2SetupExperiment", 0, 0.0, start, 0, 0.0) == ERROR
+    assert "later origin" in plant.last_message
+    assert plant.initialize(start=1e9).step(1e9, H) == OK
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-8])
+def test_a_step_that_does_not_move_the_clock_is_refused(plant: Plant, size: float) -> None:
+    assert plant.initialize(start=1e9).step(1e9, size) == ERROR
+    assert "moves the clock" in plant.last_message
+
+
+def test_a_step_is_at_most_100_seconds(running: Plant) -> None:
+    assert running.step(0.0, 100.001) == ERROR
+    assert "at most 100" in running.last_message
+
+
 def test_a_step_that_the_plant_cannot_take_is_discarded_and_changes_nothing(running: Plant) -> None:
-    assert running.set_reals({"torso.push_force[1]": 1e300}) == OK
+    assert running.set_reals({"torso.push_force[1]": 1e8}) == OK
     before = running.everything()
     assert running.step(0.0, H) == DISCARD
     assert running.messages[-1][:2] == (DISCARD, "logStatusDiscard")
@@ -196,6 +241,14 @@ def test_status_inquiries_answer_what_there_is_and_discard_the_rest(running: Pla
     assert running.call("fmi2GetIntegerStatus", DO_STEP_STATUS, None) == DISCARD
 
 
+def test_a_reset_forgets_the_last_step_s_status(running: Plant) -> None:
+    status = ctypes.c_int()
+    assert running.step(0.0, NAN) == ERROR
+    assert running.call("fmi2Reset") == OK
+    assert running.call("fmi2GetStatus", DO_STEP_STATUS, ctypes.byref(status)) == OK
+    assert status.value == OK
+
+
 def test_the_log_holds_what_was_asked_for(plant_library: Path) -> None:
     with Plant(plant_library) as quiet, Plant(plant_library, logging=True) as talking:
         quiet.initialize()
@@ -209,6 +262,33 @@ def test_the_log_holds_what_was_asked_for(plant_library: Path) -> None:
         assert talking.call("fmi2Reset") == OK
         assert [text for _, _, text in quiet.messages] == ["reset"]
         assert len(talking.messages) == 2
+
+
+def categories(*names: str) -> tuple[ctypes.c_size_t, ctypes.Array[ctypes.c_char_p]]:
+    return ctypes.c_size_t(len(names)), (ctypes.c_char_p * len(names))(*(name.encode() for name in names))
+
+
+def test_switching_categories_on_leaves_these_only_and_refusals(plant_library: Path) -> None:
+    with Plant(plant_library, logging=True) as plant:
+        plant.messages.clear()
+        assert plant.call("fmi2SetDebugLogging", 1, *categories("logStatusWarning")) == OK
+        assert plant.call("fmi2Reset") == OK
+        assert plant.messages == []
+        assert plant.step(0.0, H) == ERROR
+        assert [category for _, category, _ in plant.messages] == ["logStatusError"]
+        assert plant.call("fmi2SetDebugLogging", 1, *categories("logAll")) == OK
+        assert plant.call("fmi2Reset") == OK
+        assert plant.last_message == "reset"
+
+
+def test_switching_one_category_off_leaves_the_others(plant_library: Path) -> None:
+    with Plant(plant_library, logging=True) as plant:
+        plant.messages.clear()
+        assert plant.call("fmi2SetDebugLogging", 0, *categories("logEvents")) == OK
+        assert plant.call("fmi2Reset") == OK
+        assert plant.messages == []
+        assert plant.call("fmi2SetupExperiment", 1, -1.0, 0.0, 0, 0.0) == WARNING
+        assert [category for _, category, _ in plant.messages] == ["logStatusWarning"]
 
 
 def test_every_declared_log_category_is_known_and_no_other(plant: Plant) -> None:

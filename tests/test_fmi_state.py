@@ -84,6 +84,19 @@ def test_a_single_damaged_byte_is_refused_and_changes_nothing(plant: Plant, plac
     plant.free(state)
 
 
+@pytest.mark.parametrize("mask", [0x80, 0x40, 0x01])
+@pytest.mark.parametrize("places", [(207, 1207), (1207, 1215), (-1001, -9), (-17, -1)])
+def test_two_damaged_bytes_do_not_make_up_for_each_other(plant: Plant, places: tuple[int, int], mask: int) -> None:
+    """Among them the last bytes of words, where signs are, and neighbours."""
+    state = plant.save()
+    data = bytearray(plant.serialize(state))
+    for place in places:
+        data[place] ^= mask
+    assert plant.deserialize(bytes(data))[0] == ERROR
+    assert "damaged" in plant.last_message
+    plant.free(state)
+
+
 def test_bytes_of_another_length_are_refused(plant: Plant) -> None:
     state = plant.save()
     data = plant.serialize(state)
@@ -98,6 +111,10 @@ def test_a_block_that_is_no_saved_state_is_refused(plant: Plant) -> None:
     state = plant.save()
     foreign = ctypes.create_string_buffer(len(plant.serialize(state)))
     assert plant.call("fmi2SetFMUstate", foreign) == ERROR
+    copy = ctypes.create_string_buffer(len(foreign))
+    assert plant.call("fmi2SerializeFMUstate", foreign, copy, ctypes.c_size_t(len(foreign))) == ERROR
+    assert "no saved state" in plant.last_message
+    assert foreign.raw == copy.raw == bytes(len(foreign))
     assert plant.call("fmi2SetFMUstate", None) == ERROR
     assert plant.step(0.0, H) == OK
     plant.free(state)
@@ -108,7 +125,11 @@ def test_a_reset_instance_is_as_good_as_new(plant: Plant, plant_library: Path) -
     walk(plant, 0, 20)
     assert plant.call("fmi2Reset") == OK
     with Plant(plant_library) as fresh:
+        states = [plant.save(), fresh.save()]
+        assert plant.serialize(states[0]) == fresh.serialize(states[1])
         assert plant.everything() == fresh.everything()
+        for state in states:
+            plant.free(state)
         assert walk(plant.initialize(), 0, 20) == walk(fresh.initialize(), 0, 20)
 
 

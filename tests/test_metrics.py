@@ -4,56 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from walks import CYCLES, DISTANCE, PARAMETERS, PERIOD, ROBOT, SPEED, WEIGHT, H, Walk
 
 from hexapod_cosim.cosim.files import to_json
-from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.metrics import METRICS, View, commanded_path, compute_metrics, loading_rates, robot_weight
-from hexapod_cosim.cosim.recorder import COMMAND_COLUMNS, Recording
-from hexapod_cosim.cosim.signals import foot_names, joint_names, vector_names
-from hexapod_cosim.cosim.support import centre_of_mass, polygon_margins, stability_margins
-from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
-from hexapod_cosim.models import energy as twin
-from hexapod_cosim.models.kinematics import body_states
+from hexapod_cosim.cosim.metrics import FLOORS, METRICS, View, commanded_path, compute_metrics, loading_rates
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.report import metric_rows
+from hexapod_cosim.cosim.signals import foot_names, joint_names
 
 Array = NDArray[np.float64]
-Numbers = NDArray[np.floating[Any]] | NDArray[np.bool_]
-
-H, PERIOD, CYCLES = 0.005, 1.0, 10
-SPEED = 0.08  # m/s
-ROBOT = load_robot("athena")
-PARAMETERS = {entry.name: float(entry.start or 0.0) for entry in load_interface(ROBOT).variables if entry.causality == "parameter"}
-WEIGHT = robot_weight(PARAMETERS)
-DISTANCE = SPEED * PERIOD * (CYCLES - 2)  # m    in the judged cycles
-
-
-class Walk:
-    """A synthetic recording: everything zero until a test says otherwise; the torso moves along x at the commanded speed."""
-
-    def __init__(self, *, cycles: int = CYCLES, speed: float = SPEED) -> None:
-        outputs = [entry.name for entry in load_interface(ROBOT).variables if entry.causality == "output"]
-        self.names = ("time", *outputs, *COMMAND_COLUMNS)
-        self.time = H * np.arange(round(cycles * PERIOD / H) + 1)
-        self.data = np.zeros((len(self.time), len(self.names)))
-        self.set("time", self.time)
-        self.set("torso.quaternion[1]", 1.0)
-        self.set("torso.position[1]", speed * self.time)
-        self.set("command.vx", SPEED)
-
-    def set(self, name: str, values: Numbers | float) -> None:
-        self.data[:, self.names.index(name)] = values
-
-    @property
-    def recording(self) -> Recording:
-        return Recording(self.names, self.data)
-
-    def metrics(self, **changes: float) -> dict[str, float]:
-        parameters = PARAMETERS | {name.replace("__", "."): value for name, value in changes.items()}
-        return compute_metrics(View(self.recording, parameters, PERIOD), realtime_factor=42.0)
 
 
 def test_the_metrics_are_those_of_the_contract_in_its_order() -> None:
@@ -242,71 +205,14 @@ def test_the_commanded_path_turns_with_the_command() -> None:
     assert path[-1] == pytest.approx([0.5, 0.5])
 
 
-# ------------------------------------------------------------------------------------------------- support
+def test_a_change_below_the_floor_reads_same_and_dust_reads_nought() -> None:
+    def row(name: str, before: float, after: float) -> tuple[str, str, list[str]]:
+        rows = metric_rows({"kinematic": {name: before}, "compliant": {name: after}})
+        chosen = next(item for item in rows if item["name"] == name)
+        return chosen["change"], chosen["verdict"], chosen["values"]
 
-SQUARE = np.array([[1.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [0.0, -1.0], [-1.0, -1.0]])
-ALL = [True] * 6
-
-
-@pytest.mark.parametrize(
-    ("standing", "centre", "margin"),
-    [
-        (ALL, (0.0, 0.0), 1.0),
-        (ALL, (0.4, 0.1), 0.6),
-        (ALL, (0.0, -0.75), 0.25),
-        (ALL, (1.2, 0.0), -0.2),
-        ([True, False, True, False, True, False], (0.0, 0.0), 1.0 / math.sqrt(5.0)),  # a tripod
-        ([True, False, True, False, False, False], (0.0, 0.7), -0.3),  # a line
-        ([True, False, False, False, False, False], (1.0, 1.0), math.nan),
-        ([False] * 6, (0.0, 0.0), math.nan),
-    ],
-)
-def test_the_margin_is_the_distance_to_the_nearest_edge(standing: list[bool], centre: tuple[float, float], margin: float) -> None:
-    got = polygon_margins(SQUARE[None], np.array([standing]), np.array([centre]))
-    assert got == pytest.approx([margin], nan_ok=True)
-
-
-def test_the_margin_does_not_depend_on_the_order_of_the_feet() -> None:
-    generator = np.random.default_rng(5)
-    feet = generator.normal(size=(50, 6, 2))
-    centre, standing = 0.3 * generator.normal(size=(50, 2)), generator.random((50, 6)) < 0.7
-    order = generator.permutation(6)
-    first, second = polygon_margins(feet, standing, centre), polygon_margins(feet[:, order], standing[:, order], centre)
-    np.testing.assert_allclose(first, second, atol=1e-12)
-
-
-def poses(robot: Robot, rows: int) -> tuple[Recording, list[Array]]:
-    """Random poses as a recording, and the twin's body states of them."""
-    generator = np.random.default_rng(7)
-    names = ("time", *joint_names("angle"), *vector_names("torso.position"), *vector_names("torso.quaternion", 4))
-    angle, position = 0.5 * generator.normal(size=(rows, 6, 3)), generator.normal(size=(rows, 3))
-    quaternion = generator.normal(size=(rows, 4))
-    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    zero = np.zeros(3)
-    bodies = [
-        body_states(robot, r, p, zero, zero, joints, np.zeros((6, 3))) for r, p, joints in zip(position, quaternion, angle, strict=True)
-    ]
-    return Recording(names, np.column_stack([np.arange(rows), angle.reshape(rows, -1), position, quaternion])), bodies
-
-
-@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_the_centre_of_mass_is_the_twins(name: str) -> None:
-    robot = load_robot(name)
-    parameters = {entry.name: float(entry.start or 0.0) for entry in load_interface(robot).variables if entry.causality == "parameter"}
-    recording, bodies = poses(robot, 5)
-    expected = [twin.centre_of_mass(robot, body) for body in bodies]
-    np.testing.assert_allclose(centre_of_mass(recording, parameters), expected, atol=1e-12)
-
-
-def test_a_robot_on_a_slope_is_judged_along_gravity() -> None:
-    walk = Walk(cycles=0)
-    for leg, (x, y) in zip(LEG_NAMES, SQUARE, strict=True):
-        walk.set(f"{leg}.foot.position[1]", x)
-        walk.set(f"{leg}.foot.position[2]", y)
-        walk.set(f"{leg}.foot.contact", 1.0)
-    walk.set("torso.position[3]", 1.0)
-    massless = PARAMETERS | {name: 0.0 for name in PARAMETERS if name.endswith(".mass")} | {"torso.mass": 1.0}
-    tilted = massless | {"gravity[1]": 9.81 * math.sin(0.1), "gravity[3]": -9.81 * math.cos(0.1)}
-    assert stability_margins(walk.recording, massless) == pytest.approx([1.0])
-    # the projection falls tan(0.1) ahead of the torso, and the square is seen foreshortened
-    assert stability_margins(walk.recording, tilted) == pytest.approx([(1.0 - math.tan(0.1)) * math.cos(0.1)])
+    assert set(FLOORS) == set(METRICS)
+    assert row("yaw_drift", 5e-6, 8e-5)[:2] == ("", "same")
+    assert row("slip_net_per_metre", 6.7e-18, 0.0) == ("", "same", ["0", "0"])
+    assert row("slip_per_metre", 0.3, 0.1)[:2] == ("-66.7%", "better")
+    assert row("yaw_drift", 0.0, 0.1)[:2] == ("", "worse")

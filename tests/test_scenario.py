@@ -10,6 +10,7 @@ import pytest
 
 from hexapod_cosim.controller import Controller, make_gait
 from hexapod_cosim.cosim.scenario import list_scenarios, load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario_records import MAX_STEPS
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
 
@@ -106,6 +107,14 @@ MISTAKES = {
     "macro_step=-0.005": ["macro_step", "got -0.005", "> 0"],
     "macro_step=1": ["macro_step", "<= 0.1"],
     "macro_step=0.003": ["duration", "multiple of macro_step = 0.003", "9.999"],
+    "duration=1e9": ["walk_flat.toml: duration: ", "too many macro-steps", "at most 1000000 macro-steps, 5000 s", "lengthen macro_step"],
+    "duration=1e308": ["too many macro-steps"],
+    "macro_step=1e-9": ["too many macro-steps", "0.001 s with macro_step = 1e-09 s"],
+    "macro_step=5e-324": ["too many macro-steps"],
+    "fricton.mu=1": ["--set fricton.mu: ", "did you mean 'friction.mu'"],
+    "gat.period=1": ["--set gat.period: ", "did you mean 'gait.period'"],
+    "torso.mas=1": ["--set torso.mas: ", "did you mean 'torso.mass'"],
+    "torso.roll=1": ["--set torso.roll: ", "a parameter of the FMU; this is an output"],
     "duration=-1": ["duration", "got -1"],
     "duration=nan": ["duration", "got nan", "finite"],
     "duration=ten": ["duration", "'ten'", "number"],
@@ -137,6 +146,49 @@ def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -
     assert "\n" not in message
     for part in MISTAKES[setting]:
         assert part in message
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("macro_step = 0", "macro_step"),
+        ("macro_step = '5 mm'", "macro_step"),
+        ("duration = 1e9", "duration"),
+        ("duration = 0.0123", "duration"),
+        ("seed = -1", "seed"),
+        ("robot = 3", "robot"),
+        ("command = {vx = 'a'}", "command.vx"),
+        ("command = {vx = '1 kg'}", "command.vx"),
+        ("events = 3", "events"),
+        ("events = [{time = 1}]", "events[0].duration"),
+        ("gait = {duty = 1}", "gait.duty"),
+        ("gait = {duti = 1}", "gait"),
+        ("outputs = {plots = 1}", "outputs.plots"),
+        ("parameters = 3", "parameters"),
+        ("parameters = {'fricton.mu' = 1}", "parameters"),
+        ("parameters = {torso.mass = 1}", "parameters"),
+    ],
+)
+def test_a_mistake_in_a_file_is_told_by_file_then_key(tmp_path: Path, text: str, place: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(path)
+    assert caught.value.where == f"{path}: {place}"
+
+
+def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_without_quotes_with_them(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("parameters = {'torso.mas' = 1}")
+    with pytest.raises(ScenarioError, match=r"got 'torso\.mas'.*did you mean 'torso\.mass'"):
+        load_scenario(path)
+    path.write_text("parameters = {torso.mass = 1}")
+    with pytest.raises(ScenarioError, match=r"in quotes: \"torso\.mass\""):
+        load_scenario(path)
+
+
+def test_the_longest_run_allowed_is_allowed() -> None:
+    assert load_scenario("walk_flat", overrides=[f"duration={0.005 * MAX_STEPS}"]).steps == MAX_STEPS
 
 
 def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:

@@ -70,10 +70,14 @@ def render_variables(interface: Interface, guid: str) -> str:
 
 
 def _row(variable: Variable) -> str:
+    place = f"offsetof(struct hxVariables, {variable.field})"
+    return f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, {TYPES[variable.type]}}},'
+
+
+def _limits(variable: Variable) -> str:
     low = "-DBL_MAX" if variable.minimum is None else repr(variable.minimum)
     high = "DBL_MAX" if variable.maximum is None else repr(variable.maximum)
-    place = f"offsetof(struct hxVariables, {variable.field})"
-    return f'    {{"{variable.name}", "{variable.unit or ""}", {low}, {high}, {place}, {TYPES[variable.type]}}},'
+    return f"{low}, {high}"
 
 
 def _enumeration_checks(interface: Interface) -> Iterable[str]:
@@ -91,7 +95,20 @@ def render_defaults(interface: Interface) -> str:
     lines += ["void hx_definition_default(hxDefinition *definition) {", "  *definition = default_definition;", "}", ""]
     lines += ["void hx_input_default(hxInput *input) {", "  *input = default_input;", "}", ""]
     lines += ["const char *hx_version(void) {", f'  return "{interface.version}";', "}", ""]
+    for member, structure in (("definition", "hxDefinition"), ("input", "hxInput")):
+        lines += [f"static const hxRange {member}_ranges[] = {{", *_ranges(interface, member, structure), "};", ""]
+        lines += [f"size_t hx_{member}_ranges(const hxRange **range) {{", f"  *range = {member}_ranges;"]
+        lines += [f"  return sizeof {member}_ranges / sizeof {member}_ranges[0];", "}", ""]
     return "\n".join(lines)
+
+
+def _ranges(interface: Interface, member: str, structure: str) -> Iterable[str]:
+    for variable in interface.of_causality("input", "parameter"):
+        root, _, field = variable.field.partition(".")
+        if root == member:
+            place = f"offsetof({structure}, {field})"
+            unit = "" if variable.unit in (None, "1") else variable.unit
+            yield f'    {{"{variable.name}", "{unit}", {_limits(variable)}, {place}, {int(variable.type != "Real")}}},'
 
 
 def _initialisers(interface: Interface, member: str) -> Iterable[str]:

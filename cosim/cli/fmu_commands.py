@@ -32,6 +32,8 @@ def export(
     """Pack the plant FMU of a robot."""
     made = load_robot(robot)
     path = output or Path(f"{made.name}.fmu")
+    if path.is_dir():
+        raise HexapodError("not an FMU's name", got=str(path), expected="a file, not a folder", fix=f"write -o {path / made.name}.fmu")
     if path.suffix != ".fmu":
         raise HexapodError(
             "not an FMU's name", got=path.name, expected="a name that ends in .fmu", fix=f"write -o {path.with_suffix('.fmu')}"
@@ -50,10 +52,10 @@ def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The F
     if json:
         show_json({"fmu": str(fmu), "valid": not problems, "problems": problems})
     else:
-        print("\n".join([*problems, f"{len(problems)} problems"]) if problems else f"{fmu}: no problems found")
+        print("\n".join(problems) if problems else f"{fmu}: no problems found")
     if problems:
         fix = "export it again with `hexapod export`"
-        raise FmuError("the FMU is not sound", got=f"{len(problems)} problems, the first: {problems[0]}", fix=fix, where=str(fmu))
+        raise FmuError("the FMU is not sound: problems", got=f"{len(problems)} of them", expected="none", fix=fix, where=str(fmu))
 
 
 def design(

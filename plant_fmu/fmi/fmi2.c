@@ -2,6 +2,7 @@
 #include "fmi/instance.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -153,10 +154,10 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
              categories[i] ? categories[i] : "(NULL)");
       return fmi2Error;
     }
-    chosen |= 1u << k;
+    chosen |= k == HX_LOG_ALL ? ~0u : 1u << k;
   }
   const unsigned logged = instance->base.logged;
-  instance->base.logged = (loggingOn ? logged | chosen : logged & ~chosen) | always_logged;
+  instance->base.logged = (loggingOn ? chosen : logged & ~chosen) | always_logged;
   return fmi2OK;
 }
 
@@ -174,9 +175,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   if (functions) instance->callbacks = *functions;
   instance->base.sink = log_sink;
   instance->base.logged = loggingOn ? ~0u : always_logged;
+  if (instanceName) snprintf(instance->base.name, sizeof instance->base.name, "%s", instanceName);
   hxStatus status = HX_INVALID_ARGUMENT;
   if (fmuType == fmi2CoSimulation)
-    status = hx_instance_open(&instance->base, instanceName, fmuGUID, fmuResourceLocation);
+    status = hx_instance_open(&instance->base, fmuGUID, fmuResourceLocation);
   else
     hx_log(&instance->base, HX_LOG_ERROR, "fmi2Instantiate: got model exchange, expected co-simulation; nothing was instantiated");
   if (status == HX_OK) return instance;
@@ -202,7 +204,15 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
            stopTimeDefined ? stopTime : startTime);
     return fmi2Error;
   }
+  if (fabs(startTime) > hx_latest_start) {
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "fmi2SetupExperiment: got a start at %.17g s, expected one within %g s of 0, as a later clock is too coarse for the plant's "
+           "steps; nothing was changed, count time from a later origin",
+           startTime, hx_latest_start);
+    return fmi2Error;
+  }
   instance->base.state.start_time = startTime;
+  instance->base.state.stop_time = stopTimeDefined ? stopTime : INFINITY;
   instance->base.state.model_stale = 1;
   if (!toleranceDefined || (tolerance > 0.0 && tolerance < 1.0)) return fmi2OK;
   hx_log(&instance->base, HX_LOG_WARNING, "fmi2SetupExperiment: got tolerance %g, expected one in ]0, 1[; ignored, solver.tolerance holds",
@@ -346,7 +356,7 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
            hx_instance_state_size());
     return fmi2Error;
   }
-  hx_instance_seal(FMUstate);
+  if (hx_instance_seal(&instance->base, FMUstate) != HX_OK) return fmi2Error;
   memcpy(serializedState, FMUstate, hx_instance_state_size());
   return fmi2OK;
 }

@@ -1,5 +1,6 @@
 #include "fmi/instance.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -10,7 +11,7 @@
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...) {
   char text[HX_LOG_SIZE];
   va_list arguments;
-  if (!(instance->logged & (1u << category | 1u << HX_LOG_ALL))) return;
+  if (!(instance->logged & 1u << category)) return;
   va_start(arguments, format);
   vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
@@ -24,6 +25,7 @@ static void return_to_start(hxInstance *instance) {
   instance->state.mode = HX_MODE_INSTANTIATED;
   instance->state.model_stale = 1;
   instance->state.output_stale = 1;
+  instance->state.stop_time = INFINITY;
   instance->state.variables.definition = instance->start_definition;
   instance->state.variables.input = instance->start_input;
 }
@@ -38,13 +40,12 @@ static hxStatus check_default_guid(hxInstance *instance, const char *resources) 
   return HX_INVALID_ARGUMENT;
 }
 
-hxStatus hx_instance_open(hxInstance *instance, const char *name, const char *guid, const char *resources) {
+hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources) {
   int found = 0;
-  if (!name || !name[0] || !guid) {
+  if (!instance->name[0] || !guid) {
     hx_log(instance, HX_LOG_ERROR, "instantiation: got no %s, expected a text; pass one", guid ? "instance name" : "GUID");
     return HX_INVALID_ARGUMENT;
   }
-  snprintf(instance->name, sizeof instance->name, "%s", name);
   snprintf(instance->guid, sizeof instance->guid, "%s", guid);
   hx_definition_default(&instance->start_definition);
   hx_input_default(&instance->start_input);
@@ -193,26 +194,52 @@ hxStatus hx_instance_initialize(hxInstance *instance) {
   return HX_OK;
 }
 
-/* how far an importer's clock may be from ours: rounding of long sums, nothing more */
-static double clock_tolerance(double t) { return 1e-9 * fmax(1.0, fabs(t)); }
+static const double longest_step = 100.0; /* s */
+
+/* How far an importer's clock may be from ours: rounding of sums of some thousand steps (ours follows the importer's, so that longer ones
+ * do not pile up), and never so much that a step would be a different one, but for the last bits. */
+static double clock_tolerance(double t, double h) {
+  const double sums = 1e-9 + 1e4 * DBL_EPSILON * fabs(t), last_bits = 4.0 * DBL_EPSILON * fmax(1.0, fabs(t));
+  return fmax(last_bits, fmin(sums, 0.5 * h));
+}
 
 /* the plant goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up */
 hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
   const double now = hx_instance_time(instance);
-  if (!(h > 0.0 && h <= 1e6)) {
-    hx_log(instance, HX_LOG_ERROR, "communication step size: got %.17g s, expected more than 0 and at most 1e6; the state is unchanged", h);
+  if (!(h > 0.0 && h <= longest_step)) {
+    hx_log(instance, HX_LOG_ERROR,
+           "communication step size: got %.17g s, expected more than 0 and at most %g; the state is unchanged, make it several steps", h,
+           longest_step);
     return HX_INVALID_ARGUMENT;
   }
-  if (!(fabs(t - now) <= clock_tolerance(now))) {
+  if (!(fabs(t - now) <= clock_tolerance(now, h))) {
     hx_log(instance, HX_LOG_ERROR,
            "communication point: got %.17g s, expected %.17g, where the last step ended; the state is unchanged, "
            "restore a saved state to go back",
            t, now);
     return HX_INVALID_ARGUMENT;
   }
+  if (!(t + h > t)) {
+    hx_log(instance, HX_LOG_ERROR,
+           "communication step size: got %.17g s, expected one that moves the clock at %.17g s; the state is unchanged, make it longer", h,
+           t);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (t + h > instance->state.stop_time + clock_tolerance(now, h)) {
+    hx_log(
+        instance, HX_LOG_ERROR,
+        "communication step size: got %.17g s at %.17g s, expected a step that ends by the experiment's stop time, %.17g s; the state is "
+        "unchanged, shorten the step or set up a longer experiment",
+        h, t, instance->state.stop_time);
+    return HX_INVALID_ARGUMENT;
+  }
   /* an extra step of rounding size may end before our own time: it is done */
   if (t + h <= now) return HX_OK;
   const hxStatus status = hx_plant_step(instance->plant, &instance->state.variables.input, t + h);
+  if (status == HX_INVALID_ARGUMENT) {
+    hx_log(instance, HX_LOG_ERROR, "step from %.17g s by %.17g s: %s; the state is unchanged", t, h, hx_plant_message(instance->plant));
+    return status;
+  }
   if (status != HX_OK) {
     hx_log(instance, HX_LOG_DISCARD, "step from %.17g s by %.17g s: %s; the state is unchanged, try a smaller step or a gentler input", t,
            h, hx_plant_message(instance->plant));
@@ -222,7 +249,11 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
   return HX_OK;
 }
 
+/* the plant goes back as well, so that saved states of a reset instance and of a new one are the same bytes */
 void hx_instance_reset(hxInstance *instance) {
+  hxDefinition definition;
   return_to_start(instance);
+  hx_definition_default(&definition);
+  hx_plant_reset(instance->plant, &definition, 0.0);
   hx_log(instance, HX_LOG_EVENT, "reset");
 }

@@ -12,6 +12,9 @@ typedef enum hxMode { HX_MODE_INSTANTIATED = 1, HX_MODE_INITIALIZATION = 2, HX_M
 
 typedef enum hxLogCategory { HX_LOG_ERROR, HX_LOG_DISCARD, HX_LOG_WARNING, HX_LOG_EVENT, HX_LOG_ALL, HX_LOG_CATEGORIES } hxLogCategory;
 
+/* s  a start further from 0 is refused: the clock's last bit is to stay well below the solver's steps */
+static const double hx_latest_start = 1e9;
+
 enum { HX_GUID_SIZE = 40, HX_NAME_SIZE = 128, HX_LOG_SIZE = 2 * HX_MESSAGE_SIZE };
 
 typedef struct hxInstance hxInstance;
@@ -25,6 +28,7 @@ typedef struct hxInstanceState {
   int model_stale;  /* parameters were set since the plant was reset */
   int output_stale; /* variables.output is not that of the present time and input */
   double start_time;
+  double stop_time; /* no step goes past it; infinite when the importer names none */
   struct hxVariables variables;
 } hxInstanceState;
 
@@ -39,8 +43,8 @@ struct hxInstance {
   hxLogSink *sink;
 };
 
-/* Opens a zeroed instance; resources is a URI, a path or NULL. On failure it is to be closed all the same. */
-hxStatus hx_instance_open(hxInstance *instance, const char *name, const char *guid, const char *resources);
+/* Opens an instance that is zero but for its name, log and sink; resources is a URI, a path or NULL. On failure it is to be closed all the same. */
+hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources);
 void hx_instance_close(hxInstance *instance);
 
 /* Values by reference, n at once. Integers and Booleans come as int, by the type asked for. */
@@ -56,7 +60,7 @@ double hx_instance_time(const hxInstance *instance);
 size_t hx_instance_state_size(void);
 void hx_instance_save(const hxInstance *instance, void *block);
 hxStatus hx_instance_restore(hxInstance *instance, const void *block);
-void hx_instance_seal(void *block); /* writes the checksum that check verifies */
+hxStatus hx_instance_seal(hxInstance *instance, void *block); /* writes the checksum that check verifies */
 hxStatus hx_instance_check(hxInstance *instance, const void *block, size_t n);
 
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);

@@ -1,7 +1,8 @@
 /* resources.c - start values of the robot in the FMU's resources.
  *
  * start_values.txt: the GUID; then, for every input and parameter in the order of their references, a line
- * "reference value name". Reals are hexadecimal (0x1.8p+1), so they are exact and no locale has a say.
+ * "reference value name"; then "checksum" and, in 16 hexadecimal digits, hx_checksum over the lines above without their ends,
+ * each one's checksum the next one's seed. Reals are hexadecimal (0x1.8p+1), so they are exact and no locale has a say.
  */
 #include "fmi/instance.h"
 
@@ -57,13 +58,13 @@ static const char *skip_scheme(const char *uri) {
   return uri;
 }
 
-/* path of start_values.txt below the resources, to be freed; NULL when out of memory */
-static char *start_values_path(const char *resources) {
+/* path of start_values.txt below the resources, decoded or as it is given, to be freed; NULL when out of memory */
+static char *start_values_path(const char *resources, int decode) {
   const char *after_scheme = skip_scheme(resources);
   char *path = malloc(strlen(resources) + sizeof file_name + 1);
   if (!path) return NULL;
   strcpy(path, after_scheme ? after_scheme : resources);
-  if (after_scheme) percent_decode(path);
+  if (after_scheme && decode) percent_decode(path);
 #ifdef _WIN32
   /* /C:/x -> C:/x */
   if (path[0] == '/' && path[1] && (path[2] == ':' || path[2] == '|')) {
@@ -129,11 +130,29 @@ static int parse_value(const hxVariable *variable, const char *text, double *val
   return 1;
 }
 
+typedef struct hxReader {
+  FILE *file;
+  int number;        /* of the last line, from 1 */
+  uint64_t checksum; /* of the lines before the last */
+  uint64_t next_checksum;
+  char line[LINE_SIZE];
+} hxReader;
+
 /* the next line without its end, or NULL at the end of the file; a line too long comes in pieces and so parses as none */
-static char *next_line(FILE *file, char line[LINE_SIZE]) {
-  if (!fgets(line, LINE_SIZE, file)) return NULL;
-  line[strcspn(line, "\r\n")] = '\0';
-  return line;
+static char *next_line(hxReader *reader) {
+  size_t length = 0;
+  int c = fgetc(reader->file);
+  reader->number++;
+  if (c == EOF) return NULL;
+  for (; c != EOF && c != '\n'; c = fgetc(reader->file)) {
+    reader->line[length++] = (char)c;
+    if (length == LINE_SIZE - 1) break;
+  }
+  if (length > 0 && reader->line[length - 1] == '\r') length--;
+  reader->line[length] = '\0';
+  reader->checksum = reader->next_checksum;
+  reader->next_checksum = hx_checksum(reader->checksum, reader->line, length);
+  return reader->line;
 }
 
 /* splits "reference value name" in place; returns 0 if the line has no such form */
@@ -150,11 +169,12 @@ static int split(char *line, char *part[3]) {
 
 static void store(struct hxVariables *variables, const hxVariable *variable, double value) {
   char *place = (char *)variables + variable->offset;
-  const int number = (int)value;
   if (variable->type == HX_REAL)
     memcpy(place, &value, sizeof value);
-  else
+  else {
+    const int number = (int)value;
     memcpy(place, &number, sizeof number);
+  }
 }
 
 /* one line against the row it must be of; returns 0 if it is not */
@@ -170,39 +190,55 @@ static int read_variable(struct hxVariables *variables, const hxVariable *variab
 
 /* ---------------------------------------------------------------------------------------------- file */
 
-static hxStatus refuse(hxInstance *instance, int line, const char *got, const char *expected) {
-  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew", file_name, line,
+static hxStatus refuse(hxInstance *instance, const hxReader *reader, const char *got, const char *expected) {
+  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew", file_name, reader->number,
          got ? got : "the end of the file", expected);
   return HX_INVALID_ARGUMENT;
 }
 
-static hxStatus read_variables(hxInstance *instance, FILE *file, struct hxVariables *variables) {
+static hxStatus read_variables(hxInstance *instance, hxReader *reader, struct hxVariables *variables) {
   static const hxCausality causalities[] = {HX_INPUT, HX_PARAMETER};
-  char line[LINE_SIZE], shown[LINE_SIZE], expected[LINE_SIZE];
-  int number = 1;
+  char shown[LINE_SIZE], expected[LINE_SIZE];
   for (int k = 0; k < 2; k++) {
     const hxSection *section = &hx_sections[causalities[k]];
     for (unsigned i = 0; i < section->count; i++) {
       const hxVariable *variable = &section->variable[i];
-      char *text = next_line(file, line);
-      number++;
+      char *text = next_line(reader);
       if (text) strcpy(shown, text);
       if (!read_variable(variables, variable, section->first + i, text)) {
         snprintf(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s", section->first + i, variable->name, variable->min,
                  variable->max, variable->unit);
-        return refuse(instance, number, text ? shown : NULL, expected);
+        return refuse(instance, reader, text ? shown : NULL, expected);
       }
     }
   }
-  const char *rest = next_line(file, line);
-  return rest ? refuse(instance, number + 1, rest, "the end of the file") : HX_OK;
+  return HX_OK;
+}
+
+/* the last line tells whether the ones above are as they were exported */
+static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
+  char expected[LINE_SIZE];
+  const char *line = next_line(reader);
+  snprintf(expected, sizeof expected, "checksum %08lx%08lx", (unsigned long)(reader->checksum >> 32),
+           (unsigned long)(reader->checksum & 0xffffffffu));
+  if (!line || strcmp(line, expected) != 0) return refuse(instance, reader, line, "the checksum of the lines above: they were changed");
+  line = next_line(reader);
+  return line ? refuse(instance, reader, line, "the end of the file") : HX_OK;
+}
+
+/* whether there can be such a robot */
+static hxStatus check_robot(hxInstance *instance, const hxDefinition *definition) {
+  char message[HX_MESSAGE_SIZE];
+  const hxStatus status = hx_definition_check(definition, message);
+  if (status != HX_OK) hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU anew", file_name, message);
+  return status;
 }
 
 static hxStatus read_file(hxInstance *instance, FILE *file) {
-  char line[LINE_SIZE];
+  hxReader reader = {.file = file};
   struct hxVariables variables;
-  const char *guid = next_line(file, line);
-  if (!guid) return refuse(instance, 1, NULL, "the FMU's GUID");
+  const char *guid = next_line(&reader);
+  if (!guid) return refuse(instance, &reader, NULL, "the FMU's GUID");
   if (strcmp(guid, instance->guid) != 0) {
     hx_log(instance, HX_LOG_ERROR, "GUID: got '%s', expected '%s', that of the resources; pass the one in modelDescription.xml",
            instance->guid, guid);
@@ -210,26 +246,38 @@ static hxStatus read_file(hxInstance *instance, FILE *file) {
   }
   variables.definition = instance->start_definition;
   variables.input = instance->start_input;
-  const hxStatus status = read_variables(instance, file, &variables);
+  hxStatus status = read_variables(instance, &reader, &variables);
+  if (status == HX_OK) status = read_checksum(instance, &reader);
+  if (status == HX_OK) status = check_robot(instance, &variables.definition);
   if (status != HX_OK) return status;
   instance->start_definition = variables.definition;
   instance->start_input = variables.input;
   return HX_OK;
 }
 
+/* opens start_values.txt; a folder may be called %41 in a URI that was never encoded: the path as it is given is the second try */
+static hxStatus open_resources(hxInstance *instance, const char *resources, FILE **file) {
+  *file = NULL;
+  for (int decode = 1; decode >= 0 && !*file; decode--) {
+    char *path = start_values_path(resources, decode);
+    if (!path) {
+      hx_log(instance, HX_LOG_ERROR, "resources: out of memory; free some and try again");
+      return HX_OUT_OF_MEMORY;
+    }
+    *file = open_file(path);
+    free(path);
+  }
+  return HX_OK;
+}
+
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found) {
+  FILE *file;
   *found = 0;
   if (!resources || !resources[0]) return HX_OK;
-  char *path = start_values_path(resources);
-  if (!path) {
-    hx_log(instance, HX_LOG_ERROR, "resources: out of memory; free some and try again");
-    return HX_OUT_OF_MEMORY;
-  }
-  FILE *file = open_file(path);
-  free(path);
-  if (!file) return HX_OK;
+  hxStatus status = open_resources(instance, resources, &file);
+  if (status != HX_OK || !file) return status;
   *found = 1;
-  const hxStatus status = read_file(instance, file);
+  status = read_file(instance, file);
   fclose(file);
   return status;
 }

@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { STATE_FORMAT = 1 };
+enum { STATE_FORMAT = 2 };
 
 static const char state_magic[8] = "hexapod";
 
@@ -35,22 +35,9 @@ void hx_instance_save(const hxInstance *instance, void *bytes) {
   hx_plant_get_state(instance->plant, block->plant);
 }
 
-/* FNV-1a over 64-bit words: every single changed bit changes it */
-static uint64_t checksum(const hxStateBlock *block) {
-  const unsigned char *bytes = (const unsigned char *)block + sizeof block->header;
-  const size_t n = hx_instance_state_size() - sizeof block->header;
-  uint64_t hash = 0xcbf29ce484222325u, word = 0;
-  for (size_t i = 0; i < n; i += sizeof word) {
-    word = 0;
-    memcpy(&word, bytes + i, n - i < sizeof word ? n - i : sizeof word);
-    hash = (hash ^ word) * 0x100000001b3u;
-  }
-  return hash;
-}
-
-void hx_instance_seal(void *bytes) {
-  hxStateBlock *block = bytes;
-  block->header.checksum = checksum(block);
+/* bytes may be unaligned */
+static uint64_t checksum(const void *bytes) {
+  return hx_checksum(0, (const char *)bytes + sizeof(hxStateHeader), hx_instance_state_size() - sizeof(hxStateHeader));
 }
 
 static hxStatus refuse(hxInstance *instance, const char *what) {
@@ -64,7 +51,15 @@ static const char *fault(const hxInstance *instance, const hxStateHeader *header
   return strncmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL : "one of another FMU";
 }
 
-/* bytes may be unaligned: the header is copied out, the checksum reads by copies */
+hxStatus hx_instance_seal(hxInstance *instance, void *bytes) {
+  hxStateBlock *block = bytes;
+  const char *what = fault(instance, &block->header);
+  if (what) return refuse(instance, what);
+  block->header.checksum = checksum(block);
+  return HX_OK;
+}
+
+/* bytes may be unaligned: the header is copied out */
 hxStatus hx_instance_check(hxInstance *instance, const void *bytes, size_t n) {
   hxStateHeader header;
   if (n != hx_instance_state_size()) return refuse(instance, n < hx_instance_state_size() ? "too few bytes" : "too many bytes");

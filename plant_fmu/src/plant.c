@@ -17,15 +17,9 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 1;
+static const uint64_t saved_version = 2;
 
-/* FNV-1a over the model and the state */
-static uint64_t checksum(const hxSaved *saved) {
-  const unsigned char *bytes = (const unsigned char *)&saved->model;
-  uint64_t hash = 1469598103934665603u;
-  for (size_t i = 0; i < sizeof *saved - offsetof(hxSaved, model); ++i) hash = (hash ^ bytes[i]) * 1099511628211u;
-  return hash;
-}
+static uint64_t checksum(const hxSaved *saved) { return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model)); }
 
 static hxStatus refuse(hxPlant *plant, hxStatus status, const char *text) {
   snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);

@@ -10,6 +10,7 @@
 #define HEXAPOD_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -202,6 +203,19 @@ HX_API const char *hx_status_name(hxStatus status);
 HX_API void hx_definition_default(hxDefinition *definition);
 HX_API void hx_input_default(hxInput *input); /* the ATHENA-like robot's standing pose */
 
+/* What one number of an hxDefinition or hxInput may be. */
+typedef struct hxRange {
+  const char *name;  /* as in the FMU */
+  const char *unit;  /* "" when it has none */
+  double min, max;   /* inclusive */
+  size_t offset;     /* into the structure */
+  int is_int;        /* an int there, otherwise a double */
+} hxRange;
+
+/* The ranges of every number in either structure; returns how many there are. */
+HX_API size_t hx_definition_ranges(const hxRange **range);
+HX_API size_t hx_input_ranges(const hxRange **range);
+
 /* Checks a definition. On failure message (HX_MESSAGE_SIZE bytes, may be NULL) says what, got, expected. */
 HX_API hxStatus hx_definition_check(const hxDefinition *definition, char *message);
 
@@ -225,6 +239,9 @@ HX_API const char *hx_plant_message(const hxPlant *plant); /* of the last failur
 HX_API size_t hx_plant_state_size(void);
 HX_API void hx_plant_get_state(const hxPlant *plant, void *bytes);
 HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size);
+
+/* A number that tells damaged bytes from intact ones, on every machine the same; seed: of what came before, or 0. */
+HX_API uint64_t hx_checksum(uint64_t seed, const void *bytes, size_t n);
 
 /* For multibody researchers: the bodies' states, drifted joints allowed, and eq. 1 solved for them. */
 HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);

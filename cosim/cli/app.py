@@ -1,0 +1,33 @@
+"""The commands of `hexapod`, put together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.cosim.cli import fmu_commands, listing, run_commands
+from hexapod_cosim.cosim.plant_files import package_version
+
+app = typer.Typer(name="hexapod", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+app.command("export")(fmu_commands.export)
+app.command("simulate")(run_commands.simulate)
+app.command("compare")(run_commands.compare)
+app.command("design")(fmu_commands.design)
+app.command("report")(run_commands.report)
+app.command("validate")(fmu_commands.validate)
+app.command("list")(listing.list_what)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(package_version())
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and stop.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show where an unexpected error arose.")] = False,
+) -> None:
+    """A walking hexapod as an FMU, its compliant control, and their co-simulation."""

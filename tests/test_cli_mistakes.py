@@ -1,0 +1,97 @@
+"""One clear paragraph of the hexapod command for every mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command import Call, assert_refused
+
+from hexapod_cosim.cosim.cli import main
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["simulate", "walk_flt"], ["unknown scenario", "did you mean 'walk_flat'"]),
+        (["simulate", "--set", "gait.periode=1"], ["walk_flat.toml", "'periode'", "did you mean 'period'"]),
+        (["simulate", "--set", "macro_step=0"], ["macro_step", "got 0", "> 0"]),
+        (["simulate", "--set", "macro_step=-0.005"], ["macro_step", "got -0.005", "> 0"]),
+        (["simulate", "--control", "complaint"], ["'complaint'", "did you mean 'compliant'"]),
+        (["simulate", "--set", "torso.mas=3"], ["'torso.mas'", "did you mean 'torso.mass'"]),
+        (["simulate", "--set", "torso.mass=-3"], ["torso.mass", "-3"]),
+        (["simulate", "--set", "torso.push_force[1]=100"], ["--set torso.push_force[1]: not a parameter", "an input", "[[events]]"]),
+        (["simulate", "--set", "robot=atena"], ["unknown robot", "did you mean 'athena'"]),
+        (["simulate", "--set", "gait.period=0.005"], ["period"]),
+        (["simulate", "--set", "outputs.csv=['torso.rol']"], ["outputs.csv", "did you mean 'torso.roll'"]),
+        (["simulate", "--set", "friction.mu=-1"], ["friction.mu", "got -1"]),
+        (["simulate", "--gains", "missing.toml"], ["cannot read the gains", "missing.toml"]),
+        (["simulate", "--fmu", "missing.fmu"], ["no such FMU", "missing.fmu", "hexapod export"]),
+        (["compare", "walk_flt"], ["unknown scenario"]),
+        (["report", "."], ["not a results folder"]),
+        (["validate", "missing.fmu"], ["no such FMU"]),
+        (["export", "--robot", "atena"], ["unknown robot", "did you mean 'athena'"]),
+        (["simulate", "--set", "fricton.mu=1"], ["--set fricton.mu", "did you mean 'friction.mu'"]),
+        (["simulate", "--set", "command.vx=10 m/s"], ["walk_flat.toml: command: ", "got 'vx = 10 m/s'", "at most vx = 0.6", "tripod"]),
+        (["compare", "--set", "command.vx=10"], ["do not reach"]),
+        (["simulate", "--set", "duration=1e9"], ["too many macro-steps", "5000 s"]),
+        (["export", "-o", "athena.zip"], [".fmu"]),
+        (["export", "-o", "."], ["got '.'", "not a folder", "write -o athena.fmu"]),
+        (["export", "--fmi", "7"], ["FMI version", "got 7"]),
+        (["export", "--platforms", "amiga"], ["amiga"]),
+        (["design", "--robot", "atena"], ["unknown robot"]),
+        (["design", "--macro-step", "-1"], ["period", "got -1"]),
+        (["list", "robot"], ["'robot'", "did you mean 'robots'"]),
+    ],
+)
+def test_a_mistake_gets_one_clear_paragraph(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert_refused(call(*arguments), *parts)
+    assert not list(tmp_path.rglob("results*"))
+    assert not list(tmp_path.rglob("*.fmu"))
+
+
+def test_an_unwritable_place_is_refused_before_the_run(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    assert_refused(call("simulate", "-o", tmp_path / "file" / "out"), "cannot write", "-o")
+    assert_refused(call("simulate", "-o", tmp_path / "file"), "cannot write")
+    assert_refused(call("design", "-o", tmp_path / "file"), "cannot write")
+    assert_refused(call("export", "-o", tmp_path / "file" / "a.fmu"), "cannot write")
+
+
+def test_a_folder_named_like_an_fmu_is_refused_and_left_alone(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "athena.fmu"
+    folder.mkdir()
+    assert_refused(call("export", "-o", folder), "not a folder", str(folder / "athena.fmu"))
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_a_folder_of_someone_elses_files_is_left_alone(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("precious")
+    assert_refused(call("compare", "-o", tmp_path), "the folder holds other files", "thesis.tex")
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_foreign_fmu_is_refused(call: Call, tmp_path: Path, athena_fmu: Path) -> None:
+    arguments = ["simulate", "phantomx_walk", "--fmu", athena_fmu, "-o", tmp_path / "out"]
+    assert_refused(call(*arguments), "the FMU holds another robot: torso.mass", "got 2.6", "hexapod export")
+    (tmp_path / "plain.fmu").write_text("no archive")
+    assert_refused(call("simulate", "--fmu", tmp_path / "plain.fmu", "-o", tmp_path / "out"), "not an FMU", "plain.fmu")
+
+
+def test_an_unknown_option_is_told_and_not_zero(call: Call) -> None:
+    code, out, err = call("simulate", "--speed", "3")
+    assert (code, out) == (2, "")
+    assert "No such option: --speed" in err
+
+
+def test_an_unexpected_error_is_one_line_with_a_hint(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def burst(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("by nought")
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.load_scenario", burst)
+    assert_refused(call("simulate"), "unexpected ZeroDivisionError: by nought", "--debug")
+    with pytest.raises(ZeroDivisionError):
+        main(["--debug", "simulate"])
