@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hexapod_cosim.cosim.documentation import render_html
+from hexapod_cosim.cosim.export import start_values
 from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
 from hexapod_cosim.models.robot import load_robot
@@ -50,6 +51,7 @@ def render_all() -> dict[Path, str]:
         GENERATED / "defaults.c": render_defaults(interface),
         GENERATED / "modelDescription.xml": description.xml,
         GENERATED / "index.html": render_html(interface, description.guid),
+        GENERATED / "start_values.txt": start_values(interface, description.guid),
     }
 
 

@@ -148,7 +148,7 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
     return HX_INVALID_ARGUMENT;
   }
   if (!hx_variable_takes(variable, value)) {
-    hx_log(instance, HX_LOG_ERROR, "%s: got %.17g, expected a finite number in [%.17g, %.17g] %s; nothing was set, correct the value",
+    hx_log(instance, HX_LOG_ERROR, "%s: got %.17g, expected a finite number in [%g, %g] %s; nothing was set, correct the value",
            variable->name, value, variable->min, variable->max, variable->unit);
     return HX_INVALID_ARGUMENT;
   }
