@@ -7,10 +7,12 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from command import Call
+from fmi_plant import Plant
 
 from hexapod_cosim.cosim.cli import main
 
@@ -39,6 +41,19 @@ def athena_fmu(plant_build: Path) -> Path:
 def plant_library(plant_build: Path) -> Path:
     """The FMU's shared library."""
     return next((plant_build / "plant_fmu").glob("hexapod.[sd]*"))
+
+
+@pytest.fixture
+def plant(plant_library: Path) -> Iterator[Plant]:
+    """An FMU instance, not yet initialised."""
+    with Plant(plant_library) as instance:
+        yield instance
+
+
+@pytest.fixture
+def running(plant: Plant) -> Plant:
+    """The same, ready to step."""
+    return plant.initialize()
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,6 @@ import math
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import fmpy
@@ -30,17 +29,6 @@ from fmi_plant import (
 
 H = 0.005  # s, communication step
 NAN, INF = math.nan, math.inf
-
-
-@pytest.fixture
-def plant(plant_library: Path) -> Iterator[Plant]:
-    with Plant(plant_library) as instance:
-        yield instance
-
-
-@pytest.fixture
-def running(plant: Plant) -> Plant:
-    return plant.initialize()
 
 
 def test_the_bare_file_passes_fmpy_validation(athena_fmu: Path) -> None:

@@ -4,25 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Iterator
-from pathlib import Path
 from random import Random
 
 import pytest
 from fmi_plant import ATHENA, ERROR, OK, Plant
 
 NAN, INF = math.nan, math.inf
-
-
-@pytest.fixture
-def plant(plant_library: Path) -> Iterator[Plant]:
-    with Plant(plant_library) as instance:
-        yield instance
-
-
-@pytest.fixture
-def running(plant: Plant) -> Plant:
-    return plant.initialize()
 
 
 @pytest.mark.parametrize("name", [variable.name for variable in ATHENA.of_causality("input", "parameter")[::37] if variable.type == "Real"])
