@@ -152,6 +152,18 @@ def test_foreign_resources_are_refused(plant_library: Path, tmp_path: Path, heav
         assert "GUID" in plant.last_message
 
 
+def refusal(library: Path, folder: Path, robot: Robot, old: str, new: str) -> str:
+    """What the FMU says of a robot's start values in which old was replaced by new: it must refuse them."""
+    guid = write_resources(folder, robot)
+    file = folder / "start_values.txt"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with Plant(library, guid=guid, resources=folder.as_uri()) as plant:
+        assert plant.component is None
+        return str(plant.last_message)
+
+
 @pytest.mark.parametrize(
     ("old", "new"),
     [("4000 0x", "4000 0y"), ("4000 0x", "4001 0x"), (" torso.mass", " torso.weight"), ("p+1 torso.mass", "p torso.mass"),
@@ -159,26 +171,12 @@ def test_foreign_resources_are_refused(plant_library: Path, tmp_path: Path, heav
      (" contact.law", "0 contact.law"), ("1 contact.law", "1.0 contact.law"), ("4000 0x", "4000 -0x")],
 )  # fmt: skip
 def test_malformed_start_values_are_refused_with_the_line(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
-    guid = write_resources(tmp_path, heavy)
-    file = tmp_path / "start_values.txt"
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new, 1), encoding="utf-8")
-    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
-        assert plant.component is None
-        assert "start_values.txt: line " in plant.last_message
+    assert "start_values.txt: line " in refusal(plant_library, tmp_path, heavy, old, new)
 
 
 @pytest.mark.parametrize(("old", "new"), [("p+1 torso.mass", "p+0 torso.mass"), ("}\n", "}\0tail\n"), ("1 contact.law", "2 contact.law")])
 def test_start_values_other_than_the_exported_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
-    guid = write_resources(tmp_path, heavy)
-    file = tmp_path / "start_values.txt"
-    text = file.read_text(encoding="utf-8")
-    assert old in text
-    file.write_text(text.replace(old, new, 1), encoding="utf-8")
-    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
-        assert plant.component is None
-        assert "checksum" in plant.last_message
+    assert "checksum" in refusal(plant_library, tmp_path, heavy, old, new)
 
 
 def test_an_impossible_robot_is_refused_at_instantiation(plant_library: Path, tmp_path: Path) -> None:

@@ -139,22 +139,24 @@ static double open_depth(const hxStart *start, const hxMotion *y) {
   return depth;
 }
 
-/* Shortens a step that ends below the ground to one that ends on it: false position (Illinois) on the step itself. */
+/* Shortens a step that ends below the ground to one that ends on it: false position on the step itself, with Illinois' weights, which are
+ * depths but for being halved where the same side moves twice. */
 static double find_touchdown(hxStart *start, double h, hxState *state, hxTrial *trial) {
-  double low = 0.0, high = h, depth_low = open_depth(start, start->y), depth_high = open_depth(start, &trial->y);
+  double low = 0.0, high = h, depth = open_depth(start, &trial->y);
+  double weight_low = open_depth(start, start->y), weight_high = depth;
   int side = 0;
-  while (depth_high > touch_depth && high - low > step_floor) {
-    double middle = low + (high - low) * depth_low / (depth_low - depth_high);
+  while (depth > touch_depth && high - low > step_floor) {
+    double middle = low + (high - low) * weight_low / (weight_low - weight_high);
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
     hxTrial nearer;
     try_step(start, middle, state, &nearer);
-    const double depth = open_depth(start, &nearer.y);
-    if (depth > 0.0) {
-      high = middle, depth_high = depth, *trial = nearer;
-      depth_low *= side == 1 ? 0.5 : 1.0, side = 1;
+    const double found = open_depth(start, &nearer.y);
+    if (found > 0.0) {
+      high = middle, depth = weight_high = found, *trial = nearer;
+      weight_low *= side == 1 ? 0.5 : 1.0, side = 1;
     } else {
-      low = middle, depth_low = depth;
-      depth_high *= side == -1 ? 0.5 : 1.0, side = -1;
+      low = middle, weight_low = found;
+      weight_high *= side == -1 ? 0.5 : 1.0, side = -1;
     }
   }
   return high;
