@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c)
 
 .PHONY: help setup demo test check format generate fmu typing clean
 

@@ -42,7 +42,7 @@ def source_files() -> dict[str, Path]:
     root = _TREE if in_source_tree() else _INSTALLED / "sources"
     folders = {"src": root / "src", "fmi": root / "fmi"}
     folders["hexapod"] = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
-    found = {f"{name}/{path.name}": path for name, folder in folders.items() for path in folder.glob("*.[ch]")}
+    found = {f"{name}/{path.relative_to(folder).as_posix()}": path for name, folder in folders.items() for path in folder.rglob("*.[ch]")}
     found |= {f"generated/{name}": root / "generated" / name for name in GENERATED_SOURCES}
     return dict(sorted(found.items()))
 

@@ -27,7 +27,8 @@ JOINT_NAMES = ("coxa", "femur", "tibia")
 CONTACT_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley", "constant_damping", "hertz")
 FRICTION_LAWS = ("tanh", "none")
 SERVO_MODES = ("position", "torque", "kinematic")
-METHODS = ("ros34pw2", "ros2", "dp54", "bs32", "rk4")
+METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
+PROJECTIONS = ("none", "step")
 TERRAINS = ("flat", "slope")
 GAITS = ("tripod", "ripple", "wave", "amble")
 
@@ -121,6 +122,7 @@ class Solver:
     step: Annotated[float, Number("s", at_least=0.0)]  # 0: error control
     tolerance: Annotated[float, Number("1", above=0.0, below=1.0)]
     step_max: Annotated[float, Number("s", above=0.0)]
+    projection: Annotated[str, Choice(PROJECTIONS, default="none")]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from hexapod_cosim.models.records import (
     JOINT_NAMES,
     LEG_NAMES,
     METHODS,
+    PROJECTIONS,
     SERVO_MODES,
     TERRAINS,
     Array,
@@ -43,7 +44,7 @@ from hexapod_cosim.models.schema import Number, Vector, expect_table, read_given
 from hexapod_cosim.models.validation import check_robot
 
 __all__ = [
-    "CONTACT_LAWS", "FRICTION_LAWS", "GAITS", "JOINT_NAMES", "LEG_NAMES", "METHODS", "SERVO_MODES", "TERRAINS",
+    "CONTACT_LAWS", "FRICTION_LAWS", "GAITS", "JOINT_NAMES", "LEG_NAMES", "METHODS", "PROJECTIONS", "SERVO_MODES", "TERRAINS",
     "Array", "Baumgarte", "Contact", "Foot", "Friction", "Gait", "Leg", "Link", "Robot", "Servo", "Solver", "Terrain", "Torso",
     "box_inertia", "check_robot", "hertz_stiffness", "list_robots", "load_robot", "robot_from_table",
 ]  # fmt: skip

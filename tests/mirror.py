@@ -38,7 +38,7 @@ HxDefinition = record(
     ("servo", record("Servo", ("mode", ct.c_int), *reals("kp kd torque_max speed_max rotor_inertia coulomb_friction"))),
     ("baumgarte", record("Baumgarte", *reals("alpha beta"))),
     ("gravity", Vector3),
-    ("solver", record("Solver", ("method", ct.c_int), *reals("step tolerance step_max"))),
+    ("solver", record("Solver", ("method", ct.c_int), *reals("step tolerance step_max"), ("projection", ct.c_int))),
     ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading"))),
     (
         "initial",

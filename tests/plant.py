@@ -14,6 +14,7 @@ from hexapod_cosim.models import (
     CONTACT_LAWS,
     FRICTION_LAWS,
     METHODS,
+    PROJECTIONS,
     SERVO_MODES,
     TERRAINS,
     Leg,
@@ -145,6 +146,7 @@ def _put_settings(d: Any, robot: Robot) -> None:
     d.friction.law = 1 + FRICTION_LAWS.index(robot.friction.law)
     d.servo.mode = 1 + SERVO_MODES.index(robot.servo.mode)
     d.solver.method = 1 + METHODS.index(robot.solver.method)
+    d.solver.projection = 1 + PROJECTIONS.index(robot.solver.projection)
     d.terrain.kind = 1 + TERRAINS.index(robot.terrain.kind)
     for section in ("contact", "friction", "servo", "baumgarte", "solver", "terrain"):
         target, source = getattr(d, section), getattr(robot, section)

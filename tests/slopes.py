@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,16 +64,35 @@ def joint_slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Ar
     return by_angle, (torque(0.0, STEP) - torque(0.0, -STEP)) / (2.0 * STEP)
 
 
-def slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of contacts and servos, geometric stiffness left out as W leaves it out."""
-    G, (by_angle, by_speed) = constraints(robot, body).G, joint_slopes(robot, command, body)
-    G_x, G_v = G.T @ np.diag(by_angle) @ G, G.T @ np.diag(by_speed) @ G
+@dataclass(frozen=True)
+class LawSlopes:
+    """Slopes of the laws themselves: of the joints' torques (18,), and of the feet's forces by displacement and velocity there (3, 3)."""
+
+    by_angle: Array
+    by_speed: Array
+    feet: dict[int, tuple[Array, Array]]  # by leg, those in the ground
+
+
+def law_slopes(robot: Robot, command: Command, body: Array) -> LawSlopes:
+    """The slopes at these bodies."""
     damping = standing_damping(robot, body)
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        if foot.penetration > 0.0:
-            rows = slice(6 * 3 * (leg + 1), 6 * 3 * (leg + 1) + 6)
-            wrench = np.vstack([np.eye(3), skew(foot.point - body[3 * (leg + 1), 0:3])])
-            by_x, by_v = foot_slopes(robot, body, leg, float(damping[leg]))
-            G_x[rows, rows] += wrench @ by_x
-            G_v[rows, rows] += wrench @ by_v
+    touching = [leg for leg, foot in enumerate(foot_contacts(robot, body)) if foot.penetration > 0.0]
+    both = {leg: foot_slopes(robot, body, leg, float(damping[leg])) for leg in touching}
+    return LawSlopes(*joint_slopes(robot, command, body), {leg: (by_x[:, :3], by_v[:, :3]) for leg, (by_x, by_v) in both.items()})
+
+
+def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
+    """(114, 114) twice: G_x and G_v of these laws where the bodies are, geometric stiffness left out as W leaves it out."""
+    G, feet = constraints(robot, body).G, foot_contacts(robot, body)
+    G_x, G_v = G.T @ np.diag(law.by_angle) @ G, G.T @ np.diag(law.by_speed) @ G
+    for leg, (by_x, by_v) in law.feet.items():
+        rows = slice(6 * 3 * (leg + 1), 6 * 3 * (leg + 1) + 6)
+        wrench = np.vstack([np.eye(3), skew(feet[leg].point - body[3 * (leg + 1), 0:3])])
+        G_x[rows, rows] += wrench @ by_x @ wrench.T
+        G_v[rows, rows] += wrench @ by_v @ wrench.T
     return G_x, G_v
+
+
+def slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
+    """(114, 114) twice: G_x and G_v of contacts and servos at these bodies."""
+    return assembled(robot, body, law_slopes(robot, command, body))

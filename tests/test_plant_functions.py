@@ -26,11 +26,9 @@ from hexapod_cosim.models.dynamics import joint_kinematics, world_inertias
 from hexapod_cosim.models.kinematics import (
     axis_normals,
     body_states,
-    cross,
     joint_angle,
     joint_models,
     joint_speed,
-    quaternion_product,
     quaternion_rate,
     rotation_matrix,
     skew,
@@ -76,13 +74,9 @@ def test_the_mirrors_of_the_header_have_the_compilers_layout(core: ct.CDLL) -> N
 
 def test_rotation_and_quaternion_functions_are_the_twins(core: ct.CDLL) -> None:
     rng = np.random.default_rng(1)
-    for p, w, dp in zip(rng.normal(size=(50, 4)), rng.normal(size=(50, 3)), rng.normal(size=(50, 4)), strict=True):
-        unit = p / np.linalg.norm(p)
+    for p, w in zip(rng.normal(size=(50, 4)), rng.normal(size=(50, 3)), strict=True):
         assert distance(probed(core.hx_probe_rotation_matrix, p, size=9), rotation_matrix(p).ravel()) < SAME
         assert distance(probed(core.hx_probe_quaternion_rate, p, w, size=4), quaternion_rate(p, w)) < SAME
-        change = probed(core.hx_probe_rotation_of_change, unit, dp, size=3)
-        assert distance(change, 2.0 * quaternion_product(dp, unit * [1.0, -1.0, -1.0, -1.0])[1:]) < SAME
-        assert distance(probed(core.hx_probe_rotation_of_change, unit, quaternion_rate(unit, w), size=3), w) < SAME
 
 
 def test_axis_normals_are_the_twins(core: ct.CDLL) -> None:
@@ -100,9 +94,15 @@ def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) ->
         J, A = (root @ root.T for root in rng.normal(size=(2, 3, 3)))
         X = np.eye(6)
         X[3:6, 0:3] = -skew(c)  # v at c = v + w x c
+        s = -abs(s)  # what is left stays positive definite
         at_c = np.block([[J, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3) + A]])
-        got = probed(core.hx_probe_inertia, mass, J, A, c, s, U, size=36).reshape(6, 6)
-        assert distance(got, X.T @ at_c @ X - s * np.outer(U, U)) < SAME
+        body, less, whole, inverse = probed(core.hx_probe_inertia, mass, J, A, c, s, U, size=144).reshape(4, 6, 6)
+        rigid = np.block([[J, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3)]])
+        expected = X.T @ at_c @ X - s * np.outer(U, U)
+        assert distance(body, X.T @ rigid @ X) < SAME
+        assert distance(less, X.T @ rigid @ X - s * np.outer(U, U)) < SAME
+        assert distance(whole, expected) < SAME
+        assert distance(inverse, np.linalg.inv(expected)) < SAME * np.linalg.cond(expected)
 
 
 # joints, eq. 2-3
@@ -117,22 +117,18 @@ def test_joint_kinematics_are_the_twins_on_drifted_joints(core: ct.CDLL, seed: i
         parent, child = body[model.parent], body[model.child]
         ours = joint_kinematics(model, parent, child)
         J, R_j = inertias[model.child], rotation_matrix(child[3:7])
-        u1, u2 = cross(R_j @ model.a_j, ours.s), cross(R_j @ model.b_j, ours.s)
         expected = np.concatenate(
             [
                 ours.phi,
                 ours.dphi,
-                ours.gamma,
                 ours.s,
-                u1,
-                u2,
                 rotation_matrix(parent[3:7]) @ model.point_i,
                 R_j @ model.point_j,
                 [joint_angle(model, parent, child), joint_speed(model, parent, child)],
                 J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
             ]
         )
-        got = probed(core.hx_probe_joint, plant, inputs(plant.hold()), leg, joint, size=38)
+        got = probed(core.hx_probe_joint, plant, inputs(plant.hold()), leg, joint, size=27)
         assert distance(got, expected) < SAME
         assert float(np.max(np.abs(ours.phi))) > DRIFT / 10.0
 
@@ -156,7 +152,9 @@ def test_bodies_start_on_their_joints_where_the_twin_puts_them(core: ct.CDLL) ->
 
 def test_bodies_come_back_as_they_were_set(core: ct.CDLL) -> None:
     plant, body = drifted(core, load_robot("athena"), 5)
-    assert np.array_equal(plant.bodies, body)
+    assert distance(plant.bodies, body) < SAME
+    others = [0, 1, 2, *range(7, 13)]  # the quaternions are kept in the joints' axes
+    assert np.array_equal(plant.bodies[:, others], body[:, others])
 
 
 # ground and feet, eq. 4-5

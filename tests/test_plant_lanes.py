@@ -82,7 +82,7 @@ def test_smaller_larger_and_absolute_value_are_taken_lane_by_lane(core: ct.CDLL)
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("method", ["ros34pw2", "dp54"])
+@pytest.mark.parametrize("method", ["rosw3", "dp54"])
 def test_the_motion_does_not_depend_on_the_lane_width(core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, method: str) -> None:
     robot = changed(load_robot("phantomx_mk4"), solver={"method": method})
     command, ends = random_command(robot, 5, size=0.3), (0.004, 0.02)

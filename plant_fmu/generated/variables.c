@@ -704,6 +704,7 @@ static const hxVariable parameters[] = {
     {"solver.step", "s", 0.0, 1.0, offsetof(struct hxVariables, definition.solver.step), HX_REAL},
     {"solver.tolerance", "1", 1e-13, 1.0, offsetof(struct hxVariables, definition.solver.tolerance), HX_REAL},
     {"solver.step_max", "s", 1e-09, 1.0, offsetof(struct hxVariables, definition.solver.step_max), HX_REAL},
+    {"solver.projection", "", 1, 2, offsetof(struct hxVariables, definition.solver.projection), HX_INTEGER},
     {"terrain.kind", "", 1, 2, offsetof(struct hxVariables, definition.terrain.kind), HX_INTEGER},
     {"terrain.height", "m", -10000.0, 10000.0, offsetof(struct hxVariables, definition.terrain.height), HX_REAL},
     {"terrain.incline", "rad", -1.5, 1.5, offsetof(struct hxVariables, definition.terrain.incline), HX_REAL},
@@ -773,7 +774,7 @@ const char *const hx_log_category_names[] = {
     "logAll",
 };
 
-const char hx_default_guid[] = "{f3c387cb-2e3c-4c2e-ae97-06bb7e1ab584}";
+const char hx_default_guid[] = "{f20d259f-d166-48c2-9f34-72429959a87c}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -786,10 +787,12 @@ _Static_assert(HX_FRICTION_NONE == 2, "FrictionLaw");
 _Static_assert(HX_SERVO_POSITION == 1, "ServoMode");
 _Static_assert(HX_SERVO_TORQUE == 2, "ServoMode");
 _Static_assert(HX_SERVO_KINEMATIC == 3, "ServoMode");
-_Static_assert(HX_METHOD_ROS34PW2 == 1, "Method");
+_Static_assert(HX_METHOD_ROSW3 == 1, "Method");
 _Static_assert(HX_METHOD_ROS2 == 2, "Method");
 _Static_assert(HX_METHOD_DP54 == 3, "Method");
 _Static_assert(HX_METHOD_BS32 == 4, "Method");
 _Static_assert(HX_METHOD_RK4 == 5, "Method");
+_Static_assert(HX_PROJECTION_NONE == 1, "Projection");
+_Static_assert(HX_PROJECTION_STEP == 2, "Projection");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");
 _Static_assert(HX_TERRAIN_SLOPE == 2, "TerrainKind");

@@ -2,18 +2,14 @@
 
 #include <stddef.h>
 
-#include "kernel_avx2.h"
-#include "kernel_functions.h"
-
-static int anywhere(void) { return 1; }
-
-static const hxKernel baseline = HX_KERNEL_TABLE("baseline", anywhere);
+#include "kernels.h"
 
 const hxKernel *const hx_kernels[] = {
-#if HX_HAS_AVX2_KERNEL
+#if HX_HAS_X86_KERNELS
+    &hx_kernel_avx512,
     &hx_kernel_avx2,
 #endif
-    &baseline,
+    &hx_kernel_baseline,
     NULL,
 };
 

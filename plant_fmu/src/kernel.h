@@ -1,7 +1,7 @@
 /* kernel.h - the physics of one instruction set behind a table of functions
  *
- * The files on lanes are compiled by themselves for the baseline, and once more, included by kernel_avx2.c, with wider lanes. All kernels give
- * the same bits (lanes.h), so a state saved under one goes on under another.
+ * The headers in lanes/ are compiled once for each kernel_*.c, at its width. All kernels give the same bits (lanes/lanes.h), so a state
+ * saved under one goes on under another.
  */
 #ifndef HX_KERNEL_H
 #define HX_KERNEL_H
@@ -17,6 +17,9 @@ typedef struct hxKernel {
 
   /* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
   hxStatus (*integrate)(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message);
+
+  /* dy/dt, with or without the multipliers on the way. */
+  void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate);
 
   void (*output)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output);
 

@@ -1,7 +1,7 @@
-/* kernel_avx2.c - the files on lanes once more, four legs at a time */
-#include "kernel_avx2.h"
+/* kernel_avx2.c - the physics on lanes four legs at a time */
+#include "kernels.h"
 
-#if HX_HAS_AVX2_KERNEL
+#if HX_HAS_X86_KERNELS
 
 /* what follows is compiled for AVX2 without the build knowing, so that an importer's plain compiler call does it too */
 #include <math.h>
@@ -17,16 +17,6 @@
 #endif
 
 #define HX_LANES 4
-#define HX_LOCAL static
-
-#include "actuator.c"
-#include "contact.c"
-#include "dynamics.c"
-#include "friction.c"
-#include "integrator.c"
-#include "kinematics.c"
-#include "output.c"
-#include "terrain.c"
 
 #include "kernel_functions.h"
 

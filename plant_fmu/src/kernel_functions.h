@@ -1,41 +1,45 @@
-/* kernel_functions.h - a kernel's functions from the files on lanes: included once in each kernel's file, after them */
-#include <math.h>
-
-#include "dynamics.h"
-#include "integrator.h"
+/* kernel_functions.h - a kernel's functions from the physics on lanes: included once in each kernel's file, at its width */
 #include "kernel.h"
-#include "output.h"
+#include "lanes/dynamics.h"
+#include "lanes/integrator.h"
+#include "lanes/output.h"
 
 static const double first_step = 1e-4; /* s  tried after a reset */
 
 static void kernel_start(const hxModel *model, double t, hxState *state) {
   static const hxCommand no_command;
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  hxMotion rate;
   hxWork work;
   state->time = t;
   state->next_step = fmin(first_step, model->step_max);
   state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
-  hx_feet(model, &state->motion, delta, ddelta);
-  hx_contact_start(model, delta, &state->contact);
-  hx_dynamics_evaluate(model, &state->contact, &no_command, t, &state->motion, 0, &work, &rate);
-  state->stored_at_start = hx_kinetic_energy(model, &work) + hx_potential_energy(model, &work);
+  const hxFeet feet = feet_of(model, &state->motion);
+  hx_contact_start(model, feet.delta, &state->contact);
+  work.reactions = 0;
+  hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, &work);
+  state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) + hx_potential_energy(model, &state->motion, &work);
+}
+
+static void kernel_derivative(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate) {
+  hxRate all;
+  hxWork work;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, multipliers, &work, &all);
+  *rate = all.motion;
 }
 
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output) {
-  hxMotion rate;
+  hxRate rate;
   hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, 1, &work, &rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
   hx_output_fill(model, state, &work, output);
 }
 
 static void kernel_accelerations(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],
                                  double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
-  hxMotion rate;
+  hxRate rate;
   hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, 1, &work, &rate);
-  hx_accelerations_fill(&work, &rate, acceleration, multiplier, drive_torque);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
+  hx_accelerations_fill(&work, &rate.motion, acceleration, multiplier, drive_torque);
 }
 
 #define HX_KERNEL_TABLE(title, test)                                                                                                       \
@@ -43,5 +47,6 @@ static void kernel_accelerations(const hxModel *model, const hxState *state, con
    .runs_here = test,                                                                                                                      \
    .start = kernel_start,                                                                                                                  \
    .integrate = hx_integrate,                                                                                                              \
+   .derivative = kernel_derivative,                                                                                                        \
    .output = kernel_output,                                                                                                                \
    .accelerations = kernel_accelerations}

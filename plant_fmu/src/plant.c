@@ -50,7 +50,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   memset(&plant->state, 0, sizeof plant->state);
   hx_model_compile(&plant->model, definition);
   hx_initial_bodies(definition, body);
-  hx_motion_from_bodies(&plant->state.motion, body);
+  hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, t, &plant->state);
   plant->message[0] = '\0';
   return HX_OK;
@@ -99,13 +99,15 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   return HX_OK;
 }
 
-void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]) { hx_bodies_from_motion(&plant->state.motion, body); }
+void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]) {
+  hx_bodies_from_motion(&plant->model, &plant->state.motion, body);
+}
 
 hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]) {
   for (int b = 0; b < HX_BODIES; ++b)
     for (int i = 0; i < HX_BODY_STATE; ++i)
       if (!isfinite(body[b][i])) return refuse(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
-  hx_motion_from_bodies(&plant->state.motion, body);
+  hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
   return HX_OK;
 }

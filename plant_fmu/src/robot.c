@@ -1,8 +1,9 @@
 #include "robot.h"
 
 #include <math.h>
+#include <string.h>
 
-#include "contact.h"
+#include "contact_law.h"
 
 static void cross(const double a[3], const double b[3], double out[3]) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -67,26 +68,74 @@ static void zero_turn(const hxDefinition *d, int leg, int joint, double p[4]) {
   p[0] = cos(half), p[1] = 0.0, p[2] = 0.0, p[3] = sin(half);
 }
 
+/* The quaternion of a right-handed frame given by its axes, by the largest of its components (Shepperd). */
+static void quat_from_axes(const double x[3], const double y[3], const double z[3], double p[4]) {
+  const double squares[4] = {1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2], 1.0 - x[0] - y[1] + z[2]};
+  int largest = 0;
+  for (int i = 1; i < 4; ++i)
+    if (squares[i] > squares[largest]) largest = i;
+  const double columns[4][4] = {{squares[0], y[2] - z[1], z[0] - x[2], x[1] - y[0]},
+                                {y[2] - z[1], squares[1], y[0] + x[1], x[2] + z[0]},
+                                {z[0] - x[2], y[0] + x[1], squares[2], z[1] + y[2]},
+                                {x[1] - y[0], x[2] + z[0], z[1] + y[2], squares[3]}};
+  normalise(columns[largest], 4, p);
+}
+
+/* The turn from a link's axes to its joint's (x = a, y = b, z = axis); none for the torso. */
+static void joint_frame(const hxDefinition *d, int leg, int joint, double p[4]) {
+  double s[3], a[3], b[3];
+  p[0] = 1.0, p[1] = p[2] = p[3] = 0.0;
+  if (joint < 0) return;
+  normalise(d->leg[leg].link[joint].axis, 3, s);
+  hx_axis_normals(s, a, b);
+  quat_from_axes(a, b, s, p);
+}
+
+static void conjugate(const double p[4], double out[4]) {
+  out[0] = p[0];
+  for (int i = 1; i < 4; ++i) out[i] = -p[i];
+}
+
+/* xx yy zz xy xz yz of R(p)^T S R(p) */
+static void inertia_in_frame(const double S[6], const double p[4], double out[6]) {
+  static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
+  double axis[3][3], moved[3][3];
+  for (int i = 0; i < 3; ++i) {
+    const double unit[3] = {i == 0, i == 1, i == 2};
+    rotate(p, unit, axis[i]);
+    const double *a = axis[i];
+    moved[i][0] = S[0] * a[0] + S[3] * a[1] + S[4] * a[2];
+    moved[i][1] = S[3] * a[0] + S[1] * a[1] + S[5] * a[2];
+    moved[i][2] = S[4] * a[0] + S[5] * a[1] + S[2] * a[2];
+  }
+  for (int k = 0; k < 6; ++k) {
+    const double *a = axis[row[k]], *m = moved[column[k]];
+    out[k] = a[0] * m[0] + a[1] * m[1] + a[2] * m[2];
+  }
+}
+
 static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int joint, int slot) {
   const hxLink *link = &d->leg[leg].link[joint];
-  double s_j[3], s_i[3], a[3], b[3], sP_i[3], p[4];
+  double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], s[3], s_i[3], sP[3], sP_i[3], sP_j[3], inertia[6];
+  joint_frame(d, leg, joint - 1, frame_i);
+  joint_frame(d, leg, joint, frame_j);
+  conjugate(frame_i, to_i);
+  conjugate(frame_j, to_j);
+  zero_turn(d, leg, joint, turn);
+  quat_mul(to_i, turn, from);
+  quat_mul(from, frame_j, zero);
   normalise(link->axis, 3, s_j);
-  hx_axis_normals(s_j, a, b);
-  zero_turn(d, leg, joint, p);
-  rotate(p, s_j, s_i);
-  joint_on_parent(d, leg, joint, sP_i);
+  rotate(turn, s_j, s);
+  rotate(to_i, s, s_i);
+  joint_on_parent(d, leg, joint, sP);
+  rotate(to_i, sP, sP_i);
+  for (int i = 0; i < 3; ++i) sP[i] = -link->com[i];
+  rotate(to_j, sP, sP_j);
+  inertia_in_frame(link->inertia, frame_j, inertia);
   m->mass[slot] = link->mass;
-  for (int i = 0; i < 6; ++i) m->inertia[i][slot] = link->inertia[i];
-  for (int i = 0; i < 3; ++i) {
-    m->s_i[i][slot] = s_i[i];
-    m->s_j[i][slot] = s_j[i];
-    m->a_j[i][slot] = a[i];
-    m->b_j[i][slot] = b[i];
-    m->sP_i[i][slot] = sP_i[i];
-    m->sP_j[i][slot] = -link->com[i];
-  }
-  m->zero[0][slot] = p[0];
-  m->zero[1][slot] = p[3];
+  for (int i = 0; i < 6; ++i) m->inertia[i][slot] = inertia[i];
+  for (int i = 0; i < 3; ++i) m->s_i[i][slot] = s_i[i], m->sP_i[i][slot] = sP_i[i], m->sP_j[i][slot] = sP_j[i];
+  for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
 }
 
 static void compile_ground(hxModel *model, const hxDefinition *d) {
@@ -113,7 +162,7 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->rotor_inertia = d->servo.rotor_inertia, model->coulomb_friction = d->servo.coulomb_friction;
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
-  model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max;
+  model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max, model->projection = d->solver.projection;
 }
 
 void hx_model_compile(hxModel *model, const hxDefinition *d) {
@@ -123,9 +172,13 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
     const int leg = slot < HX_LEGS ? slot : 0;
     for (int joint = 0; joint < HX_JOINTS; ++joint) compile_joint(&model->joint[joint], d, leg, joint, slot);
     const hxLink *tibia = &d->leg[leg].link[HX_JOINTS - 1];
-    double tip[3];
+    double tip[3], frame[4], to_joint[4], foot[3];
     link_tip(tibia, tip);
-    for (int i = 0; i < 3; ++i) model->foot_centre[i][slot] = tip[i] - tibia->com[i];
+    for (int i = 0; i < 3; ++i) tip[i] -= tibia->com[i];
+    joint_frame(d, leg, HX_JOINTS - 1, frame);
+    conjugate(frame, to_joint);
+    rotate(to_joint, tip, foot);
+    for (int i = 0; i < 3; ++i) model->foot_centre[i][slot] = foot[i];
   }
   compile_ground(model, d);
   compile_settings(model, d);
@@ -173,22 +226,38 @@ void hx_initial_bodies(const hxDefinition *d, double body[HX_BODIES][HX_BODY_STA
   }
 }
 
-void hx_motion_from_bodies(hxMotion *motion, const double body[HX_BODIES][HX_BODY_STATE]) {
-  for (int i = 0; i < HX_BODY_STATE; ++i) {
-    motion->torso[i] = body[0][i];
-    for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      for (int leg = 0; leg < HX_LEGS; ++leg) motion->link[joint][i][leg] = body[1 + HX_JOINTS * leg + joint][i];
-      hx_fill_slots(motion->link[joint][i]);
+/* The frame of the joint that a link hangs on. */
+static void frame_of(const hxModel *model, int leg, int joint, double p[4]) {
+  for (int i = 0; i < 4; ++i) p[i] = model->joint[joint].frame[i][leg];
+}
+
+void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE], hxMotion *motion) {
+  memcpy(motion->torso, body[0], sizeof motion->torso);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    double (*to)[HX_SLOTS] = motion->link[joint];
+    for (int leg = 0; leg < HX_LEGS; ++leg) {
+      const double *from = body[1 + HX_JOINTS * leg + joint];
+      double frame[4], p[4];
+      frame_of(model, leg, joint, frame);
+      quat_mul(from + HX_P, frame, p);
+      for (int i = 0; i < HX_BODY_STATE; ++i) to[i][leg] = from[i];
+      for (int i = 0; i < 4; ++i) to[HX_P + i][leg] = p[i];
     }
+    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(to[i]);
   }
 }
 
-void hx_bodies_from_motion(const hxMotion *motion, double body[HX_BODIES][HX_BODY_STATE]) {
-  for (int i = 0; i < HX_BODY_STATE; ++i) {
-    body[0][i] = motion->torso[i];
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      for (int leg = 0; leg < HX_LEGS; ++leg) body[1 + HX_JOINTS * leg + joint][i] = motion->link[joint][i][leg];
-  }
+void hx_bodies_from_motion(const hxModel *model, const hxMotion *motion, double body[HX_BODIES][HX_BODY_STATE]) {
+  memcpy(body[0], motion->torso, sizeof motion->torso);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int leg = 0; leg < HX_LEGS; ++leg) {
+      double *to = body[1 + HX_JOINTS * leg + joint], frame[4], back[4], p[4];
+      for (int i = 0; i < HX_BODY_STATE; ++i) to[i] = motion->link[joint][i][leg];
+      frame_of(model, leg, joint, frame);
+      conjugate(frame, back);
+      quat_mul(to + HX_P, back, p);
+      memcpy(to + HX_P, p, sizeof p);
+    }
 }
 
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time) {

@@ -6,10 +6,9 @@
 #define HX_STATE_H
 
 #include "hexapod/hexapod.h"
-#include "lanes.h"
 
 enum {
-  HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES, /* a pack is HX_LANES legs */
+  HX_SLOTS = 8, /* legs in memory, padded: slots past the last leg mirror leg 0 */
   HX_TORSO_SIZE = 16,
   HX_MOTION_SIZE = HX_TORSO_SIZE + HX_JOINTS * HX_BODY_STATE * HX_SLOTS
 };
@@ -27,17 +26,16 @@ typedef union hxMotion {
   };
 } hxMotion;
 
-/* A joint and the link it moves; i = parent, j = child (equations.md: s, s^P, a, b). */
+/* A joint and the link it moves; i = parent, j = child (equations.md: s, s^P, a, b). The child's axes here and in its motion are the
+ * joint's: x = a, y = b, z = s, so that its rotation matrix holds what the constraint needs. */
 typedef struct hxJointModel {
   double mass[HX_SLOTS];
   double inertia[6][HX_SLOTS];  /* child's axes */
   double s_i[3][HX_SLOTS];      /* joint axis, parent's axes */
-  double s_j[3][HX_SLOTS];      /* joint axis, child's axes */
-  double a_j[3][HX_SLOTS];      /* normals to it, child's axes */
-  double b_j[3][HX_SLOTS];
   double sP_i[3][HX_SLOTS];     /* parent's centre of mass to the joint, parent's axes */
   double sP_j[3][HX_SLOTS];     /* child's centre of mass to the joint, child's axes */
-  double zero[2][HX_SLOTS];     /* w, z of the turn about z from the parent's to the child's axes at angle 0 */
+  double zero[4][HX_SLOTS];     /* the turn from the parent's to the child's axes at angle 0 */
+  double frame[4][HX_SLOTS];    /* the turn from the link's axes, those of hexapod.h, to the child's axes here */
 } hxJointModel;
 
 typedef struct hxModel {
@@ -48,7 +46,7 @@ typedef struct hxModel {
   double foot_radius;
   double gravity[3];
   double alpha, beta;               /* Baumgarte */
-  int contact_law, friction_law, terrain_kind, servo_mode, method;
+  int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
   double stiffness, damping_scale, impact_speed_floor; /* eq. 4; what damping_scale means is the law's business */
   double mu, slope;                 /* eq. 5 */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;

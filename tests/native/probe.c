@@ -5,15 +5,11 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "contact.h"
-#include "dynamics.h"
-#include "friction.h"
+#include "contact_law.h"
 #include "hexapod/hexapod.h"
-#include "kinematics.h"
+#include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
-#include "spatial.h"
-#include "terrain.h"
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wmissing-prototypes" /* called from Python only: there is no header */
@@ -72,6 +68,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, solver.step),
     FIELD(hxDefinition, solver.tolerance),
     FIELD(hxDefinition, solver.step_max),
+    FIELD(hxDefinition, solver.projection),
     FIELD(hxDefinition, terrain.kind),
     FIELD(hxDefinition, terrain.height),
     FIELD(hxDefinition, terrain.incline),
@@ -163,7 +160,10 @@ HX_API void hx_probe_select(const double *a, const double *b, double out[3][HX_S
 
 HX_API void hx_probe_rotation_matrix(const double p[4], double R[3][3]) {
   const hxMat3 M = hx_rotation_matrix(quat(p));
-  put3(M.x, 0, R[0]), put3(M.y, 0, R[1]), put3(M.z, 0, R[2]);
+  double column[3][3];
+  put3(M.x, 0, column[0]), put3(M.y, 0, column[1]), put3(M.z, 0, column[2]);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) R[i][j] = column[j][i];
 }
 
 HX_API void hx_probe_quaternion_rate(const double p[4], const double w[3], double out[4]) {
@@ -171,37 +171,42 @@ HX_API void hx_probe_quaternion_rate(const double p[4], const double w[3], doubl
   out[0] = hx_lane(d.w, 0), out[1] = hx_lane(d.x, 0), out[2] = hx_lane(d.y, 0), out[3] = hx_lane(d.z, 0);
 }
 
-HX_API void hx_probe_rotation_of_change(const double p[4], const double dp[4], double out[3]) {
-  put3(hx_rotation_of_change(quat(p), quat(dp)), 0, out);
-}
-
 HX_API void hx_probe_axis_normals(const double axis[3], double a[3], double b[3]) { hx_axis_normals(axis, a, b); }
-
-static void put_inertia(const hxInertia6 *inertia, double out[6][6]) {
-  for (int j = 0; j < 6; ++j) {
-    const hxVec3 o = hx_zero3();
-    hxMotion6 unit = {o, o};
-    hxReal *component[6] = {&unit.ang.x, &unit.ang.y, &unit.ang.z, &unit.lin.x, &unit.lin.y, &unit.lin.z};
-    *component[j] = hx_splat(1.0);
-    const hxForce6 f = hx_inertia_mul(inertia, unit);
-    double column_j[6];
-    put3(f.ang, 0, column_j), put3(f.lin, 0, column_j + 3);
-    for (int i = 0; i < 6; ++i) out[i][j] = column_j[i];
-  }
-}
 
 static hxSym3 take_sym3(const double S[3][3]) {
   return (hxSym3){hx_splat(S[0][0]), hx_splat(S[1][1]), hx_splat(S[2][2]), hx_splat(S[0][1]), hx_splat(S[0][2]), hx_splat(S[1][2])};
 }
 
-/* (the inertia of a body with mass, J at c, and of a block A at c, as seen from the origin) - s U U^T; angular part first */
+static hxMotion6 unit_motion(int j) {
+  double x[6] = {0.0};
+  x[j] = 1.0;
+  return (hxMotion6){hx_splat_vec3(x), hx_splat_vec3(x + 3)};
+}
+
+static void put_column(hxForce6 f, int j, double out[6][6]) {
+  double column[6];
+  put3(f.ang, 0, column), put3(f.lin, 0, column + 3);
+  for (int i = 0; i < 6; ++i) out[i][j] = column[i];
+}
+
+/* as 6 x 6, angular part first, from the origin: a body with mass and J at c; that less s U U^T, by both ways; a block A at c and the body less
+ * s U U^T; the inverse of the last, column by column */
 HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3][3], const double c[3], double s, const double U[6],
-                             double out[6][6]) {
-  hxInertia6 inertia = hx_rigid_inertia(hx_splat(mass), take_sym3(J), hx_splat_vec3(c));
-  const hxInertia6 block = hx_inertia_at(take_sym3(A), hx_splat_vec3(c));
-  hx_inertia_add(&inertia, &block);
-  hx_inertia_downdate(&inertia, hx_splat(s), (hxForce6){hx_splat_vec3(U), hx_splat_vec3(U + 3)});
-  put_inertia(&inertia, out);
+                             double out[4][6][6]) {
+  const hxRigid6 body = hx_rigid_inertia(hx_splat(mass), take_sym3(J), hx_splat_vec3(c));
+  const hxForce6 force = {hx_splat_vec3(U), hx_splat_vec3(U + 3)};
+  const hxInertia6 lessened = hx_rigid_downdate(&body, hx_splat(s), force);
+  hxInertia6 whole = hx_inertia_at(take_sym3(A), hx_splat_vec3(c));
+  hx_inertia_add_rigid(&whole, &body);
+  hx_inertia_downdate(&whole, hx_splat(s), force);
+  for (int j = 0; j < 6; ++j) {
+    const hxMotion6 unit = unit_motion(j);
+    put_column(hx_rigid_mul(&body, unit), j, out[0]);
+    put_column(hx_inertia_mul(&lessened, unit), j, out[1]);
+    put_column(hx_inertia_mul(&whole, unit), j, out[2]);
+    const hxMotion6 a = hx_inertia_solve(&whole, (hxForce6){unit.ang, unit.lin});
+    put_column((hxForce6){a.ang, a.lin}, j, out[3]);
+  }
 }
 
 /* ---- laws -------------------------------------------------------------------------------------------------------------------- */
@@ -218,9 +223,7 @@ HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double da
   out[0] = hx_lane(f.force, 0), out[1] = hx_lane(f.elastic, 0), out[2] = hx_lane(f.stiffness, 0), out[3] = hx_lane(f.viscosity, 0);
 }
 
-HX_API double hx_probe_friction(const hxPlant *plant, double speed) {
-  return hx_lane(hx_friction(plant->model.friction_law)->per_speed(&plant->model, hx_splat(speed)), 0);
-}
+HX_API double hx_probe_friction(const hxPlant *plant, double speed) { return hx_lane(hx_friction(&plant->model, hx_splat(speed)), 0); }
 
 /* command: angle, speed, torque; out: torque, friction, stiffness, damping */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed, const double command[3], double out[4]) {
@@ -232,7 +235,7 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed, con
 
 /* out: distance, normal */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
-  const hxGround ground = hx_terrain(plant->model.terrain_kind)->ground(&plant->model, hx_splat_vec3(point));
+  const hxGround ground = hx_ground(&plant->model, hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
 }
@@ -252,72 +255,87 @@ HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS], 
 
 /* ---- the plant as it is now ---------------------------------------------------------------------------------------------------- */
 
-static void evaluate(hxPlant *plant, const hxInput *input, double age, hxWork *work, hxMotion *rate) {
+static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplicit *implicit, hxWork *work, hxRate *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time - age);
-  hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time, &plant->state.motion, 1, work, rate);
+  hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time, &plant->state.motion, implicit, 1, work, rate);
 }
 
-/* out: Phi 5, dPhi 5, gamma 5, s, u1, u2, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz */
-HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int joint, double out[38]) {
+/* out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz */
+HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int joint, double out[27]) {
   hxWork work;
-  hxMotion rate;
-  evaluate(plant, input, 0.0, &work, &rate);
+  hxRate rate;
+  evaluate(plant, input, 0.0, NULL, &work, &rate);
   const int lane = leg % HX_LANES;
   const hxJointWork *w = &work.pack[leg / HX_LANES].joint[joint];
-  const hxJointKinematics *k = &w->kin;
-  put3(k->phi_lin, lane, out), put3(k->dphi_lin, lane, out + 5), put3(k->gamma_lin, lane, out + 10);
-  for (int i = 0; i < 2; ++i) {
-    out[3 + i] = hx_lane(k->phi[i], lane);
-    out[8 + i] = hx_lane(k->dphi[i], lane);
-    out[13 + i] = hx_lane(k->gamma[i], lane);
-  }
-  put3(k->s, lane, out + 15), put3(k->u1, lane, out + 18), put3(k->u2, lane, out + 21);
-  put3(k->sP_i, lane, out + 24), put3(k->sP_j, lane, out + 27);
-  out[30] = hx_lane(k->angle, lane), out[31] = hx_lane(k->speed, lane);
+  const hxJointKinematics *k = &w->reaction.kin;
+  const hxConstraint constraint = hx_joint_constraint(&plant->model, &plant->state.motion, joint, leg - lane);
+  put3(constraint.phi_lin, lane, out), put3(constraint.dphi_lin, lane, out + 5);
+  for (int i = 0; i < 2; ++i) out[3 + i] = hx_lane(constraint.phi[i], lane), out[8 + i] = hx_lane(constraint.dphi[i], lane);
+  put3(k->s, lane, out + 10), put3(k->sP_i, lane, out + 13), put3(k->sP_j, lane, out + 16);
+  out[19] = hx_lane(w->angle, lane), out[20] = hx_lane(w->speed, lane);
   const hxReal J[6] = {w->J.xx, w->J.yy, w->J.zz, w->J.xy, w->J.xz, w->J.yz};
-  for (int i = 0; i < 6; ++i) out[32 + i] = hx_lane(J[i], lane);
+  for (int i = 0; i < 6; ++i) out[21 + i] = hx_lane(J[i], lane);
 }
 
-/* out: point, velocity, normal, penetration, approach speed, force on the foot, stiffness, viscosity, drag; the last three as a step
- * of length `ahead` takes them */
+/* out: point, velocity, normal, penetration, approach speed, force on the foot, its slopes stiffness, viscosity, drag as a step of length `ahead`
+ * takes them */
 HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double ahead, double out[17]) {
   hxWork work;
-  hxMotion rate;
-  evaluate(plant, input, 0.0, &work, &rate);
-  const int lane = leg % HX_LANES;
-  hx_foot_ahead(&plant->model, &plant->state.contact, ahead, &work);
-  const hxFootWork *foot = &work.pack[leg / HX_LANES].foot;
-  put3(foot->kin.point, lane, out), put3(foot->kin.velocity, lane, out + 3), put3(foot->kin.normal, lane, out + 6);
+  hxRate rate;
+  hxImplicit implicit = {.z = 1e-3, .ahead = ahead};
+  evaluate(plant, input, 0.0, &implicit, &work, &rate);
+  const int lane = leg % HX_LANES, pack = leg / HX_LANES;
+  const hxFootWork *foot = &work.pack[pack].foot;
+  const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
+  put3(hx_add(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3), put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
-  out[14] = hx_lane(foot->normal.stiffness, lane), out[15] = hx_lane(foot->normal.viscosity, lane), out[16] = hx_lane(foot->drag, lane);
+  out[14] = hx_lane(implicit.slope[pack].stiffness, lane), out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
+  out[16] = hx_lane(implicit.slope[pack].drag, lane);
 }
 
 /* dy/dt under a command given `age` seconds ago: bodies, and the powers of motors, push and everything that dissipates */
 HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age, double body[HX_BODIES][HX_BODY_STATE], double power[3]) {
   hxWork work;
-  hxMotion rate;
-  evaluate(plant, input, age, &work, &rate);
-  hx_bodies_from_motion(&rate, body);
-  power[0] = rate.actuator_work, power[1] = rate.push_work, power[2] = rate.dissipated;
+  hxRate rate;
+  evaluate(plant, input, age, NULL, &work, &rate);
+  hx_bodies_from_motion(&plant->model, &rate.motion, body);
+  power[0] = rate.motion.actuator_work, power[1] = rate.motion.push_work, power[2] = rate.motion.dissipated;
 }
 
-/* u of W u + D^T mu = G_v dv + G_x dx, D u = 0, for h gamma = z; rows of u: linear, angular */
-HX_API void hx_probe_implicit(hxPlant *plant, const hxInput *input, double z, const double dx[HX_BODIES][HX_BODY_STATE],
-                              const double dv[HX_BODIES][HX_BODY_STATE], double u[HX_BODIES][6]) {
+/* a change from (v, w) of s_x and of s_v: rows of the bodies */
+static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6], hxRate *change) {
+  memset(change, 0, sizeof *change);
+  for (int i = 0; i < 3; ++i) {
+    change->motion.torso[HX_R + i] = s_x[0][i], change->torso_turn[i] = s_x[0][3 + i];
+    change->motion.torso[HX_V + i] = s_v[0][i], change->motion.torso[HX_W + i] = s_v[0][3 + i];
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      for (int slot = 0; slot < HX_SLOTS; ++slot) {
+        const int body = 1 + HX_JOINTS * (slot < HX_LEGS ? slot : 0) + joint;
+        double (*link)[HX_SLOTS] = change->motion.link[joint];
+        link[HX_R + i][slot] = s_x[body][i], change->link_turn[joint][i][slot] = s_x[body][3 + i];
+        link[HX_V + i][slot] = s_v[body][i], link[HX_W + i][slot] = s_v[body][3 + i];
+      }
+  }
+}
+
+/* k/h of a stage (eq. 15) with h gamma = z after changes s_x, s_v (linear, angular rows): the bodies' rates and the angular velocities theirs
+ * stand for. The slopes are this point's, `ahead` of it. */
+HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead, const double s_x[HX_BODIES][6],
+                           const double s_v[HX_BODIES][6], double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {
   hxWork work;
-  hxMotion rate, motion[3];
-  hxImplicit implicit;
-  double body[HX_BODIES][HX_BODY_STATE];
-  memset(motion, 0, sizeof motion);
-  evaluate(plant, input, 0.0, &work, &rate);
-  hx_motion_from_bodies(&motion[0], dx);
-  hx_motion_from_bodies(&motion[1], dv);
-  hx_implicit_factorise(&plant->model, &work, z, &implicit);
-  hx_implicit_solve(&implicit, &motion[0], &motion[1], &motion[2]);
-  hx_bodies_from_motion(&motion[2], body);
-  for (int b = 0; b < HX_BODIES; ++b) memcpy(u[b], &body[b][HX_V], 6 * sizeof(double));
+  hxRate rate, change;
+  hxImplicit implicit = {.z = z, .ahead = ahead};
+  evaluate(plant, input, 0.0, &implicit, &work, &rate);
+  put_change(s_x, s_v, &change);
+  implicit.change = &change;
+  evaluate(plant, input, 0.0, &implicit, &work, &rate);
+  hx_bodies_from_motion(&plant->model, &rate.motion, body);
+  for (int i = 0; i < 3; ++i) {
+    turn[0][i] = rate.torso_turn[i];
+    for (int b = 1; b < HX_BODIES; ++b) turn[b][i] = rate.link_turn[(b - 1) % HX_JOINTS][i][(b - 1) / HX_JOINTS];
+  }
 }
 
 /* shape: stages, order, error order; the rest as in hxMethodRow */

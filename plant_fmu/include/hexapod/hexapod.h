@@ -59,8 +59,13 @@ typedef enum hxTerrainKind { HX_TERRAIN_FLAT = 1, HX_TERRAIN_SLOPE } hxTerrainKi
 
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
+typedef enum hxProjection {
+  HX_PROJECTION_NONE = 1,  /* the joints drift, held by the Baumgarte terms */
+  HX_PROJECTION_STEP       /* positions and velocities are put back on the joints after every step */
+} hxProjection;
+
 typedef enum hxMethod {
-  HX_METHOD_ROS34PW2 = 1,  /* linearly implicit W-method, order 3(2) */
+  HX_METHOD_ROSW3 = 1,     /* linearly implicit W-method, order 3(2) */
   HX_METHOD_ROS2,          /* linearly implicit W-method, order 2(1) */
   HX_METHOD_DP54,          /* explicit Dormand-Prince, order 5(4) */
   HX_METHOD_BS32,          /* explicit Bogacki-Shampine, order 3(2) */
@@ -123,6 +128,7 @@ typedef struct hxDefinition {
     double step;       /* s   > 0: fixed step; 0: error control */
     double tolerance;  /* 1   of the error control */
     double step_max;   /* s   of the error control */
+    int projection;    /* hxProjection */
   } solver;
   struct {
     int kind;        /* hxTerrainKind */

@@ -1,8 +1,8 @@
-#include "contact.h"
+#include "contact_law.h"
 
 #include <math.h>
 
-HX_LOCAL double hx_exact_restitution_chi(double e) {
+double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
   /* g(chi) = ln(1 + chi) - ln(1 - chi e) - chi (1 + e) falls from 0, then rises to infinity at 1/e: one root in between */
   double low = 0.0, high = 1.0 / e;
@@ -46,23 +46,8 @@ static const hxContactRow contact_rows[] = {
     [HX_CONTACT_HERTZ] = {hertz, whatever_the_speed},
 };
 
-HX_LOCAL const hxContactRow *hx_contact(int law) {
+const hxContactRow *hx_contact(int law) {
   return law >= 1 && law < (int)(sizeof contact_rows / sizeof contact_rows[0]) ? &contact_rows[law] : NULL;
-}
-
-HX_LOCAL hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta) {
-  const hxReal zero = hx_splat(0.0);
-  const hxReal depth = closed * hx_max(delta, zero);
-  const hxReal root = hx_sqrt(depth);
-  const hxReal elastic = model->stiffness * depth * root;
-  const hxReal factor = 1.0 + damping * ddelta;
-  const hxMask pushes = hx_less(zero, factor);
-  return (hxNormalForce){
-      .force = elastic * hx_max(factor, zero),
-      .elastic = elastic,
-      .stiffness = hx_select(pushes, closed * (1.5 * model->stiffness) * root * factor, zero),
-      .viscosity = hx_select(pushes, elastic * damping, zero),
-  };
 }
 
 static void close_foot(const hxModel *model, hxContactState *contact, int leg, double impact_speed) {
@@ -82,7 +67,7 @@ static void fill_contact_slots(hxContactState *contact) {
   hx_fill_slots(contact->impact_speed);
 }
 
-HX_LOCAL void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
+void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     open_foot(contact, leg);
     contact->impact_speed[leg] = 0.0;
@@ -91,7 +76,7 @@ HX_LOCAL void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS
   fill_contact_slots(contact);
 }
 
-HX_LOCAL int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact) {
+int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact) {
   int touchdowns = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (contact->closed[leg] == 0.0 && delta[leg] > 0.0) {

@@ -2,6 +2,7 @@
  *
  * All arithmetic on legs goes through this type, with the operators of C. The width follows the instruction set; each lane's
  * result does not depend on it, because every operation here is exact IEEE arithmetic lane by lane (no contraction, no libm).
+ * The headers in this folder are the physics on lanes: each kernel_*.c includes them once, at its own width.
  */
 #ifndef HX_LANES_H
 #define HX_LANES_H
@@ -9,6 +10,8 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#include "../state.h"
 
 #ifndef HX_LANES
 #if !defined(__GNUC__)
@@ -22,12 +25,7 @@
 #endif
 #endif
 
-/* Linkage of the functions on lanes: ordinary in files compiled by themselves, static where a kernel includes them (kernel_avx2.c). */
-#ifndef HX_LOCAL
-#define HX_LOCAL
-#endif
-
-enum { HX_SLOTS = 8 }; /* legs in memory, padded: slots past the last leg mirror leg 0 */
+enum { HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES }; /* a pack is HX_LANES legs */
 
 #if HX_LANES == 1
 typedef double hxReal;
@@ -35,6 +33,13 @@ typedef int64_t hxMask;
 #else
 typedef double hxReal __attribute__((vector_size(8 * HX_LANES)));
 typedef int64_t hxMask __attribute__((vector_size(8 * HX_LANES)));
+#endif
+
+/* lanes of one pack in another order */
+#if defined(__clang__) || __GNUC__ >= 12
+#define HX_SHUFFLE(x, ...) __builtin_shufflevector(x, x, __VA_ARGS__)
+#else
+#define HX_SHUFFLE(x, ...) __builtin_shuffle(x, (hxMask){__VA_ARGS__})
 #endif
 
 static inline hxReal hx_load(const double *slots) {
@@ -82,7 +87,28 @@ static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return hx_from
 static inline hxReal hx_min(hxReal a, hxReal b) { return hx_select(hx_less(b, a), b, a); }
 static inline hxReal hx_max(hxReal a, hxReal b) { return hx_select(hx_less(a, b), b, a); }
 static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) { return hx_min(hx_max(x, low), high); }
-static inline hxReal hx_abs(hxReal x) { return hx_max(x, -x); }
+static inline hxReal hx_abs(hxReal x) { return hx_from_bits(hx_bits(x) & INT64_MAX); }
+
+/* The sum over the legs, in every lane, in one order whatever the width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */
+#if HX_LANES == 2
+static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
+  const hxReal x = (pack[0] + pack[2]) + pack[1];
+  return x + HX_SHUFFLE(x, 1, 0);
+}
+#elif HX_LANES == 4
+static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
+  const hxMask legs = {-1, -1, 0, 0};
+  const hxReal x = pack[0] + hx_from_bits(hx_bits(pack[1]) & legs);
+  const hxReal halves = x + HX_SHUFFLE(x, 2, 3, 0, 1);
+  return halves + HX_SHUFFLE(halves, 1, 0, 3, 2);
+}
+#else
+static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
+  double x[HX_SLOTS];
+  for (int p = 0; p < HX_PACKS; ++p) hx_store(&x[p * HX_LANES], pack[p]);
+  return hx_splat(((x[0] + x[4]) + x[2]) + ((x[1] + x[5]) + x[3]));
+}
+#endif
 
 /* e^x - 1 for |x| <= 40: x = k ln 2 + r, Taylor to r^13 (remainder 4e-18), then 2^k (e^r - 1) + (2^k - 1) */
 static inline hxReal hx_expm1(hxReal x) {
@@ -108,18 +134,25 @@ static inline hxReal hx_tanh(hxReal x) {
   return e / (e + 2.0);
 }
 
+/* tanh(x) / x for x > 0 */
+static inline hxReal hx_tanh_ratio(hxReal x) {
+  const hxReal e = hx_expm1(2.0 * hx_min(x, hx_splat(20.0)));
+  return e / ((e + 2.0) * x);
+}
+
 /* The angle 2 atan(y / x) of a half-angle's sine y and cosine x, up to a common factor; in (-pi, pi].
- * Each tan(half) = y / (x + |(x, y)|); three halvings leave |t| <= tan(pi/16), where the odd series to t^23 is exact to 1e-17. */
+ * Each tan(half) = y / (x + |(x, y)|); two halvings leave |t| <= tan(pi/8), where the minimax polynomial is exact to 1.3e-18. */
 static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   const hxMask back = hx_less(x, hx_splat(0.0));
   const hxReal y2 = y * y;
   hxReal cosine = hx_abs(x);
-  for (int halving = 0; halving < 3; ++halving) cosine = cosine + hx_sqrt(cosine * cosine + y2);
+  for (int halving = 0; halving < 2; ++halving) cosine = cosine + hx_sqrt(cosine * cosine + y2);
   const hxReal t = hx_select(back, -y, y) / cosine;
-  const hxReal z = t * t;
-  hxReal series = hx_splat(-1.0 / 23);
-  for (int n = 21; n > 1; n -= 2) series = ((n / 2) % 2 ? -1.0 : 1.0) / n + z * series;
-  return 16.0 * (t + t * z * series);
+  const hxReal z = t * t, z2 = z * z, z4 = z2 * z2;
+  const hxReal low = (-0.3333333333333313 + z * 0.19999999999942733) + z2 * (-0.14285714279416978 + z * 0.11111110752667197);
+  const hxReal mid = (-0.09090897019166005 + z * 0.07692048884053129) + z2 * (-0.06662990413300302 + z * 0.05847147723724963);
+  const hxReal high = (-0.05036270404445784 + z * 0.037993873512197886) - z2 * 0.017835677876676313;
+  return 8.0 * (t + t * z * (low + z4 * (mid + z4 * high)));
 }
 
 #endif

@@ -12,7 +12,7 @@ typedef struct {
 } hxQuat;
 typedef struct {
   hxVec3 x, y, z;
-} hxMat3; /* rows */
+} hxMat3; /* columns */
 typedef struct {
   hxReal xx, yy, zz, xy, xz, yz;
 } hxSym3;
@@ -28,12 +28,25 @@ static inline void hx_store_vec3(double (*m)[HX_SLOTS], int slot, hxVec3 a) {
   hx_store(&m[2][slot], a.z);
 }
 
-static inline hxVec3 hx_splat_vec3(const double a[3]) { return (hxVec3){hx_splat(a[0]), hx_splat(a[1]), hx_splat(a[2])}; }
+static inline hxQuat hx_load_quat(const double (*m)[HX_SLOTS], int slot) {
+  return (hxQuat){hx_load(&m[0][slot]), hx_load(&m[1][slot]), hx_load(&m[2][slot]), hx_load(&m[3][slot])};
+}
+
+static inline void hx_store_quat(double (*m)[HX_SLOTS], int slot, hxQuat p) {
+  hx_store(&m[0][slot], p.w);
+  hx_store(&m[1][slot], p.x);
+  hx_store(&m[2][slot], p.y);
+  hx_store(&m[3][slot], p.z);
+}
 
 static inline hxSym3 hx_load_sym3(const double (*m)[HX_SLOTS], int slot) {
   return (hxSym3){hx_load(&m[0][slot]), hx_load(&m[1][slot]), hx_load(&m[2][slot]),
                   hx_load(&m[3][slot]), hx_load(&m[4][slot]), hx_load(&m[5][slot])};
 }
+
+/* the same in all lanes */
+static inline hxVec3 hx_splat_vec3(const double a[3]) { return (hxVec3){hx_splat(a[0]), hx_splat(a[1]), hx_splat(a[2])}; }
+static inline hxQuat hx_splat_quat(const double p[4]) { return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])}; }
 
 static inline hxVec3 hx_zero3(void) { return (hxVec3){hx_splat(0.0), hx_splat(0.0), hx_splat(0.0)}; }
 static inline hxVec3 hx_add(hxVec3 a, hxVec3 b) { return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -47,13 +60,13 @@ static inline hxVec3 hx_add_scaled(hxVec3 a, hxReal s, hxVec3 b) { return (hxVec
 
 static inline hxVec3 hx_cross(hxVec3 a, hxVec3 b) { return (hxVec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
-static inline hxVec3 hx_mul(hxMat3 A, hxVec3 b) { return (hxVec3){hx_dot(A.x, b), hx_dot(A.y, b), hx_dot(A.z, b)}; }
-
-/* A^T b */
-static inline hxVec3 hx_tmul(hxMat3 A, hxVec3 b) {
+static inline hxVec3 hx_mul(hxMat3 A, hxVec3 b) {
   return (hxVec3){A.x.x * b.x + A.y.x * b.y + A.z.x * b.z, A.x.y * b.x + A.y.y * b.y + A.z.y * b.z,
                   A.x.z * b.x + A.y.z * b.y + A.z.z * b.z};
 }
+
+/* A^T b */
+static inline hxVec3 hx_tmul(hxMat3 A, hxVec3 b) { return (hxVec3){hx_dot(A.x, b), hx_dot(A.y, b), hx_dot(A.z, b)}; }
 
 static inline hxVec3 hx_sym_mul(hxSym3 S, hxVec3 b) {
   return (hxVec3){S.xx * b.x + S.xy * b.y + S.xz * b.z, S.xy * b.x + S.yy * b.y + S.yz * b.z, S.xz * b.x + S.yz * b.y + S.zz * b.z};
@@ -65,7 +78,7 @@ static inline hxMat3 hx_rotation_matrix(hxQuat p) {
   const hxReal x = two * p.x, y = two * p.y, z = two * p.z;
   const hxReal wx = p.w * x, wy = p.w * y, wz = p.w * z;
   const hxReal xx = p.x * x, xy = p.x * y, xz = p.x * z, yy = p.y * y, yz = p.y * z, zz = p.z * z;
-  return (hxMat3){{1.0 - (yy + zz), xy - wz, xz + wy}, {xy + wz, 1.0 - (xx + zz), yz - wx}, {xz - wy, yz + wx, 1.0 - (xx + yy)}};
+  return (hxMat3){{1.0 - (yy + zz), xy + wz, xz - wy}, {xy - wz, 1.0 - (xx + zz), yz + wx}, {xz + wy, yz - wx, 1.0 - (xx + yy)}};
 }
 
 /* dp/dt = (0, w) p / 2, w in world axes (eq. 8) */
@@ -74,16 +87,13 @@ static inline hxQuat hx_quaternion_rate(hxQuat p, hxVec3 w) {
   return (hxQuat){-x * p.x - y * p.y - z * p.z, x * p.w + y * p.z - z * p.y, y * p.w + z * p.x - x * p.z, z * p.w + x * p.y - y * p.x};
 }
 
-/* the rotation 2 Im(dp conj(p)) of a small quaternion change: the inverse of hx_quaternion_rate */
-static inline hxVec3 hx_rotation_of_change(hxQuat p, hxQuat dp) {
-  return (hxVec3){2.0 * (-dp.w * p.x + dp.x * p.w - dp.y * p.z + dp.z * p.y), 2.0 * (-dp.w * p.y + dp.y * p.w - dp.z * p.x + dp.x * p.z),
-                  2.0 * (-dp.w * p.z + dp.z * p.w - dp.x * p.y + dp.y * p.x)};
-}
-
 /* R S R^T */
 static inline hxSym3 hx_rotate_sym3(hxMat3 R, hxSym3 S) {
-  const hxVec3 tx = hx_sym_mul(S, R.x), ty = hx_sym_mul(S, R.y), tz = hx_sym_mul(S, R.z);
-  return (hxSym3){hx_dot(R.x, tx), hx_dot(R.y, ty), hx_dot(R.z, tz), hx_dot(R.x, ty), hx_dot(R.x, tz), hx_dot(R.y, tz)};
+  const hxVec3 tx = hx_mul(R, (hxVec3){S.xx, S.xy, S.xz}), ty = hx_mul(R, (hxVec3){S.xy, S.yy, S.yz}),
+               tz = hx_mul(R, (hxVec3){S.xz, S.yz, S.zz}); /* columns of R S */
+  return (hxSym3){tx.x * R.x.x + ty.x * R.y.x + tz.x * R.z.x, tx.y * R.x.y + ty.y * R.y.y + tz.y * R.z.y,
+                  tx.z * R.x.z + ty.z * R.y.z + tz.z * R.z.z, tx.x * R.x.y + ty.x * R.y.y + tz.x * R.z.y,
+                  tx.x * R.x.z + ty.x * R.y.z + tz.x * R.z.z, tx.y * R.x.z + ty.y * R.y.z + tz.y * R.z.z};
 }
 
 #endif

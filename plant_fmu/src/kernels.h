@@ -1,0 +1,16 @@
+/* kernels.h - the kernels there are: whether the compiler can build those of wider instruction sets beside the baseline */
+#ifndef HX_KERNELS_H
+#define HX_KERNELS_H
+
+#include "kernel.h"
+
+extern const hxKernel hx_kernel_baseline;
+
+#if defined(__GNUC__) && defined(__x86_64__) && !defined(HX_BASELINE_ONLY)
+#define HX_HAS_X86_KERNELS 1
+extern const hxKernel hx_kernel_avx2, hx_kernel_avx512;
+#else
+#define HX_HAS_X86_KERNELS 0
+#endif
+
+#endif

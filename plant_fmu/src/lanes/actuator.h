@@ -1,0 +1,35 @@
+/* actuator.h - the servo of a joint: PD with feed-forward, torque-speed line, gear friction */
+#ifndef HX_ACTUATOR_H
+#define HX_ACTUATOR_H
+
+#include "vec3.h"
+
+typedef struct {
+  hxReal torque;    /* N m        motor on child */
+  hxReal friction;  /* N m        gear on child */
+  hxReal stiffness; /* N m/rad    -d torque/d angle, 0 where the torque is clipped */
+  hxReal damping;   /* N m s/rad  -d (torque + friction)/d speed */
+} hxServo;
+
+static const double hx_gear_speed = 0.05; /* rad/s, where the gear's dry friction saturates */
+
+/* motor: clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line; gear: -tau_c tanh(qd / 0.05) (eq. 13) */
+static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref,
+                                      hxReal torque_ref) {
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
+  const hxReal wanted = model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
+  const hxReal load = speed * (1.0 / model->speed_max);
+  const hxReal high = model->torque_max * hx_clip(1.0 - load, zero, one);
+  const hxReal low = -model->torque_max * hx_clip(1.0 + load, zero, one);
+  const hxReal torque = hx_clip(wanted, low, high);
+  const hxMask free = hx_less(low, wanted) & hx_less(wanted, high);
+  const hxReal t = hx_tanh(speed * (1.0 / hx_gear_speed));
+  return (hxServo){
+      .torque = torque,
+      .friction = -model->coulomb_friction * t,
+      .stiffness = hx_select(free, hx_splat(model->kp), zero),
+      .damping = hx_select(free, hx_splat(model->kd), zero) + (model->coulomb_friction / hx_gear_speed) * (1.0 - t * t),
+  };
+}
+
+#endif

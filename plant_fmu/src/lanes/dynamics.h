@@ -1,0 +1,483 @@
+/* dynamics.h - eq. 1 solved exactly in O(n): Newton-Euler with multipliers and Baumgarte on the tree of 19 bodies
+ *
+ * All legs of a pack at once. Points, and the spatial vectors of the sweeps, are from and about the torso's centre of mass. Accelerations are
+ * what a body feels, a - g, until they are stored: gravity is then no force at all.
+ */
+#ifndef HX_DYNAMICS_H
+#define HX_DYNAMICS_H
+
+#include "actuator.h"
+#include "foot.h"
+#include "kinematics.h"
+
+/* What the O(n) sweeps of eq. 11-12 keep of joint k. */
+typedef struct {
+  hxMotion6 S;      /* (s, P x s) */
+  hxForce6 U;       /* I S, I the articulated inertia of the child with all it carries */
+  hxReal inverse_d; /* 1/d; 0 where the joint is driven kinematically */
+  hxReal u;         /* torque - S.p */
+} hxSweep;
+
+/* A joint and its child. */
+typedef struct {
+  hxBody body;            /* the child */
+  hxVec3 c;               /* the child's centre of mass along the chain: r + sum of s_i^P - s_j^P */
+  hxSym3 J;               /* child's inertia, world axes, about its centre of mass */
+  hxReal angle, speed;    /* rad, rad/s */
+  hxReal torque;          /* N m  on the joint's axis: servo and gear (kinematic mode: gear, then the drive's too) */
+  hxReal driven;          /* rad/s2  the drive's qdd in kinematic mode, else 0 */
+  hxServo servo;
+  hxMotion6 bias;         /* the child's acceleration from a_k of eq. 10, summed from the hip to here, with S qdd in kinematic mode */
+  hxForce6 p;             /* what that bias takes less what is applied */
+  hxSweep sweep;
+  hxMotion6 acceleration; /* a - g of the child at its centre of mass */
+  struct {                /* for the multipliers, when they are asked for */
+    hxJointKinematics kin;
+    hxVec3 gyroscopic;    /* -w x (J w) */
+    hxReal qdd;
+    hxVec3 lambda_lin;    /* rows 1-3 */
+    hxReal lambda[2];     /* rows 4, 5 */
+  } reaction;
+} hxJointWork;
+
+typedef struct {
+  hxJointWork joint[HX_JOINTS];
+  hxFootWork foot;
+} hxLegWork;
+
+typedef struct {
+  hxBody torso;
+  hxSym3 torso_J;
+  hxMotion6 torso_acceleration; /* a - g */
+  int reactions;                /* whether multipliers are wanted */
+  hxLegWork pack[HX_PACKS];
+} hxWork;
+
+/* dy/dt, and the angular velocities that its quaternion rates stand for. The same doubles as a vector for the integrator. */
+typedef union {
+  double y[HX_MOTION_SIZE + 8 + HX_JOINTS * 3 * HX_SLOTS];
+  struct {
+    hxMotion motion;
+    double torso_turn[8]; /* the last five are padding */
+    double link_turn[HX_JOINTS][3][HX_SLOTS];
+  };
+} hxRate;
+
+enum { HX_RATE_SIZE = sizeof(hxRate) / sizeof(double) };
+
+/* A stage of a linearly implicit method (eq. 15). The slopes of contact and servo are the first stage's, kept for the others. */
+typedef struct {
+  double z;             /* h gamma */
+  double ahead;         /* s  how far ahead the first stage looks for the contact's slopes */
+  const hxRate *change; /* sum of h g_ij k_j over the stages before this one; NULL: the first stage */
+  struct {
+    hxReal servo_stiffness[HX_JOINTS], servo_damping[HX_JOINTS];
+    hxReal stiffness, viscosity, drag;
+  } slope[HX_PACKS];
+} hxImplicit;
+
+/* ---- root to leaf: where everything is and what it feels there ------------------------------------------------------------ */
+
+/* along a leg, up to the present link */
+typedef struct {
+  hxVec3 c, dc, ddc; /* centre of mass from the torso's by the joints alone, its rate, its second rate without angular accelerations */
+  hxMotion6 bias;    /* sums of dw and P x dw */
+} hxChain;
+
+/* The drive's acceleration: the rheonomic constraint q = q_ref + qd_ref (t - t_command) with Baumgarte. */
+static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *command, double t, int joint, int slot,
+                                        const hxJointWork *k) {
+  const hxReal angle_ref = hx_load(&command->angle[joint][slot]), speed_ref = hx_load(&command->speed[joint][slot]);
+  const hxReal error = k->angle - (angle_ref + speed_ref * (t - command->time));
+  return -2.0 * model->alpha * (k->speed - speed_ref) - model->beta * model->beta * error;
+}
+
+/* dw of eq. 10: rows 4 and 5 of D on it are c = gamma - 2 alpha dPhi - beta^2 Phi, s.dw is 0 or the drive's qdd.
+ * With x = w_i x w_j taken out, gamma is Phi |w|^2 - w qd of the relative w; what is left is solved in the child's axes. */
+static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i, const hxBody *j, hxReal speed,
+                                hxReal driven) {
+  const hxVec3 w = hx_tmul(j->axes, hx_sub(j->w, w_i)), x = hx_cross(w_i, j->w);
+  const hxReal twice = hx_splat(2.0 * model->alpha), rest = hx_dot(w, w) - model->beta * model->beta;
+  const hxReal along = driven - hx_dot(kin->s, x), inverse_sz = 1.0 / kin->sz;
+  const hxReal c4 = kin->sx * rest - w.x * speed - twice * (kin->sy * w.z - kin->sz * w.y);
+  const hxReal c5 = kin->sy * rest - w.y * speed - twice * (kin->sz * w.x - kin->sx * w.z);
+  const hxReal dz = kin->sz * along + kin->sy * c4 - kin->sx * c5;
+  const hxReal dx = (c5 + kin->sx * dz) * inverse_sz, dy = (kin->sy * dz - c4) * inverse_sz;
+  return hx_add(x, hx_mul(j->axes, (hxVec3){dx, dy, dz}));
+}
+
+/* a motion about the torso's centre of mass, at c from it */
+static inline hxVec3 motion_at(hxMotion6 a, hxVec3 c) { return hx_add(a.lin, hx_cross(a.ang, c)); }
+
+/* One joint and its child: positions, velocities, bias acceleration and the force it takes. */
+static inline void joint_pass(const hxModel *model, const hxCommand *command, double t, const hxMotion *motion, int joint, int slot,
+                              int reactions, const hxBody *i, hxChain *chain, hxJointWork *k) {
+  const hxJointModel *m = &model->joint[joint];
+  const hxBody j = hx_link_body(motion, joint, slot);
+  const hxJointKinematics kin = hx_joint_kinematics(m, slot, i, &j);
+  const hxVec3 P = hx_add(chain->c, kin.sP_i);
+  const hxVec3 dsP_i = hx_cross(i->w, kin.sP_i), dsP_j = hx_cross(j.w, kin.sP_j);
+  chain->c = hx_sub(P, kin.sP_j);
+  chain->dc = hx_add(chain->dc, hx_sub(dsP_i, dsP_j));
+  chain->ddc = hx_add(chain->ddc, hx_sub(hx_cross(i->w, dsP_i), hx_cross(j.w, dsP_j)));
+  k->body = j;
+  k->c = chain->c;
+  k->sweep.S = (hxMotion6){kin.s, hx_cross(P, kin.s)};
+  k->speed = hx_dot(kin.s, hx_sub(j.w, i->w));
+  k->driven = model->servo_mode == HX_SERVO_KINEMATIC ? drive_acceleration(model, command, t, joint, slot, k) : hx_splat(0.0);
+
+  /* rows 1-3 of a_k telescope: ddc - 2 alpha (v_j - v_0 - dc) - beta^2 (r_j - r_0 - c) */
+  const hxVec3 dw = joint_bias(model, &kin, i->w, &j, k->speed, k->driven);
+  const hxVec3 drift = hx_sub(hx_sub(hx_link_vec3(motion, joint, HX_R, slot), hx_torso_vec3(motion, HX_R)), chain->c);
+  const hxVec3 drift_rate = hx_sub(hx_sub(hx_link_vec3(motion, joint, HX_V, slot), hx_torso_vec3(motion, HX_V)), chain->dc);
+  const hxVec3 rows =
+      hx_add_scaled(hx_add_scaled(chain->ddc, hx_splat(-2.0 * model->alpha), drift_rate), hx_splat(-model->beta * model->beta), drift);
+  chain->bias.ang = hx_add(chain->bias.ang, dw);
+  chain->bias.lin = hx_add(chain->bias.lin, hx_cross(P, dw));
+  k->bias = (hxMotion6){chain->bias.ang, hx_add(chain->bias.lin, rows)};
+
+  /* p of the child: (J dw + w x (J w), m a) at its centre of mass */
+  const hxSym3 J = hx_rotate_sym3(j.axes, hx_load_sym3(m->inertia, slot));
+  const hxVec3 gyroscopic = hx_cross(hx_sym_mul(J, j.w), j.w);
+  const hxVec3 lin = hx_scale(hx_load(&m->mass[slot]), motion_at(k->bias, chain->c));
+  const hxVec3 ang = hx_sub(hx_sym_mul(J, k->bias.ang), gyroscopic);
+  k->J = J;
+  k->p = (hxForce6){hx_add(ang, hx_cross(chain->c, lin)), lin};
+  if (reactions) k->reaction.kin = kin, k->reaction.gyroscopic = gyroscopic;
+}
+
+/* first all half-angles, then all angles: their long chains of operations overlap */
+static inline void joint_angles(const hxModel *model, const hxMotion *motion, hxWork *work) {
+  hxReal sine[HX_JOINTS * HX_PACKS], cosine[HX_JOINTS * HX_PACKS];
+  for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack, ++n) {
+      const int slot = pack * HX_LANES;
+      const hxQuat i = joint > 0 ? hx_link_quat(motion, joint - 1, slot) : hx_torso_quat(motion);
+      hx_joint_half_angle(&model->joint[joint], slot, i, hx_link_quat(motion, joint, slot), &sine[n], &cosine[n]);
+    }
+  for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack, ++n) work->pack[pack].joint[joint].angle = hx_angle_from_half(sine[n], cosine[n]);
+}
+
+static inline void leg_pass(const hxModel *model, const hxCommand *command, double t, const hxMotion *motion, const hxBody *torso, int slot,
+                            int reactions, hxLegWork *leg) {
+  const hxVec3 o = hx_zero3();
+  hxChain chain = {o, o, o, {o, o}};
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    joint_pass(model, command, t, motion, joint, slot, reactions, joint > 0 ? &leg->joint[joint - 1].body : torso, &chain,
+               &leg->joint[joint]);
+}
+
+static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot, hxJointWork *k) {
+  k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]), hx_load(&command->speed[joint][slot]),
+                             hx_load(&command->torque[joint][slot]));
+  k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction : k->servo.torque + k->servo.friction;
+}
+
+/* where the foot touches, from the torso's centre of mass */
+static inline hxVec3 contact_point(const hxLegWork *leg) { return hx_add(leg->joint[HX_JOINTS - 1].c, leg->foot.kin.arm); }
+
+/* a force on the tibia at x: taken off its p */
+static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
+  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+  p->lin = hx_sub(p->lin, force);
+  p->ang = hx_sub(p->ang, hx_cross(x, force));
+}
+
+static inline void leg_foot(const hxModel *model, const hxContactState *contact, const hxMotion *motion, int slot, hxLegWork *leg) {
+  const int tibia = HX_JOINTS - 1;
+  const hxBody *body = &leg->joint[tibia].body;
+  leg->foot.kin = hx_foot_kinematics(model, slot, hx_link_vec3(motion, tibia, HX_R, slot), body->axes,
+                                     hx_link_vec3(motion, tibia, HX_V, slot), body->w);
+  hx_foot_force(model, contact, slot, &leg->foot);
+  push_tibia(leg, contact_point(leg), leg->foot.force);
+}
+
+/* ---- what a linearly implicit stage adds (eq. 15) -------------------------------------------------------------------------- */
+
+/* The slopes of this stage's forces, the contact's where it will be a step ahead: a foot that has just touched down has none yet, and a W
+ * without them lets go of the very contact that it is there for. */
+static inline void keep_slopes(const hxModel *model, const hxContactState *contact, int pack, const hxLegWork *leg, hxImplicit *implicit) {
+  const hxFootWork *foot = &leg->foot;
+  const int slot = pack * HX_LANES;
+  const hxReal deeper = foot->kin.delta + implicit->ahead * hx_max(foot->kin.ddelta, hx_splat(0.0));
+  const hxNormalForce ahead =
+      hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), deeper, foot->kin.ddelta);
+  implicit->slope[pack].stiffness = ahead.stiffness;
+  implicit->slope[pack].viscosity = ahead.viscosity;
+  implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    implicit->slope[pack].servo_stiffness[joint] = leg->joint[joint].servo.stiffness;
+    implicit->slope[pack].servo_damping[joint] = leg->joint[joint].servo.damping;
+  }
+}
+
+/* displacement and velocity change of a body before this stage's own share: dx = s_x + z (v + s_v), dv = s_v */
+typedef struct {
+  hxMotion6 x, v;
+} hxShift;
+
+static inline hxShift shift(double z, hxVec3 v, hxVec3 w, hxMotion6 s_x, hxMotion6 s_v) {
+  const hxReal ahead = hx_splat(z);
+  return (hxShift){{hx_add_scaled(s_x.ang, ahead, hx_add(w, s_v.ang)), hx_add_scaled(s_x.lin, ahead, hx_add(v, s_v.lin))}, s_v};
+}
+
+static inline hxShift link_shift(const hxImplicit *implicit, const hxMotion *motion, int joint, int slot) {
+  const hxMotion *s = &implicit->change->motion;
+  const hxMotion6 s_x = {hx_load_vec3(implicit->change->link_turn[joint], slot), hx_link_vec3(s, joint, HX_R, slot)};
+  const hxMotion6 s_v = {hx_link_vec3(s, joint, HX_W, slot), hx_link_vec3(s, joint, HX_V, slot)};
+  return shift(implicit->z, hx_link_vec3(motion, joint, HX_V, slot), hx_link_vec3(motion, joint, HX_W, slot), s_x, s_v);
+}
+
+static inline hxShift torso_shift(const hxImplicit *implicit, const hxMotion *motion) {
+  const hxMotion *s = &implicit->change->motion;
+  const hxMotion6 s_x = {hx_splat_vec3(implicit->change->torso_turn), hx_torso_vec3(s, HX_R)};
+  const hxMotion6 s_v = {hx_torso_vec3(s, HX_W), hx_torso_vec3(s, HX_V)};
+  return shift(implicit->z, hx_torso_vec3(motion, HX_V), hx_torso_vec3(motion, HX_W), s_x, s_v);
+}
+
+/* G_v dv + G_x dx: what servos and contact answer the shifts with, added to torques and p */
+static inline void leg_response(const hxImplicit *implicit, const hxMotion *motion, int pack, hxLegWork *leg) {
+  const hxReal k = implicit->slope[pack].stiffness, drag = implicit->slope[pack].drag, rest = implicit->slope[pack].viscosity - drag;
+  const hxVec3 n = leg->foot.kin.normal, arm = leg->foot.kin.arm;
+  if (!implicit->change) { /* dx = z v, dv = 0 */
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      leg->joint[joint].torque -= implicit->z * implicit->slope[pack].servo_stiffness[joint] * leg->joint[joint].speed;
+    push_tibia(leg, contact_point(leg), hx_scale(implicit->z * k * leg->foot.kin.ddelta, n));
+    return;
+  }
+  hxShift i = torso_shift(implicit, motion), j = i;
+  for (int joint = 0; joint < HX_JOINTS; ++joint, i = j) {
+    hxJointWork *work = &leg->joint[joint];
+    j = link_shift(implicit, motion, joint, pack * HX_LANES);
+    work->torque -= implicit->slope[pack].servo_stiffness[joint] * hx_dot(work->sweep.S.ang, hx_sub(j.x.ang, i.x.ang)) +
+                    implicit->slope[pack].servo_damping[joint] * hx_dot(work->sweep.S.ang, hx_sub(j.v.ang, i.v.ang));
+  }
+  const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
+  const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
+  push_tibia(leg, contact_point(leg), hx_add_scaled(hx_scale(-along, n), -drag, v));
+}
+
+/* The contact's share of W: B = (z c_n + z^2 k_n) n n^T + z c_t (1 - n n^T) at the contact point, on the tibia's inertia and, by the bias, p. */
+static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack, hxLegWork *leg) {
+  const double z = implicit->z;
+  const hxVec3 n = leg->foot.kin.normal, x = contact_point(leg);
+  const hxReal t = z * implicit->slope[pack].drag;
+  const hxReal d = z * implicit->slope[pack].viscosity + z * z * implicit->slope[pack].stiffness - t;
+  const hxSym3 B = {t + d * n.x * n.x, t + d * n.y * n.y, t + d * n.z * n.z, d * n.x * n.y, d * n.x * n.z, d * n.y * n.z};
+  const hxVec3 bias = hx_add(motion_at(leg->joint[HX_JOINTS - 1].bias, x), hx_splat_vec3(model->gravity));
+  push_tibia(leg, x, hx_neg(hx_sym_mul(B, bias)));
+  return hx_inertia_at(B, x);
+}
+
+/* ---- the sweeps of eq. 11-12 ----------------------------------------------------------------------------------------------- */
+
+/* 1/d, d = S.U + what the joint itself resists with */
+static inline hxReal sweep_inverse(const hxModel *model, const hxSweep *sweep, hxReal resists) {
+  return model->servo_mode == HX_SERVO_KINEMATIC ? hx_splat(0.0) : 1.0 / (hx_power(sweep->U, sweep->S) + resists);
+}
+
+static inline hxRigid6 link_inertia(const hxModel *model, const hxJointWork *k, int joint, int slot) {
+  return hx_rigid_inertia(hx_load(&model->joint[joint].mass[slot]), k->J, k->c);
+}
+
+/* U = I S of a link with all it carries; leaves I - U U^T/d, what the parent carries */
+static inline void sweep_inertia(const hxModel *model, const hxImplicit *implicit, int joint, int pack, hxLegWork *leg, hxInertia6 *I) {
+  hxJointWork *k = &leg->joint[joint];
+  hxSweep *sweep = &k->sweep;
+  const hxRigid6 own = link_inertia(model, k, joint, pack * HX_LANES);
+  hxReal resists = hx_splat(model->rotor_inertia);
+  if (implicit) {
+    const double z = implicit->z;
+    resists += z * implicit->slope[pack].servo_damping[joint] + (z * z) * implicit->slope[pack].servo_stiffness[joint];
+    if (joint == HX_JOINTS - 1) *I = contact_inertia(model, implicit, pack, leg);
+  } else if (joint == HX_JOINTS - 1) {
+    sweep->U = hx_rigid_mul(&own, sweep->S);
+    sweep->inverse_d = sweep_inverse(model, sweep, resists);
+    *I = hx_rigid_downdate(&own, sweep->inverse_d, sweep->U);
+    return;
+  }
+  hx_inertia_add_rigid(I, &own);
+  sweep->U = hx_inertia_mul(I, sweep->S);
+  sweep->inverse_d = sweep_inverse(model, sweep, resists);
+  hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
+}
+
+/* u = torque - S.p; leaves p + U u/d, what the parent is handed */
+static inline void sweep_force(hxJointWork *k, hxForce6 *p) {
+  hxSweep *sweep = &k->sweep;
+  *p = hx_force_add(*p, k->p);
+  sweep->u = k->torque - hx_power(*p, sweep->S);
+  *p = hx_force_add_scaled(*p, sweep->inverse_d * sweep->u, sweep->U);
+}
+
+/* qdd = (u - U.a)/d; leaves a + S qdd, the child's acceleration but for its bias */
+static inline void sweep_motion(hxJointWork *k, hxMotion6 *a) {
+  const hxSweep *sweep = &k->sweep;
+  const hxReal qdd = sweep->inverse_d * (sweep->u - hx_power(sweep->U, *a));
+  *a = hx_motion_add_scaled(*a, qdd, sweep->S);
+  k->reaction.qdd = qdd + k->driven;
+  const hxMotion6 felt = hx_motion_add(*a, k->bias);
+  k->acceleration = (hxMotion6){felt.ang, motion_at(felt, k->c)};
+}
+
+/* Multipliers leaf to root: D_kk^T lambda_k = g_k - M_k dv_k - sum over children c of D_ck^T lambda_c.
+ * About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5) and the axis's, u1 = a x s, u2 = b x s. */
+static inline void leg_multipliers(const hxModel *model, int slot, hxLegWork *leg) {
+  /* at the link's centre of mass: by the ground, then by the child */
+  hxForce6 handed = {hx_cross(leg->foot.kin.arm, leg->foot.force), leg->foot.force};
+  for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
+    hxJointWork *k = &leg->joint[joint];
+    const hxJointKinematics *kin = &k->reaction.kin;
+    const hxVec3 lin = hx_add_scaled(handed.lin, -hx_load(&model->joint[joint].mass[slot]), k->acceleration.lin);
+    const hxVec3 ang = hx_sub(hx_add(k->reaction.gyroscopic, handed.ang), hx_sym_mul(k->J, k->acceleration.ang));
+    const hxVec3 about_joint = hx_sub(ang, hx_cross(kin->sP_j, lin));
+    const hxReal along = hx_dot(about_joint, kin->s), inverse_sz = 1.0 / kin->sz;
+    if (model->servo_mode == HX_SERVO_KINEMATIC) {
+      k->torque = model->rotor_inertia * k->reaction.qdd - along;
+      k->servo.torque = k->torque - k->servo.friction;
+    }
+    k->reaction.lambda_lin = lin;
+    k->reaction.lambda[0] = (along * kin->sy - hx_dot(about_joint, k->body.axes.y)) * inverse_sz;
+    k->reaction.lambda[1] = (hx_dot(about_joint, k->body.axes.x) - along * kin->sx) * inverse_sz;
+    handed = (hxForce6){hx_add(about_joint, hx_cross(kin->sP_i, lin)), lin};
+  }
+}
+
+/* ---- the torso -------------------------------------------------------------------------------------------------------------- */
+
+static inline void torso_pass(const hxModel *model, const hxMotion *motion, hxWork *work) {
+  const double *J = model->torso_inertia;
+  const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]), hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};
+  work->torso = hx_torso_body(motion);
+  work->torso_J = hx_rotate_sym3(work->torso.axes, body);
+}
+
+/* sums over the legs, in every lane */
+static inline hxVec3 sum_vec3(const hxVec3 *legs, size_t stride) {
+  hxReal x[HX_PACKS], y[HX_PACKS], z[HX_PACKS];
+  for (int k = 0; k < HX_PACKS; ++k) {
+    const hxVec3 *v = (const hxVec3 *)((const char *)legs + (size_t)k * stride);
+    x[k] = v->x, y[k] = v->y, z[k] = v->z;
+  }
+  return (hxVec3){hx_sum_legs(x), hx_sum_legs(y), hx_sum_legs(z)};
+}
+
+static inline hxSym3 sum_sym3(const hxSym3 *legs, size_t stride) {
+  const hxVec3 *diagonal = (const hxVec3 *)legs;
+  const hxVec3 d = sum_vec3(diagonal, stride), o = sum_vec3(diagonal + 1, stride);
+  return (hxSym3){d.x, d.y, d.z, o.x, o.y, o.z};
+}
+
+/* (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs */
+static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand *command, const hxWork *work, const hxInertia6 *I,
+                                           const hxForce6 *p) {
+  const hxReal m = hx_splat(model->torso_mass), o = hx_splat(0.0);
+  const hxVec3 gyroscopic = hx_cross(hx_sym_mul(work->torso_J, work->torso.w), work->torso.w);
+  const size_t inertia = sizeof *I, force = sizeof *p;
+  const hxInertia6 A = {hx_sym_add(work->torso_J, sum_sym3(&I->C, inertia)),
+                        {sum_vec3(&I->H.x, inertia), sum_vec3(&I->H.y, inertia), sum_vec3(&I->H.z, inertia)},
+                        hx_sym_add((hxSym3){m, m, m, o, o, o}, sum_sym3(&I->A, inertia))};
+  const hxVec3 torque = hx_sub(hx_add(hx_splat_vec3(command->push_torque), gyroscopic), sum_vec3(&p->ang, force));
+  return hx_inertia_solve(&A, (hxForce6){torque, hx_sub(hx_splat_vec3(command->push_force), sum_vec3(&p->lin, force))});
+}
+
+/* ---- dy/dt ------------------------------------------------------------------------------------------------------------------ */
+
+static inline void store_torso_rate(const hxModel *model, const hxMotion *motion, const hxImplicit *implicit, const hxWork *work,
+                                    hxRate *rate) {
+  const hxMotion *s = implicit && implicit->change ? &implicit->change->motion : NULL;
+  const hxMotion6 felt = work->torso_acceleration;
+  const hxMotion6 dv = {felt.ang, hx_add(felt.lin, hx_splat_vec3(model->gravity))};
+  hxVec3 v = hx_torso_vec3(motion, HX_V), w = work->torso.w;
+  if (implicit) v = hx_add_scaled(v, hx_splat(implicit->z), dv.lin), w = hx_add_scaled(w, hx_splat(implicit->z), dv.ang);
+  if (s) v = hx_add(v, hx_torso_vec3(s, HX_V)), w = hx_add(w, hx_torso_vec3(s, HX_W));
+  const hxQuat dp = hx_quaternion_rate(hx_torso_quat(motion), w);
+  const hxReal entries[HX_BODY_STATE] = {v.x, v.y, v.z, dp.w, dp.x, dp.y, dp.z, dv.lin.x, dv.lin.y, dv.lin.z, dv.ang.x, dv.ang.y, dv.ang.z};
+  for (int i = 0; i < HX_BODY_STATE; ++i) rate->motion.torso[i] = hx_lane(entries[i], 0);
+  rate->torso_turn[0] = hx_lane(w.x, 0), rate->torso_turn[1] = hx_lane(w.y, 0), rate->torso_turn[2] = hx_lane(w.z, 0);
+  for (int i = 3; i < 8; ++i) rate->torso_turn[i] = 0.0;
+}
+
+/* positions advance with v + s_v + z dv, which is v without an implicit stage; dp/dt = (0, w) p / 2 */
+static inline void store_link_rate(const hxModel *model, const hxMotion *motion, const hxImplicit *implicit, int joint, int slot,
+                                   const hxJointWork *k, hxRate *rate) {
+  const hxMotion *s = implicit && implicit->change ? &implicit->change->motion : NULL;
+  const hxVec3 dv = hx_add(k->acceleration.lin, hx_splat_vec3(model->gravity)), dw = k->acceleration.ang;
+  hxVec3 v = hx_link_vec3(motion, joint, HX_V, slot), w = hx_link_vec3(motion, joint, HX_W, slot);
+  if (implicit) v = hx_add_scaled(v, hx_splat(implicit->z), dv), w = hx_add_scaled(w, hx_splat(implicit->z), dw);
+  if (s) v = hx_add(v, hx_link_vec3(s, joint, HX_V, slot)), w = hx_add(w, hx_link_vec3(s, joint, HX_W, slot));
+  double (*to)[HX_SLOTS] = rate->motion.link[joint];
+  hx_store_vec3(&to[HX_R], slot, v);
+  hx_store_quat(&to[HX_P], slot, hx_quaternion_rate(hx_link_quat(motion, joint, slot), w));
+  hx_store_vec3(&to[HX_V], slot, dv);
+  hx_store_vec3(&to[HX_W], slot, dw);
+  hx_store_vec3(rate->link_turn[joint], slot, w);
+}
+
+/* power of the motors and of everything that dissipates: gears, contact damping, friction */
+static inline void store_powers(const hxCommand *command, const hxMotion *motion, const hxWork *work, hxMotion *rate) {
+  hxReal actuator[HX_PACKS], dissipated[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const hxLegWork *leg = &work->pack[pack];
+    const hxFootWork *foot = &leg->foot;
+    hxReal in = hx_splat(0.0);
+    hxReal out = (foot->normal.force - foot->normal.elastic) * foot->kin.ddelta + foot->drag * foot->slip_speed * foot->slip_speed;
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      in = in + leg->joint[joint].servo.torque * leg->joint[joint].speed;
+      out = out - leg->joint[joint].servo.friction * leg->joint[joint].speed;
+    }
+    actuator[pack] = in, dissipated[pack] = out;
+  }
+  rate->actuator_work = hx_lane(hx_sum_legs(actuator), 0);
+  rate->dissipated = hx_lane(hx_sum_legs(dissipated), 0);
+  rate->push_work = 0.0;
+  for (int i = 0; i < 3; ++i)
+    rate->push_work += command->push_force[i] * motion->torso[HX_V + i] + command->push_torque[i] * motion->torso[HX_W + i];
+}
+
+/* Positions, velocities and forces at (t, y); work is filled up to the sweeps. */
+static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
+                                      const hxMotion *motion, hxWork *work) {
+  torso_pass(model, motion, work);
+  joint_angles(model, motion, work);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    leg_pass(model, command, t, motion, &work->torso, pack * HX_LANES, work->reactions, &work->pack[pack]);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack) joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
+  for (int pack = 0; pack < HX_PACKS; ++pack) leg_foot(model, contact, motion, pack * HX_LANES, &work->pack[pack]);
+}
+
+/* Everything at (t, y): work, and dy/dt into rate. With implicit, rate is k/h of that stage (eq. 15) instead. The multipliers are found when
+ * asked for, and in kinematic mode. */
+static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
+                                 const hxMotion *motion, hxImplicit *implicit, int multipliers, hxWork *work, hxRate *rate) {
+  hxInertia6 I[HX_PACKS];
+  hxForce6 p[HX_PACKS];
+  work->reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
+  hx_dynamics_forces(model, contact, command, t, motion, work);
+  for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
+    if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
+    leg_response(implicit, motion, pack, &work->pack[pack]);
+  }
+
+  /* leaf to root, the torso, root to leaf; packs side by side, for one's operations fill the other's waits */
+  for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack) sweep_inertia(model, implicit, joint, pack, &work->pack[pack], &I[pack]);
+  for (int pack = 0; pack < HX_PACKS; ++pack) p[pack] = (hxForce6){hx_zero3(), hx_zero3()};
+  for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack) sweep_force(&work->pack[pack].joint[joint], &p[pack]);
+  work->torso_acceleration = torso_acceleration(model, command, work, I, p);
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    hxMotion6 a = work->torso_acceleration;
+    for (int joint = 0; joint < HX_JOINTS; ++joint) sweep_motion(&work->pack[pack].joint[joint], &a);
+    if (work->reactions) leg_multipliers(model, pack * HX_LANES, &work->pack[pack]);
+  }
+  store_torso_rate(model, motion, implicit, work, rate);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      store_link_rate(model, motion, implicit, joint, pack * HX_LANES, &work->pack[pack].joint[joint], rate);
+  store_powers(command, motion, work, &rate->motion);
+}
+
+#endif

@@ -1,0 +1,91 @@
+/* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels there (eq. 4, 5) */
+#ifndef HX_FOOT_H
+#define HX_FOOT_H
+
+#include "spatial.h"
+
+/* The ground: how far a point is above it, and which way is up there. */
+typedef struct {
+  hxReal distance; /* m  signed, > 0 above the ground */
+  hxVec3 normal;   /* 1  out of the ground, world axes */
+} hxGround;
+
+/* A sphere against the ground. */
+typedef struct {
+  hxVec3 arm;           /* m  tibia's centre of mass to the contact point */
+  hxVec3 normal;        /* 1  out of the ground there */
+  hxReal delta, ddelta; /* m, m/s  penetration, approach speed */
+  hxVec3 velocity;      /* m/s  of the foot's material point there */
+} hxFootKinematics;
+
+/* Force along the normal and its slopes. */
+typedef struct {
+  hxReal force;     /* N    f_n */
+  hxReal elastic;   /* N    its part that is stored: K delta^(3/2) */
+  hxReal stiffness; /* N/m  df_n/ddelta */
+  hxReal viscosity; /* N s/m  df_n/d(ddelta) */
+} hxNormalForce;
+
+typedef struct {
+  hxFootKinematics kin;
+  hxNormalForce normal;
+  hxVec3 slip, force;   /* m/s, N  tangential velocity, ground on foot */
+  hxReal slip_speed;
+  hxReal drag;          /* N s/m  size of the tangential force over the slip speed */
+  hxReal drag_per_load; /* s/m    the same over mu f_n */
+} hxFootWork;
+
+/* The only place a terrain is chosen. */
+static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
+  if (model->terrain_kind == HX_TERRAIN_FLAT)
+    return (hxGround){point.z - model->ground_point[2], {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
+  const hxVec3 n = hx_splat_vec3(model->ground_normal);
+  return (hxGround){hx_dot(n, hx_sub(point, hx_splat_vec3(model->ground_point))), n};
+}
+
+/* g of f_t = -mu f_n g(|v_t|) v_t (eq. 5): tanh(k_t v) / v, whose limit at rest is k_t; the series k_t (1 - (k_t v)^2 / 3) is exact below
+ * k_t v = 1e-5. The only place a friction law is chosen. */
+static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
+  if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
+  const hxReal x = model->slope * speed;
+  const hxMask slow = hx_less(x, hx_splat(1e-5));
+  return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0), hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
+}
+
+/* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 4) while the contact is closed */
+static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta) {
+  const hxReal zero = hx_splat(0.0);
+  const hxReal depth = closed * hx_max(delta, zero);
+  const hxReal root = hx_sqrt(depth);
+  const hxReal elastic = model->stiffness * depth * root;
+  const hxReal factor = 1.0 + damping * ddelta;
+  const hxMask pushes = hx_less(zero, factor);
+  return (hxNormalForce){
+      .force = elastic * hx_max(factor, zero),
+      .elastic = elastic,
+      .stiffness = hx_select(pushes, closed * (1.5 * model->stiffness) * root * factor, zero),
+      .viscosity = hx_select(pushes, elastic * damping, zero),
+  };
+}
+
+/* the foot of a tibia at r with its axes, moving with v and w */
+static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, int slot, hxVec3 r, hxMat3 axes, hxVec3 v, hxVec3 w) {
+  const hxVec3 to_centre = hx_mul(axes, hx_load_vec3(model->foot_centre, slot));
+  const hxGround ground = hx_ground(model, hx_add(r, to_centre));
+  const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-model->foot_radius), ground.normal);
+  const hxVec3 velocity = hx_add(v, hx_cross(w, arm));
+  return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance, -hx_dot(velocity, ground.normal), velocity};
+}
+
+/* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t across it */
+static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, int slot, hxFootWork *foot) {
+  const hxFootKinematics *kin = &foot->kin;
+  foot->normal = hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), kin->delta, kin->ddelta);
+  foot->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
+  foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
+  foot->drag_per_load = model->mu * hx_friction(model, foot->slip_speed);
+  foot->drag = foot->normal.force * foot->drag_per_load;
+  foot->force = hx_add_scaled(hx_scale(foot->normal.force, kin->normal), -foot->drag, foot->slip);
+}
+
+#endif

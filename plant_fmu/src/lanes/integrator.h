@@ -1,0 +1,322 @@
+/* integrator.h - from one time to another, stopping at every touch-down */
+#ifndef HX_INTEGRATOR_H
+#define HX_INTEGRATOR_H
+
+#include <stdio.h>
+
+#include "../contact_law.h"
+#include "../method.h"
+#include "dynamics.h"
+
+static const double step_floor = 1e-11;              /* s  below this the error control gives up */
+static const double most_steps[3] = {1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
+static const double touch_depth[2] = {1e-10, 1e-6};  /* m, m over the tolerance  a touch-down is found when the foot is in by less */
+
+/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 0.1 J for the energy audit. */
+static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
+static const double work_scale = 0.1;
+
+/* Where a step starts. */
+typedef struct {
+  const hxModel *model;
+  const hxCommand *command;
+  const hxContactState *contact;
+  const hxMethodRow *method;
+  double t;
+  double touch;     /* m  how deep a foot may be that has just touched down */
+  double last_step; /* count of steps, kept and rejected, at which the error control gives up */
+  const hxMotion *y;
+} hxStart;
+
+/* All feet: penetration, approach speed. */
+typedef struct {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+} hxFeet;
+
+typedef struct {
+  hxMotion y;
+  double error; /* of the step over the tolerance; 0 without an estimate */
+} hxTrial;
+
+static inline hxFeet feet_of(const hxModel *model, const hxMotion *motion) {
+  hxFeet feet;
+  const int tibia = HX_JOINTS - 1;
+  for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+    const hxBody body = hx_link_body(motion, tibia, slot);
+    const hxFootKinematics foot = hx_foot_kinematics(model, slot, hx_link_vec3(motion, tibia, HX_R, slot), body.axes,
+                                                     hx_link_vec3(motion, tibia, HX_V, slot), body.w);
+    hx_store(&feet.delta[slot], foot.delta);
+    hx_store(&feet.ddelta[slot], foot.ddelta);
+  }
+  return feet;
+}
+
+/* ---- one step --------------------------------------------------------------------------------------------------------------- */
+
+/* base + h sum of weights k, n of them (base NULL: 0); one pass over memory, n known to the compiler */
+static inline void combine_n(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int size) {
+  hxReal w[HX_STAGES];
+  for (int j = 0; j < n; ++j) w[j] = hx_splat(h * weights[j]);
+  for (int i = 0; i < size; i += HX_LANES) {
+    hxReal sum = base ? hx_load(&base[i]) : hx_splat(0.0);
+    for (int j = 0; j < n; ++j) sum += w[j] * hx_load(&k[j].y[i]);
+    hx_store(&out[i], sum);
+  }
+}
+
+static void combine(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int size) {
+  switch (n) {
+  case 1:
+    combine_n(out, base, h, weights, k, 1, size);
+    break;
+  case 2:
+    combine_n(out, base, h, weights, k, 2, size);
+    break;
+  case 3:
+    combine_n(out, base, h, weights, k, 3, size);
+    break;
+  case 4:
+    combine_n(out, base, h, weights, k, 4, size);
+    break;
+  default:
+    combine_n(out, base, h, weights, k, n, size);
+  }
+}
+
+/* largest error over scale; NaN is the caller's to find */
+static double error_norm(const hxMotion *error, double tolerance) {
+  hxReal links = hx_splat(0.0);
+  double largest[HX_LANES];
+  double worst = fabs(error->actuator_work) / work_scale;
+  worst = fabs(error->push_work) / work_scale > worst ? fabs(error->push_work) / work_scale : worst;
+  worst = fabs(error->dissipated) / work_scale > worst ? fabs(error->dissipated) / work_scale : worst;
+  for (int i = 0; i < HX_BODY_STATE; ++i) {
+    const double scale = 1.0 / error_scale[i], torso = scale * fabs(error->torso[i]);
+    worst = torso > worst ? torso : worst;
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
+        links = hx_max(links, scale * hx_abs(hx_load(&error->link[joint][i][slot])));
+  }
+  hx_store(largest, links);
+  for (int lane = 0; lane < HX_LANES; ++lane) worst = largest[lane] > worst ? largest[lane] : worst;
+  return worst / tolerance;
+}
+
+static void normalise_quaternions(hxMotion *m) {
+  double *p = &m->torso[HX_P];
+  const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+  for (int i = 0; i < 4; ++i) p[i] *= scale;
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+      const hxQuat q = hx_link_quat(m, joint, slot);
+      const hxReal s = 1.0 / hx_sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+      hx_store_quat(&m->link[joint][HX_P], slot, (hxQuat){s * q.w, s * q.x, s * q.y, s * q.z});
+    }
+}
+
+/* One step of the method from a start, kept or not. */
+static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
+  const hxMethodRow *m = start->method;
+  hxImplicit implicit = {.z = h * m->gamma, .ahead = h};
+  hxRate k[HX_STAGES], change;
+  hxMotion y;
+  hxWork work;
+  for (int i = 0; i < m->stages; ++i) {
+    if (i > 0) {
+      combine(y.y, start->y->y, h, m->a[i], k, i, HX_MOTION_SIZE);
+      if (m->gamma > 0.0) combine(change.y, NULL, h, m->g[i], k, i, HX_RATE_SIZE);
+      implicit.change = &change;
+    }
+    hx_dynamics_evaluate(start->model, start->contact, start->command, start->t + m->c[i] * h, i > 0 ? &y : start->y,
+                         m->gamma > 0.0 ? &implicit : NULL, 0, &work, &k[i]);
+    state->evaluations += 1.0;
+  }
+  combine(trial->y.y, start->y->y, h, m->b, k, m->stages, HX_MOTION_SIZE);
+  trial->error = 0.0;
+  if (m->error_order > 0 && start->model->step == 0.0) {
+    combine(y.y, NULL, h, m->e, k, m->stages, HX_MOTION_SIZE);
+    trial->error = error_norm(&y, start->model->tolerance);
+  }
+  normalise_quaternions(&trial->y);
+}
+
+/* ---- touch-down ------------------------------------------------------------------------------------------------------------- */
+
+/* how deep the deepest open foot is in the ground */
+static double open_depth(const hxContactState *contact, const hxFeet *feet) {
+  double depth = -HUGE_VAL;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (contact->closed[leg] == 0.0 && feet->delta[leg] > depth) depth = feet->delta[leg];
+  return depth;
+}
+
+/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends: bisection. */
+static double cubic_crossing(double from, double slope_from, double to, double slope_to, double level) {
+  const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;
+  double low = 0.0, high = 1.0;
+  while (high - low > 1e-14) {
+    const double x = 0.5 * (low + high);
+    if (from + x * (slope_from + x * (curve + x * bend)) > level)
+      high = x;
+    else
+      low = x;
+  }
+  return high;
+}
+
+/* When the first open foot will be half a touch depth in, by the cubics through depths and speeds at two times. */
+static double expected_touch(const hxStart *start, double t_low, const hxFeet *low, double t_high, const hxFeet *high) {
+  const double h = t_high - t_low, level = 0.5 * start->touch;
+  double first = 1.0;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (start->contact->closed[leg] == 0.0 && high->delta[leg] > level) {
+      const double x = cubic_crossing(low->delta[leg], h * low->ddelta[leg], high->delta[leg], h * high->ddelta[leg], level);
+      first = x < first ? x : first;
+    }
+  return t_low + first * h;
+}
+
+/* Shortens a step that ends below the ground to one that ends on it: each guess is a step of its own; every third halves what is left,
+ * should the cubics crawl. */
+static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial, hxFeet *feet) {
+  double low = 0.0, high = h;
+  hxFeet feet_low = feet_of(start->model, start->y);
+  for (int guess = 1; open_depth(start->contact, feet) > start->touch && high - low > step_floor; ++guess) {
+    double middle = guess % 3 ? expected_touch(start, low, &feet_low, high, feet) : low;
+    if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
+    hxTrial nearer;
+    try_step(start, middle, state, &nearer);
+    const hxFeet found = feet_of(start->model, &nearer.y);
+    if (open_depth(start->contact, &found) > 0.0)
+      high = middle, *feet = found, *trial = nearer;
+    else
+      low = middle, feet_low = found;
+  }
+  return high;
+}
+
+/* ---- error control ---------------------------------------------------------------------------------------------------------- */
+
+/* x^(-1/n) for x in about [1e-4, 1e4], in plain arithmetic: the same on every machine. Newton on r^-n = x rises to its root. */
+static double inverse_root(double x, int n) {
+  double r = 0.1, before = 0.0;
+  for (int i = 0; i < 100 && r > before; ++i) {
+    double power = x;
+    for (int k = 0; k < n; ++k) power *= r;
+    before = r;
+    r += r * (1.0 - power) / n;
+  }
+  return r;
+}
+
+/* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5. */
+static double step_factor(const hxMethodRow *method, double error) {
+  const int n = method->error_order + 1;
+  double large = 1.0, small = 1.0;
+  for (int i = 0; i < n; ++i) large *= 0.9 / 0.2, small *= 0.9 / 5.0;
+  if (!(error < large)) return 0.2;
+  if (error < small) return 5.0;
+  return 0.9 * inverse_root(error, n);
+}
+
+/* Steps that a call over a time may take: no call runs on for ever. */
+static double steps_allowed(double time) { return fmin(most_steps[0] + most_steps[1] * time, most_steps[2]); }
+
+/* Why a step of h from t cannot be had. */
+static hxStatus give_up(const hxTrial *trial, double t, double h, char *message) {
+  const int lost = isnan(trial->error);
+  snprintf(message, HX_MESSAGE_SIZE,
+           lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, stiffness and inputs, or let the error "
+                  "control choose the step (solver.step = 0)"
+                : "the error control gives up at t = %.9g s (step %.3g s), where it finds no step that takes the motion on in reasonable "
+                  "time; check the inputs for extreme values, raise solver.tolerance or use a linearly implicit solver.method",
+           t, h);
+  return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
+}
+
+static int all_finite(const hxMotion *y) {
+  hxReal sum = hx_splat(0.0);
+  double lanes[HX_LANES], total = 0.0;
+  for (int i = 0; i < HX_MOTION_SIZE; i += HX_LANES) sum += 0.0 * hx_load(&y->y[i]);
+  hx_store(lanes, sum);
+  for (int lane = 0; lane < HX_LANES; ++lane) total += lanes[lane];
+  return total == 0.0;
+}
+
+/* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is its length. */
+static hxStatus advance(const hxStart *start, double h_max, hxState *state, double *taken, char *message) {
+  const hxModel *model = start->model;
+  hxTrial trial;
+  double h = model->step > 0.0 ? h_max : fmin(h_max, state->next_step);
+  trial.error = 0.0;
+  for (;;) {
+    if (model->step == 0.0 && state->steps + state->rejected >= start->last_step) return give_up(&trial, start->t, h, message);
+    try_step(start, h, state, &trial);
+    if (!all_finite(&trial.y)) trial.error = NAN;
+    if (trial.error <= 1.0) break;
+    state->rejected += 1.0;
+    h *= fmin(step_factor(start->method, trial.error), 0.9);
+    if (h < step_floor || (model->step > 0.0 && isnan(trial.error))) return give_up(&trial, start->t, h, message);
+  }
+  if (model->step == 0.0) {
+    const double next = fmin(model->step_max, h * step_factor(start->method, trial.error));
+    /* a step cut short by the end of the interval says little against a longer one */
+    state->next_step = h < h_max ? next : fmax(next, state->next_step);
+  }
+  hxFeet feet = feet_of(model, &trial.y);
+  *taken = open_depth(start->contact, &feet) > 0.0 ? find_touchdown(start, h, state, &trial, &feet) : h;
+  if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial.y);
+  state->motion = trial.y;
+  state->steps += 1.0;
+  state->touchdowns += hx_contact_switch(model, feet.delta, feet.ddelta, &state->contact);
+  return HX_OK;
+}
+
+/* From state->time to t_end; the last step lands on it exactly. */
+static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+  hxStart start = {.model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .y = &state->motion};
+  start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
+  start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
+  while (state->time < t_end) {
+    const double left = t_end - state->time;
+    double taken;
+    start.t = state->time;
+    const hxStatus status = advance(&start, left, state, &taken, message);
+    if (status != HX_OK) return status;
+    const double t = state->time + taken;
+    state->time = taken >= left || t_end - t < step_floor ? t_end : t;
+  }
+  return HX_OK;
+}
+
+static hxStatus run_fixed(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+  const double t_start = state->time;
+  const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
+  if (count > steps_allowed(t_end - t_start)) {
+    snprintf(message, HX_MESSAGE_SIZE,
+             "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; raise solver.step "
+             "or make shorter calls",
+             model->step, count, steps_allowed(t_end - t_start));
+    return HX_STEP_TOO_SMALL;
+  }
+  for (double i = 1.0; i <= count; i += 1.0) {
+    const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
+    const hxStatus status = run_to(model, command, t, state, message);
+    if (status != HX_OK) return status;
+  }
+  return HX_OK;
+}
+
+static void fill_motion_slots(hxMotion *m) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(m->link[joint][i]);
+}
+
+/* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
+static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, t_end, state, message);
+  fill_motion_slots(&state->motion);
+  return status;
+}
+
+#endif

@@ -1,0 +1,99 @@
+/* kinematics.h - bodies, joints and constraint equations of one pack of legs */
+#ifndef HX_KINEMATICS_H
+#define HX_KINEMATICS_H
+
+#include "spatial.h"
+
+/* How a body is turned and turning; the torso is the same in every lane. World axes. */
+typedef struct {
+  hxMat3 axes; /* its axes: columns of R_WB */
+  hxVec3 w;    /* angular velocity */
+} hxBody;
+
+/* Joint between parent i and child j. */
+typedef struct {
+  hxVec3 s;          /* axis, fixed in i */
+  hxReal sx, sy, sz; /* the same in the child's axes (a, b, their normal): (0, 0, 1) but for drift */
+  hxVec3 sP_i, sP_j; /* centres of mass to the joint's point */
+} hxJointKinematics;
+
+/* Phi and its rate (eq. 2): rows 1-3, rows 4-5. */
+typedef struct {
+  hxVec3 phi_lin, dphi_lin;
+  hxReal phi[2], dphi[2];
+} hxConstraint;
+
+static inline hxVec3 hx_torso_vec3(const hxMotion *motion, int row) { return hx_splat_vec3(&motion->torso[row]); }
+static inline hxVec3 hx_link_vec3(const hxMotion *motion, int joint, int row, int slot) {
+  return hx_load_vec3(&motion->link[joint][row], slot);
+}
+static inline hxQuat hx_torso_quat(const hxMotion *motion) { return hx_splat_quat(&motion->torso[HX_P]); }
+static inline hxQuat hx_link_quat(const hxMotion *motion, int joint, int slot) { return hx_load_quat(&motion->link[joint][HX_P], slot); }
+
+static inline hxBody hx_torso_body(const hxMotion *motion) {
+  return (hxBody){hx_rotation_matrix(hx_torso_quat(motion)), hx_torso_vec3(motion, HX_W)};
+}
+
+static inline hxBody hx_link_body(const hxMotion *motion, int joint, int slot) {
+  return (hxBody){hx_rotation_matrix(hx_link_quat(motion, joint, slot)), hx_link_vec3(motion, joint, HX_W, slot)};
+}
+
+/* q from the half-angle in p_rel = conj(p_i zero) p_j, of which the real part and the part along the axis, the child's z, are needed */
+static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQuat i, hxQuat j, hxReal *sine, hxReal *cosine) {
+  const hxQuat o = hx_load_quat(model->zero, slot);
+  const hxQuat from = {i.w * o.w - i.x * o.x - i.y * o.y - i.z * o.z, i.w * o.x + i.x * o.w + i.y * o.z - i.z * o.y,
+                       i.w * o.y - i.x * o.z + i.y * o.w + i.z * o.x, i.w * o.z + i.x * o.y - i.y * o.x + i.z * o.w};
+  *sine = from.w * j.z - from.z * j.w - from.x * j.y + from.y * j.x;
+  *cosine = from.w * j.w + from.x * j.x + from.y * j.y + from.z * j.z;
+}
+
+static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, int slot, const hxBody *i, const hxBody *j) {
+  const hxVec3 s = hx_mul(i->axes, hx_load_vec3(model->s_i, slot));
+  return (hxJointKinematics){s,
+                             hx_dot(j->axes.x, s),
+                             hx_dot(j->axes.y, s),
+                             hx_dot(j->axes.z, s),
+                             hx_mul(i->axes, hx_load_vec3(model->sP_i, slot)),
+                             hx_mul(j->axes, hx_load_vec3(model->sP_j, slot))};
+}
+
+/* Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s); the rates of rows 4, 5 are (a x s).(w_j - w_i), (b x s).(w_j - w_i). */
+static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxMotion *motion, int joint, int slot) {
+  const hxBody i = joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion), j = hx_link_body(motion, joint, slot);
+  const hxVec3 r_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_R, slot) : hx_torso_vec3(motion, HX_R);
+  const hxVec3 v_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_V, slot) : hx_torso_vec3(motion, HX_V);
+  const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
+  const hxVec3 w = hx_tmul(j.axes, hx_sub(j.w, i.w)); /* child's axes */
+  const hxVec3 v_j = hx_link_vec3(motion, joint, HX_V, slot);
+  return (hxConstraint){.phi_lin = hx_sub(hx_add(hx_link_vec3(motion, joint, HX_R, slot), k.sP_j), hx_add(r_i, k.sP_i)),
+                        .dphi_lin = hx_sub(hx_add(v_j, hx_cross(j.w, k.sP_j)), hx_add(v_i, hx_cross(i.w, k.sP_i))),
+                        .phi = {k.sx, k.sy},
+                        .dphi = {k.sy * w.z - k.sz * w.y, k.sz * w.x - k.sx * w.z}};
+}
+
+/* Puts links back on their joints, hip to foot: turned by the least turn that brings the child's z on the axis, moved to the point, and
+ * what they turn and move otherwise than about the joint taken away. */
+static inline void project_link(const hxModel *model, int joint, int slot, hxMotion *motion) {
+  const hxBody i = joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion), drifted = hx_link_body(motion, joint, slot);
+  const hxVec3 r_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_R, slot) : hx_torso_vec3(motion, HX_R);
+  const hxVec3 v_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_V, slot) : hx_torso_vec3(motion, HX_V);
+  const hxVec3 s = hx_mul(i.axes, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.axes.z, u = hx_cross(z, s);
+  const hxReal scale = 1.0 / hx_sqrt(2.0 * (1.0 + hx_dot(z, s))), w = (1.0 + hx_dot(z, s)) * scale;
+  const hxVec3 turn = hx_scale(scale, u);
+  const hxQuat p = hx_link_quat(motion, joint, slot);
+  const hxVec3 v = {p.x, p.y, p.z}, moved = hx_add(hx_add_scaled(hx_scale(w, v), p.w, turn), hx_cross(turn, v));
+  hx_store_quat(&motion->link[joint][HX_P], slot, (hxQuat){w * p.w - hx_dot(turn, v), moved.x, moved.y, moved.z});
+  const hxVec3 w_j = hx_add_scaled(i.w, hx_dot(s, hx_sub(drifted.w, i.w)), s);
+  hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);
+  const hxBody j = hx_link_body(motion, joint, slot);
+  const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
+  hx_store_vec3(&motion->link[joint][HX_R], slot, hx_sub(hx_add(r_i, k.sP_i), k.sP_j));
+  hx_store_vec3(&motion->link[joint][HX_V], slot, hx_sub(hx_add(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
+}
+
+static inline void hx_project(const hxModel *model, hxMotion *motion) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) project_link(model, joint, slot, motion);
+}
+
+#endif

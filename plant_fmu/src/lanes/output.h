@@ -1,0 +1,154 @@
+/* output.h - what the robot shows, from an evaluation with multipliers */
+#ifndef HX_OUTPUT_H
+#define HX_OUTPUT_H
+
+#include "dynamics.h"
+
+static void get3(hxVec3 a, int lane, double out[3]) {
+  out[0] = hx_lane(a.x, lane);
+  out[1] = hx_lane(a.y, lane);
+  out[2] = hx_lane(a.z, lane);
+}
+
+/* the pack and lane that hold a leg */
+static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
+  *lane = leg % HX_LANES;
+  return &work->pack[leg / HX_LANES];
+}
+
+static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) { return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w))); }
+
+/* of bodies and rotors */
+static double hx_kinetic_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+  const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J, hx_torso_vec3(motion, HX_V), work->torso.w);
+  hxReal legs[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    legs[pack] = hx_splat(0.0);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointWork *k = &work->pack[pack].joint[joint];
+      const int slot = pack * HX_LANES;
+      const hxReal mass = hx_load(&model->joint[joint].mass[slot]);
+      const hxReal rotor = (0.5 * model->rotor_inertia) * k->speed * k->speed;
+      legs[pack] += body_kinetic(mass, k->J, hx_link_vec3(motion, joint, HX_V, slot), k->body.w) + rotor;
+    }
+  }
+  return hx_lane(torso + hx_sum_legs(legs), 0);
+}
+
+/* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
+static double hx_potential_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+  const hxVec3 g = hx_splat_vec3(model->gravity);
+  hxReal legs[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const hxFootWork *foot = &work->pack[pack].foot;
+    const int slot = pack * HX_LANES;
+    legs[pack] = 0.4 * foot->normal.elastic * hx_max(foot->kin.delta, hx_splat(0.0));
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      legs[pack] -= hx_load(&model->joint[joint].mass[slot]) * hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
+  }
+  return hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
+}
+
+/* joint on child: force -lambda, torque about the joint's point -(u1 lambda_4 + u2 lambda_5); the motor's torque is not in it */
+static void fill_joint(const hxJointWork *k, int lane, int leg, int joint, hxOutput *o) {
+  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.axes.x, s), u2 = hx_cross(k->body.axes.y, s);
+  const hxVec3 couple = hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
+  o->angle[leg][joint] = hx_lane(k->angle, lane);
+  o->speed[leg][joint] = hx_lane(k->speed, lane);
+  o->torque[leg][joint] = hx_lane(k->servo.torque, lane);
+  get3(hx_neg(k->reaction.lambda_lin), lane, o->reaction_force[leg][joint]);
+  get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
+}
+
+static void fill_foot(const hxFootWork *foot, hxVec3 tibia, const hxContactState *contact, int lane, int leg, hxOutput *o) {
+  get3(foot->force, lane, o->foot.force[leg]);
+  get3(hx_add(tibia, foot->kin.arm), lane, o->foot.position[leg]);
+  get3(foot->kin.velocity, lane, o->foot.velocity[leg]);
+  o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
+  o->foot.tangential_force[leg] = hx_lane(foot->drag * foot->slip_speed, lane);
+  o->foot.slip_speed[leg] = hx_lane(foot->slip_speed, lane);
+  o->foot.penetration[leg] = hx_lane(foot->kin.delta, lane);
+  o->foot.impact_speed[leg] = contact->impact_speed[leg];
+  o->foot.contact[leg] = contact->closed[leg] != 0.0;
+}
+
+static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) {
+  const double *m = motion->torso;
+  const hxMat3 R = work->torso.axes;
+  double x[3], y[3], z[3]; /* columns of R */
+  get3(R.x, 0, x), get3(R.y, 0, y), get3(R.z, 0, z);
+  for (int i = 0; i < 3; ++i) {
+    o->torso.position[i] = m[HX_R + i];
+    o->torso.velocity[i] = m[HX_V + i];
+    o->torso.angular_velocity[i] = m[HX_W + i];
+  }
+  for (int i = 0; i < 4; ++i) o->torso.quaternion[i] = m[HX_P + i];
+  o->torso.roll = atan2(y[2], z[2]);
+  o->torso.pitch = asin(fmin(1.0, fmax(-1.0, -x[2])));
+  o->torso.yaw = atan2(x[1], x[0]);
+  get3(hx_tmul(R, work->torso_acceleration.lin), 0, o->imu.specific_force);
+  get3(hx_tmul(R, work->torso.w), 0, o->imu.angular_velocity);
+}
+
+/* norms of Phi and dPhi/dt over all joints */
+static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutput *o) {
+  hxReal position[HX_PACKS], velocity[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    position[pack] = velocity[pack] = hx_splat(0.0);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxConstraint c = hx_joint_constraint(model, motion, joint, pack * HX_LANES);
+      position[pack] += hx_dot(c.phi_lin, c.phi_lin) + c.phi[0] * c.phi[0] + c.phi[1] * c.phi[1];
+      velocity[pack] += hx_dot(c.dphi_lin, c.dphi_lin) + c.dphi[0] * c.dphi[0] + c.dphi[1] * c.dphi[1];
+    }
+  }
+  o->constraint.position_error = sqrt(hx_lane(hx_sum_legs(position), 0));
+  o->constraint.velocity_error = sqrt(hx_lane(hx_sum_legs(velocity), 0));
+}
+
+static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
+  const hxMotion *m = &state->motion;
+  o->energy.kinetic = hx_kinetic_energy(model, m, work);
+  o->energy.potential = hx_potential_energy(model, m, work);
+  o->energy.actuator_work = m->actuator_work;
+  o->energy.push_work = m->push_work;
+  o->energy.dissipated = m->dissipated;
+  o->energy.residual = o->energy.kinetic + o->energy.potential - state->stored_at_start - m->actuator_work - m->push_work + m->dissipated;
+}
+
+static void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
+  o->time = state->time;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    int lane;
+    const hxLegWork *w = leg_work(work, leg, &lane);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) fill_joint(&w->joint[joint], lane, leg, joint, o);
+    const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
+    fill_foot(&w->foot, tibia, &state->contact, lane, leg, o);
+  }
+  fill_torso(&state->motion, work, o);
+  fill_energy(model, state, work, o);
+  fill_constraint(model, &state->motion, o);
+  o->solver.evaluations = state->evaluations;
+  o->solver.steps = state->steps;
+  o->solver.rejected = state->rejected;
+  o->solver.touchdowns = state->touchdowns;
+}
+
+/* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's bodies */
+static void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, double acceleration[HX_BODIES][6],
+                                  double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
+  for (int i = 0; i < 6; ++i) acceleration[0][i] = rate->torso[HX_V + i];
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    int lane;
+    const hxLegWork *w = leg_work(work, leg, &lane);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointWork *k = &w->joint[joint];
+      const int row = HX_JOINTS * leg + joint;
+      for (int i = 0; i < 6; ++i) acceleration[1 + row][i] = rate->link[joint][HX_V + i][leg];
+      get3(k->reaction.lambda_lin, lane, multiplier[row]);
+      for (int i = 0; i < 2; ++i) multiplier[row][3 + i] = hx_lane(k->reaction.lambda[i], lane);
+      drive_torque[row] = hx_lane(k->servo.torque, lane);
+    }
+  }
+}
+
+#endif
