@@ -1,7 +1,8 @@
 """Makes the coefficients of the method rosw3 (plant_fmu/src/method.c): those nearest to ROS34PW2's that keep order 3 with A_i formed anew.
 
-ROS34PW2 (Rang and Angermann, BIT 45, 2005) is a W-method: order 3 with one inexact Jacobian A for all its stages. Here every stage has its
-own (its masses and joints are where the stage is), which asks for one condition more, sum b_i c_i gamma_i = 0; ROS34PW2 misses it by 0.0025.
+ROS34PW2 (Rang and Angermann, BIT 45, 2005) is a W-method: order 3 with one inexact Jacobian A for all its stages. Here every stage has
+its own (its masses and joints are where the stage is), which asks for one condition more, sum b_i c_i gamma_i = 0; ROS34PW2 misses it by
+0.0025.
 Kept: gamma, the last stage's a = (0, 0, 1) and stiff accuracy (b = last row of a + g + gamma), so that it stays A- and L-stable.
 """
 
@@ -16,10 +17,13 @@ Array = NDArray[np.float64]
 GAMMA = 0.435866521508459
 # ROS34PW2's a_21, a_31, a_32, g_21, g_31, g_32, b_1..b_3, and its embedded weights
 START = np.array(
-    [0.871733043016918, 0.844574600153694, -0.112990642364842, -0.871733043016918, -0.903380570130441, 0.054180672388095]
-    + [0.242123807060953, -1.223250583904515, 1.545260255335102]
+    [
+        *(0.871733043016918, 0.844574600153694, -0.112990642364842),
+        *(-0.871733043016918, -0.903380570130441, 0.054180672388095),
+        *(0.242123807060953, -1.223250583904515, 1.545260255335102),
+    ]
 )
-EMBEDDED = np.array([0.378109031458194, -0.096042292212423, 0.5, 0.217932660754229])
+EMBEDDED = np.array([0.378109031458194, -0.096042292212423, 0.5, 0.217933260754230])
 
 
 def method(x: Array) -> tuple[Array, Array, Array]:

@@ -4,13 +4,13 @@
 #include "lanes/integrator.h"
 #include "lanes/output.h"
 
-static const double first_step = 1e-4; /* s  tried after a reset */
+static const double cautious_step = 1e-4; /* s  tried after a reset */
 
 static void kernel_start(const hxModel *model, double t, hxState *state) {
   static const hxCommand no_command;
   hxWork work;
   state->time = t;
-  state->next_step = fmin(first_step, model->step_max);
+  state->next_step = state->first_step = fmin(cautious_step, model->step_max);
   state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
   const hxFeet feet = feet_of(model, &state->motion);

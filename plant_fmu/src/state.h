@@ -73,6 +73,7 @@ typedef struct hxContactState {
 typedef struct hxState {
   double time;
   double next_step;        /* s  what the error control would take next */
+  double first_step;       /* s  the same for the first step of a call, which new inputs shorten */
   double stored_at_start;  /* J  energy the audit starts from */
   hxMotion motion;
   hxContactState contact;

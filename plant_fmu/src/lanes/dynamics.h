@@ -23,6 +23,7 @@ typedef struct {
   hxBody body;            /* the child */
   hxVec3 c;               /* the child's centre of mass along the chain: r + sum of s_i^P - s_j^P */
   hxSym3 J;               /* child's inertia, world axes, about its centre of mass */
+  hxVec3 gyroscopic;      /* -w x (J w) */
   hxReal angle, speed;    /* rad, rad/s */
   hxReal torque;          /* N m  on the joint's axis: servo and gear (kinematic mode: gear, then the drive's too) */
   hxReal driven;          /* rad/s2  the drive's qdd in kinematic mode, else 0 */
@@ -33,7 +34,6 @@ typedef struct {
   hxMotion6 acceleration; /* a - g of the child at its centre of mass */
   struct {                /* for the multipliers, when they are asked for */
     hxJointKinematics kin;
-    hxVec3 gyroscopic;    /* -w x (J w) */
     hxReal qdd;
     hxVec3 lambda_lin;    /* rows 1-3 */
     hxReal lambda[2];     /* rows 4, 5 */
@@ -110,24 +110,30 @@ static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *k
 static inline hxVec3 motion_at(hxMotion6 a, hxVec3 c) { return hx_add(a.lin, hx_cross(a.ang, c)); }
 
 /* One joint and its child: positions, velocities, bias acceleration and the force it takes. */
+/* Attitude and inertia of a link. */
+static inline void link_pass(const hxModel *model, const hxMotion *motion, int joint, int slot, hxJointWork *k) {
+  k->body = hx_link_body(motion, joint, slot);
+  k->J = hx_rotate_sym3(k->body.axes, hx_load_sym3(model->joint[joint].inertia, slot));
+  k->gyroscopic = hx_cross(hx_sym_mul(k->J, k->body.w), k->body.w);
+}
+
 static inline void joint_pass(const hxModel *model, const hxCommand *command, double t, const hxMotion *motion, int joint, int slot,
                               int reactions, const hxBody *i, hxChain *chain, hxJointWork *k) {
   const hxJointModel *m = &model->joint[joint];
-  const hxBody j = hx_link_body(motion, joint, slot);
-  const hxJointKinematics kin = hx_joint_kinematics(m, slot, i, &j);
+  const hxBody *j = &k->body;
+  const hxJointKinematics kin = hx_joint_kinematics(m, slot, i, j);
   const hxVec3 P = hx_add(chain->c, kin.sP_i);
-  const hxVec3 dsP_i = hx_cross(i->w, kin.sP_i), dsP_j = hx_cross(j.w, kin.sP_j);
+  const hxVec3 dsP_i = hx_cross(i->w, kin.sP_i), dsP_j = hx_cross(j->w, kin.sP_j);
   chain->c = hx_sub(P, kin.sP_j);
   chain->dc = hx_add(chain->dc, hx_sub(dsP_i, dsP_j));
-  chain->ddc = hx_add(chain->ddc, hx_sub(hx_cross(i->w, dsP_i), hx_cross(j.w, dsP_j)));
-  k->body = j;
+  chain->ddc = hx_add(chain->ddc, hx_sub(hx_cross(i->w, dsP_i), hx_cross(j->w, dsP_j)));
   k->c = chain->c;
   k->sweep.S = (hxMotion6){kin.s, hx_cross(P, kin.s)};
-  k->speed = hx_dot(kin.s, hx_sub(j.w, i->w));
+  k->speed = hx_dot(kin.s, hx_sub(j->w, i->w));
   k->driven = model->servo_mode == HX_SERVO_KINEMATIC ? drive_acceleration(model, command, t, joint, slot, k) : hx_splat(0.0);
 
   /* rows 1-3 of a_k telescope: ddc - 2 alpha (v_j - v_0 - dc) - beta^2 (r_j - r_0 - c) */
-  const hxVec3 dw = joint_bias(model, &kin, i->w, &j, k->speed, k->driven);
+  const hxVec3 dw = joint_bias(model, &kin, i->w, j, k->speed, k->driven);
   const hxVec3 drift = hx_sub(hx_sub(hx_link_vec3(motion, joint, HX_R, slot), hx_torso_vec3(motion, HX_R)), chain->c);
   const hxVec3 drift_rate = hx_sub(hx_sub(hx_link_vec3(motion, joint, HX_V, slot), hx_torso_vec3(motion, HX_V)), chain->dc);
   const hxVec3 rows =
@@ -137,13 +143,10 @@ static inline void joint_pass(const hxModel *model, const hxCommand *command, do
   k->bias = (hxMotion6){chain->bias.ang, hx_add(chain->bias.lin, rows)};
 
   /* p of the child: (J dw + w x (J w), m a) at its centre of mass */
-  const hxSym3 J = hx_rotate_sym3(j.axes, hx_load_sym3(m->inertia, slot));
-  const hxVec3 gyroscopic = hx_cross(hx_sym_mul(J, j.w), j.w);
   const hxVec3 lin = hx_scale(hx_load(&m->mass[slot]), motion_at(k->bias, chain->c));
-  const hxVec3 ang = hx_sub(hx_sym_mul(J, k->bias.ang), gyroscopic);
-  k->J = J;
+  const hxVec3 ang = hx_sub(hx_sym_mul(k->J, k->bias.ang), k->gyroscopic);
   k->p = (hxForce6){hx_add(ang, hx_cross(chain->c, lin)), lin};
-  if (reactions) k->reaction.kin = kin, k->reaction.gyroscopic = gyroscopic;
+  if (reactions) k->reaction.kin = kin;
 }
 
 /* first all half-angles, then all angles: their long chains of operations overlap */
@@ -330,7 +333,7 @@ static inline void leg_multipliers(const hxModel *model, int slot, hxLegWork *le
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
     const hxVec3 lin = hx_add_scaled(handed.lin, -hx_load(&model->joint[joint].mass[slot]), k->acceleration.lin);
-    const hxVec3 ang = hx_sub(hx_add(k->reaction.gyroscopic, handed.ang), hx_sym_mul(k->J, k->acceleration.ang));
+    const hxVec3 ang = hx_sub(hx_add(k->gyroscopic, handed.ang), hx_sym_mul(k->J, k->acceleration.ang));
     const hxVec3 about_joint = hx_sub(ang, hx_cross(kin->sP_j, lin));
     const hxReal along = hx_dot(about_joint, kin->s), inverse_sz = 1.0 / kin->sz;
     if (model->servo_mode == HX_SERVO_KINEMATIC) {
@@ -441,6 +444,8 @@ static inline void hx_dynamics_forces(const hxModel *model, const hxContactState
                                       const hxMotion *motion, hxWork *work) {
   torso_pass(model, motion, work);
   joint_angles(model, motion, work);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack) link_pass(model, motion, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     leg_pass(model, command, t, motion, &work->torso, pack * HX_LANES, work->reactions, &work->pack[pack]);
   for (int joint = 0; joint < HX_JOINTS; ++joint)

@@ -244,10 +244,10 @@ static int all_finite(const hxMotion *y) {
 }
 
 /* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is its length. */
-static hxStatus advance(const hxStart *start, double h_max, hxState *state, double *taken, char *message) {
+static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state, double *taken, char *message) {
   const hxModel *model = start->model;
   hxTrial trial;
-  double h = model->step > 0.0 ? h_max : fmin(h_max, state->next_step);
+  double h = model->step > 0.0 ? h_max : fmin(h_max, *next_step);
   trial.error = 0.0;
   for (;;) {
     if (model->step == 0.0 && state->steps + state->rejected >= start->last_step) return give_up(&trial, start->t, h, message);
@@ -261,7 +261,7 @@ static hxStatus advance(const hxStart *start, double h_max, hxState *state, doub
   if (model->step == 0.0) {
     const double next = fmin(model->step_max, h * step_factor(start->method, trial.error));
     /* a step cut short by the end of the interval says little against a longer one */
-    state->next_step = h < h_max ? next : fmax(next, state->next_step);
+    *next_step = state->next_step = h < h_max ? next : fmax(next, state->next_step);
   }
   hxFeet feet = feet_of(model, &trial.y);
   *taken = open_depth(start->contact, &feet) > 0.0 ? find_touchdown(start, h, state, &trial, &feet) : h;
@@ -277,12 +277,14 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_
   hxStart start = {.model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .y = &state->motion};
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
+  double first = fmin(state->first_step, state->next_step), *next_step = &first; /* new inputs: a larger error than the last step's */
   while (state->time < t_end) {
     const double left = t_end - state->time;
     double taken;
     start.t = state->time;
-    const hxStatus status = advance(&start, left, state, &taken, message);
+    const hxStatus status = advance(&start, left, next_step, state, &taken, message);
     if (status != HX_OK) return status;
+    if (next_step == &first) state->first_step = first, next_step = &state->next_step;
     const double t = state->time + taken;
     state->time = taken >= left || t_end - t < step_floor ? t_end : t;
   }
