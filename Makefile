@@ -7,15 +7,16 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp)
 
-.PHONY: help setup demo test check format generate fmu typing clean
+.PHONY: help setup demo test check bench bench-quick format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
 	@echo "make demo      the paper's comparison; says where its report is"
 	@echo "make test      every test"
 	@echo "make check     formatters, linters, types, generated files"
+	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make format    formats C and Python"
 	@echo "make generate  plant_fmu/generated/ from plant_fmu/interface.toml"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
@@ -42,9 +43,15 @@ check: setup typing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py
+	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
+
+bench: setup typing
+	$(BIN)/python -m benchmarks.run
+
+bench-quick: setup typing
+	$(BIN)/python -m benchmarks.run --quick
 
 format: setup
 	$(BIN)/ruff check --fix-only --quiet .

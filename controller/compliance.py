@@ -15,11 +15,13 @@ set for its ride height.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
-from hexapod_cosim.controller.kinematics import LEGS, Array, Mask, Plane
+from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, Mask, Plane
 from hexapod_cosim.controller.slip_pid import SlipPid
 from hexapod_cosim.controller.suspension import Suspension
 
@@ -31,102 +33,103 @@ DETERMINANT_FLOOR = 1e-9  # m4    feet on one line share no moment
 class Compliance:
     """The two laws of all feet. Horizontal shifts and forces are complex numbers x + i y.
 
-    Attributes: tangential: (2, 6) shift and shift_rate; normal: (2, 6) lift and lift_rate;
-    (6,) each: shift, shift_rate: horizontal correction and its rate [m, m/s]; lift, lift_rate: the vertical one;
-    squeeze: tangential force the feet give way to [N]; excess: normal force beyond the preload [N]; share: of the weight [N].
+    What the planned paths ask is laid out beforehand by `plan`; `step` takes it step by step and answers to the forces.
+
+    Attributes, (6,) each:
+        shift, lift: horizontal and vertical correction [m]; shift_rate: of the horizontal one [m/s];
+        squeeze: tangential force the feet give way to [N]; excess: normal force beyond the preload [N].
     """
 
     def __init__(self, gains: Gains, *, weight: float, centre: complex, period: float) -> None:
         """weight [N] and centre of mass x + i y [m] of the robot in the walking frame."""
         self.pid = SlipPid(gains.slip, period=period)
         self.suspension = Suspension(gains.suspension, period=period)
-        self.normal = self.suspension.state
-        self.lift, self.lift_rate = self.normal
-        self._weight, self._centre = weight, centre
-        self._preloads, self._per_share = np.full(LEGS, gains.suspension.preload), np.full(LEGS, TRIPOD_LEGS / weight)
-        self._follow = np.full(LEGS, 1.0 - math.exp(-period / gains.slip.load_time))
-        self._largest, self._per_second = np.full(LEGS, LARGEST_LOAD), np.full(LEGS, 1.0 / period)
-        self.squeeze = np.zeros(LEGS, dtype=np.complex128)
-        self.tangential = np.zeros((2, LEGS), dtype=np.complex128)
-        self.shift, self.shift_rate = self.tangential
-        self._new, self._common = np.zeros((2, LEGS), dtype=np.complex128)
-        self.excess, self.share, self._load, self._scale, self._t, self._zero = np.zeros((6, LEGS))
-        self._stance, self._gone = np.empty((2, LEGS), dtype=np.bool_)
+        self._weight, self._centre, self._per_second = weight, centre, 1.0 / period
+        self._preload, self._per_share = gains.suspension.preload, TRIPOD_LEGS / weight
+        self._follow = 1.0 - math.exp(-period / gains.slip.load_time)
+        self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
+        self.lift: Array = np.zeros(LEGS)
+        self.reset()
 
     def reset(self) -> None:
-        """Both laws at rest."""
+        """Both laws at rest, and nothing planned."""
         self.pid.reset()
         self.suspension.reset()
-        for plane in (self.shift, self.shift_rate, self.squeeze):
-            plane[:] = 0.0
-        for buffer in (self.excess, self.share, self._scale):
-            buffer[:] = 0.0
+        self.shift[:] = self.lift[:] = 0.0
+        self.squeeze, self.shift_rate, self._last_shift = ([0j] * LEGS for _ in range(3))
+        self.excess = [0.0] * LEGS
+        self._at, self._scale = 0, [(0.0,) * LEGS]
+        self._known: tuple[list[bool], list[bool]] = ([], [])
 
-    def step(self, push: Plane, normal: Array, contact: Mask, *, swinging: Mask, plane: Plane) -> None:
-        """One period.
+    def save(self) -> tuple[Any, ...]:
+        """What both laws remember."""
+        return self.pid.state, self.pid.output, self.suspension.state, self._scale[self._at], self._last_shift
 
-        Args:
-            push, normal: (6,) ground on foot in the walking frame, x + i y and z [N]; contact: (6,) measured.
-            swinging, plane: (6,) of the foot paths.
+    def restore(self, state: tuple[Any, ...]) -> None:
+        """Goes back to it; nothing more is planned."""
+        self.pid.state, self.pid.output, self.suspension.state, scale, self._last_shift = state
+        self.shift[:], self.lift[:] = self._last_shift, self.suspension.state[0]
+        self._scale, self._at, self._known = [scale], 0, ([], [])
+
+    def plan(self, plane: Plane, swinging: Mask) -> None:
+        """Lays out what the coming steps ask: planned feet (n, 6) x + i y [m], and which of them (6,) swing throughout."""
+        self.shares = even_shares(plane, ~swinging, self._weight, self._centre)
+        self._preloads, self._swinging = (self._preload * self.shares).tolist(), swinging.tolist()
+        loads = np.minimum(self._per_share * self.shares, LARGEST_LOAD).T.tolist()
+        follow, smoothed = self._follow, []
+        for planned, scale in zip(loads, self._scale[self._at], strict=True):
+            last = scale
+            smoothed.append([last] + [last := last + follow * (load - last) for load in planned])
+        self._scale, self._at = list(zip(*smoothed, strict=True)), 0
+
+    def step(self, push: Plane, normal: Array, contact: Mask) -> Feet:
+        """One planned period on: shift and lift of the feet, and their rates.
+
+        push, normal: (6,) ground on foot in the walking frame, x + i y and z [N]; contact: (6,) measured.
         """
-        np.logical_not(swinging, self._stance)
-        load = self._load
-        np.maximum(normal, self._zero, out=load)
-        np.multiply(load, contact, load)
-        self.share[:] = even_shares(plane.tolist(), self._stance.tolist(), self._weight, self._centre)
-        self._split(push, contact)
-        self._yield(swinging, contact)
-        np.multiply(self.share, self._preloads, self.excess)
-        np.subtract(load, self.excess, self.excess)
-        np.multiply(self.excess, self._stance, self.excess)
-        self.suspension.step(self.excess)
+        preloads = self._preloads[self._at]
+        self._at += 1
+        swinging, touching = self._swinging, contact.tolist()
+        loads = [f if touches and f > 0.0 else 0.0 for f, touches in zip(normal.tolist(), touching, strict=True)]
+        self._split([f if touches else 0j for f, touches in zip(push.tolist(), touching, strict=True)], loads)
+        if (swinging, touching) != self._known:
+            self._forget(swinging, touching)
+        self._yield()
+        self.excess = [0.0 if swings else f - held for f, held, swings in zip(loads, preloads, swinging, strict=True)]
+        lift, lift_rate = self.suspension.step(self.excess)
+        self.lift[:] = lift
+        return self._last_shift, lift, self.shift_rate, lift_rate
 
-    def _split(self, push: Plane, contact: Mask) -> None:
+    def _split(self, push: Sequence[complex], loads: Sequence[float]) -> None:
         """squeeze = f_t - (f_n / sum f_n) sum f_t over the feet in contact."""
-        squeeze = self.squeeze
-        np.multiply(push, contact, squeeze)
-        total = sum(self._load.tolist())
-        if total > LOAD_FLOOR:
-            np.multiply(self._load, sum(squeeze.tolist()) / total, self._common)
-            np.subtract(squeeze, self._common, squeeze)
+        total = sum(loads)
+        common = sum(push) / total if total > LOAD_FLOOR else 0j
+        self.squeeze = [f - load * common for f, load in zip(push, loads, strict=True)]
 
-    def _yield(self, swinging: Mask, contact: Mask) -> None:
-        """shift = PID(squeeze) x smoothed share in thirds of the weight; the PID starts afresh when its foot has lifted off."""
-        np.greater(swinging, contact, self._gone)
-        if True in self._gone.tolist():
-            self.pid.reset(self._gone)
-        scale, new = self._scale, self._new
-        np.multiply(self.share, self._per_share, self._t)
-        np.minimum(self._t, self._largest, out=self._t)
-        np.subtract(self._t, scale, self._t)
-        np.multiply(self._t, self._follow, self._t)
-        np.add(scale, self._t, scale)
-        np.multiply(self.pid.step(self.squeeze), scale, new)
-        np.subtract(new, self.shift, self.shift_rate)
-        np.multiply(self.shift_rate, self._per_second, self.shift_rate)
-        self.shift[:] = new
+    def _forget(self, swinging: list[bool], touching: list[bool]) -> None:
+        """The PID starts afresh when its foot has lifted off; until it is back nothing pushes it."""
+        self._known = swinging, touching
+        self.pid.reset([swings and not touches for swings, touches in zip(swinging, touching, strict=True)])
+
+    def _yield(self) -> None:
+        """shift = PID(squeeze) x smoothed share in thirds of the weight."""
+        shift = [u * scale for u, scale in zip(self.pid.step(self.squeeze), self._scale[self._at], strict=True)]
+        self.shift_rate = [(new - old) * self._per_second for new, old in zip(shift, self._last_shift, strict=True)]
+        self._last_shift, self.shift[:] = shift, shift
 
 
-def even_shares(feet: list[complex], standing: list[bool], weight: float, centre: complex) -> list[float]:
-    """What each foot carries [N]: least squares with sum f = weight and no moment about the centre of mass; never negative.
+def even_shares(feet: Plane, standing: Mask, weight: float, centre: complex) -> Array:
+    """(n, 6) what each foot carries [N]: least squares with sum f = weight and no moment about the centre of mass; never negative.
 
-    f = a + b x + c y over the standing feet, p = x + i y [m] from the centre:
+    f = a + b x + c y over the standing feet (6,), the same in all rows, p = x + i y [m] from the centre:
     (n sx sy; sx sxx sxy; sy sxy syy) (a b c) = (weight 0 0), with sums s over the standing feet.
-    Plain numbers: six legs are too few for arrays to pay.
     """
-    n, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for foot, stands in zip(feet, standing, strict=True):
-        if stands:
-            arm = foot - centre
-            x, y = arm.real, arm.imag
-            n, sx, sy = n + 1, sx + x, sy + y
-            sxx, sxy, syy = sxx + x * x, sxy + x * y, syy + y * y
+    shares, arm = np.zeros(feet.shape), feet.T[standing] - centre
+    x, y, n = arm.real, arm.imag, max(len(arm), 1)
+    sx, sy, sxx, sxy, syy = x.sum(axis=0), y.sum(axis=0), (x * x).sum(axis=0), (x * y).sum(axis=0), (y * y).sum(axis=0)
     a, b, c = sxx * syy - sxy * sxy, sxy * sy - sx * syy, sx * sxy - sxx * sy
     determinant = n * a + sx * b + sy * c
-    if determinant < DETERMINANT_FLOOR:
-        each = weight / max(n, 1)
-        return [each if stands else 0.0 for stands in standing]
-    per = weight / determinant
-    a, b, c = (a - b * centre.real - c * centre.imag) * per, b * per, c * per
-    shares = [a + b * p.real + c * p.imag if stands else 0.0 for p, stands in zip(feet, standing, strict=True)]
-    return [0.0 if share < 0.0 else share for share in shares]
+    solvable = determinant >= DETERMINANT_FLOOR
+    per = weight / np.where(solvable, determinant, 1.0)
+    shares[:, standing] = np.where(solvable, np.maximum((a + b * x + c * y) * per, 0.0), weight / n).T
+    return shares

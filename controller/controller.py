@@ -2,27 +2,31 @@
 
     command -> ramp -> foot paths -> + compliance (measured forces) -> posture -> inverse kinematics -> angle_ref, speed_ref
 
-Kinematic control is the same chain without the compliance: the commands alone.
+Kinematic control is the same chain without the compliance: the commands alone. What depends on these alone, up to the foot paths, is
+planned for many steps at once, in arrays over time; what depends on the last step, in Python's own numbers, leg by leg.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
+from operator import add
+from struct import Struct
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.controller.compliance import Compliance
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.gait import Gait
-from hexapod_cosim.controller.kinematics import LEGS, Array, LegSolver, Mask, Plane
-from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths, Twist
+from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, LegSolver, Mask, Plane
+from hexapod_cosim.controller.posture import Posture
+from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
 from hexapod_cosim.models import HexapodError, Robot
 from hexapod_cosim.models.kinematics import axis_rotation
 
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
+PLANNED = 128  # steps at most that are planned at once; nothing depends on it but the time it takes
+PACK = Struct("12d").pack_into  # numbers into an array: half the time of an assignment
 
 
 class ControllerError(HexapodError):
@@ -62,14 +66,10 @@ class JointCommand:
 class Diagnostics:
     """The controller's insides for recorders and tests: arrays of six legs that change at every step."""
 
-    phase: Array  # 1    of each leg's cycle
     swinging: Mask  # planned to be in the air
     shift: Plane  # m    horizontal correction by the compliance, x + i y in the walking frame
     lift: Array  # m    vertical correction
-    plane: Plane  # m    foot targets given to the inverse kinematics, x + i y in the torso frame
-    height: Array  # m    and z
     unreachable: Mask  # the joints could not follow at the last step
-    command: Array  # (6,) vx vy yaw_rate height roll pitch after the ramp
 
 
 class Controller:
@@ -88,61 +88,55 @@ class Controller:
             )  # fmt: skip
         self.period, self.gait, self.gains = period, gait, gains
         self.legs = LegSolver(robot)
-        self.ramp = CommandRamp(gait.period)
+        self.ramp = CommandRamp(gait.period, period=period)
         self.stance = np.array([leg.stance for leg in robot.legs])
         self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
         weight = robot.total_mass * float(np.linalg.norm(robot.gravity))
         self.compliance = None if gains is None else Compliance(gains, weight=weight, centre=centre_of_mass(robot), period=period)
         mismatch = None if gains is None else gains.mismatch(robot, period=period)
         self.warnings: tuple[str, ...] = () if mismatch is None else (mismatch,)
-        self._radius = np.full(LEGS, robot.foot.radius)
+        self._per_second, self._radius = 1.0 / period, robot.foot.radius
+        self._stance_pitch = (self.stance[:, 2] - self.stance[:, 1]).tolist()
         self._allocate()
         self.reset()
 
     def _allocate(self) -> None:
-        self._out = JointCommand()
-        # rows: position and velocity
-        self._horizontal, self._vertical = np.empty((2, LEGS), dtype=np.complex128), np.empty((2, LEGS))
-        (self._plane, self._plane_velocity), (self._height, self._rise) = self._horizontal, self._vertical
+        laws, legs = self.compliance, self.legs
+        self._out = JointCommand(*legs.joints)
         # rows (x y z 0) of forces, seen as x + i y and z without a copy
         self._force, self._rotation = np.zeros((LEGS, 4)), np.zeros((3, 4))
         self._push, self._normal = self._force.view(np.complex128)[:, 0], self._force[:, 2]
-        self._rolling = np.zeros((2, LEGS), dtype=np.complex128)
-        self._rolled, self._roll_rate = self._rolling
-        self._pitch, self._stance_pitch = np.empty(LEGS), self.stance[:, 2] - self.stance[:, 1]
-        self._per_second = np.full(LEGS, 1.0 / self.period)
-        self._unreachable = np.zeros(LEGS, dtype=np.bool_)
-        laws = self.compliance
         self.diagnostics = Diagnostics(
-            phase=self.paths.phase, swinging=self.paths.swinging, plane=self._plane, height=self._height,
+            swinging=np.zeros(LEGS, dtype=np.bool_), unreachable=legs.unreachable,
             shift=np.zeros(LEGS, dtype=np.complex128) if laws is None else laws.shift, lift=np.zeros(LEGS) if laws is None else laws.lift,
-            unreachable=self._unreachable, command=self.ramp.value,
         )  # fmt: skip
 
     def reset(self) -> None:
         """Standing in the stance, all memory cleared; the next step is the first."""
         self.ramp.reset()
         self.paths.reset()
-        if self.compliance is not None:
-            self.compliance.reset()
-        self._rolled[:] = 0.0
-        self._twist: Twist = (0j, 0.0)
+        self.rolled = [0j] * LEGS
         self._start: float | None = None
         self._count = 0
-
-    @property
-    def state_arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything the controller remembers between steps, by name (live arrays)."""
-        paths = self.paths
-        arrays: dict[str, NDArray[Any]] = {
-            "ramp.value": self.ramp.value, "ramp.rate": self.ramp.rate,
-            "paths.plane": paths.plane, "paths.height": paths.height, "paths.landing": paths.landing,
-            "paths.phase": paths.phase, "paths.blend": paths.blend, "rolled": self._rolled,
-        }  # fmt: skip
         if self.compliance is not None:
-            laws = self.compliance
-            arrays |= {"pid.state": laws.pid.state, "suspension.state": laws.suspension.state, "compliance.shift": laws.shift}
-        return arrays
+            self.compliance.reset()
+        self._lay_out(slice(0, 1), *self.ramp.ahead(0))
+
+    def save(self) -> dict[str, Any]:
+        """Everything the controller remembers between steps."""
+        laws = None if self.compliance is None else self.compliance.save()
+        own = {"rolled": self.rolled, "_start": self._start, "_count": self._count}
+        return {"ramp": self.ramp.save(), "paths": self.paths.save(), "laws": laws, "legs": self.legs.save(), "own": own}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Goes back to a saved state: the steps after it are the same again, bit for bit."""
+        self.ramp.restore(state["ramp"])
+        self.paths.restore(state["paths"])
+        if self.compliance is not None:
+            self.compliance.restore(state["laws"])
+        self.legs.restore(state["legs"])
+        vars(self).update(state["own"])
+        self._lay_out(slice(0, 1), *self.ramp.ahead(0))
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """The joint commands for [t, t + period). The result's arrays are reused by the next step.
@@ -153,23 +147,22 @@ class Controller:
             measurement: sensor values at t; kinematic control does not look at it.
         """
         self._advance(t, command)
-        paths, laws = self.paths, self.compliance
-        if laws is None:
-            self._horizontal[:], self._vertical[:] = paths.horizontal, paths.vertical
-        else:
+        feet = self._feet[self._at]
+        if self.compliance is not None:
             self._sense(measurement)
-            laws.step(self._push, self._normal, measurement.contact, swinging=paths.swinging, plane=paths.plane)
-            np.add(paths.horizontal, laws.tangential, self._horizontal)
-            np.add(paths.vertical, laws.normal, self._vertical)
+            feet = _sum(feet, self.compliance.step(self._push, self._normal, measurement.contact))
         if self._count:
-            self._roll()
-        self._pose()
-        out = self._out
-        self.legs.solve(self._plane, self._height, self._plane_velocity, self._rise, out.angle_ref, out.speed_ref, self._unreachable)
+            feet = self._roll(feet)
+        if self._posture is not None:
+            feet = self._posture.apply(self._at, feet)
+        self.legs.solve(feet)
         return self._out
 
     def _advance(self, t: float, command: BodyCommand) -> None:
-        self.ramp.aim(command)
+        """To the planned step at t."""
+        if command is not self.ramp.target and command != self.ramp.target:
+            self.ramp.aim(command)
+            self._last = self._at
         if self._start is None:
             self._start = t
             return
@@ -177,60 +170,65 @@ class Controller:
         due = self._start + self._count * self.period
         if not abs(t - due) <= CLOCK_TOLERANCE * self.period:
             raise ControllerError("step out of time", got=t, expected=f"t = {due} s", fix="step once per period, or reset the controller")
-        ramp, target = self.ramp, self.ramp.target
-        if ramp.settled:
-            going = (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
-            self.paths.advance(self._twist, self._twist, going=going)
-            return
-        v, yaw_rate = self._twist
-        ramp.advance(self.period)
-        vx, vy, turn = ramp.value[:3].tolist()
-        self._twist = (complex(vx, vy), turn)
-        self.paths.advance(self._twist, (0.5 * (v + self._twist[0]), 0.5 * (yaw_rate + turn)), going=True)
+        if self._at == self._last:
+            self._plan()
+        self._at += 1
+        self.paths.advance()
+        self.ramp.steps += 1
 
-    def _roll(self) -> None:
+    def _plan(self) -> None:
+        """Plans what depends on the command alone, up to the next lift-off or touch-down."""
+        ramp, target, paths = self.ramp, self.ramp.target, self.paths
+        moves = (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
+        value, rate = ramp.ahead(PLANNED if ramp.settled or moves else min(ramp.remaining, PLANNED))
+        paths.plan(value[:, 0] + 1j * value[:, 1], value[:, 2], going=moves or not ramp.settled)
+        end = paths.left + 1
+        self._lay_out(slice(1, end), value[1:end], rate[1:end])
+
+    def _lay_out(self, chosen: slice, value: Array, rate: Array) -> None:
+        """Turns planned steps into what `step` needs: Python's own numbers, faster than arrays of six."""
+        steps = self.paths.steps
+        columns = (steps.plane, steps.height, steps.plane_velocity, steps.rise)
+        self._feet: list[Feet] = list(zip(*(column[chosen].tolist() for column in columns), strict=True))
+        swinging = self.diagnostics.swinging
+        swinging[:] = steps.swinging[-1]  # in all of them the same
+        level = not (value[:, 3:].any() or rate[:, 3:].any())
+        self._posture = None if level else Posture(value[:, 3:], rate[:, 3:])
+        if self.compliance is not None:
+            self.compliance.plan(steps.plane[chosen], swinging)
+        self._at, self._last = (0 if chosen.start == 0 else -1), len(self._feet) - 1
+
+    def _roll(self, feet: Feet) -> Feet:
         """Keeps the contact point of the round foot, not its centre, on the planned path.
 
         A tibia that pitches by dB rolls its foot's sphere by -R dB along the leg's outward direction; B from the last step's angles.
         """
-        angle, roll, rate = self._out.angle_ref, self._rolled, self._roll_rate
-        rate[:] = roll
-        np.subtract(angle[:, 2], angle[:, 1], self._pitch)
-        np.subtract(self._pitch, self._stance_pitch, self._pitch)
-        np.multiply(self._pitch, self._radius, self._pitch)
-        np.multiply(self.legs.heading, self._pitch, roll)
-        np.subtract(roll, rate, rate)
-        np.multiply(rate, self._per_second, rate)
-        np.add(self._horizontal, self._rolling, self._horizontal)
+        angles, radius, per_second, before = self.legs.angles, self._radius, self._per_second, self.rolled
+        legs = zip(self.legs.headings, angles[1::3], angles[2::3], self._stance_pitch, strict=True)
+        self.rolled = rolled = [heading * (radius * (q3 - q2 - stance)) for heading, q2, q3, stance in legs]
+        plane, height, velocity, rise = feet
+        velocity = [v + (new - old) * per_second for v, new, old in zip(velocity, rolled, before, strict=True)]
+        return list(map(add, plane, rolled)), height, velocity, rise
 
     def _sense(self, measurement: Measurement) -> None:
         """Foot forces in the walking frame K: rows f_K = f_W R_WT R_TK, the transpose of R_KT R_TW f_W."""
         w, x, y, z = measurement.quaternion.tolist()
+        xx, yy, zz = x * x, y * y, z * z
+        PACK(
+            self._rotation.data, 0,
+            1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y), 0.0,
+            2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x), 0.0,
+            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy), 0.0,
+        )  # fmt: skip
         rotation = self._rotation
-        rotation[:, :3] = (
-            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        )
-        roll, pitch = self.ramp.value[4:].tolist()
-        if roll != 0.0 or pitch != 0.0:
-            rotation[:, :3] = rotation[:, :3] @ _posture(roll, pitch).T
-        np.dot(measurement.foot_force, rotation, self._force)
+        if self._posture is not None:
+            rotation[:, :3] = rotation[:, :3] @ self._posture.rotation[self._at].T
+        np.dot(measurement.foot_force, rotation, out=self._force)
 
-    def _pose(self) -> None:
-        """Walking frame to torso frame: p_T = R_TK (p_K - height), v_T = R_TK (v_K - rate) - w_T x p_T."""
-        ramp = self.ramp
-        if ramp.settled and ramp.level:
-            return
-        height, roll, pitch = ramp.value[3:].tolist()
-        height_rate, roll_rate, pitch_rate = ramp.rate[3:].tolist()
-        plane, velocity = self._plane, self._plane_velocity
-        turn = _posture(roll, pitch).T
-        x, y, z = turn @ np.stack([plane.real, plane.imag, self._height - height])
-        vx, vy, vz = turn @ np.stack([velocity.real, velocity.imag, self._rise - height_rate])
-        wx, wy, wz = roll_rate, pitch_rate * math.cos(roll), -pitch_rate * math.sin(roll)
-        plane.real, plane.imag, self._height[:] = x, y, z
-        velocity.real, velocity.imag, self._rise[:] = vx - (wy * z - wz * y), vy - (wz * x - wx * z), vz - (wx * y - wy * x)
+
+def _sum(feet: Feet, shifts: Feet) -> Feet:
+    (plane, height, velocity, rise), (x, z, v, w) = feet, shifts
+    return list(map(add, plane, x)), list(map(add, height, z)), list(map(add, velocity, v)), list(map(add, rise, w))
 
 
 def centre_of_mass(robot: Robot) -> complex:
@@ -244,9 +242,3 @@ def centre_of_mass(robot: Robot) -> complex:
             point = point + rotation @ np.array(link.tip)
     x, y, _ = (moment / robot.total_mass).tolist()
     return complex(x, y)
-
-
-def _posture(roll: float, pitch: float) -> Array:
-    """(3, 3) R_KT: torso to walking frame, roll about x first, then pitch about y."""
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    return np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])

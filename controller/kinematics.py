@@ -14,9 +14,11 @@ numbers: on arrays of six, numpy's cost per call is several times that of the si
 
 from __future__ import annotations
 
-import cmath
-import math
-from dataclasses import dataclass
+from cmath import phase
+from collections.abc import Sequence
+from math import acos, sin, sqrt
+from struct import Struct
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +36,8 @@ FLAG_TOLERANCE = 1e-9  # rad or 1    round-off at the edge of the reach is not "
 SINGULAR_SINE = 0.02  # 1    floor of sin(gamma): a straight leg has no finite joint speed
 FOLDED_COSINE = -1.0 + 1e-12  # 1    least cos(gamma): a folded leg of equal links has no direction
 RADIUS_FLOOR = 1e-9  # m2    floor of the squared distance from the coxa axis
+ROOT_FLOOR = sqrt(RADIUS_FLOOR)  # m
+PACK = Struct(f"{6 * LEGS}d").pack_into  # numbers into an array: half the time of an assignment
 
 
 def _check_axes(robot: Robot) -> None:
@@ -47,12 +51,8 @@ def _check_axes(robot: Robot) -> None:
                 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class LegInverse:
-    """Inverse kinematics of one leg. Points of a plane are x + i y seen from above, u + i w in the leg's own plane.
-
-    Formulas in products instead of powers and `abs`, which raise on overflow: whatever comes in, something comes out.
-    """
+class LegConstants(NamedTuple):
+    """What the inverse kinematics of a leg need. Points of a plane are x + i y seen from above, u + i w in the leg's own plane."""
 
     hip: complex  # m    of the coxa axis, torso frame
     height: float  # m    of the femur joint, torso frame
@@ -63,42 +63,65 @@ class LegInverse:
     yaw: complex  # e^-i hip_yaw
     tilt: complex  # e^-i tilt_2
     knee_tilt: float  # rad    tilt_2 - tilt_3
+    side_square: float  # m2    Y^2
+    scale: float  # 1/m2    1 / (2 a b)
+    shift: float  # 1    (a^2 + b^2) / (2 a b)
 
-    def solve(self, plane: complex, height: float, velocity: complex, rise: float) -> tuple[complex, bool, tuple[float, ...]]:
-        """e^i psi of the leg's outward direction, whether the foot is within reach, and q_1 to q_3, dq_1 to dq_3 [rad, rad/s]."""
-        a, b, side = self.femur, self.tibia, self.side
+
+Feet = tuple[Sequence[complex], Sequence[float], Sequence[complex], Sequence[float]]
+Solution = tuple[list[float], list[float], list[complex], list[int]]
+
+
+def solve_legs(legs: Sequence[LegConstants], feet: Feet) -> Solution:
+    """Inverse kinematics without limits: whatever comes in, something comes out.
+
+    Args:
+        feet: of each leg x + i y and z of its foot in the torso frame [m], and their velocities [m/s].
+
+    Returns: q_1 q_2 q_3 of all legs [rad], their speeds [rad/s], e^i psi of the legs' outward directions, and which legs do not reach.
+    """
+    angle: list[float] = []
+    speed: list[float] = []
+    headings: list[complex] = []
+    lost: list[int] = []
+    for number, (leg, plane, height, velocity, rise) in enumerate(zip(legs, *feet, strict=True)):
+        hip, z_0, coxa, side, a, b, yaw, tilt, knee_tilt, side_square, scale, shift = leg
         # rho^2 = x^2 + y^2 - Y^2: the foot's distance along the coxa's x axis;  e^i psi = (x + i y) / (rho + i Y)
-        point = plane - self.hip
+        point = plane - hip
         x, y = point.real, point.imag
-        square = x * x + y * y - side * side
-        within = square >= RADIUS_FLOOR
-        rho = math.sqrt(square if within else RADIUS_FLOOR)
-        heading = point / (rho + 1j * side)
+        square = x * x + y * y - side_square
+        rho = sqrt(square) if square >= RADIUS_FLOOR else ROOT_FLOOR
+        heading = point / complex(rho, side)
         # from the femur joint to the foot: r + i z = e^i B (b + a e^i gamma), so cos gamma = (r^2 + z^2 - a^2 - b^2) / (2 a b)
-        r, z = rho - self.coxa, height - self.height
-        cosine = (r * r + z * z - a * a - b * b) / (2.0 * a * b)
+        r, z = rho - coxa, height - z_0
+        cosine = wanted = (r * r + z * z) * scale - shift
         if not FOLDED_COSINE <= cosine <= 1.0:
-            wanted, cosine = cosine, min(max(cosine, FOLDED_COSINE), 1.0)
-            within = within and abs(wanted - cosine) <= FLAG_TOLERANCE
-        gamma = math.acos(cosine)
-        sine = math.sin(gamma)
-        knee = cosine + 1j * sine
-        lower = (r + 1j * z) / (b + a * knee)  # e^i B
+            cosine = min(max(wanted, FOLDED_COSINE), 1.0)
+        if not (square >= RADIUS_FLOOR and abs(wanted - cosine) <= FLAG_TOLERANCE):
+            lost.append(number)
+        gamma = acos(cosine)
+        sine = sin(gamma)
+        knee = complex(cosine, sine)
+        lower = complex(r, z) / (b + a * knee)  # e^i B
         # velocity in the coxa frame v e^-i psi: dq_1 = v_y / rho; then u + i rise, u = v_x + Y dq_1, is left for the leg's plane
         v = velocity * heading.conjugate()
         turn = v.imag / rho
         u = v.real + side * turn
         # dq_2 = -Re((u + i rise)^* e^i B) / (a sin gamma);  dq_3 = -Re((u + i rise)^* (r + i z)) / (a b sin gamma)
         lever = -a * (sine if sine > SINGULAR_SINE else SINGULAR_SINE)
-        angles = cmath.phase(heading * self.yaw), cmath.phase(lower * knee * self.tilt), gamma - self.knee_tilt
-        speeds = turn, (u * lower.real + rise * lower.imag) / lever, (u * r + rise * z) / (lever * b)
-        return heading, within, angles + speeds
+        angle += (phase(heading * yaw), phase(lower * knee * tilt), gamma - knee_tilt)
+        speed += (turn, (u * lower.real + rise * lower.imag) / lever, (u * r + rise * z) / (lever * b))
+        headings.append(heading)
+    return angle, speed, headings, lost
 
 
 class LegSolver:
     """Forward and inverse kinematics of a robot's legs in the torso frame. Raises RobotError on another axis pattern.
 
-    Attribute `heading`: (6,) the legs' outward directions e^(i psi) in the torso frame at the last solve.
+    Attributes, results of the last solve:
+        joints: (2, 6, 3) angles and speeds [rad, rad/s];  angles: the same angles, leg by leg;
+        unreachable: (6,) legs whose angles do not put the foot on its target;
+        headings: the legs' outward directions e^(i psi) in the torso frame.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -117,16 +140,19 @@ class LegSolver:
 
     def _prepare(self) -> None:
         zero = np.exp(-1j * np.stack([self.hip_yaw, self.femur_tilt]))  # turns e^i psi, e^i A into e^i q
+        a, b, y = self.femur, self.tibia, self.offset_y
         columns = (
-            self.hip[0] + 1j * self.hip[1], self.hip[2] + self.coxa_height, self.coxa_length, self.offset_y, self.femur, self.tibia,
-            *zero, self.femur_tilt - self.tibia_tilt,
+            self.hip[0] + 1j * self.hip[1], self.hip[2] + self.coxa_height, self.coxa_length, y, a, b, *zero,
+            self.femur_tilt - self.tibia_tilt, y * y, 0.5 / (a * b), 0.5 * (a / b + b / a),
         )  # fmt: skip
-        self._legs = [LegInverse(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
-        # one row per leg: three angles, three speeds
-        self._high = np.hstack([self.angle_max, np.full((LEGS, 3), self.speed_max)])
-        self._low = np.hstack([self.angle_min, np.full((LEGS, 3), -self.speed_max)])
-        self._wanted, self._bounded = np.empty((2, LEGS, 6))
-        self.heading: Plane = np.empty(LEGS, dtype=np.complex128)
+        self._legs = [LegConstants(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
+        # angles of all legs, then speeds
+        most = np.full((LEGS, 3), self.speed_max)
+        self._low, self._high = (np.stack(limits).reshape(-1) for limits in ((self.angle_min, -most), (self.angle_max, most)))
+        self._wanted, self._bounded = np.zeros((2, 6 * LEGS))
+        self.joints = self._bounded.reshape(2, LEGS, 3)
+        self.unreachable: Mask = np.zeros(LEGS, dtype=np.bool_)
+        self.angles, self.headings = [0.0] * (3 * LEGS), [0j] * LEGS
 
     def forward(self, angle: Array) -> Array:
         """(6, 3) feet's centres in the torso frame [m] at joint angles (6, 3) [rad]."""
@@ -161,15 +187,14 @@ class LegSolver:
 
     def inverse(self, foot: Array) -> Array:
         """(6, 3) joint angles [rad] of feet (6, 3) [m] in the torso frame. Raises ReachError: leg, target, reach."""
-        angle, wrong = np.empty((LEGS, 3)), np.empty(LEGS, dtype=np.bool_)
         points = np.asarray(foot, dtype=np.float64)
-        if np.isfinite(points).all():
-            plane = points[:, 0] + 1j * points[:, 1]
-            self.solve(plane, points[:, 2], np.zeros_like(plane), np.zeros(LEGS), angle, np.empty_like(angle), wrong)
-        else:
-            wrong[:] = ~np.isfinite(points).all(axis=1)
+        wrong = ~np.isfinite(points).all(axis=1)
         if not wrong.any():
-            return angle
+            still = [0.0] * LEGS
+            self.solve(((points[:, 0] + 1j * points[:, 1]).tolist(), points[:, 2].tolist(), still, still))
+            wrong = self.unreachable
+        if not wrong.any():
+            return np.array(self.joints[0])
         leg = int(np.argmax(wrong))
         raise ReachError(
             "the foot cannot get there", got=tuple(points[leg].tolist()), expected=self._reach_text(leg),
@@ -185,25 +210,34 @@ class LegSolver:
             f"at {self.coxa_length[leg]:.4f} m, with joints within {limits} rad"
         )
 
-    def solve(self, plane: Plane, height: Array, plane_velocity: Plane, rise: Array, angle: Array, speed: Array, unreachable: Mask) -> None:
+    def save(self) -> tuple[list[float], list[complex]]:
+        """What of the last solve the next step looks at."""
+        return self.angles, self.headings
+
+    def restore(self, state: tuple[list[float], list[complex]]) -> None:
+        """Goes back to it."""
+        self.angles, self.headings = state
+
+    def solve(self, feet: Feet) -> None:
         """Inverse kinematics that never raises: the nearest angles within the limits, and a flag.
 
+        A joint held by its limit has speed 0, none is faster than the servo.
+
         Args:
-            plane, height: (6,) feet's centres in the torso frame, x + i y and z [m].
-            plane_velocity, rise: (6,) their velocity in the torso frame, alike [m/s].
-            angle, speed: (6, 3) results [rad, rad/s]; a joint held by its limit has speed 0, none is faster than the servo.
-            unreachable: (6,) result: this leg's angles do not put the foot on its target.
+            feet: of each leg x + i y and z of its foot in the torso frame [m], and their velocities [m/s].
         """
-        feet = zip(self._legs, plane.tolist(), height.tolist(), plane_velocity.tolist(), rise.tolist(), strict=True)
-        heading, within, rows = zip(*[leg.solve(p, z, v, w) for leg, p, z, v, w in feet], strict=True)
-        self.heading[:] = heading
-        unreachable[:] = [not reached for reached in within]
+        angles, speeds, self.headings, lost = solve_legs(self._legs, feet)
         wanted, bounded = self._wanted, self._bounded
-        wanted[:] = rows
+        PACK(wanted.data, 0, *angles, *speeds)
         np.maximum(wanted, self._low, out=bounded)
         np.minimum(bounded, self._high, out=bounded)
-        angle[...], speed[...] = bounded[:, :3], bounded[:, 3:]
+        self.unreachable.fill(False)
+        if lost:
+            self.unreachable[lost] = True
         if wanted.tobytes() != bounded.tobytes():
-            held = np.abs(wanted[:, :3] - angle) > FLAG_TOLERANCE
-            unreachable |= held.any(axis=1)
+            angle, speed = self.joints
+            held = np.abs(wanted[: 3 * LEGS].reshape(LEGS, 3) - angle) > FLAG_TOLERANCE
+            self.unreachable |= held.any(axis=1)
             speed[held] = 0.0
+            angles = angle.reshape(-1).tolist()
+        self.angles = angles

@@ -14,54 +14,58 @@ Discretised by Tustin's rule at the controller's period h:
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
 from hexapod_cosim.controller.gains import SlipGains
-from hexapod_cosim.controller.kinematics import LEGS, Array, Mask, Plane
+from hexapod_cosim.controller.kinematics import LEGS
+
+AT_REST = (0j, 0j, 0j, 0j)
+LegState = tuple[complex, complex, complex, complex]  # e, e', i, d
 
 
-def recursion(gains: SlipGains, *, period: float) -> Array:
-    """(5, 5) one period of the law: (e, e', i, d, u) from (e-, e'-, i-, d-, e)."""
+def coefficients(gains: SlipGains, *, period: float) -> tuple[float, ...]:
+    """The numbers in e' = take (e + e-) + keep e'-, i = i- + gather (e' + e'-), d = taken (e' - e'-) + kept d-, u = k_p e' + i + d."""
     h, tf, td = period, gains.filter_time, gains.derivative_time
-    take, keep = h / (2.0 * tf + h), (2.0 * tf - h) / (2.0 * tf + h)
-    taken, kept = 2.0 * gains.kd / (2.0 * td + h), (2.0 * td - h) / (2.0 * td + h)
-    last, old, integral, derivative, force = np.eye(5)
-    smooth = take * (force + last) + keep * old
-    integral = integral + 0.5 * gains.ki * h * (smooth + old)
-    derivative = taken * (smooth - old) + kept * derivative
-    return np.stack([force, smooth, integral, derivative, gains.kp * smooth + integral + derivative])
+    smoothing = h / (2.0 * tf + h), (2.0 * tf - h) / (2.0 * tf + h)
+    return *smoothing, 0.5 * gains.ki * h, 2.0 * gains.kd / (2.0 * td + h), (2.0 * td - h) / (2.0 * td + h), gains.kp
 
 
 class SlipPid:
     """PIDs of all feet. Both directions at once: forces and shifts are complex numbers x + i y, one per leg.
 
-    Attributes: output: (6,) foot shift [m]; state: (4, 6) rows e, e', integral, derivative.
+    In Python's own numbers, which for six legs take less time than arrays.
+
+    Attributes: output: foot shifts [m]; state: of each leg e, e', integral, derivative.
     """
 
     def __init__(self, gains: SlipGains, *, period: float) -> None:
-        self._step = recursion(gains, period=period)
+        self._coefficients = coefficients(gains, period=period)
         self._tracking, self._limit = min(period / gains.tracking_time, 1.0), gains.limit
-        self._before, self._after = np.zeros((2, 5, LEGS), dtype=np.complex128)
-        self._before_parts, self._after_parts = self._before.view(np.float64), self._after.view(np.float64)
-        self.state: Plane = self._after[:4]
-        self.output: Plane = self._after[4]
+        self.state: list[LegState] = [AT_REST] * LEGS
+        self.output = [0j] * LEGS
 
-    def reset(self, legs: Mask | None = None) -> None:
-        """Forgets everything, of the legs (6,) given or of all."""
-        np.copyto(self._after, 0.0, where=True if legs is None else legs)
+    def reset(self, legs: Sequence[bool] = (True,) * LEGS) -> None:
+        """Forgets everything, of the legs chosen or of all."""
+        self.state = [AT_REST if chosen else state for state, chosen in zip(self.state, legs, strict=True)]
+        self.output = [0j if chosen else shift for shift, chosen in zip(self.output, legs, strict=True)]
 
-    def step(self, force: Plane) -> Plane:
-        """One period. force: (6,) tangential force to give way to [N]. Returns `output`, the foot shift [m]."""
-        self._before[:4] = self.state
-        self._before[4] = force
-        np.dot(self._step, self._before_parts, self._after_parts)
-        self._clamp()
+    def step(self, force: Sequence[complex]) -> list[complex]:
+        """One period. force: of each leg, tangential, to give way to [N]. Returns `output`, the foot shifts [m]."""
+        take, keep, gather, taken, kept, kp = self._coefficients
+        states, output = [], []
+        for f, (last, old, sum_before, slope_before) in zip(force, self.state, strict=True):
+            smooth = take * (f + last) + keep * old
+            integral = sum_before + gather * (smooth + old)
+            derivative = taken * (smooth - old) + kept * slope_before
+            states.append((f, smooth, integral, derivative))
+            output.append(kp * smooth + integral + derivative)
+        self.state, self.output = states, output
+        if max(map(abs, output)) > self._limit:
+            self._clamp()
         return self.output
 
     def _clamp(self) -> None:
-        length = np.abs(self.output)
-        if max(length.tolist()) <= self._limit:
-            return
-        wanted = self.output.copy()
-        self.output *= self._limit / np.maximum(length, self._limit)
-        self.state[2] += self._tracking * (self.output - wanted)
+        wanted = self.output
+        self.output = [u * (self._limit / max(abs(u), self._limit)) for u in wanted]
+        excess = [self._tracking * (clamped - u) for clamped, u in zip(self.output, wanted, strict=True)]
+        self.state = [(e, smooth, i + more, d) for (e, smooth, i, d), more in zip(self.state, excess, strict=True)]

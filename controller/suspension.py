@@ -5,6 +5,8 @@ The force is held over a period, so the discretisation by the matrix exponential
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.linalg import expm
 
@@ -22,29 +24,27 @@ def discretise(gains: SuspensionGains, *, period: float) -> tuple[Array, Array]:
 
 
 class Suspension:
-    """Suspensions of all feet. `state` (2, 6): deflection [m] and its rate [m/s]."""
+    """Suspensions of all feet, in Python's own numbers. `state`: their deflections [m] and the rates of these [m/s]."""
 
     def __init__(self, gains: SuspensionGains, *, period: float) -> None:
         a, b = discretise(gains, period=period)
-        self._transition = np.column_stack([a, b])  # (2, 3): acts on (z, z', f)
+        self._transition = np.column_stack([a, b]).tolist()  # acts on (z, z', f)
         self._limit = gains.limit
-        self._stacked = np.zeros((3, LEGS))
-        self.state = np.zeros((2, LEGS))
+        self.reset()
 
     def reset(self) -> None:
         """Relaxed and at rest."""
-        self.state[:] = 0.0
+        self.state = [0.0] * LEGS, [0.0] * LEGS
 
-    def step(self, force: Array) -> Array:
-        """One period. force: (6,) normal force beyond the preload [N]. Returns `state`: deflection and rate (2, 6)."""
-        state, stacked = self.state, self._stacked
-        stacked[:2], stacked[2] = state, force
-        np.dot(self._transition, stacked, out=state)
-        z, rate = state
-        reached = z.tolist()
-        if max(reached) > self._limit or min(reached) < -self._limit:
+    def step(self, force: Sequence[float]) -> tuple[list[float], list[float]]:
+        """One period. force: of each leg, normal, beyond the preload [N]. Returns `state`: deflections and rates."""
+        (a, b, c), (d, e, g) = self._transition
+        legs = list(zip(*self.state, force, strict=True))
+        z, rate = [a * p + b * v + c * f for p, v, f in legs], [d * p + e * v + g * f for p, v, f in legs]
+        limit = self._limit
+        if max(z) > limit or min(z) < -limit:
             # at its stop the suspension stands still
-            rate[np.abs(z) > self._limit] = 0.0
-            np.maximum(z, -self._limit, out=z)
-            np.minimum(z, self._limit, out=z)
-        return state
+            rate = [0.0 if abs(p) > limit else v for p, v in zip(z, rate, strict=True)]
+            z = [min(max(p, -limit), limit) for p in z]
+        self.state = z, rate
+        return self.state

@@ -14,14 +14,14 @@ joints of small servos do not reach. DWELL keeps the foot from moving sideways w
 
 from __future__ import annotations
 
-import cmath
-import math
+import itertools
 from dataclasses import astuple, dataclass
+from typing import Any
 
 import numpy as np
 
 from hexapod_cosim.controller.gait import Gait
-from hexapod_cosim.controller.kinematics import LEGS, Array, Mask
+from hexapod_cosim.controller.kinematics import LEGS, Array, Mask, Plane
 from hexapod_cosim.models import HexapodError
 
 DWELL = 0.1  # 1    share of the swing at each end with vertical motion only
@@ -30,9 +30,6 @@ HOME_TOLERANCE = 1e-9  # m    a foot this close to its stance position need not 
 CLOCK_EPSILON = 1e-9  # cycles    the clock starts this much before the first lift-off
 NEARLY_DONE = 1e-12  # 1    floor of 1 - s
 SMALL_ANGLE = 1e-12  # rad    below it sin(a)/a is 1
-STRAIGHT = 1e-6  # rad/s    slower turns are aimed at as straight: the landing point is off by less than 1e-7 m
-
-Twist = tuple[complex, float]  # vx + i vy [m/s], yaw rate [rad/s]
 
 
 @dataclass(frozen=True)
@@ -48,66 +45,91 @@ class BodyCommand:
 
 
 class CommandRamp:
-    """Turns steps of the command into smooth changes: a cubic from the present value and rate to the new value and rate 0."""
+    """Turns steps of the command into smooth changes: a cubic from the present value and rate to the new value and rate 0.
 
-    def __init__(self, duration: float) -> None:
-        self.duration = duration  # s
-        self.value, self.rate = np.zeros(6), np.zeros(6)  # vx vy yaw_rate height roll pitch, and per second
-        self.target = BodyCommand()
+    Attributes: target: where it goes; steps: periods since that was told, which the owner counts on.
+    """
+
+    def __init__(self, duration: float, *, period: float) -> None:
+        self.duration, self.period = duration, period  # s
         self._cubic = np.zeros((4, 6))
-        self._elapsed = duration
+        self._end = next(
+            number for number in itertools.count(int(duration / period)) if number * period >= duration
+        )  # steps that a change takes
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the zero command, at rest."""
+        self._cubic[:] = 0.0
+        self.target, self._goal = BodyCommand(), np.zeros(6)
+        self.steps = self._end
+
+    def save(self) -> tuple[Any, ...]:
+        """What it remembers."""
+        return self.target, self._goal, self.steps, self._cubic.copy()
+
+    def restore(self, state: tuple[Any, ...]) -> None:
+        """Goes back to it."""
+        self.target, self._goal, self.steps, self._cubic[:] = state
 
     @property
     def settled(self) -> bool:
         """The value is the target, and at rest."""
-        return self._elapsed >= self.duration
+        return self.steps >= self._end
 
     @property
-    def level(self) -> bool:
-        """The target is the nominal height and posture."""
-        return self.target.height == 0.0 and self.target.roll == 0.0 and self.target.pitch == 0.0
+    def remaining(self) -> int:
+        """Steps until it is."""
+        return max(self._end - self.steps, 0)
 
     def aim(self, target: BodyCommand) -> None:
-        """Heads for a command; repeating the present one changes nothing."""
+        """Heads for a command; repeating the present one changes nothing. Raises HexapodError when it is not finite."""
         if target == self.target:
             return
         goal = np.array(astuple(target), dtype=np.float64)
         if not np.isfinite(goal).all():
             raise HexapodError("impossible body command", got=target, expected="finite numbers", fix="check where the command comes from")
-        slope = self.rate * self.duration
-        gap = goal - self.value
-        self._cubic[:] = self.value, slope, 3.0 * gap - 2.0 * slope, slope - 2.0 * gap
-        self.target, self._elapsed = target, 0.0
+        (value,), (rate,) = self.ahead(0)
+        gap, slope = goal - value, rate * self.duration
+        self._cubic[:] = value, slope, 3.0 * gap - 2.0 * slope, slope - 2.0 * gap
+        self.target, self._goal, self.steps = target, goal, 0
 
-    def advance(self, period: float) -> None:
-        """One step in time; the last one lands on the target exactly."""
+    def ahead(self, count: int) -> tuple[Array, Array]:
+        """(count + 1, 6) each: vx vy yaw_rate height roll pitch now and at the next `count` steps, and their rates per second."""
         if self.settled:
-            return
-        self._elapsed += period
-        if self.settled:
-            self.value[:] = astuple(self.target)
-            self.rate[:] = 0.0
-            return
-        x = self._elapsed / self.duration
+            return np.tile(self._goal, (count + 1, 1)), np.zeros((count + 1, 6))
+        numbers = np.arange(self.steps, self.steps + count + 1)[:, None]
+        x, under_way = numbers * self.period / self.duration, numbers < self._end
         c0, c1, c2, c3 = self._cubic
-        self.value[:] = c0 + x * (c1 + x * (c2 + x * c3))
-        self.rate[:] = (c1 + x * (2.0 * c2 + 3.0 * x * c3)) / self.duration
+        value = np.where(under_way, c0 + x * (c1 + x * (c2 + x * c3)), self._goal)
+        rate = np.where(under_way, (c1 + x * (2.0 * c2 + 3.0 * x * c3)) / self.duration, 0.0)
+        return value, rate
 
-    def reset(self) -> None:
-        """Back to the zero command, at rest."""
-        self.value[:] = self.rate[:] = 0.0
-        self.target, self._elapsed = BodyCommand(), self.duration
+
+@dataclass(frozen=True)
+class Steps:
+    """Feet at successive periods, (n, 6) each, in the walking frame; what is on the ground in its frame, where the walk began."""
+
+    plane: Plane  # m    centres, x + i y
+    height: Array  # m    and z
+    plane_velocity: Plane  # m/s
+    rise: Array  # m/s
+    phase: Array  # 1    in [0, 1)
+    swinging: Mask
+    progress: Array  # 1    tau of swinging feet, else 0
+    blend: Array  # 1    s of swinging feet, else 0
+    goal: Plane  # m    on the ground: where a swinging foot will touch down, a standing one stands
+    pull: Plane  # m    (goal - foot)/(1 - s) on the ground, 0 of standing feet
+    way: Plane  # m    (n, 1) of the walking frame over the ground
+    turn: Array  # rad    (n, 1)
 
 
 class FootPaths:
-    """The planned feet, advanced one period at a time.
+    """The planned feet. Steps depend on the command alone, so many are planned at once and then taken one by one.
 
-    Attributes, (6,) each, in the walking frame:
-        plane, height: feet's centres, x + i y and z [m];  plane_velocity, rise: their velocity [m/s];
-        horizontal, vertical: (2, 6) the same in two blocks, each of position and velocity;
-        landing: where swinging feet will touch down [m];  phase: in [0, 1);  swinging;  lifted: lift-off in the last step;
-        progress, blend: tau and s of swinging feet, else 0.
-    walking: the gait clock runs.
+    Nothing in a step depends on how many are planned at once: sums over time run from the walk's begin.
+
+    Attributes: steps: planned, of which number `at` is the present one and `left` are to come;  walking: the gait clock runs.
     """
 
     def __init__(self, gait: Gait, home: Array, *, period: float) -> None:
@@ -115,136 +137,149 @@ class FootPaths:
         self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
         self.swing_time = gait.period * (1.0 - gait.duty)
         self._landing_lead = 0.5 * gait.period * gait.duty + self.swing_time  # s    from lift-off to the middle of the next stance
-        rows = np.empty((3, LEGS), dtype=np.complex128)
-        self.landing, self.plane, self.plane_velocity = rows
-        self._points, self.horizontal, self.vertical = rows[:2], rows[1:], np.empty((2, LEGS))
-        self.height, self.rise = self.vertical
-        self.phase, self.progress, self.blend = (np.empty(LEGS) for _ in range(3))
-        self.swinging, self.lifted, self._standing = (np.empty(LEGS, dtype=np.bool_) for _ in range(3))
-        self._homes: list[complex] = self.home.tolist()
-        self._home_heights: list[float] = self.home_height.tolist()
         self._offsets = np.array(gait.offsets) + gait.start_clock() - CLOCK_EPSILON
-        # full arrays: numpy is faster with them than with Python numbers
-        self._one, self._duty = np.ones(LEGS), np.full(LEGS, gait.duty)
         self.reset()
 
     def reset(self) -> None:
         """All feet in the stance, clock stopped."""
-        self.plane[:], self.landing[:], self.height[:] = self.home, self.home, self.home_height
-        self.plane_velocity[:] = 0.0
-        self.rise[:] = self.progress[:] = self.blend[:] = 0.0
-        self.swinging[:] = self.lifted[:] = False
-        self._rewind()
+        self._rest(self.home, 0)
 
-    def _rewind(self) -> None:
-        self.walking = False
-        self._steps = 0
-        self.phase[:] = self._offsets % 1.0
-        self._standing[:] = self.phase < self._duty  # a leg that begins in its swing phase waits for its next lift-off
+    def save(self) -> tuple[Any, ...]:
+        """What it remembers: the present step."""
+        at = self.at
+        present = {name: rows[at : at + 1].copy() for name, rows in vars(self.steps).items()}
+        return present, self.walking, self._before + at
 
-    def advance(self, twist: Twist, mean_twist: Twist, *, going: bool) -> None:
-        """One period on.
+    def restore(self, state: tuple[Any, ...]) -> None:
+        """Goes back to it; nothing more is planned."""
+        present, self.walking, self._before = state
+        self.steps, self.at = Steps(**present), 0
+
+    @property
+    def left(self) -> int:
+        """Planned steps to come."""
+        return len(self.steps.phase) - 1 - self.at
+
+    def advance(self) -> None:
+        """One period on, to a step that is planned."""
+        self.at += 1
+
+    def _rest(self, plane: Plane, count: int) -> None:
+        """Plans `count` more steps of standing still, with the clock rewound."""
+        zeros, still = np.zeros((count + 1, LEGS)), np.zeros((count + 1, LEGS), dtype=np.complex128)
+        plane, height, phase = (np.tile(row, (count + 1, 1)) for row in (plane, self.home_height, self._phases(np.zeros(1))[0]))
+        self.walking, self.at, self._before = False, 0, 0
+        self.steps = Steps(
+            plane=plane, height=height, plane_velocity=still, rise=zeros, phase=phase, swinging=zeros > 0.0, progress=zeros, blend=zeros,
+            goal=plane, pull=still, way=still[:, :1], turn=zeros[:, :1],
+        )  # fmt: skip
+
+    def _phases(self, numbers: Array) -> Array:
+        """(n, 6) phases so many periods after the walk's begin."""
+        clock = self._offsets + (numbers * self.period / self.gait.period)[:, None]
+        return np.asarray(clock - np.floor(clock))
+
+    def plan(self, v: Plane, yaw_rate: Array, *, going: bool) -> None:
+        """Plans the steps after the present one, up to the next in which a leg lifts off or touches down.
 
         Args:
-            twist: (vx + i vy, yaw rate) at the end of the period [m/s, rad/s]; mean_twist: its mean over the period.
+            v, yaw_rate: (n + 1,) vx + i vy and yaw rate [m/s, rad/s] now and at the next n steps.
             going: the body moves or is commanded to; when False, feet step home and the clock then stops.
         """
-        self.lifted.fill(False)
-        if not self.walking:
-            if not going:
-                self.plane_velocity[:] = 0.0
-                return
-            self.walking = True
-        self._carry(mean_twist)
-        self._tick(going)
-        # a foot on the ground: dp/dt = -(v + i w p)
-        v, yaw_rate = twist
-        self.plane_velocity.fill(-v)
-        if yaw_rate != 0.0:
-            self.plane_velocity -= 1j * yaw_rate * self.plane
-        self.rise.fill(0.0)
-        if True in self.swinging.tolist():
-            self._swing(twist)
-        elif not going and self._at_home().all():
-            self._rewind()
-
-    def _at_home(self) -> Mask:
-        return np.asarray(np.abs(self.plane - self.home) < HOME_TOLERANCE)
-
-    def _carry(self, twist: Twist) -> None:
-        """Ground points drift past the body: p' = e^(-i w h) (p - d), d = v (e^(i w h) - 1)/(i w) its way under a constant twist."""
-        v, yaw_rate = twist
-        half = 0.5 * yaw_rate * self.period
-        chord = math.sin(half) / half if abs(half) > SMALL_ANGLE else 1.0
-        way = v * self.period * chord * cmath.rect(1.0, half)
-        np.subtract(self._points, way, self._points)
-        if yaw_rate != 0.0:
-            np.multiply(self._points, cmath.rect(1.0, -2.0 * half), self._points)
-
-    def _tick(self, going: bool) -> None:
-        """Clock, lift-offs and touch-downs."""
-        self._steps += 1
-        np.add(self._offsets, self._steps * self.period / self.gait.period, self.phase)
-        np.remainder(self.phase, self._one, self.phase)
-        standing = self.phase < self._duty
-        if standing.tobytes() == self._standing.tobytes():
+        steps, at = self.steps, self.at
+        before = self._before + at if self.walking else 0
+        if not (self.walking or going):
+            self._rest(steps.plane[at], len(v) - 1)
             return
-        landed = self.swinging & standing
-        self.plane[landed] = self.landing[landed]
-        self.height[landed] = self.home_height[landed]
-        self.progress[landed] = self.blend[landed] = 0.0
-        self.swinging[landed] = False
-        np.logical_and(self._standing, ~standing, out=self.lifted)
+        phase = self._phases(np.arange(before, before + len(v)))
+        standing = phase < self.gait.duty
+        feet, lifted = steps.plane[at], standing[0] & ~standing[1]
+        swinging = steps.swinging[at] & ~standing[1]
         if not going:
-            self.lifted &= ~self._at_home()
-        self.swinging |= self.lifted
-        self._standing[:] = standing
+            landed = steps.swinging[at] & standing[1]
+            feet = np.where(landed, cis(-steps.turn[at]) * (steps.goal[at] - steps.way[at]), feet)
+            home = np.abs(feet - self.home) < HOME_TOLERANCE
+            lifted &= ~home
+            if home.all() and not (swinging | lifted).any():
+                self._rest(feet, len(v) - 1)
+                return
+        changed = int((standing[1:] != standing[1]).argmax()) // LEGS  # the first never differs from itself: 0 is none
+        end = 1 + (changed or len(v) - 1)
+        self.steps = self._walk(v[:end, None], yaw_rate[:end, None], phase[:end], swinging | lifted, lifted)
+        self.walking, self.at, self._before = True, 0, before
 
-    def _swing(self, twist: Twist) -> None:
-        """The feet in the air. Plain numbers: the few legs that swing are too few for arrays to pay."""
-        duty, time = self.gait.duty, self.swing_time
-        phase, before, lifted = self.phase.tolist(), self.blend.tolist(), self.lifted.tolist()
-        landing, plane = self._points.tolist()
-        for leg, swings in enumerate(self.swinging.tolist()):
-            if not swings:
-                continue
-            tau = (phase[leg] - duty) / (1.0 - duty)
-            goal, p = landing[leg], plane[leg]
-            if tau < FREEZE or lifted[leg]:
-                goal = self.landing[leg] = self._landing_point(leg, tau, twist)
-            # the way to the landing point shrinks as 1 - s: p' = p + (s' - s)/(1 - s) (landing - p)
-            s, slope = blend(tau)
-            p += (s - before[leg]) / max(1.0 - before[leg], NEARLY_DONE) * (goal - p)
-            self.plane[leg] = p
-            self.plane_velocity[leg] += slope / (time * max(1.0 - s, NEARLY_DONE)) * (goal - p)
-            lift, slope = hop(tau, top=self.gait.step_height, down=self.gait.touchdown_speed * time)
-            self.height[leg] = self._home_heights[leg] + lift
-            self.rise[leg] = slope / time
-            self.progress[leg], self.blend[leg] = tau, s
+    def _walk(self, v: Plane, yaw_rate: Array, phase: Array, swinging: Mask, lifted: Mask) -> Steps:
+        """The steps in which these legs (6,) are in the air; those that lift off just now will in any case be aimed once."""
+        now, at, time = self.steps, self.at, self.swing_time
+        tau = (phase - self.gait.duty) / (1.0 - self.gait.duty)
+        way, turn = self._odometry(v, yaw_rate)
+        # the way to the landing point shrinks as 1 - s: with pull = (goal - foot)/(1 - s), pull' = pull + (goal' - goal)/(1 - s)
+        s, slope = blend(tau)
+        s = np.where(swinging, s, 0.0)
+        free = swinging & (tau < FREEZE)
+        free[0], free[1] = True, free[1] | lifted
+        goal = _held(way + cis(turn) * self._landing(tau, v, yaw_rate), free, now.goal[at])
+        pull = np.empty_like(goal)
+        pull[0] = np.where(swinging, now.pull[at], 0.0)
+        pull[1:] = np.diff(goal, axis=0) / np.maximum(1.0 - s[:-1], NEARLY_DONE)
+        np.cumsum(pull, axis=0, out=pull)
+        ground, back = goal - (1.0 - s) * pull, cis(-turn)
+        plane, carried = back * (ground - way), back * (np.concatenate([ground[:1], ground[:-1]]) - way)
+        # a foot on the ground: dp/dt = -(v + i w p)
+        velocity = slope / time * (back * pull) - (v + 1j * yaw_rate * carried)
+        lift, climb = hop(tau, top=self.gait.step_height, down=self.gait.touchdown_speed * time)
+        return Steps(
+            plane=plane, height=self.home_height + np.where(swinging, lift, 0.0), plane_velocity=velocity,
+            rise=np.where(swinging, climb / time, 0.0), phase=phase, swinging=np.broadcast_to(swinging, phase.shape),
+            progress=np.where(swinging, tau, 0.0), blend=s, goal=goal, pull=pull, way=way, turn=turn,
+        )  # fmt: skip
 
-    def _landing_point(self, leg: int, tau: float, twist: Twist) -> complex:
+    def _odometry(self, v: Plane, yaw_rate: Array) -> tuple[Plane, Array]:
+        """(n, 1) each: way and turn of the walking frame since the walk's begin."""
+        turn, way = np.empty_like(yaw_rate), np.empty_like(v)
+        turn[0], way[0] = self.steps.turn[self.at], self.steps.way[self.at]
+        rate = 0.5 * (yaw_rate[1:] + yaw_rate[:-1])
+        np.cumsum(np.concatenate([turn[:1], rate * self.period]), axis=0, out=turn)
+        way[1:] = cis(turn[:-1]) * travel(0.5 * (v[1:] + v[:-1]), rate, self.period)
+        return np.cumsum(way, axis=0), turn
+
+    def _landing(self, tau: Array, v: Plane, yaw_rate: Array) -> Plane:
         """Where the ground under the stance position, half a stance after touch-down, is now."""
-        v, yaw_rate = twist
         ahead = self._landing_lead - tau * self.swing_time
-        if abs(yaw_rate) < STRAIGHT:
-            return self._homes[leg] + ahead * v
-        centre = 1j * v / yaw_rate  # of the turn
-        return cmath.rect(1.0, yaw_rate * ahead) * (self._homes[leg] - centre) + centre
+        turned = cis(yaw_rate * ahead) * self.home if yaw_rate.any() else self.home
+        return np.asarray(turned + travel(v, yaw_rate, ahead))
 
 
-def blend(tau: float) -> tuple[float, float]:
+def _held(values: Plane, free: Mask, before: Plane) -> Plane:
+    """The ones `before` (6,) in the first row; then the values while they are `free`, which is at once or never; then the last."""
+    values[0] = before
+    last = free[1:].sum(axis=0)
+    return np.where(free, values, values[last, np.arange(LEGS)])
+
+
+def cis(angle: Array) -> Plane:
+    """e^(i angle)"""
+    return np.asarray(np.cos(angle) + 1j * np.sin(angle))
+
+
+def travel(v: Plane, yaw_rate: Array, time: Array | float) -> Plane:
+    """The way under a constant twist: v (e^(i w t) - 1)/(i w)."""
+    if not yaw_rate.any():
+        return np.asarray(v * time)
+    half = 0.5 * yaw_rate * time
+    chord = np.divide(np.sin(half), half, out=np.ones_like(half), where=np.abs(half) > SMALL_ANGLE)
+    return np.asarray(v * time * chord * cis(half))
+
+
+def blend(tau: Array) -> tuple[Array, Array]:
     """s in [0, 1] and ds/dtau: s = 1/2 + 45/64 y - 9/32 y^5 + 5/64 y^9 between the dwells."""
-    y = (2.0 * tau - 1.0) / (1.0 - 2.0 * DWELL)
-    if y <= -1.0:
-        return 0.0, 0.0
-    if y >= 1.0:
-        return 1.0, 0.0
+    y = np.minimum(np.maximum((2.0 * tau - 1.0) / (1.0 - 2.0 * DWELL), -1.0), 1.0)
     y4 = y * y * y * y
     flat = 1.0 - y4
     return 0.5 + y * (45.0 + y4 * (5.0 * y4 - 18.0)) / 64.0, 45.0 / 32.0 * flat * flat / (1.0 - 2.0 * DWELL)
 
 
-def hop(tau: float, *, top: float, down: float) -> tuple[float, float]:
+def hop(tau: Array, *, top: float, down: float) -> tuple[Array, Array]:
     """z and dz/dtau [m]: 64 top (tau (1 - tau))^3 + down tau^3 (1 - tau), down the touch-down speed times the swing's time."""
     arch = tau * (1.0 - tau)
     bow, fall = 64.0 * top * arch * arch, down * tau * tau

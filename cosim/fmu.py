@@ -9,8 +9,9 @@ import ctypes
 import math
 import zipfile
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -45,7 +46,7 @@ class Plant(Protocol):
     """What the master asks of a plant. Times in s."""
 
     def names(self, causality: str, kind: str = "Real") -> list[str]: ...
-    def block(self, names: Sequence[str]) -> Block: ...
+    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> Block: ...
     def parameters(self) -> dict[str, float]: ...
     def set_parameters(self, values: Mapping[str, Any]) -> None: ...
     def initialise(self, start: float, stop: float) -> None: ...
@@ -61,30 +62,38 @@ class StepError(FmuError):
 
 
 class FmuBlock:
-    """A block of an FMU; the ctypes arrays live as long as it does, so a call allocates nothing of note."""
+    """A block of an FMU. The arguments of its calls are made once, as C has them, so that a call converts and allocates nothing.
 
-    def __init__(self, fmu: Fmu, names: Sequence[str], kind: str, references: Sequence[int]) -> None:
-        count, element = len(names), ctypes.c_double if kind == "Real" else ctypes.c_int
-        buffer: Any = (element * count)()
+    `buffer`: a contiguous array for the values, float64 for Reals, int32 else; without one the block makes its own.
+    """
+
+    def __init__(self, fmu: Fmu, names: Sequence[str], kind: str, references: Sequence[int], buffer: NDArray[Any] | None) -> None:
+        dtype = np.dtype(np.float64 if kind == "Real" else np.int32)
+        values = np.zeros(len(names), dtype) if buffer is None else buffer
+        if values.dtype != dtype or values.shape != (len(names),) or not values.flags.c_contiguous:
+            got = f"{values.dtype} {values.shape}, {values.strides[:1]} bytes apart"
+            raise FmuError("not a buffer for these variables", got=got, expected=f"{dtype} ({len(names)},), contiguous")
+        self.names, self.values = tuple(names), values
         self._fmu = fmu
-        self._get, self._set = fmu.function(f"fmi2Get{SUFFIX[kind]}"), fmu.function(f"fmi2Set{SUFFIX[kind]}")
-        self._arguments = (fmu.component, (ctypes.c_uint * count)(*references), count, buffer)
-        self.names = tuple(names)
-        self.values: NDArray[Any] = np.frombuffer(buffer, dtype=np.float64 if kind == "Real" else np.int32)
+        numbers, size, address = (ctypes.c_uint * len(names))(*references), ctypes.c_size_t(len(names)), ctypes.c_void_p(values.ctypes.data)
+        self._get, self._set = (fmu.bind(f"fmi2{verb}{SUFFIX[kind]}", numbers, size, address) for verb in ("Get", "Set"))
 
     def get(self) -> None:
         """Reads all values from the FMU. Raises FmuError."""
-        status = self._fmu.call(self._get, *self._arguments)
+        self._fmu.forget()
+        status = self._get()
         if status > WARNING:
             raise self._fmu.failure("the FMU does not give its outputs", status)
 
     def put(self) -> int:
         """Hands all values to the FMU. Returns its status."""
-        return self._fmu.call(self._set, *self._arguments)
+        self._fmu.forget()
+        return self._set()
 
     def set(self) -> None:
         """Hands all values to the FMU. Raises FmuError."""
-        status = self.put()
+        self._fmu.forget()
+        status = self._set()
         if status > WARNING:
             raise self._fmu.failure("the FMU does not take its inputs", status)
 
@@ -97,6 +106,7 @@ class Fmu:
         self.description = read_description(self.path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self._log: deque[str] = deque(maxlen=20)
+        self.forget = self._log.clear  # what the FMU said before a call is of no interest after it
         self._callbacks = self._make_callbacks()
         self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
         self._slave: Any = None
@@ -119,8 +129,8 @@ class Fmu:
             slave.freeLibrary()
             raise
         self._slave = slave
-        self.component = slave.component
-        self._do_step = self.function("fmi2DoStep")
+        self._begin, self._length = ctypes.c_double(), ctypes.c_double()
+        self._do_step = self.bind("fmi2DoStep", self._begin, self._length, ctypes.c_int(1))  # 1: nothing before is needed again
 
     def _make_callbacks(self) -> fmi2CallbackFunctions:
         callbacks = fmi2CallbackFunctions()
@@ -139,14 +149,14 @@ class Fmu:
         fix = "export it again on this machine with `hexapod export`"
         return FmuError("the FMU cannot be loaded", got=said, fix=fix, where=str(self.path))
 
-    def function(self, name: str) -> Any:
-        """The C function of this name, with its argument types."""
-        return getattr(self._slave.dll, name)
+    def bind(self, name: str, *arguments: Any) -> Callable[[], int]:
+        """A C function of the FMU with its arguments, as C has them, in place: called, it returns the status.
 
-    def call(self, function: Any, *arguments: Any) -> int:
-        """Calls a C function; what the FMU said before is no longer of interest. Returns the status."""
-        self._log.clear()
-        return int(function(*arguments))
+        The arguments are of the types that fmpy declares, so its function goes without the conversion it would make at every call.
+        """
+        function = getattr(self._slave.dll, name)
+        unchecked = ctypes.cast(function, ctypes.CFUNCTYPE(function.restype))
+        return partial(unchecked, ctypes.c_void_p(self._slave.component), *arguments)
 
     def failure(self, what: str, status: int) -> FmuError:
         """The error for a call that came back with `status`, in the FMU's own words where it gave any."""
@@ -159,15 +169,15 @@ class Fmu:
         """Names of all variables of a causality and an FMI type, in the order of the model description."""
         return [name for name, variable in self.variables.items() if variable.causality == causality and variable.type == kind]
 
-    def block(self, names: Sequence[str]) -> FmuBlock:
-        """The named variables, all of one type, as a block. Raises FmuError for a name the FMU lacks."""
+    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FmuBlock:
+        """The named variables, all of one type, as a block, its values in `buffer` if given. Raises FmuError for a name the FMU lacks."""
         for name in names:
             if name not in self.variables:
                 raise self._unknown(name)
         kinds = {self.variables[name].type for name in names} or {"Real"}
         if len(kinds) != 1:
             raise FmuError("a block holds variables of one type", got=sorted(kinds), where=str(self.path))
-        return FmuBlock(self, names, kinds.pop(), [self.variables[name].valueReference for name in names])
+        return FmuBlock(self, names, kinds.pop(), [self.variables[name].valueReference for name in names], buffer)
 
     def parameters(self) -> dict[str, float]:
         """All parameters with the values that hold now; an enumeration's is the number of its item."""
@@ -224,7 +234,7 @@ class Fmu:
             self._slave.exitInitializationMode,
         )
         for call in calls:
-            self._log.clear()
+            self.forget()
             try:
                 call()
             except Exception as error:
@@ -233,7 +243,9 @@ class Fmu:
 
     def step(self, t: float, h: float) -> None:
         """Steps from t to t + h [s]. Raises StepError."""
-        status = self.call(self._do_step, self.component, t, h, 1)
+        self.forget()
+        self._begin.value, self._length.value = t, h
+        status = self._do_step()
         if status > WARNING:
             said, reached = self._said(status), self._reached(status)
             raise StepError(f"the FMU {STATUS[status]}s the step from {t:.6g} s", reached=reached, got=said, where=self.path.name)

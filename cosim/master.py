@@ -87,17 +87,18 @@ def _loop(
     h: float,
     progress: Progress | None,
 ) -> None:
-    pushes = schedule.pushes
-    signals.read()
+    read, control, write, record, advance = signals.read, controller.step, signals.write, recorder.record, plant.step
+    pushes, measurement = schedule.pushes, signals.measurement
+    read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
         if pushes is not None:
             signals.push[:] = pushes[k]
-        signals.write(controller.step(t, command, signals.measurement))
-        recorder.record()
-        plant.step(t, h)
-        signals.read()
+        write(control(t, command, measurement))
+        record()
+        advance(t, h)
+        read()
         if progress is not None and k % PROGRESS_STEPS == 0:
             progress((k + 1) * h)
-    recorder.record()
+    record()
     if progress is not None:
         progress(len(schedule.commands) * h)

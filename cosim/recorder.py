@@ -98,7 +98,7 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 class Recorder:
-    """Fills rows of a run; times (rows,) and body commands (rows, 6) are known beforehand, so a row copies the plant's blocks and no more.
+    """Fills rows of a run; times (rows,) and body commands (rows, 6) are known beforehand, so a row copies the plant's values and no more.
 
     `extra` holds further things to record: an array, seen afresh at every row, under the names of its entries in memory order.
     """
@@ -106,8 +106,7 @@ class Recorder:
     def __init__(
         self, signals: Signals, times: Array, commands: Array, *, extra: Mapping[tuple[str, ...], NDArray[Any]] = MappingProxyType({})
     ) -> None:
-        blocks = (signals.outputs, signals.flags, signals.inputs)
-        sources = {block.names: block.values for block in blocks} | {names: array.reshape(-1) for names, array in extra.items()}
+        sources = {signals.names: signals.values} | {names: array.reshape(-1) for names, array in extra.items()}
         self.names = ("time", *(name for names in sources for name in names), *COMMAND_COLUMNS)
         ends = np.cumsum([1, *map(len, sources)]).tolist()
         self._data = np.full((len(times), len(self.names)), np.nan)  # filled, so that no row is the first to touch its memory

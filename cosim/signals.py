@@ -1,9 +1,12 @@
 """Which variable is what: the plant's outputs seen as arrays (leg, joint, axis), its inputs as arrays to write. No copies: all are views.
 
-The outputs a controller needs come first in the block, so that each is one contiguous piece of the buffer the FMU fills.
+All values stand in one row, outputs, flags, inputs, which the FMU fills and reads and which a recorder copies in one piece. The outputs a
+controller needs come first, so that each is one contiguous piece of it.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,18 +52,25 @@ CONTACT = foot_names("contact")
 
 
 class Signals:
-    """The plant's blocks and the views on them. `noise` is the standard deviation of the measured foot forces, as a share of them."""
+    """The plant's blocks and the views on them. `noise` is the standard deviation of the measured foot forces, as a share of them.
+
+    Attributes: names, values: of the whole row, flags as 0 and 1;  outputs, flags, inputs: its blocks;  measurement: what a robot senses;
+    push: (6,) force [N] and torque [N m] on the torso, world axes, to be written.
+    """
 
     def __init__(self, plant: Plant, *, noise: float = 0.0, seed: int = 0) -> None:
         outputs, inputs, flags = plant.names("output"), plant.names("input"), plant.names("output", "Boolean")
         _refuse_foreign(outputs, inputs, flags)
-        first = [name for names in MEASURED.values() for name in names]
-        taken = set(first)
-        self.outputs = plant.block([*first, *(name for name in outputs if name not in taken)])
-        self.flags = plant.block([*CONTACT, *(name for name in flags if name not in CONTACT)])
-        self.inputs = plant.block([*(name for names in COMMANDED.values() for name in names), *PUSH])
-        self._commanded = self.inputs.values[: 3 * LEGS * JOINTS].reshape(3, LEGS, JOINTS)
-        self.push: NDArray[np.float64] = self.inputs.values[3 * LEGS * JOINTS :]  # (6,) force [N] and torque [N m], world
+        seen = _first([name for names in MEASURED.values() for name in names], outputs)
+        flagged = _first(CONTACT, flags)
+        written = [*(name for names in COMMANDED.values() for name in names), *PUSH]
+        self.names = (*seen, *flagged, *written)
+        self.values: NDArray[np.float64] = np.zeros(len(self.names))
+        output_row, self._flag_row, input_row = np.split(self.values, np.cumsum([len(seen), len(flagged)]))
+        self.outputs, self.inputs = plant.block(seen, output_row), plant.block(written, input_row)
+        self.flags = plant.block(flagged)
+        self._angle_ref, self._speed_ref, self._torque_ref = input_row[: 3 * LEGS * JOINTS].reshape(3, LEGS, JOINTS)
+        self.push: NDArray[np.float64] = input_row[3 * LEGS * JOINTS :]
         self._contact = np.zeros(LEGS, dtype=bool)
         self._touching = self.flags.values[:LEGS]
         self._noise, self._generator = noise, np.random.default_rng(seed)
@@ -85,17 +95,23 @@ class Signals:
         """Brings outputs and measurement up to date."""
         self.outputs.get()
         self.flags.get()
-        np.not_equal(self._touching, 0, out=self._contact)
+        self._contact[...] = self._touching
+        self._flag_row[...] = self.flags.values
         if self._noise:
             scale = 1.0 + self._noise * self._generator.standard_normal(self._force.shape)
             np.multiply(self._force, scale, out=self.measurement.foot_force)
 
     def write(self, command: JointCommand) -> None:
         """Hands a joint command, and the push as it stands, to the plant."""
-        self._commanded[0] = command.angle_ref
-        self._commanded[1] = command.speed_ref
-        self._commanded[2] = command.torque_ref
+        self._angle_ref[...] = command.angle_ref
+        self._speed_ref[...] = command.speed_ref
+        self._torque_ref[...] = command.torque_ref
         self.inputs.set()
+
+
+def _first(names: Sequence[str], among: Sequence[str]) -> list[str]:
+    """All names `among` which these are, these first."""
+    return [*names, *(name for name in among if name not in set(names))]
 
 
 def _refuse_foreign(outputs: list[str], inputs: list[str], flags: list[str]) -> None:

@@ -20,10 +20,9 @@ SPEED = 0.08  # m/s of the torso
 class FakeBlock:
     """A view on some of the plant's values."""
 
-    def __init__(self, plant: FakePlant, names: Sequence[str], dtype: type[Any]) -> None:
+    def __init__(self, plant: FakePlant, names: Sequence[str], buffer: NDArray[Any]) -> None:
         self._plant = plant
-        self.names = tuple(names)
-        self.values: NDArray[Any] = np.zeros(len(names), dtype=dtype)
+        self.names, self.values = tuple(names), buffer
 
     def get(self) -> None:
         self._plant.log.append("get")
@@ -48,9 +47,9 @@ class FakePlant:
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         return [name for name, entry in self.variables.items() if entry.causality == causality and entry.type == kind]
 
-    def block(self, names: Sequence[str]) -> FakeBlock:
+    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FakeBlock:
         boolean = bool(names) and self.variables[names[0]].type == "Boolean"
-        return FakeBlock(self, names, np.int32 if boolean else np.float64)
+        return FakeBlock(self, names, np.zeros(len(names), np.int32 if boolean else np.float64) if buffer is None else buffer)
 
     def parameters(self) -> dict[str, float]:
         return {name: value for name, value in self.values.items() if self.variables[name].causality == "parameter"}

@@ -35,11 +35,17 @@ def standing_forces() -> np.ndarray:
     return force
 
 
+def respond(laws: Compliance, force: np.ndarray, contact: np.ndarray, *, swinging: np.ndarray) -> None:
+    """One period with feet in the stance and forces (6, 3)."""
+    laws.plan(PLANE[None, :], swinging)
+    laws.step(force[:, :2] @ XY, force[:, 2], contact)
+
+
 def test_a_common_push_is_left_alone() -> None:
     laws, force = make(), standing_forces()
     force[:, 2] *= [0.5, 1.0, 1.5, 0.5, 1.0, 1.5]
     force[:, :2] = 0.3 * force[:, 2:] * [1.0, -0.5]
-    laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+    respond(laws, force, EVERYBODY, swinging=NOBODY)
     assert np.abs(laws.squeeze).max() < ROUND_OFF
 
 
@@ -47,7 +53,7 @@ def test_squeezing_is_given_way_to_and_adds_up_to_nothing() -> None:
     laws, force = make(), standing_forces()
     force[0, 1], force[3, 1] = 2.0, -2.0
     for _ in range(10):
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=NOBODY)
     np.testing.assert_allclose(laws.squeeze, [2j, 0, 0, -2j, 0, 0], atol=ROUND_OFF)
     assert laws.shift[0].imag > 0.0 > laws.shift[3].imag
     assert abs(laws.shift.sum()) < 1e-12
@@ -65,7 +71,7 @@ def test_yielding_takes_the_slip_from_a_leg_that_is_squeezed() -> None:
         f, shift_before, last = 0.0, 0.0, 0.0
         for _ in range(200):
             force[0, 0], force[2, 0] = f, -f
-            laws.step(force[:, :2] @ XY, force[:, 2], force[:, 2] > 0.0, swinging=force[:, 2] == 0.0, plane=PLANE)
+            respond(laws, force, force[:, 2] > 0.0, swinging=force[:, 2] == 0.0)
             shift = sign * laws.shift[0].real
             # backward Euler of f = -c ((u - u-)/h + (f - f-)/(K h) + drift)
             scale = creep / PERIOD
@@ -82,11 +88,11 @@ def test_the_shift_goes_when_the_load_is_planned_to_go() -> None:
     laws, force = make(), standing_forces()
     force[0, 1], force[3, 1] = 2.0, -2.0
     for _ in range(60):
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=NOBODY)
     loaded, swinging = abs(laws.shift[0]), np.array([True, False, False, False, False, False])
     force[0, :2] = force[3, :2] = 0.0
     for _ in range(60):
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=swinging, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=swinging)
     fade = np.exp(-60 * PERIOD / GAINS.slip.load_time)
     assert abs(laws.shift[0]) < 1.5 * fade * loaded  # the integral is still there: the foot has not left the ground
     assert abs(laws.pid.output[0]) > 0.5 * loaded
@@ -98,8 +104,8 @@ def test_the_measured_load_does_not_move_the_feet_sideways() -> None:
     other, heavier = make(), force.copy()
     heavier[:, 2] *= [1.3, 0.7, 1.3, 1.3, 0.7, 1.3]
     for _ in range(20):
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
-        other.step(heavier[:, :2] @ XY, heavier[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=NOBODY)
+        respond(other, heavier, EVERYBODY, swinging=NOBODY)
     np.testing.assert_allclose(other.shift, laws.shift, atol=1e-15)
 
 
@@ -107,40 +113,40 @@ def test_lift_off_resets_the_pid_of_that_leg_only() -> None:
     laws, force = make(), standing_forces()
     force[0, 1], force[3, 1] = 2.0, -2.0
     for _ in range(40):
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=NOBODY)
     swinging = np.array([True, False, False, False, False, False])
-    laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=swinging, plane=PLANE)
-    assert laws.pid.state[2, 0] != 0.0  # planned to swing, but still on the ground
+    respond(laws, force, EVERYBODY, swinging=swinging)
+    assert laws.pid.state[0][2] != 0.0  # planned to swing, but still on the ground
     force[0] = 0.0
-    laws.step(force[:, :2] @ XY, force[:, 2], ~swinging, swinging=swinging, plane=PLANE)
-    assert laws.pid.state[2, 0] == 0.0
-    assert laws.pid.state[2, 3] != 0.0
+    respond(laws, force, ~swinging, swinging=swinging)
+    assert laws.pid.state[0][2] == 0.0
+    assert laws.pid.state[3][2] != 0.0
 
 
 @pytest.mark.parametrize("standing", ["111111", "101010", "010101", "110111", "101101"])
 def test_the_shares_carry_the_weight_about_the_centre_of_mass(standing: str) -> None:
     laws = Compliance(GAINS, weight=WEIGHT, centre=0.01 - 0.005j, period=PERIOD)
     swinging = np.array([flag == "0" for flag in standing])
-    laws.step(np.zeros(6, dtype=complex), standing_forces()[:, 2], ~swinging, swinging=swinging, plane=PLANE)
-    assert laws.share.sum() == pytest.approx(WEIGHT)
-    assert (laws.share @ PLANE) / WEIGHT == pytest.approx(0.01 - 0.005j)
-    assert not laws.share[swinging].any()
+    respond(laws, standing_forces() * [0.0, 0.0, 1.0], ~swinging, swinging=swinging)
+    assert laws.shares.sum() == pytest.approx(WEIGHT)
+    assert (laws.shares[0] @ PLANE) / WEIGHT == pytest.approx(0.01 - 0.005j)
+    assert not laws.shares[0, swinging].any()
 
 
 def test_feet_on_one_line_share_the_weight_evenly() -> None:
     laws = make()
     swinging = np.array([True, False, True, True, False, True])
-    laws.step(np.zeros(6, dtype=complex), standing_forces()[:, 2], ~swinging, swinging=swinging, plane=PLANE)
-    np.testing.assert_allclose(laws.share[[1, 4]], WEIGHT / 2.0)
+    respond(laws, standing_forces() * [0.0, 0.0, 1.0], ~swinging, swinging=swinging)
+    np.testing.assert_allclose(laws.shares[0, [1, 4]], WEIGHT / 2.0)
 
 
 def test_at_the_preload_the_suspension_rests_and_beyond_it_the_foot_yields_upwards() -> None:
     laws, force = make(), standing_forces()
     force[:, 2] *= GAINS.suspension.preload
-    laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+    respond(laws, force, EVERYBODY, swinging=NOBODY)
     assert np.abs(laws.lift).max() < 1e-15
     force[2, 2] += 5.0
-    laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+    respond(laws, force, EVERYBODY, swinging=NOBODY)
     assert laws.lift[2] > 0.0
 
 
@@ -150,14 +156,14 @@ def test_the_preload_makes_good_the_servos_sag() -> None:
     sag = (np.einsum("lj,lj->l", jacobian[:, 2], jacobian[:, 2]) / ROBOT.servo.kp) * load
     laws, force = make(), standing_forces()
     for _ in range(2000):
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=NOBODY)
     np.testing.assert_allclose(-laws.lift, sag, rtol=1e-6)
 
 
 def test_a_swinging_foot_is_not_pushed() -> None:
     laws, force = make(), np.zeros((6, 3))
     for _ in range(100):
-        laws.step(force[:, :2] @ XY, force[:, 2], NOBODY, swinging=EVERYBODY, plane=PLANE)
+        respond(laws, force, NOBODY, swinging=EVERYBODY)
     assert not laws.lift.any()
     assert not laws.shift.any()
 
@@ -167,7 +173,7 @@ def test_rates_are_those_of_the_corrections() -> None:
     for _ in range(50):
         force = standing_forces() + generator.normal(size=(6, 3))
         before = laws.shift.copy()
-        laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+        respond(laws, force, EVERYBODY, swinging=NOBODY)
         np.testing.assert_allclose(laws.shift_rate, (laws.shift - before) / PERIOD, atol=1e-12)
 
 
@@ -175,5 +181,5 @@ def test_gains_without_integral_or_proportional_part_leave_the_feet() -> None:
     quiet = replace(GAINS, slip=replace(GAINS.slip, kp=0.0, ki=0.0, kd=0.0))
     laws, force = Compliance(quiet, weight=WEIGHT, centre=0j, period=PERIOD), standing_forces()
     force[0, 1], force[3, 1] = 2.0, -2.0
-    laws.step(force[:, :2] @ XY, force[:, 2], EVERYBODY, swinging=NOBODY, plane=PLANE)
+    respond(laws, force, EVERYBODY, swinging=NOBODY)
     assert not laws.shift.any()

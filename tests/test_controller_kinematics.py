@@ -47,6 +47,11 @@ def reachable_poses(robot: Robot, count: int = POSES) -> np.ndarray:
     return np.array(found)
 
 
+def seen(rows: np.ndarray) -> tuple[list[complex], list[float]]:
+    """x + i y and z of rows (6, 3), as Python's own numbers."""
+    return (rows[:, 0] + 1j * rows[:, 1]).tolist(), rows[:, 2].tolist()
+
+
 def test_forward_kinematics_are_the_twins(robot: Robot) -> None:
     for angle in reachable_poses(robot, 20):
         np.testing.assert_allclose(LegSolver(robot).forward(angle), foot_positions(robot, angle), atol=ROUND_OFF)
@@ -71,16 +76,16 @@ def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
 
 def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot) -> None:
     solver, generator = LegSolver(robot), np.random.default_rng(3)
-    angle, speed, flag = np.empty((6, 3)), np.empty((6, 3)), np.empty(6, dtype=bool)
     compared = 0
     for pose in reachable_poses(robot, 50):
         foot, velocity = solver.forward(pose), generator.normal(size=(6, 3)) * 0.02
-        solver.solve(foot[:, 0] + 1j * foot[:, 1], foot[:, 2], velocity[:, 0] + 1j * velocity[:, 1], velocity[:, 2], angle, speed, flag)
+        solver.solve((*seen(foot), *seen(velocity)))
+        speed = solver.joints[1]
         expected = np.linalg.solve(solver.jacobian(pose), velocity[:, :, None])[:, :, 0]
         slow = np.abs(expected).max(axis=1) < robot.servo.speed_max
         compared += int(slow.sum())
         np.testing.assert_allclose(speed[slow], expected[slow], rtol=1e-7, atol=1e-9)
-        assert not flag.any()
+        assert not solver.unreachable.any()
     assert compared > 100
 
 
@@ -123,9 +128,9 @@ def test_solve_stays_within_the_limits_and_flags_the_leg() -> None:
     foot = solver.forward(robot.stance)
     foot[0] *= 3.0
     foot[5] = solver.hip[:, 5]  # on the coxa's axis
-    angle, speed, flag = np.empty((6, 3)), np.empty((6, 3)), np.empty(6, dtype=bool)
-    solver.solve(foot[:, 0] + 1j * foot[:, 1], foot[:, 2], np.full(6, 0.1 + 0j), np.zeros(6), angle, speed, flag)
-    assert flag.tolist() == [True, False, False, False, False, True]
+    solver.solve((*seen(foot), [0.1 + 0j] * 6, [0.0] * 6))
+    angle, speed = solver.joints
+    assert solver.unreachable.tolist() == [True, False, False, False, False, True]
     assert (angle >= solver.angle_min).all()
     assert (angle <= solver.angle_max).all()
     assert np.isfinite(speed).all()

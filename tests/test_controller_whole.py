@@ -83,7 +83,7 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
     controller = make(name)
     run(controller, command, 600)
     worst, compared = 0.0, 0
-    before, swinging = None, controller.paths.swinging.copy()
+    before, swinging = None, controller.diagnostics.swinging.copy()
     for k in range(600, 900):
         out = controller.step(k * PERIOD, command, Measurement())
         foot = foot_positions(robot, out.angle_ref)[:, :2] @ [1.0, 1.0j]
@@ -93,9 +93,9 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
             rolled = robot.foot.radius * (pitch - before[1]) * heading
             middle = 0.5 * (foot + before[0])
             over_ground = (foot - before[0] + rolled) / PERIOD + complex(command.vx, command.vy) + 1j * command.yaw_rate * middle
-            still = ~swinging & ~controller.paths.swinging
+            still = ~swinging & ~controller.diagnostics.swinging
             worst, compared = max(worst, float(np.abs(over_ground[still]).max(initial=0.0))), compared + int(still.sum())
-        before, swinging = (foot, pitch), controller.paths.swinging.copy()
+        before, swinging = (foot, pitch), controller.diagnostics.swinging.copy()
     assert compared > 600
     # roll is followed one period late, and headings turn meanwhile: R dB dpsi/dt ~ 0.015 m x 0.4 x 0.5 /s; the body moves at 50 mm/s
     assert worst < 3e-3
@@ -133,6 +133,38 @@ def test_the_same_inputs_give_the_same_bits_and_reset_starts_afresh(compliant: b
     np.testing.assert_array_equal(run(make(compliant=compliant), BodyCommand(vx=0.08), 300, measurement=squeezed()), first)
 
 
+@pytest.mark.parametrize("compliant", [False, True])
+def test_a_restored_controller_goes_on_bit_for_bit(compliant: bool) -> None:
+    controller, command = make(compliant=compliant), BodyCommand(0.05, 0.02, 0.2, 0.01, 0.05)
+    fresh = controller.save()
+    start = run(controller, BodyCommand(vx=0.08), 130, measurement=squeezed())
+    run(controller, command, 67, first=130, measurement=squeezed())  # the ramp and a planned swing are under way
+    state = controller.save()
+    first = run(controller, command, 300, first=197, measurement=squeezed())
+    run(controller, BodyCommand(vy=-0.03), 100, first=497, measurement=squeezed())
+    controller.restore(state)
+    np.testing.assert_array_equal(run(controller, command, 300, first=197, measurement=squeezed()), first)
+    controller.restore(fresh)
+    np.testing.assert_array_equal(run(controller, BodyCommand(vx=0.08), 130, measurement=squeezed()), start)
+    other = make(compliant=compliant)
+    other.restore(state)
+    np.testing.assert_array_equal(run(other, command, 300, first=197, measurement=squeezed()), first)
+
+
+@pytest.mark.parametrize("compliant", [False, True])
+def test_commands_do_not_depend_on_how_many_steps_are_planned_at_once(compliant: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    walks = []
+    for planned in (1, 11, 1000):
+        monkeypatch.setattr("hexapod_cosim.controller.controller.PLANNED", planned)
+        controller, parts, first = make(compliant=compliant), [], 0
+        for command, steps in ((BodyCommand(vx=0.08), 333), (BodyCommand(0.03, 0.01, 0.2, roll=0.1), 250), (BodyCommand(), 600)):
+            parts.append(run(controller, command, steps, first=first, measurement=squeezed()))
+            first += steps
+        walks.append(np.concatenate(parts))
+    np.testing.assert_array_equal(walks[1], walks[0])
+    np.testing.assert_array_equal(walks[2], walks[0])
+
+
 def test_kinematic_control_does_not_look_at_the_forces() -> None:
     np.testing.assert_array_equal(
         run(make(), BodyCommand(vx=0.08), 200, measurement=squeezed()), run(make(), BodyCommand(vx=0.08), 200, measurement=Measurement())
@@ -147,9 +179,8 @@ def test_the_corrections_are_added_to_the_feet_before_the_inverse_kinematics() -
     shown = controller.diagnostics
     feet = foot_positions(robot, out.angle_ref)
     home = foot_positions(robot, robot.stance)
-    rolled = controller.state_arrays["rolled"]
     assert np.abs(shown.shift).max() > 1e-4
-    np.testing.assert_allclose(feet[:, :2] @ [1.0, 1.0j], home[:, :2] @ [1.0, 1.0j] + shown.shift + rolled, atol=1e-9)
+    np.testing.assert_allclose(feet[:, :2] @ [1.0, 1.0j], home[:, :2] @ [1.0, 1.0j] + shown.shift + controller.rolled, atol=1e-9)
     np.testing.assert_allclose(feet[:, 2], home[:, 2] + shown.lift, atol=1e-9)
 
 

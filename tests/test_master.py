@@ -73,6 +73,8 @@ def test_measurements_are_views_on_what_the_plant_gave() -> None:
     assert np.concatenate([array.ravel() for array in shown]).tolist() == list(range(61))
     assert measured.contact.tolist() == [False, True, False, False, False, False]
     assert all(np.shares_memory(array, signals.outputs.values) for array in shown)
+    row = dict(zip(signals.names, signals.values.tolist(), strict=True))
+    assert (row["LF.femur.angle"], row["LF.foot.contact"], row["LM.foot.contact"]) == (1.0, 0.0, 1.0)
 
 
 def test_a_step_that_the_plant_refuses_ends_the_run_and_keeps_its_rows() -> None:
@@ -203,6 +205,22 @@ def test_fmpy_reads_our_csv_and_our_block_reads_what_fmpy_reads(athena_fmu: Path
     table = fmpy_read_csv(tmp_path / "results.csv")
     assert table.dtype.names == ("time", *block.names)
     assert table["LF.femur.angle"][0] == block.values[1]
+
+
+def test_a_block_fills_the_buffer_it_is_given_and_refuses_one_that_does_not_fit(athena_fmu: Path) -> None:
+    names = joint_names("angle")
+    with Fmu(athena_fmu) as plant:
+        plant.initialise(0.0, 1.0)
+        own, row = plant.block(names), np.full(40, np.nan)
+        given = plant.block(names, row[3:21])
+        own.get()
+        given.get()
+        np.testing.assert_array_equal(row[3:21], own.values)
+        assert np.isnan(row[:3]).all()
+        assert np.isnan(row[21:]).all()
+        for buffer in (row[:17], row[:36:2], np.zeros(18, dtype=np.int32)):
+            with pytest.raises(FmuError, match="not a buffer for these variables"):
+                plant.block(names, buffer)
 
 
 @pytest.fixture(scope="module")

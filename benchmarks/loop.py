@@ -1,0 +1,70 @@
+"""The co-simulation's own cost: the whole loop against real time, and the master on an FMU that computes nothing."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+from benchmarks.toolchain import Tools
+from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
+from hexapod_cosim.controller.design import design_gains
+from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.master import run
+from hexapod_cosim.cosim.recorder import Recorder
+from hexapod_cosim.cosim.run import simulate
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.schedule import make_schedule
+from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.models import load_robot
+
+SCENARIO = "walk_flat"
+REPEATS = 5
+
+
+class Still:
+    """A controller that commands nothing."""
+
+    def __init__(self) -> None:
+        self._command = JointCommand()
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """The same command always."""
+        return self._command
+
+
+def realtime_factor(tools: Tools, control: str) -> float:
+    """Of the whole loop, plant and Python controller, at a macro-step of 5 ms."""
+    scenario = load_scenario(SCENARIO, overrides=[f"control={control}"])
+    gains = None if control == "kinematic" else design_gains(load_robot(scenario.robot), period=scenario.macro_step)
+    return median(simulate(scenario, fmu=tools.fmu, gains=gains).outcome.realtime_factor for _ in range(REPEATS))
+
+
+def master_overhead(tools: Tools) -> float:
+    """us per macro-step of fmpy's calls and the recording alone."""
+    scenario = load_scenario(SCENARIO)
+    schedule = make_schedule(scenario)
+    with TemporaryDirectory(prefix="hexapod-bench-") as folder:
+        idle = _idle_fmu(Path(folder), tools)
+        with Fmu(idle) as plant:
+            plant.initialise(0.0, scenario.duration)
+            walls = []
+            for _ in range(REPEATS):
+                signals = Signals(plant)
+                recorder = Recorder(signals, schedule.times, schedule.rows)
+                begin = perf_counter()
+                run(plant, signals, Still(), schedule, recorder, h=scenario.macro_step)
+                walls.append(perf_counter() - begin)
+    return 1e6 * median(walls) / scenario.steps
+
+
+def _idle_fmu(folder: Path, tools: Tools) -> Path:
+    """The FMU with a binary that does nothing."""
+    idle = folder / "idle.fmu"
+    library = next(tools.native.glob("libbench_idle_fmu.*"))
+    with zipfile.ZipFile(tools.fmu) as source, zipfile.ZipFile(idle, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, library.read_bytes() if name.startswith("binaries/") else source.read(name))
+    return idle

@@ -1,0 +1,115 @@
+"""Runs of drivers: time, evaluations, and the error against the converged solution of the same law."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks import BUILD
+from benchmarks.series import REFERENCES, Series, command
+from benchmarks.toolchain import Tools
+from benchmarks.walks import DURATION
+
+Array = NDArray[np.float64]
+
+TIMEOUT = 300.0  # s    of one call of a driver
+SHORT = 0.05  # s    a walk that is over sooner is repeated
+REPEATS, REPEATED_TIME = 9, 0.15  # at most, and until about so many seconds
+
+
+class DriverError(Exception):
+    """A driver that gave up, in its own words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One walk by one method at one setting; error and seconds are inf where the engine gave up."""
+
+    engine: str
+    method: str
+    law: str
+    setting: float
+    walk: str
+    error: float  # m    largest distance of the torso's path from the converged one
+    seconds: float  # median over the repeats
+    evaluations: float
+    microseconds_per_evaluation: float  # NaN: unknown
+
+    @property
+    def realtime_factor(self) -> float:
+        return DURATION / self.seconds
+
+
+@dataclass
+class Bench:
+    """Runs drivers on walk files and knows the converged paths."""
+
+    tools: Tools
+    walks: Mapping[str, Path]  # files by name
+    _references: dict[tuple[str, str], Array] = field(default_factory=dict)
+
+    def run(self, series: Series, setting: float, walk: str) -> Run:
+        """Measures one walk; short ones several times."""
+        facts: dict[str, Any] = {"engine": series.engine, "method": series.method, "law": series.law, "setting": setting, "walk": walk}
+        try:
+            told, path = self.call(series.engine, series.method, setting, walk)
+            if told["seconds"][0] < SHORT:
+                repeats = max(3, min(REPEATS, int(REPEATED_TIME / told["seconds"][0])))
+                told, path = self.call(series.engine, series.method, setting, walk, repeats=repeats)
+        except DriverError:
+            return Run(error=math.inf, seconds=math.inf, evaluations=math.nan, microseconds_per_evaluation=math.nan, **facts)
+        each = told["microseconds_per_evaluation"]
+        return Run(
+            error=distance(path, self.reference(series.law, walk)),
+            seconds=median(told["seconds"]),
+            evaluations=told["evaluations"],
+            microseconds_per_evaluation=math.nan if each is None else each,
+            **facts,
+        )
+
+    def call(self, engine: str, method: str, setting: float, walk: str, *, repeats: int = 1) -> tuple[dict[str, Any], Array]:
+        """What a driver prints, and its path (n + 1, 3). Raises DriverError."""
+        out = BUILD / "path.bin"
+        words = [*command(engine, self.tools), str(self.walks[walk]), method, repr(setting), str(repeats), str(out)]
+        return json.loads(call(words)), np.fromfile(out).reshape(-1, 3)
+
+    def reference(self, law: str, walk: str) -> Array:
+        """The converged path (n + 1, 3), kept in build/bench for as long as neither walk nor driver changes."""
+        if (law, walk) not in self._references:
+            engine, method, setting = REFERENCES[law]
+            driver = Path(command(engine, self.tools)[-1])  # binary or script
+            key = hashlib.sha256(self.walks[walk].read_bytes() + driver.read_bytes() + f"{method} {setting}".encode()).hexdigest()[:16]
+            kept = BUILD / "converged" / f"{law}-{walk}-{key}.npy"
+            if not kept.exists():
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                np.save(kept, self.call(engine, method, setting, walk)[1])
+            self._references[law, walk] = np.load(kept)
+        return self._references[law, walk]
+
+
+def call(words: list[str]) -> str:
+    """The last line that a command prints. Raises DriverError."""
+    try:
+        done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=TIMEOUT)
+    except subprocess.TimeoutExpired as error:
+        raise DriverError(f"more than {TIMEOUT:g} s") from error
+    lines = done.stdout.strip().splitlines()
+    if done.returncode != 0 or not lines:
+        raise DriverError(done.stderr.strip() or f"exit code {done.returncode}")
+    return lines[-1]
+
+
+def distance(path: Array, reference: Array) -> float:
+    """m    the largest distance between two paths; inf for one that left the numbers."""
+    gap = np.linalg.norm(path - reference, axis=1).max()
+    return float(gap) if np.isfinite(gap) else math.inf

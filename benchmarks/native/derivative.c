@@ -1,0 +1,89 @@
+/* derivative.c - microseconds of one evaluation of the right-hand side, by kernel: `derivative WALK REPEATS [KERNEL MULTIPLIERS]`
+ *
+ * Evaluated are the states of a walk, one after the other, so that neither the branch predictor nor the cache knows the answer. Prints a
+ * JSON line, for each kernel that runs here {"plain": us, "multipliers": us}: the least of the repeats' means, since noise only ever adds.
+ * With a kernel and 0 or 1 named, that is evaluated ROUNDS times at every state and nothing is printed: for counting instructions.
+ */
+#include <string.h>
+
+#include "driver.h"
+#include "kernel.h"
+#include "robot.h"
+
+enum { VISITS = 400, ROUNDS = 25 };
+
+typedef struct {
+  hxModel model;
+  int count;
+  hxState state[VISITS];
+  hxCommand command[VISITS];
+} Visited;
+
+static int visit(const Walk *walk, Visited *visited) {
+  hxPlant *plant = hx_plant_create();
+  if (!plant || hx_plant_reset(plant, &walk->definition, 0.0) != HX_OK) return 1;
+  visited->model = plant->model;
+  for (visited->count = 0; visited->count < VISITS && visited->count < walk->n; ++visited->count) {
+    const int k = visited->count;
+    visited->state[k] = plant->state;
+    hx_command_from_input(&visited->command[k], &walk->input[k], plant->state.time);
+    if (hx_plant_step(plant, &walk->input[k], (k + 1) * walk->h) != HX_OK) return 1;
+  }
+  hx_plant_destroy(plant);
+  return 0;
+}
+
+/* us of one evaluation; the results are summed so that none can be left out */
+__attribute__((noinline)) static double measure(const hxKernel *kernel, const Visited *visited, int multipliers, double *sum) {
+  hxMotion rate;
+  const double begin = seconds_now();
+  for (int round = 0; round < ROUNDS; ++round) {
+    for (int k = 0; k < visited->count; ++k) {
+      kernel->derivative(&visited->model, &visited->state[k], &visited->command[k], multipliers, &rate);
+      *sum += rate.y[HX_V];
+    }
+  }
+  return 1e6 * (seconds_now() - begin) / (ROUNDS * visited->count);
+}
+
+static void report(const hxKernel *kernel, const Visited *visited, int repeats, double *sum) {
+  double best[2] = {1e30, 1e30};
+  for (int r = 0; r < repeats; ++r) {
+    for (int multipliers = 0; multipliers < 2; ++multipliers) {
+      const double us = measure(kernel, visited, multipliers, sum);
+      if (us < best[multipliers]) best[multipliers] = us;
+    }
+  }
+  printf("\"%s\": {\"plain\": %.6f, \"multipliers\": %.6f}", kernel->name, best[0], best[1]);
+}
+
+static int only(const char *name, int multipliers, const Visited *visited, double *sum) {
+  for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel) {
+    if (strcmp((*kernel)->name, name) != 0 || !(*kernel)->runs_here()) continue;
+    measure(*kernel, visited, multipliers, sum);
+    return 0;
+  }
+  return 1;
+}
+
+int main(int argc, char **argv) {
+  static Visited visited;
+  Walk walk;
+  double sum = 0.0;
+  const char *comma = "";
+  if (argc != 3 && argc != 5) {
+    fprintf(stderr, "usage: %s WALK REPEATS [KERNEL MULTIPLIERS]\n", argv[0]);
+    return 2;
+  }
+  if (walk_read(argv[1], &walk) || visit(&walk, &visited)) return 2;
+  if (argc == 5) return only(argv[3], atoi(argv[4]), &visited, &sum);
+  printf("{");
+  for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel) {
+    if (!(*kernel)->runs_here()) continue;
+    printf("%s", comma);
+    report(*kernel, &visited, atoi(argv[2]), &sum);
+    comma = ", ";
+  }
+  printf("}\n");
+  return sum != sum;
+}

@@ -1,0 +1,74 @@
+/* instances.c - many plants in one process, stepped in turn: `instances WALK TOLERANCE COUNT` prints a JSON line
+ *
+ * {"microseconds_per_step": of one plant's macro-step, "bytes_per_instance": its structure, "resident_per_instance": by which the process
+ * grew, null where the system does not tell, "allocations": in all steps together}. All plants walk the same walk: what grows is the memory
+ * they touch.
+ */
+#include <unistd.h>
+
+#include "driver.h"
+#include "state.h"
+
+/* the linker puts these in the place of the allocator, for the code of this program */
+static long allocations;
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *block, size_t size);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *block, size_t size);
+
+void *__wrap_malloc(size_t size) { return ++allocations, __real_malloc(size); }
+void *__wrap_calloc(size_t count, size_t size) { return ++allocations, __real_calloc(count, size); }
+void *__wrap_realloc(void *block, size_t size) { return ++allocations, __real_realloc(block, size); }
+
+/* bytes of the process in memory; 0 where there is no /proc */
+static double resident(void) {
+  double pages = 0.0, ignored;
+  FILE *file = fopen("/proc/self/statm", "r");
+  if (!file) return 0.0;
+  if (fscanf(file, "%lf %lf", &ignored, &pages) != 2) pages = 0.0;
+  fclose(file);
+  return pages * (double)sysconf(_SC_PAGESIZE);
+}
+
+static int create(hxPlant **plant, int count, const hxDefinition *definition) {
+  for (int i = 0; i < count; ++i) {
+    plant[i] = hx_plant_create();
+    if (!plant[i] || hx_plant_reset(plant[i], definition, 0.0) != HX_OK) return 1;
+  }
+  return 0;
+}
+
+static int step_all(hxPlant **plant, int count, const Walk *walk, int64_t k) {
+  for (int i = 0; i < count; ++i)
+    if (hx_plant_step(plant[i], &walk->input[k], (double)(k + 1) * walk->h) != HX_OK) return 1;
+  return 0;
+}
+
+int main(int argc, char **argv) {
+  Walk walk;
+  if (argc != 4) {
+    fprintf(stderr, "usage: %s WALK TOLERANCE COUNT\n", argv[0]);
+    return 2;
+  }
+  const int count = atoi(argv[3]);
+  if (walk_read(argv[1], &walk) || count < 1) return 2;
+  walk.definition.solver.step = 0.0;
+  walk.definition.solver.tolerance = atof(argv[2]);
+  hxPlant **plant = calloc((size_t)count, sizeof(hxPlant *));
+  const double before = resident();
+  if (!plant || create(plant, count, &walk.definition)) return 1;
+  const long before_steps = allocations;
+  const double begin = seconds_now();
+  for (int64_t k = 0; k < walk.n; ++k)
+    if (step_all(plant, count, &walk, k)) return 1;
+  const double seconds = seconds_now() - begin;
+  printf("{\"microseconds_per_step\": %.6f, \"bytes_per_instance\": %zu, \"allocations\": %ld, \"resident_per_instance\": ",
+         1e6 * seconds / ((double)walk.n * count), sizeof(hxPlant), allocations - before_steps);
+  if (before > 0.0)
+    printf("%.0f}\n", (resident() - before) / count);
+  else
+    printf("null}\n");
+  return 0;
+}

@@ -1,0 +1,95 @@
+"""What is measured: every integrator of ours and of the peers, each with its settings from coarse to fine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.toolchain import Tools
+
+OURS = "hexapod"
+PLANT_LAW, MUJOCO_LAW, DRAKE_LAW = "plant", "mujoco", "drake"  # whose contact
+
+
+@dataclass(frozen=True, kw_only=True)
+class Series:
+    """One method of one engine."""
+
+    engine: str
+    method: str  # as its driver calls it
+    settings: tuple[float, ...]  # step sizes in s or tolerances, coarse to fine
+    adaptive: bool
+    law: str = PLANT_LAW  # an engine's own contact is judged by its own converged solution
+    every: int = 1  # n-th walk only, for slow engines; odd, so that both robots are among them
+    quick: bool = False  # measured in a quick run too, in every second setting
+
+    @property
+    def name(self) -> str:
+        return f"{self.engine} {self.method}"
+
+
+TOLERANCES = (1.0, 3e-1, 1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6, 1e-7)
+EXPLICIT_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+STEPS = (5e-3, 2.5e-3, 1.25e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
+EXPLICIT_STEPS = (1e-4, 5e-5, 2.5e-5)
+PEER_STEPS = (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
+OWN_STEPS = (2e-3, 1e-3, 5e-4)
+
+
+def ours() -> list[Series]:
+    """Our integrators."""
+    implicit = [Series(engine=OURS, method=name, settings=TOLERANCES, adaptive=True, quick=True) for name in ("rosw3", "ros2")]
+    explicit = [Series(engine=OURS, method=name, settings=EXPLICIT_TOLERANCES, adaptive=True) for name in ("dp54", "bs32")]
+    fixed = [Series(engine=OURS, method=f"{name}-fixed", settings=STEPS, adaptive=False) for name in ("rosw3", "ros2")]
+    return [*implicit, *explicit, *fixed, Series(engine=OURS, method="rk4-fixed", settings=EXPLICIT_STEPS, adaptive=False)]
+
+
+def peers() -> list[Series]:
+    """The peers' integrators: MuJoCo, Pinocchio and Simbody under the plant's law, MuJoCo and Drake under their own."""
+    return [*_under_our_law(), *_under_their_own()]
+
+
+def _under_our_law() -> list[Series]:
+    return [
+        Series(engine="mujoco", method="law-RK4", settings=PEER_STEPS, adaptive=False, quick=True),
+        Series(engine="mujoco", method="law-implicitfast", settings=PEER_STEPS, adaptive=False, quick=True),
+        Series(engine="pinocchio", method="rk4", settings=PEER_STEPS[1:], adaptive=False),
+        Series(engine="pinocchio", method="semi-implicit", settings=PEER_STEPS, adaptive=False),
+        Series(engine="simbody", method="CPodesBDF", settings=(1e-1, 1e-2, 1e-3, 1e-4), adaptive=True, every=3),
+        Series(engine="simbody", method="RungeKuttaMerson", settings=(1e-1, 1e-2, 1e-3), adaptive=True, every=3),
+        Series(engine="simbody", method="SemiExplicitEuler", settings=(1e-3, 5e-4, 2.5e-4), adaptive=False, every=3),
+    ]
+
+
+def _under_their_own() -> list[Series]:
+    drake = {
+        "discrete": (2e-3, 1e-3, 5e-4),
+        "cenic": (1e-1, 1e-2, 1e-3),
+        "implicit_euler": (1e-1, 1e-2),
+        "runge_kutta3": (1e-1, 1e-2),
+    }
+    return [
+        Series(engine="mujoco", method="own-implicitfast", settings=OWN_STEPS, adaptive=False, law=MUJOCO_LAW),
+        Series(engine="mujoco", method="own-RK4", settings=OWN_STEPS[1:], adaptive=False, law=MUJOCO_LAW),
+        *(
+            Series(engine="drake", method=method, settings=settings, adaptive=method != "discrete", law=DRAKE_LAW, every=5)
+            for method, settings in drake.items()
+        ),
+    ]
+
+
+# what counts as converged, by whose law: (engine, method, setting)
+REFERENCES = {
+    PLANT_LAW: (OURS, "dp54", 1e-9),
+    MUJOCO_LAW: ("mujoco", "own-RK4", 6.25e-5),
+    DRAKE_LAW: ("drake", "runge_kutta3", 1e-7),
+}
+
+
+def command(engine: str, tools: Tools) -> list[str]:
+    """How the driver of an engine is called; [] when it is not there."""
+    if engine == "drake":
+        script = Path(__file__).parent / "drake_walk.py"
+        return [str(tools.python), str(script)] if script.exists() and "drake" not in tools.missing else []
+    driver = tools.driver("plant" if engine == OURS else engine)
+    return [str(driver)] if driver.exists() and engine not in tools.missing else []

@@ -1,0 +1,106 @@
+"""What the benchmarks need beside the package: an environment of the peers' wheels and the drivers built against them.
+
+All of it lies in build/bench. A peer that cannot be had here is reported with the reason and otherwise left out.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks import BUILD, ROOT
+
+REQUIREMENTS = Path(__file__).parent / "requirements.txt"
+OUR_TARGETS = ("bench_plant", "bench_derivative", "bench_instances", "bench_idle_fmu", "fmu")
+PEER_TARGETS = ("mujoco", "pinocchio", "simbody")
+QUICK_TARGETS = ("mujoco",)  # compiles in seconds, Pinocchio's templates in minutes
+LAST_LINES = 3  # of a failed command's words
+
+
+@dataclass(frozen=True)
+class Tools:
+    """Where drivers and the peers' Python are; missing: why a peer is not there."""
+
+    native: Path
+    python: Path
+    missing: dict[str, str]
+
+    @property
+    def fmu(self) -> Path:
+        """The default robot's FMU, of the sources as they are."""
+        return self.native / "athena.fmu"
+
+    def driver(self, name: str) -> Path:
+        """A native driver."""
+        return self.native / f"bench_{name}"
+
+
+def prepare(*, quick: bool) -> Tools:
+    """Installs the peers' wheels and builds all drivers; what is up to date stays. Raises RuntimeError when our own do not build."""
+    python = _environment()
+    missing = _install(python, ("mujoco",) if quick else None)
+    native = BUILD / "native"
+    configured = _configure(native, python)
+    if configured:
+        raise RuntimeError(f"the drivers cannot be configured: {configured}")
+    for target in OUR_TARGETS:
+        if trouble := _build(native, target):
+            raise RuntimeError(f"{target} does not build: {trouble}")
+    for target in QUICK_TARGETS if quick else PEER_TARGETS:
+        if trouble := _build(native, f"bench_{target}"):
+            missing[target] = missing.get(target) or trouble
+    return Tools(native, python, missing)
+
+
+def _environment() -> Path:
+    folder = BUILD / "venv"
+    python = folder / "bin" / "python"
+    if not python.exists():
+        _run([sys.executable, "-m", "venv", str(folder)])
+    return python
+
+
+def _install(python: Path, chosen: tuple[str, ...] | None) -> dict[str, str]:
+    """Installs the pinned wheels one by one; returns what went wrong by peer."""
+    missing = {}
+    for line in REQUIREMENTS.read_text(encoding="utf-8").splitlines():
+        name = line.partition("==")[0]
+        if not name or name.startswith("#") or (chosen is not None and name not in chosen):
+            continue
+        stamp = python.parents[1] / f".{line}"
+        if not stamp.exists():
+            trouble = _run([str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", line])
+            if trouble:
+                missing[PACKAGES[name]] = trouble
+            else:
+                stamp.touch()
+    return missing
+
+
+PACKAGES = {"mujoco": "mujoco", "pin": "pinocchio", "cmeel-eigen": "pinocchio", "drake": "drake"}
+
+
+def _configure(native: Path, python: Path) -> str:
+    packages = next((python.parents[1] / "lib").glob("python3*/site-packages"))
+    options = [
+        "-DCMAKE_BUILD_TYPE=Release", f"-DPython_EXECUTABLE={sys.executable}",
+        f"-DMUJOCO_DIR={packages / 'mujoco'}", f"-DCMEEL_PREFIX={packages / 'cmeel.prefix'}",
+    ]  # fmt: skip
+    return _run(["cmake", "-S", str(ROOT / "benchmarks"), "-B", str(native), *options])
+
+
+def _build(native: Path, target: str) -> str:
+    return _run(["cmake", "--build", str(native), "--target", target])
+
+
+def _run(command: list[str]) -> str:
+    """Runs a command; returns "", or the last it said when it failed."""
+    environment = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])}
+    if shutil.which(command[0], path=environment["PATH"]) is None:
+        return f"{command[0]} is not installed"
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    return "" if done.returncode == 0 else " / ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])

@@ -1,0 +1,96 @@
+"""What a long walk must keep: the energy books, the joints, and its indifference to stiff laws and to how the legs are numbered."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plant import Plant
+from states import changed
+
+from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_gait
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.statics import settled
+
+H = 5e-3  # s
+BOOKS = 1e-4  # of the work done: the energy residual after a minute
+DRIFT = 1e-6  # m, 1: of all joints together, after ten minutes
+PROJECTED = 1e-13  # the same when the links are put back after every step: rounding
+RENUMBERED = 1e-9  # m, rad: what rounding has grown to after a second of walking
+STIFF = 2.0  # of the evaluations
+
+
+def walking(robot: Robot, duration: float) -> Iterator[tuple[float, Command]]:
+    """End time and joint commands of every macro-step of a kinematic walk at 0.08 m/s."""
+    controller = Controller(robot, period=H, gait=make_gait(robot, robot.gait.name))
+    nothing, forward = Measurement(), BodyCommand(vx=0.08)
+    for k in range(round(duration / H)):
+        told = controller.step(k * H, forward, nothing)
+        yield (k + 1) * H, Command(angle_ref=told.angle_ref.copy(), speed_ref=told.speed_ref.copy())
+
+
+def standing(core: ct.CDLL, robot: Robot) -> Plant:
+    position, quaternion, angle = settled(robot)
+    return Plant(core, robot, position=position, quaternion=quaternion, angle=angle)
+
+
+def walk(core: ct.CDLL, robot: Robot, duration: float) -> Plant:
+    plant = standing(core, robot)
+    for t, command in walking(robot, duration):
+        plant.step(t, command)
+    return plant
+
+
+@pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
+def test_the_energy_books_of_a_minute_balance(core: ct.CDLL, robot: str) -> None:
+    energy = walk(core, changed(load_robot(robot), solver={"tolerance": 1e-5}), 60.0).output().energy
+    assert energy.actuator_work > 10.0
+    assert abs(energy.residual) < BOOKS * energy.actuator_work
+
+
+def test_ten_minutes_of_walking_leave_the_joints_together(core: ct.CDLL) -> None:
+    constraint = walk(core, load_robot("athena"), 600.0).output().constraint
+    assert constraint.position_error < DRIFT
+    assert constraint.velocity_error < 1e3 * DRIFT
+
+
+def test_projection_puts_positions_and_velocities_back_on_the_joints(core: ct.CDLL) -> None:
+    robot = changed(load_robot("athena"), solver={"tolerance": 1e-2})
+    loose = walk(core, robot, 2.0).output()
+    kept = walk(core, changed(robot, solver={"projection": "step"}), 2.0).output()
+    assert loose.constraint.position_error > 1e3 * PROJECTED
+    assert kept.constraint.position_error < PROJECTED
+    assert kept.constraint.velocity_error < 1e2 * PROJECTED
+    assert np.max(np.abs(kept.torso.position - loose.torso.position)) < 1e-3
+
+
+def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL) -> None:
+    robot = load_robot("athena")
+    usual = walk(core, robot, 2.0).output().solver.evaluations
+    for changes in ({"friction": {"slope": 1000.0}}, {"contact": {"stiffness": 1e7}}):
+        assert walk(core, changed(robot, **changes), 2.0).output().solver.evaluations < STIFF * usual
+
+
+def test_legs_in_another_order_walk_the_same_way(core: ct.CDLL) -> None:
+    robot = changed(load_robot("athena"), solver={"step": 1e-3})
+    order = [3, 0, 5, 1, 4, 2]
+    renumbered = replace(robot, legs=tuple(robot.legs[leg] for leg in order))
+    position, quaternion, angle = settled(robot)
+    plants = [Plant(core, robot, position=position, quaternion=quaternion, angle=angle)]
+    plants += [Plant(core, renumbered, position=position, quaternion=quaternion, angle=angle[order])]
+    for t, command in walking(robot, 1.0):
+        plants[0].step(t, command)
+        plants[1].step(t, Command(angle_ref=command.angle_ref[order], speed_ref=command.speed_ref[order]))
+    here, there = (plant.output() for plant in plants)
+    assert there.torso.position == pytest.approx(here.torso.position, abs=RENUMBERED)
+    assert shuffled(here.angle, order) == pytest.approx(there.angle, abs=RENUMBERED)
+    assert not np.array_equal(there.torso.position, here.torso.position)  # the sums over the legs round differently: it was another run
+
+
+def shuffled(values: Array, order: list[int]) -> Array:
+    return np.asarray(values)[order]
