@@ -247,7 +247,7 @@ static int all_finite(const hxMotion *y) {
 static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state, double *taken, char *message) {
   const hxModel *model = start->model;
   hxTrial trial;
-  double h = model->step > 0.0 ? h_max : fmin(h_max, *next_step);
+  double h = model->step > 0.0 ? h_max : h_max / ceil(fmax(1.0, h_max / *next_step)); /* equal steps to the end */
   trial.error = 0.0;
   for (;;) {
     if (model->step == 0.0 && state->steps + state->rejected >= start->last_step) return give_up(&trial, start->t, h, message);

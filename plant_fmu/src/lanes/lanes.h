@@ -11,6 +11,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#if defined(__x86_64__) && defined(__GNUC__)
+#include <immintrin.h>
+#endif
+
 #include "../state.h"
 
 #ifndef HX_LANES
@@ -81,11 +85,16 @@ static inline hxReal hx_from_bits(hxMask m) {
   return x;
 }
 
-/* mask ? a : b, lane by lane */
+/* mask ? a : b, lane by lane; b < a ? b : a and a < b ? b : a, which is what these instructions do, NaN and signed zeros included */
+#if HX_LANES == 4 && defined(__AVX__)
+static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return _mm256_blendv_pd(b, a, hx_from_bits(mask)); }
+static inline hxReal hx_min(hxReal a, hxReal b) { return _mm256_min_pd(b, a); }
+static inline hxReal hx_max(hxReal a, hxReal b) { return _mm256_max_pd(b, a); }
+#else
 static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return hx_from_bits((mask & hx_bits(a)) | (~mask & hx_bits(b))); }
-
 static inline hxReal hx_min(hxReal a, hxReal b) { return hx_select(hx_less(b, a), b, a); }
 static inline hxReal hx_max(hxReal a, hxReal b) { return hx_select(hx_less(a, b), b, a); }
+#endif
 static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) { return hx_min(hx_max(x, low), high); }
 static inline hxReal hx_abs(hxReal x) { return hx_from_bits(hx_bits(x) & INT64_MAX); }
 
