@@ -46,9 +46,10 @@ def walk(core: ct.CDLL, robot: Robot, duration: float) -> Plant:
     return plant
 
 
-@pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
-def test_the_energy_books_of_a_minute_balance(core: ct.CDLL, robot: str) -> None:
-    energy = walk(core, changed(load_robot(robot), solver={"tolerance": 1e-5}), 60.0).output().energy
+@pytest.mark.parametrize(("robot", "tolerance"), [("athena", 1e-4), ("phantomx_mk4", 1e-5)])
+def test_the_energy_books_of_a_minute_balance(core: ct.CDLL, robot: str, tolerance: float) -> None:
+    """The PhantomX's servos work at their limits: stepping over those kinks costs 2e-4 of the work at the default tolerance."""
+    energy = walk(core, changed(load_robot(robot), solver={"tolerance": tolerance}), 60.0).output().energy
     assert energy.actuator_work > 10.0
     assert abs(energy.residual) < BOOKS * energy.actuator_work
 

@@ -230,7 +230,7 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed, con
   const hxServo servo =
       hx_servo_torque(&plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]), hx_splat(command[1]), hx_splat(command[2]));
   out[0] = hx_lane(servo.torque, 0), out[1] = hx_lane(servo.friction, 0);
-  out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping, 0);
+  out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
 
 /* out: distance, normal */

@@ -8,7 +8,9 @@ typedef struct {
   hxReal torque;    /* N m        motor on child */
   hxReal friction;  /* N m        gear on child */
   hxReal stiffness; /* N m/rad    -d torque/d angle, 0 where the torque is clipped */
-  hxReal damping;   /* N m s/rad  -d (torque + friction)/d speed */
+  hxReal damping;   /* N m s/rad  -d torque/d speed */
+  hxReal drag;      /* N m s/rad  -d friction/d speed */
+  hxReal low, high; /* N m        what the motor can do at this speed */
 } hxServo;
 
 static const double hx_gear_speed = 0.05; /* rad/s, where the gear's dry friction saturates */
@@ -23,12 +25,16 @@ static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal
   const hxReal low = -model->torque_max * hx_clip(1.0 + load, zero, one);
   const hxReal torque = hx_clip(wanted, low, high);
   const hxMask free = hx_less(low, wanted) & hx_less(wanted, high);
+  const hxMask falling = ~free & hx_less(zero, torque * load) & hx_less(hx_abs(load), one); /* on the torque-speed line's slopes */
   const hxReal t = hx_tanh(speed * (1.0 / hx_gear_speed));
   return (hxServo){
       .torque = torque,
       .friction = -model->coulomb_friction * t,
       .stiffness = hx_select(free, hx_splat(model->kp), zero),
-      .damping = hx_select(free, hx_splat(model->kd), zero) + (model->coulomb_friction / hx_gear_speed) * (1.0 - t * t),
+      .damping = hx_select(free, hx_splat(model->kd), hx_select(falling, hx_splat(model->torque_max / model->speed_max), zero)),
+      .low = low,
+      .high = high,
+      .drag = (model->coulomb_friction / hx_gear_speed) * (1.0 - t * t),
   };
 }
 

@@ -31,10 +31,11 @@ typedef struct {
   hxMotion6 bias;         /* the child's acceleration from a_k of eq. 10, summed from the hip to here, with S qdd in kinematic mode */
   hxForce6 p;             /* what that bias takes less what is applied */
   hxSweep sweep;
+  hxReal qdd;
+  hxReal turned, sped;    /* rad, rad/s  shifts of angle and speed before this stage's own share (eq. 16) */
   hxMotion6 acceleration; /* a - g of the child at its centre of mass */
   struct {                /* for the multipliers, when they are asked for */
     hxJointKinematics kin;
-    hxReal qdd;
     hxVec3 lambda_lin;    /* rows 1-3 */
     hxReal lambda[2];     /* rows 4, 5 */
   } reaction;
@@ -43,6 +44,7 @@ typedef struct {
 typedef struct {
   hxJointWork joint[HX_JOINTS];
   hxFootWork foot;
+  hxVec3 foot_moved, foot_sped; /* m, m/s  shifts of the contact point before this stage's own share (eq. 16) */
 } hxLegWork;
 
 typedef struct {
@@ -211,7 +213,7 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
   implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     implicit->slope[pack].servo_stiffness[joint] = leg->joint[joint].servo.stiffness;
-    implicit->slope[pack].servo_damping[joint] = leg->joint[joint].servo.damping;
+    implicit->slope[pack].servo_damping[joint] = leg->joint[joint].servo.damping + leg->joint[joint].servo.drag;
   }
 }
 
@@ -244,8 +246,12 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
   const hxReal k = implicit->slope[pack].stiffness, drag = implicit->slope[pack].drag, rest = implicit->slope[pack].viscosity - drag;
   const hxVec3 n = leg->foot.kin.normal, arm = leg->foot.kin.arm;
   if (!implicit->change) { /* dx = z v, dv = 0 */
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      leg->joint[joint].torque -= implicit->z * implicit->slope[pack].servo_stiffness[joint] * leg->joint[joint].speed;
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      hxJointWork *work = &leg->joint[joint];
+      work->turned = implicit->z * work->speed, work->sped = hx_splat(0.0);
+      work->torque -= implicit->slope[pack].servo_stiffness[joint] * work->turned;
+    }
+    leg->foot_moved = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity), leg->foot_sped = hx_zero3();
     push_tibia(leg, contact_point(leg), hx_scale(implicit->z * k * leg->foot.kin.ddelta, n));
     return;
   }
@@ -253,10 +259,11 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
   for (int joint = 0; joint < HX_JOINTS; ++joint, i = j) {
     hxJointWork *work = &leg->joint[joint];
     j = link_shift(implicit, motion, joint, pack * HX_LANES);
-    work->torque -= implicit->slope[pack].servo_stiffness[joint] * hx_dot(work->sweep.S.ang, hx_sub(j.x.ang, i.x.ang)) +
-                    implicit->slope[pack].servo_damping[joint] * hx_dot(work->sweep.S.ang, hx_sub(j.v.ang, i.v.ang));
+    work->turned = hx_dot(work->sweep.S.ang, hx_sub(j.x.ang, i.x.ang)), work->sped = hx_dot(work->sweep.S.ang, hx_sub(j.v.ang, i.v.ang));
+    work->torque -= implicit->slope[pack].servo_stiffness[joint] * work->turned + implicit->slope[pack].servo_damping[joint] * work->sped;
   }
   const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
+  leg->foot_moved = x, leg->foot_sped = v;
   const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
   push_tibia(leg, contact_point(leg), hx_add_scaled(hx_scale(-along, n), -drag, v));
 }
@@ -319,7 +326,7 @@ static inline void sweep_motion(hxJointWork *k, hxMotion6 *a) {
   const hxSweep *sweep = &k->sweep;
   const hxReal qdd = sweep->inverse_d * (sweep->u - hx_power(sweep->U, *a));
   *a = hx_motion_add_scaled(*a, qdd, sweep->S);
-  k->reaction.qdd = qdd + k->driven;
+  k->qdd = qdd + k->driven;
   const hxMotion6 felt = hx_motion_add(*a, k->bias);
   k->acceleration = (hxMotion6){felt.ang, motion_at(felt, k->c)};
 }
@@ -337,7 +344,7 @@ static inline void leg_multipliers(const hxModel *model, int slot, hxLegWork *le
     const hxVec3 about_joint = hx_sub(ang, hx_cross(kin->sP_j, lin));
     const hxReal along = hx_dot(about_joint, kin->s), inverse_sz = 1.0 / kin->sz;
     if (model->servo_mode == HX_SERVO_KINEMATIC) {
-      k->torque = model->rotor_inertia * k->reaction.qdd - along;
+      k->torque = model->rotor_inertia * k->qdd - along;
       k->servo.torque = k->torque - k->servo.friction;
     }
     k->reaction.lambda_lin = lin;
@@ -418,19 +425,43 @@ static inline void store_link_rate(const hxModel *model, const hxMotion *motion,
   hx_store_vec3(rate->link_turn[joint], slot, w);
 }
 
-/* power of the motors and of everything that dissipates: gears, contact damping, friction */
-static inline void store_powers(const hxCommand *command, const hxMotion *motion, const hxWork *work, hxMotion *rate) {
+/* power of the motor, and what the gear takes; along a stage's own shift of angle and speed, to first order */
+static inline void joint_powers(const hxJointWork *k, double z, hxReal *in, hxReal *out) {
+  *in += k->servo.torque * k->speed;
+  *out -= k->servo.friction * k->speed;
+  if (z == 0.0) return;
+  const hxReal dspeed = k->sped + z * k->qdd, dangle = k->turned + (z * z) * k->qdd;
+  const hxReal torque = k->servo.torque, shifted = torque - k->servo.stiffness * dangle - k->servo.damping * dspeed;
+  const hxReal within = hx_clip(shifted, hx_min(k->servo.low, torque), hx_max(k->servo.high, torque)); /* a drive's may be anything */
+  *in += torque * dspeed + k->speed * (within - torque);
+  *out -= k->servo.friction * dspeed - k->speed * k->servo.drag * dspeed;
+}
+
+/* what contact damping and friction take */
+static inline hxReal foot_power(const hxModel *model, const hxLegWork *leg, double z) {
+  const hxFootWork *foot = &leg->foot;
+  const hxNormalForce *f = &foot->normal;
+  const hxReal slip2 = foot->slip_speed * foot->slip_speed;
+  const hxReal power = (f->force - f->elastic) * foot->kin.ddelta + foot->drag * slip2;
+  if (z == 0.0) return power;
+  const hxMotion6 felt = leg->joint[HX_JOINTS - 1].acceleration;
+  const hxVec3 a = hx_add(motion_at(felt, foot->kin.arm), hx_splat_vec3(model->gravity)), n = foot->kin.normal;
+  const hxVec3 dv = hx_add_scaled(leg->foot_sped, hx_splat(z), a), dx = hx_add_scaled(leg->foot_moved, hx_splat(z * z), a);
+  const hxReal dspeed = -hx_dot(n, dv), ddepth = -hx_dot(n, dx);
+  const hxReal dforce = f->viscosity * dspeed + f->stiffness * ddepth;
+  return power + (f->force - f->elastic) * dspeed + foot->kin.ddelta * (dforce - f->stored * ddepth) +
+         2.0 * foot->drag * hx_dot(foot->slip, dv) + foot->drag_per_load * slip2 * dforce;
+}
+
+static inline void store_powers(const hxModel *model, const hxCommand *command, const hxMotion *motion, const hxImplicit *implicit,
+                                const hxWork *work, hxMotion *rate) {
   hxReal actuator[HX_PACKS], dissipated[HX_PACKS];
+  const double z = implicit ? implicit->z : 0.0;
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
-    const hxFootWork *foot = &leg->foot;
-    hxReal in = hx_splat(0.0);
-    hxReal out = (foot->normal.force - foot->normal.elastic) * foot->kin.ddelta + foot->drag * foot->slip_speed * foot->slip_speed;
-    for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      in = in + leg->joint[joint].servo.torque * leg->joint[joint].speed;
-      out = out - leg->joint[joint].servo.friction * leg->joint[joint].speed;
-    }
-    actuator[pack] = in, dissipated[pack] = out;
+    actuator[pack] = hx_splat(0.0);
+    dissipated[pack] = foot_power(model, leg, z);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) joint_powers(&leg->joint[joint], z, &actuator[pack], &dissipated[pack]);
   }
   rate->actuator_work = hx_lane(hx_sum_legs(actuator), 0);
   rate->dissipated = hx_lane(hx_sum_legs(dissipated), 0);
@@ -482,7 +513,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       store_link_rate(model, motion, implicit, joint, pack * HX_LANES, &work->pack[pack].joint[joint], rate);
-  store_powers(command, motion, work, &rate->motion);
+  store_powers(model, command, motion, implicit, work, &rate->motion);
 }
 
 #endif

@@ -24,6 +24,7 @@ typedef struct {
   hxReal elastic;   /* N    its part that is stored: K delta^(3/2) */
   hxReal stiffness; /* N/m  df_n/ddelta */
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
+  hxReal stored;    /* N/m  d elastic/ddelta */
 } hxNormalForce;
 
 typedef struct {
@@ -64,6 +65,7 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
       .force = elastic * hx_max(factor, zero),
       .elastic = elastic,
       .stiffness = hx_select(pushes, closed * (1.5 * model->stiffness) * root * factor, zero),
+      .stored = closed * (1.5 * model->stiffness) * root,
       .viscosity = hx_select(pushes, elastic * damping, zero),
   };
 }

@@ -12,9 +12,9 @@ static const double step_floor = 1e-11;              /* s  below this the error 
 static const double most_steps[3] = {1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
 static const double touch_depth[2] = {1e-10, 1e-6};  /* m, m over the tolerance  a touch-down is found when the foot is in by less */
 
-/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 0.1 J for the energy audit. */
+/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 1 J for the energy audit. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
-static const double work_scale = 0.1;
+static const double work_scale = 1.0;
 
 /* Where a step starts. */
 typedef struct {
