@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import BUILD
-from benchmarks.series import REFERENCES, Series, command
+from benchmarks.series import Series, command
 from benchmarks.toolchain import Tools
 from benchmarks.walks import DURATION
 
@@ -56,7 +57,7 @@ class Bench:
 
     tools: Tools
     walks: Mapping[str, Path]  # files by name
-    _references: dict[tuple[str, str], Array] = field(default_factory=dict)
+    _references: dict[str, Array] = field(default_factory=dict)
 
     def run(self, series: Series, setting: float, walk: str) -> Run:
         """Measures one walk; short ones several times."""
@@ -66,11 +67,12 @@ class Bench:
             if told["seconds"][0] < SHORT:
                 repeats = max(3, min(REPEATS, int(REPEATED_TIME / told["seconds"][0])))
                 told, path = self.call(series.engine, series.method, setting, walk, repeats=repeats)
+            error = distance(path, self.reference(series, walk))
         except DriverError:
             return Run(error=math.inf, seconds=math.inf, evaluations=math.nan, microseconds_per_evaluation=math.nan, **facts)
         each = told["microseconds_per_evaluation"]
         return Run(
-            error=distance(path, self.reference(series.law, walk)),
+            error=error,
             seconds=median(told["seconds"]),
             evaluations=told["evaluations"],
             microseconds_per_evaluation=math.nan if each is None else each,
@@ -79,22 +81,26 @@ class Bench:
 
     def call(self, engine: str, method: str, setting: float, walk: str, *, repeats: int = 1) -> tuple[dict[str, Any], Array]:
         """What a driver prints, and its path (n + 1, 3). Raises DriverError."""
-        out = BUILD / "path.bin"
+        out = BUILD / f"path-{os.getpid()}.bin"
         words = [*command(engine, self.tools), str(self.walks[walk]), method, repr(setting), str(repeats), str(out)]
-        return json.loads(call(words)), np.fromfile(out).reshape(-1, 3)
+        told = json.loads(call(words))
+        path = np.fromfile(out).reshape(-1, 3)
+        out.unlink()
+        return told, path
 
-    def reference(self, law: str, walk: str) -> Array:
-        """The converged path (n + 1, 3), kept in build/bench for as long as neither walk nor driver changes."""
-        if (law, walk) not in self._references:
-            engine, method, setting = REFERENCES[law]
+    def reference(self, series: Series, walk: str) -> Array:
+        """The converged path (n + 1, 3), kept in build/bench for as long as neither walk nor driver changes. Raises DriverError."""
+        engine, method, setting = series.reference
+        key = f"{engine}-{method}-{setting:g}-{walk}"
+        if key not in self._references:
             driver = Path(command(engine, self.tools)[-1])  # binary or script
-            key = hashlib.sha256(self.walks[walk].read_bytes() + driver.read_bytes() + f"{method} {setting}".encode()).hexdigest()[:16]
-            kept = BUILD / "converged" / f"{law}-{walk}-{key}.npy"
+            digest = hashlib.sha256(self.walks[walk].read_bytes() + driver.read_bytes()).hexdigest()[:16]
+            kept = BUILD / "converged" / f"{key}-{digest}.npy"
             if not kept.exists():
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 np.save(kept, self.call(engine, method, setting, walk)[1])
-            self._references[law, walk] = np.load(kept)
-        return self._references[law, walk]
+            self._references[key] = np.load(kept)
+        return self._references[key]
 
 
 def call(words: list[str]) -> str:

@@ -160,6 +160,9 @@ class Controller:
 
     def _advance(self, t: float, command: BodyCommand) -> None:
         """To the planned step at t."""
+        due = t if self._start is None else self._start + (self._count + 1) * self.period
+        if not abs(t - due) <= CLOCK_TOLERANCE * self.period:
+            raise ControllerError("step out of time", got=t, expected=f"t = {due} s", fix="step once per period, or reset the controller")
         if command is not self.ramp.target and command != self.ramp.target:
             self.ramp.aim(command)
             self._last = self._at
@@ -167,9 +170,6 @@ class Controller:
             self._start = t
             return
         self._count += 1
-        due = self._start + self._count * self.period
-        if not abs(t - due) <= CLOCK_TOLERANCE * self.period:
-            raise ControllerError("step out of time", got=t, expected=f"t = {due} s", fix="step once per period, or reset the controller")
         if self._at == self._last:
             self._plan()
         self._at += 1

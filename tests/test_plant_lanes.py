@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plant import Plant, pointer
+from plant import Plant, inputs, pointer
 from states import changed, random_command, random_pose
 
 from hexapod_cosim.models import load_robot
@@ -21,7 +21,7 @@ ULP = 2.0**-52
 TANH_ULPS, EXPM1_ULPS, ANGLE_ULPS = 4.0, 4.0, 4.0  # a handful of roundings each: no error of method may be seen
 ROOT = Path(__file__).parents[1]
 BASELINE = "-DHX_BASELINE_ONLY"  # no kernel beside the one whose lanes are asked for
-WIDTHS = {"scalar": [BASELINE, "-DHX_LANES=1"], "two": [BASELINE, "-DHX_LANES=2"], "eight": [BASELINE, "-DHX_LANES=8"]}
+WIDTHS = {name: [BASELINE, f"-DHX_LANES={lanes}"] for name, lanes in (("scalar", 1), ("two", 2), ("four", 4), ("eight", 8))}
 
 
 def mapped(function: Callable[..., None], *arguments: Array) -> Array:
@@ -95,6 +95,33 @@ def test_the_motion_does_not_depend_on_the_lane_width(core: ct.CDLL, other_cores
     assert np.array_equal(here.dv, there.dv)
     assert np.array_equal(here.multipliers, there.multipliers)
     assert bytes(plants[0].output_record(command)) == bytes(plants[1].output_record(command))
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("garbage", [0x00, 0xFF])
+def test_what_lies_on_the_stack_does_not_matter(core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int) -> None:
+    """Slots that no pack covers must not be read before they are written: 0xFF... is a NaN."""
+    robot = load_robot("athena")
+    plants = [Plant(library, robot) for library in (core, other_cores[width])]
+    for plant in plants:
+        core.hx_probe_stain_stack(garbage)
+        plant.step(0.02)
+    assert plants[0].save() == plants[1].save()
+
+
+def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct.CDLL) -> None:
+    robot = changed(load_robot("athena"), servo={"mode": "kinematic"})
+    plant, command = Plant(core, robot, **random_pose(robot, 6)), random_command(robot, 6, size=0.3)
+    seen = {}
+    core.hx_probe_kernel.restype = ct.c_char_p
+    for index in range(8):
+        rate = np.zeros((19, 13))
+        name = core.hx_probe_kernel(index, ct.c_void_p(plant.handle), ct.byref(inputs(command)), pointer(rate))
+        if name:
+            seen[name] = rate
+    assert b"baseline" in seen
+    assert all(np.array_equal(rate, seen[b"baseline"]) for rate in seen.values())
+    assert np.count_nonzero(seen[b"baseline"]) > 100
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ from plant import Plant, definition
 from states import MACRO, changed, landing, lopsided, random_bodies, random_command, trail
 
 from hexapod_cosim.models import METHODS, load_robot
+from hexapod_cosim.models.statics import settled
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -75,6 +76,19 @@ def test_setting_the_bodies_starts_the_books_anew_at_the_same_time(core: ct.CDLL
     assert output.time == 8 * MACRO
     assert (output.energy.actuator_work, output.energy.dissipated, output.energy.residual, output.solver.steps) == (0.0, 0.0, 0.0, 0.0)
     assert np.array_equal(output.foot.contact != 0, output.foot.penetration > 0.0)
+
+
+@pytest.mark.parametrize("start", [0.0, 1.0, 64.0, 1000.1])
+def test_a_quiet_call_takes_one_step_whatever_the_clock_says(core: ct.CDLL, start: float) -> None:
+    """step_max is the call's length, which the clock's last bit makes longer in two calls of three."""
+    robot = load_robot("athena")
+    position, quaternion, angle = settled(robot)
+    plant, steps = Plant(core, robot), []
+    plant.reset(definition(robot, position=position, quaternion=quaternion, angle=angle), start)
+    for k in range(400):
+        plant.step(start + (k + 1) * robot.solver.step_max)
+        steps.append(plant.output().solver.steps)
+    assert steps[399] - steps[199] == 200
 
 
 def test_a_start_time_shifts_the_time_and_nothing_else(core: ct.CDLL) -> None:

@@ -43,7 +43,7 @@ static inline int law_compile(Law *law, const hxDefinition *d) {
   }
   law->stiffness = d->contact.stiffness, law->chi = law_chi(d->contact.restitution), law->floor = d->contact.impact_speed_floor;
   law->mu = d->friction.mu, law->slope = d->friction.slope;
-  law->ground = -d->terrain.height, law->radius = d->foot_radius;
+  law->ground = d->terrain.height, law->radius = d->foot_radius;
   law->kp = d->servo.kp, law->kd = d->servo.kd, law->torque_max = d->servo.torque_max, law->speed_max = d->servo.speed_max;
   law->gear = d->servo.coulomb_friction;
   return 0;

@@ -76,7 +76,7 @@ static void write_model(Xml *xml, const hxDefinition *d, int own, const char *in
   if (!own) ADD(xml, "<flag contact='disable' constraint='disable'/>");
   ADD(xml, "</option>\n<default><joint frictionloss='%.17g'/></default>\n<worldbody>\n", own ? d->servo.coulomb_friction : 0.0);
   ADD(xml, "<geom type='plane' size='0 0 1' pos='0 0 %.17g' friction='%.17g' condim='3'/>\n<body>\n<freejoint align='false'/>\n",
-      -d->terrain.height, d->friction.mu);
+      d->terrain.height, d->friction.mu);
   add_inertial(xml, d->torso.mass, d->torso.com, d->torso.inertia);
   for (int i = 0; i < HX_LEGS; ++i) add_leg(xml, d, i);
   ADD(xml, "</body>\n</worldbody>\n");

@@ -7,6 +7,13 @@
 
 #include "hexapod/hexapod.h"
 
+/* a*b + c rounds twice on every machine, whatever an importer's compiler call says about fused arithmetic */
+#if defined(__clang__)
+#pragma clang fp contract(off)
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif
+
 enum {
   HX_SLOTS = 8, /* legs in memory, padded: slots past the last leg mirror leg 0 */
   HX_TORSO_SIZE = 16,

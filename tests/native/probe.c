@@ -7,6 +7,7 @@
 
 #include "contact_law.h"
 #include "hexapod/hexapod.h"
+#include "kernel.h"
 #include "lanes/dynamics.h"
 #include "method.h"
 #include "robot.h"
@@ -336,6 +337,25 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
     turn[0][i] = rate.torso_turn[i];
     for (int b = 1; b < HX_BODIES; ++b) turn[b][i] = rate.link_turn[(b - 1) % HX_JOINTS][i][(b - 1) / HX_JOINTS];
   }
+}
+
+/* fills the stack that the next call will use */
+HX_API void hx_probe_stain_stack(int byte) {
+  volatile char stain[300000];
+  for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
+}
+
+/* dy/dt by the i-th kernel; its name, or NULL when there is none or it does not run here */
+HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input, double body[HX_BODIES][HX_BODY_STATE]) {
+  hxCommand command;
+  hxMotion rate;
+  for (int k = 0; k <= i; ++k)
+    if (!hx_kernels[k]) return NULL;
+  if (!hx_kernels[i]->runs_here()) return NULL;
+  hx_command_from_input(&command, input, plant->state.time);
+  hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, &rate);
+  hx_bodies_from_motion(&plant->model, &rate, body);
+  return hx_kernels[i]->name;
 }
 
 /* shape: stages, order, error order; the rest as in hxMethodRow */

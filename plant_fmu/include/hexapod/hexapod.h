@@ -132,7 +132,7 @@ typedef struct hxDefinition {
   } solver;
   struct {
     int kind;        /* hxTerrainKind */
-    double height;   /* m    of the ground below the world's origin */
+    double height;   /* m    of the ground at the world's origin */
     double incline;  /* rad  of HX_TERRAIN_SLOPE: the ground rises along the heading */
     double heading;  /* rad  about z, from x */
   } terrain;

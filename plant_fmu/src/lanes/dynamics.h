@@ -44,6 +44,7 @@ typedef struct {
 typedef struct {
   hxJointWork joint[HX_JOINTS];
   hxFootWork foot;
+  hxVec3 response; /* N  what a stage adds to the foot's force, but for the share of its own acceleration */
   hxVec3 foot_moved, foot_sped; /* m, m/s  shifts of the contact point before this stage's own share (eq. 16) */
 } hxLegWork;
 
@@ -111,7 +112,6 @@ static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *k
 /* a motion about the torso's centre of mass, at c from it */
 static inline hxVec3 motion_at(hxMotion6 a, hxVec3 c) { return hx_add(a.lin, hx_cross(a.ang, c)); }
 
-/* One joint and its child: positions, velocities, bias acceleration and the force it takes. */
 /* Attitude and inertia of a link. */
 static inline void link_pass(const hxModel *model, const hxMotion *motion, int joint, int slot, hxJointWork *k) {
   k->body = hx_link_body(motion, joint, slot);
@@ -119,6 +119,7 @@ static inline void link_pass(const hxModel *model, const hxMotion *motion, int j
   k->gyroscopic = hx_cross(hx_sym_mul(k->J, k->body.w), k->body.w);
 }
 
+/* One joint and its child: positions, velocities, bias acceleration and the force it takes. */
 static inline void joint_pass(const hxModel *model, const hxCommand *command, double t, const hxMotion *motion, int joint, int slot,
                               int reactions, const hxBody *i, hxChain *chain, hxJointWork *k) {
   const hxJointModel *m = &model->joint[joint];
@@ -252,7 +253,8 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
       work->torque -= implicit->slope[pack].servo_stiffness[joint] * work->turned;
     }
     leg->foot_moved = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity), leg->foot_sped = hx_zero3();
-    push_tibia(leg, contact_point(leg), hx_scale(implicit->z * k * leg->foot.kin.ddelta, n));
+    leg->response = hx_scale(implicit->z * k * leg->foot.kin.ddelta, n);
+    push_tibia(leg, contact_point(leg), leg->response);
     return;
   }
   hxShift i = torso_shift(implicit, motion), j = i;
@@ -265,19 +267,48 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
   const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
   leg->foot_moved = x, leg->foot_sped = v;
   const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
-  push_tibia(leg, contact_point(leg), hx_add_scaled(hx_scale(-along, n), -drag, v));
+  leg->response = hx_add_scaled(hx_scale(-along, n), -drag, v);
+  push_tibia(leg, contact_point(leg), leg->response);
 }
 
-/* The contact's share of W: B = (z c_n + z^2 k_n) n n^T + z c_t (1 - n n^T) at the contact point, on the tibia's inertia and, by the bias, p. */
-static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack, hxLegWork *leg) {
+/* The contact's share of W: B = across 1 + along n n^T at the contact point, z c_t and z c_n + z^2 k_n - z c_t. */
+typedef struct {
+  hxVec3 n;
+  hxReal across, along;
+} hxContactBlock;
+
+static inline hxContactBlock contact_block(const hxImplicit *implicit, int pack, const hxLegWork *leg) {
   const double z = implicit->z;
-  const hxVec3 n = leg->foot.kin.normal, x = contact_point(leg);
-  const hxReal t = z * implicit->slope[pack].drag;
-  const hxReal d = z * implicit->slope[pack].viscosity + z * z * implicit->slope[pack].stiffness - t;
-  const hxSym3 B = {t + d * n.x * n.x, t + d * n.y * n.y, t + d * n.z * n.z, d * n.x * n.y, d * n.x * n.z, d * n.y * n.z};
+  const hxReal across = z * implicit->slope[pack].drag;
+  const hxReal along = z * implicit->slope[pack].viscosity + z * z * implicit->slope[pack].stiffness - across;
+  return (hxContactBlock){leg->foot.kin.normal, across, along};
+}
+
+/* B a: what an acceleration of the contact point takes off the foot's force in a stage */
+static inline hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
+  return hx_add_scaled(hx_scale(B->across, a), B->along * hx_dot(B->n, a), B->n);
+}
+
+/* B as part of the tibia's inertia; what the bias acceleration meets of it goes to p */
+static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack, hxLegWork *leg) {
+  const hxContactBlock B = contact_block(implicit, pack, leg);
+  const hxVec3 n = B.n, x = contact_point(leg), an = hx_scale(B.along, n);
   const hxVec3 bias = hx_add(motion_at(leg->joint[HX_JOINTS - 1].bias, x), hx_splat_vec3(model->gravity));
-  push_tibia(leg, x, hx_neg(hx_sym_mul(B, bias)));
-  return hx_inertia_at(B, x);
+  push_tibia(leg, x, hx_neg(contact_resistance(&B, bias)));
+  return hx_inertia_at((hxSym3){B.across + an.x * n.x, B.across + an.y * n.y, B.across + an.z * n.z, an.x * n.y, an.x * n.z, an.y * n.z},
+                       x);
+}
+
+/* acceleration of the contact point's material */
+static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *leg) {
+  return hx_add(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm), hx_splat_vec3(model->gravity));
+}
+
+/* ground on foot, as a stage's accelerations contain it */
+static inline hxVec3 stage_force(const hxModel *model, const hxImplicit *implicit, int pack, const hxLegWork *leg) {
+  if (!implicit) return leg->foot.force;
+  const hxContactBlock B = contact_block(implicit, pack, leg);
+  return hx_sub(hx_add(leg->foot.force, leg->response), contact_resistance(&B, foot_acceleration(model, leg)));
 }
 
 /* ---- the sweeps of eq. 11-12 ----------------------------------------------------------------------------------------------- */
@@ -333,9 +364,10 @@ static inline void sweep_motion(hxJointWork *k, hxMotion6 *a) {
 
 /* Multipliers leaf to root: D_kk^T lambda_k = g_k - M_k dv_k - sum over children c of D_ck^T lambda_c.
  * About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5) and the axis's, u1 = a x s, u2 = b x s. */
-static inline void leg_multipliers(const hxModel *model, int slot, hxLegWork *leg) {
-  /* at the link's centre of mass: by the ground, then by the child */
-  hxForce6 handed = {hx_cross(leg->foot.kin.arm, leg->foot.force), leg->foot.force};
+static inline void leg_multipliers(const hxModel *model, const hxImplicit *implicit, int pack, hxLegWork *leg) {
+  const hxVec3 ground = stage_force(model, implicit, pack, leg);
+  const int slot = pack * HX_LANES;
+  hxForce6 handed = {hx_cross(leg->foot.kin.arm, ground), ground}; /* at the link's centre of mass: by the ground, then by the child */
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
@@ -363,20 +395,13 @@ static inline void torso_pass(const hxModel *model, const hxMotion *motion, hxWo
   work->torso_J = hx_rotate_sym3(work->torso.axes, body);
 }
 
-/* sums over the legs, in every lane */
-static inline hxVec3 sum_vec3(const hxVec3 *legs, size_t stride) {
-  hxReal x[HX_PACKS], y[HX_PACKS], z[HX_PACKS];
-  for (int k = 0; k < HX_PACKS; ++k) {
-    const hxVec3 *v = (const hxVec3 *)((const char *)legs + (size_t)k * stride);
-    x[k] = v->x, y[k] = v->y, z[k] = v->z;
+/* sums over the legs, in every lane: of n numbers that stand one after the other in each pack's struct */
+static inline void sum_packs(const hxReal *first, size_t stride, int n, hxReal *sum) {
+  for (int i = 0; i < n; ++i) {
+    hxReal x[HX_PACKS];
+    for (int k = 0; k < HX_PACKS; ++k) x[k] = first[(size_t)k * stride + (size_t)i];
+    sum[i] = hx_sum_legs(x);
   }
-  return (hxVec3){hx_sum_legs(x), hx_sum_legs(y), hx_sum_legs(z)};
-}
-
-static inline hxSym3 sum_sym3(const hxSym3 *legs, size_t stride) {
-  const hxVec3 *diagonal = (const hxVec3 *)legs;
-  const hxVec3 d = sum_vec3(diagonal, stride), o = sum_vec3(diagonal + 1, stride);
-  return (hxSym3){d.x, d.y, d.z, o.x, o.y, o.z};
 }
 
 /* (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs */
@@ -384,12 +409,21 @@ static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand
                                            const hxForce6 *p) {
   const hxReal m = hx_splat(model->torso_mass), o = hx_splat(0.0);
   const hxVec3 gyroscopic = hx_cross(hx_sym_mul(work->torso_J, work->torso.w), work->torso.w);
-  const size_t inertia = sizeof *I, force = sizeof *p;
-  const hxInertia6 A = {hx_sym_add(work->torso_J, sum_sym3(&I->C, inertia)),
-                        {sum_vec3(&I->H.x, inertia), sum_vec3(&I->H.y, inertia), sum_vec3(&I->H.z, inertia)},
-                        hx_sym_add((hxSym3){m, m, m, o, o, o}, sum_sym3(&I->A, inertia))};
-  const hxVec3 torque = hx_sub(hx_add(hx_splat_vec3(command->push_torque), gyroscopic), sum_vec3(&p->ang, force));
-  return hx_inertia_solve(&A, (hxForce6){torque, hx_sub(hx_splat_vec3(command->push_force), sum_vec3(&p->lin, force))});
+  enum { INERTIA = sizeof(hxInertia6) / sizeof(hxReal), FORCE = sizeof(hxForce6) / sizeof(hxReal) };
+  union {
+    hxReal entry[INERTIA];
+    hxInertia6 I;
+  } A;
+  union {
+    hxReal entry[FORCE];
+    hxForce6 f;
+  } legs;
+  sum_packs(&I->C.xx, INERTIA, INERTIA, A.entry);
+  sum_packs(&p->ang.x, FORCE, FORCE, legs.entry);
+  A.I.C = hx_sym_add(work->torso_J, A.I.C);
+  A.I.A = hx_sym_add((hxSym3){m, m, m, o, o, o}, A.I.A);
+  const hxVec3 torque = hx_sub(hx_add(hx_splat_vec3(command->push_torque), gyroscopic), legs.f.ang);
+  return hx_inertia_solve(&A.I, (hxForce6){torque, hx_sub(hx_splat_vec3(command->push_force), legs.f.lin)});
 }
 
 /* ---- dy/dt ------------------------------------------------------------------------------------------------------------------ */
@@ -425,6 +459,15 @@ static inline void store_link_rate(const hxModel *model, const hxMotion *motion,
   hx_store_vec3(rate->link_turn[joint], slot, w);
 }
 
+/* Slots that no pack of this width covers go with leg 0, as in every motion. */
+static inline void fill_rate_slots(hxRate *rate) {
+  if (HX_PACKS * HX_LANES >= HX_SLOTS) return;
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(rate->motion.link[joint][i]);
+    for (int i = 0; i < 3; ++i) hx_fill_slots(rate->link_turn[joint][i]);
+  }
+}
+
 /* power of the motor, and what the gear takes; along a stage's own shift of angle and speed, to first order */
 static inline void joint_powers(const hxJointWork *k, double z, hxReal *in, hxReal *out) {
   *in += k->servo.torque * k->speed;
@@ -444,8 +487,7 @@ static inline hxReal foot_power(const hxModel *model, const hxLegWork *leg, doub
   const hxReal slip2 = foot->slip_speed * foot->slip_speed;
   const hxReal power = (f->force - f->elastic) * foot->kin.ddelta + foot->drag * slip2;
   if (z == 0.0) return power;
-  const hxMotion6 felt = leg->joint[HX_JOINTS - 1].acceleration;
-  const hxVec3 a = hx_add(motion_at(felt, foot->kin.arm), hx_splat_vec3(model->gravity)), n = foot->kin.normal;
+  const hxVec3 a = foot_acceleration(model, leg), n = foot->kin.normal;
   const hxVec3 dv = hx_add_scaled(leg->foot_sped, hx_splat(z), a), dx = hx_add_scaled(leg->foot_moved, hx_splat(z * z), a);
   const hxReal dspeed = -hx_dot(n, dv), ddepth = -hx_dot(n, dx);
   const hxReal dforce = f->viscosity * dspeed + f->stiffness * ddepth;
@@ -507,12 +549,13 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxMotion6 a = work->torso_acceleration;
     for (int joint = 0; joint < HX_JOINTS; ++joint) sweep_motion(&work->pack[pack].joint[joint], &a);
-    if (work->reactions) leg_multipliers(model, pack * HX_LANES, &work->pack[pack]);
+    if (work->reactions) leg_multipliers(model, implicit, pack, &work->pack[pack]);
   }
   store_torso_rate(model, motion, implicit, work, rate);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       store_link_rate(model, motion, implicit, joint, pack * HX_LANES, &work->pack[pack].joint[joint], rate);
+  fill_rate_slots(rate);
   store_powers(model, command, motion, implicit, work, &rate->motion);
 }
 

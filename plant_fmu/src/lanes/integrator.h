@@ -138,6 +138,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     trial->error = error_norm(&y, start->model->tolerance);
   }
   normalise_quaternions(&trial->y);
+  if (start->model->projection == HX_PROJECTION_STEP) hx_project(start->model, &trial->y);
 }
 
 /* ---- touch-down ------------------------------------------------------------------------------------------------------------- */
@@ -247,7 +248,7 @@ static int all_finite(const hxMotion *y) {
 static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state, double *taken, char *message) {
   const hxModel *model = start->model;
   hxTrial trial;
-  double h = model->step > 0.0 ? h_max : h_max / ceil(fmax(1.0, h_max / *next_step)); /* equal steps to the end */
+  double h = model->step > 0.0 ? h_max : h_max / ceil(fmax(1.0, h_max / *next_step - 1e-9)); /* equal steps; no more for a last bit */
   trial.error = 0.0;
   for (;;) {
     if (model->step == 0.0 && state->steps + state->rejected >= start->last_step) return give_up(&trial, start->t, h, message);
@@ -265,7 +266,6 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   }
   hxFeet feet = feet_of(model, &trial.y);
   *taken = open_depth(start->contact, &feet) > 0.0 ? find_touchdown(start, h, state, &trial, &feet) : h;
-  if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial.y);
   state->motion = trial.y;
   state->steps += 1.0;
   state->touchdowns += hx_contact_switch(model, feet.delta, feet.ddelta, &state->contact);

@@ -107,7 +107,7 @@ static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
 #elif HX_LANES == 4
 static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
   const hxMask legs = {-1, -1, 0, 0};
-  const hxReal x = pack[0] + hx_from_bits(hx_bits(pack[1]) & legs);
+  const hxReal x = pack[0] + hx_select(legs, pack[1], hx_splat(-0.0)); /* adding -0 changes nothing, not even -0 */
   const hxReal halves = x + HX_SHUFFLE(x, 2, 3, 0, 1);
   return halves + HX_SHUFFLE(halves, 1, 0, 3, 2);
 }
