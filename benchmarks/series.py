@@ -100,9 +100,6 @@ REFERENCES = {
 }
 # Drake's three plants differ in their friction, and so in their limits
 DRAKE_LIMITS = {"cenic": ("cenic", 1e-6), "discrete": ("discrete", 1e-4)}
-    "cenic": ("cenic", 1e-6),
-    "discrete": ("discrete", 1e-4),
-}  # its three plants differ in their friction, and so in their limits
 
 
 def command(engine: str, tools: Tools) -> list[str]:
