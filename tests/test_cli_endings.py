@@ -100,12 +100,16 @@ def test_an_interrupt_while_results_are_written_waits_for_them(
     assert json.loads((folder / "run.json").read_text())["status"] == "completed"
 
 
-def test_an_interrupt_while_figures_are_drawn_says_what_is_there(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_while_figures_are_drawn_says_what_is_there(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
     def struck(*_: object, **__: object) -> list[Path]:
         signal.raise_signal(signal.SIGINT)
         return []
 
     monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.write_report", struck)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background starts with it ignored
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     code, _, err = call("simulate", "stand", "-o", tmp_path / "out", "--set", "duration=0.2")
     assert code == 130
     assert f"`hexapod report {tmp_path / 'out'}` draws them" in err
