@@ -47,10 +47,10 @@ check: setup typing
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 
-bench: setup typing
+bench: setup
 	$(BIN)/python -m benchmarks.run
 
-bench-quick: setup typing
+bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick
 
 format: setup

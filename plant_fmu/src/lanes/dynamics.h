@@ -52,7 +52,6 @@ typedef struct {
   hxBody torso;
   hxSym3 torso_J;
   hxMotion6 torso_acceleration; /* a - g */
-  int reactions;                /* whether multipliers are wanted */
   hxLegWork pack[HX_PACKS];
 } hxWork;
 
@@ -158,8 +157,8 @@ static inline void joint_angles(const hxModel *model, const hxMotion *motion, hx
   for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack, ++n) {
       const int slot = pack * HX_LANES;
-      const hxQuat i = joint > 0 ? hx_link_quat(motion, joint - 1, slot) : hx_torso_quat(motion);
-      hx_joint_half_angle(&model->joint[joint], slot, i, hx_link_quat(motion, joint, slot), &sine[n], &cosine[n]);
+      hx_joint_half_angle(&model->joint[joint], slot, hx_parent_quat(motion, joint, slot), hx_link_quat(motion, joint, slot), &sine[n],
+                          &cosine[n]);
     }
   for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack, ++n) work->pack[pack].joint[joint].angle = hx_angle_from_half(sine[n], cosine[n]);
@@ -191,10 +190,7 @@ static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
 }
 
 static inline void leg_foot(const hxModel *model, const hxContactState *contact, const hxMotion *motion, int slot, hxLegWork *leg) {
-  const int tibia = HX_JOINTS - 1;
-  const hxBody *body = &leg->joint[tibia].body;
-  leg->foot.kin = hx_foot_kinematics(model, slot, hx_link_vec3(motion, tibia, HX_R, slot), body->axes,
-                                     hx_link_vec3(motion, tibia, HX_V, slot), body->w);
+  leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
   hx_foot_force(model, contact, slot, &leg->foot);
   push_tibia(leg, contact_point(leg), leg->foot.force);
 }
@@ -223,23 +219,26 @@ typedef struct {
   hxMotion6 x, v;
 } hxShift;
 
-static inline hxShift shift(double z, hxVec3 v, hxVec3 w, hxMotion6 s_x, hxMotion6 s_v) {
-  const hxReal ahead = hx_splat(z);
-  return (hxShift){{hx_add_scaled(s_x.ang, ahead, hx_add(w, s_v.ang)), hx_add_scaled(s_x.lin, ahead, hx_add(v, s_v.lin))}, s_v};
+static inline hxMotion6 torso_velocity(const hxMotion *m) { return (hxMotion6){hx_torso_vec3(m, HX_W), hx_torso_vec3(m, HX_V)}; }
+
+static inline hxMotion6 link_velocity(const hxMotion *m, int joint, int slot) {
+  return (hxMotion6){hx_link_vec3(m, joint, HX_W, slot), hx_link_vec3(m, joint, HX_V, slot)};
+}
+
+static inline hxShift shift(double z, hxMotion6 v, hxMotion6 s_x, hxMotion6 s_v) {
+  return (hxShift){hx_motion_add_scaled(s_x, hx_splat(z), hx_motion_add(v, s_v)), s_v};
 }
 
 static inline hxShift link_shift(const hxImplicit *implicit, const hxMotion *motion, int joint, int slot) {
   const hxMotion *s = &implicit->change->motion;
   const hxMotion6 s_x = {hx_load_vec3(implicit->change->link_turn[joint], slot), hx_link_vec3(s, joint, HX_R, slot)};
-  const hxMotion6 s_v = {hx_link_vec3(s, joint, HX_W, slot), hx_link_vec3(s, joint, HX_V, slot)};
-  return shift(implicit->z, hx_link_vec3(motion, joint, HX_V, slot), hx_link_vec3(motion, joint, HX_W, slot), s_x, s_v);
+  return shift(implicit->z, link_velocity(motion, joint, slot), s_x, link_velocity(s, joint, slot));
 }
 
 static inline hxShift torso_shift(const hxImplicit *implicit, const hxMotion *motion) {
   const hxMotion *s = &implicit->change->motion;
   const hxMotion6 s_x = {hx_splat_vec3(implicit->change->torso_turn), hx_torso_vec3(s, HX_R)};
-  const hxMotion6 s_v = {hx_torso_vec3(s, HX_W), hx_torso_vec3(s, HX_V)};
-  return shift(implicit->z, hx_torso_vec3(motion, HX_V), hx_torso_vec3(motion, HX_W), s_x, s_v);
+  return shift(implicit->z, torso_velocity(motion), s_x, torso_velocity(s));
 }
 
 /* G_v dv + G_x dx: what servos and contact answer the shifts with, added to torques and p */
@@ -428,14 +427,19 @@ static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand
 
 /* ---- dy/dt ------------------------------------------------------------------------------------------------------------------ */
 
+/* a - g as the acceleration it is */
+static inline hxMotion6 from_felt(const hxModel *model, hxMotion6 felt) {
+  return (hxMotion6){felt.ang, hx_add(felt.lin, hx_splat_vec3(model->gravity))};
+}
+
+/* nu of eq. 16, what positions advance with: v + z dv + s_v in a linearly implicit stage, else v */
 static inline void store_torso_rate(const hxModel *model, const hxMotion *motion, const hxImplicit *implicit, const hxWork *work,
                                     hxRate *rate) {
-  const hxMotion *s = implicit && implicit->change ? &implicit->change->motion : NULL;
-  const hxMotion6 felt = work->torso_acceleration;
-  const hxMotion6 dv = {felt.ang, hx_add(felt.lin, hx_splat_vec3(model->gravity))};
-  hxVec3 v = hx_torso_vec3(motion, HX_V), w = work->torso.w;
-  if (implicit) v = hx_add_scaled(v, hx_splat(implicit->z), dv.lin), w = hx_add_scaled(w, hx_splat(implicit->z), dv.ang);
-  if (s) v = hx_add(v, hx_torso_vec3(s, HX_V)), w = hx_add(w, hx_torso_vec3(s, HX_W));
+  const hxMotion6 dv = from_felt(model, work->torso_acceleration);
+  hxMotion6 nu = torso_velocity(motion);
+  if (implicit) nu = hx_motion_add_scaled(nu, hx_splat(implicit->z), dv);
+  if (implicit && implicit->change) nu = hx_motion_add(nu, torso_velocity(&implicit->change->motion));
+  const hxVec3 v = nu.lin, w = nu.ang;
   const hxQuat dp = hx_quaternion_rate(hx_torso_quat(motion), w);
   const hxReal entries[HX_BODY_STATE] = {v.x, v.y, v.z, dp.w, dp.x, dp.y, dp.z, dv.lin.x, dv.lin.y, dv.lin.z, dv.ang.x, dv.ang.y, dv.ang.z};
   for (int i = 0; i < HX_BODY_STATE; ++i) rate->motion.torso[i] = hx_lane(entries[i], 0);
@@ -443,29 +447,31 @@ static inline void store_torso_rate(const hxModel *model, const hxMotion *motion
   for (int i = 3; i < 8; ++i) rate->torso_turn[i] = 0.0;
 }
 
-/* positions advance with v + s_v + z dv, which is v without an implicit stage; dp/dt = (0, w) p / 2 */
 static inline void store_link_rate(const hxModel *model, const hxMotion *motion, const hxImplicit *implicit, int joint, int slot,
                                    const hxJointWork *k, hxRate *rate) {
-  const hxMotion *s = implicit && implicit->change ? &implicit->change->motion : NULL;
-  const hxVec3 dv = hx_add(k->acceleration.lin, hx_splat_vec3(model->gravity)), dw = k->acceleration.ang;
-  hxVec3 v = hx_link_vec3(motion, joint, HX_V, slot), w = hx_link_vec3(motion, joint, HX_W, slot);
-  if (implicit) v = hx_add_scaled(v, hx_splat(implicit->z), dv), w = hx_add_scaled(w, hx_splat(implicit->z), dw);
-  if (s) v = hx_add(v, hx_link_vec3(s, joint, HX_V, slot)), w = hx_add(w, hx_link_vec3(s, joint, HX_W, slot));
+  const hxMotion6 dv = from_felt(model, k->acceleration);
+  hxMotion6 nu = link_velocity(motion, joint, slot);
+  if (implicit) nu = hx_motion_add_scaled(nu, hx_splat(implicit->z), dv);
+  if (implicit && implicit->change) nu = hx_motion_add(nu, link_velocity(&implicit->change->motion, joint, slot));
   double (*to)[HX_SLOTS] = rate->motion.link[joint];
-  hx_store_vec3(&to[HX_R], slot, v);
-  hx_store_quat(&to[HX_P], slot, hx_quaternion_rate(hx_link_quat(motion, joint, slot), w));
-  hx_store_vec3(&to[HX_V], slot, dv);
-  hx_store_vec3(&to[HX_W], slot, dw);
-  hx_store_vec3(rate->link_turn[joint], slot, w);
+  hx_store_vec3(&to[HX_R], slot, nu.lin);
+  hx_store_quat(&to[HX_P], slot, hx_quaternion_rate(hx_link_quat(motion, joint, slot), nu.ang));
+  hx_store_vec3(&to[HX_V], slot, dv.lin);
+  hx_store_vec3(&to[HX_W], slot, dv.ang);
+  hx_store_vec3(rate->link_turn[joint], slot, nu.ang);
+}
+
+static inline void fill_motion_slots(hxMotion *motion) {
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(motion->link[joint][i]);
 }
 
 /* Slots that no pack of this width covers go with leg 0, as in every motion. */
 static inline void fill_rate_slots(hxRate *rate) {
   if (HX_PACKS * HX_LANES >= HX_SLOTS) return;
-  for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(rate->motion.link[joint][i]);
+  fill_motion_slots(&rate->motion);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int i = 0; i < 3; ++i) hx_fill_slots(rate->link_turn[joint][i]);
-  }
 }
 
 /* power of the motor, and what the gear takes; along a stage's own shift of angle and speed, to first order */
@@ -512,15 +518,15 @@ static inline void store_powers(const hxModel *model, const hxCommand *command, 
     rate->push_work += command->push_force[i] * motion->torso[HX_V + i] + command->push_torque[i] * motion->torso[HX_W + i];
 }
 
-/* Positions, velocities and forces at (t, y); work is filled up to the sweeps. */
+/* Positions, velocities and forces at (t, y); work is filled up to the sweeps, with what the multipliers take if they are wanted. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
-                                      const hxMotion *motion, hxWork *work) {
+                                      const hxMotion *motion, int reactions, hxWork *work) {
   torso_pass(model, motion, work);
   joint_angles(model, motion, work);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack) link_pass(model, motion, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack)
-    leg_pass(model, command, t, motion, &work->torso, pack * HX_LANES, work->reactions, &work->pack[pack]);
+    leg_pass(model, command, t, motion, &work->torso, pack * HX_LANES, reactions, &work->pack[pack]);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int pack = 0; pack < HX_PACKS; ++pack) joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
   for (int pack = 0; pack < HX_PACKS; ++pack) leg_foot(model, contact, motion, pack * HX_LANES, &work->pack[pack]);
@@ -532,8 +538,8 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
                                  const hxMotion *motion, hxImplicit *implicit, int multipliers, hxWork *work, hxRate *rate) {
   hxInertia6 I[HX_PACKS];
   hxForce6 p[HX_PACKS];
-  work->reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
-  hx_dynamics_forces(model, contact, command, t, motion, work);
+  const int reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
+  hx_dynamics_forces(model, contact, command, t, motion, reactions, work);
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
     leg_response(implicit, motion, pack, &work->pack[pack]);
@@ -549,7 +555,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     hxMotion6 a = work->torso_acceleration;
     for (int joint = 0; joint < HX_JOINTS; ++joint) sweep_motion(&work->pack[pack].joint[joint], &a);
-    if (work->reactions) leg_multipliers(model, implicit, pack, &work->pack[pack]);
+    if (reactions) leg_multipliers(model, implicit, pack, &work->pack[pack]);
   }
   store_torso_rate(model, motion, implicit, work, rate);
   for (int pack = 0; pack < HX_PACKS; ++pack)

@@ -2,7 +2,7 @@
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
-#include "spatial.h"
+#include "kinematics.h"
 
 /* The ground: how far a point is above it, and which way is up there. */
 typedef struct {
@@ -70,12 +70,12 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
   };
 }
 
-/* the foot of a tibia at r with its axes, moving with v and w */
-static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, int slot, hxVec3 r, hxMat3 axes, hxVec3 v, hxVec3 w) {
-  const hxVec3 to_centre = hx_mul(axes, hx_load_vec3(model->foot_centre, slot));
+static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxMotion *motion, int slot, const hxBody *tibia) {
+  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot);
+  const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->foot_centre, slot));
   const hxGround ground = hx_ground(model, hx_add(r, to_centre));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-model->foot_radius), ground.normal);
-  const hxVec3 velocity = hx_add(v, hx_cross(w, arm));
+  const hxVec3 velocity = hx_add(v, hx_cross(tibia->w, arm));
   return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance, -hx_dot(velocity, ground.normal), velocity};
 }
 

@@ -40,11 +40,9 @@ typedef struct {
 
 static inline hxFeet feet_of(const hxModel *model, const hxMotion *motion) {
   hxFeet feet;
-  const int tibia = HX_JOINTS - 1;
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
-    const hxBody body = hx_link_body(motion, tibia, slot);
-    const hxFootKinematics foot = hx_foot_kinematics(model, slot, hx_link_vec3(motion, tibia, HX_R, slot), body.axes,
-                                                     hx_link_vec3(motion, tibia, HX_V, slot), body.w);
+    const hxBody tibia = hx_link_body(motion, HX_JOINTS - 1, slot);
+    const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &tibia);
     hx_store(&feet.delta[slot], foot.delta);
     hx_store(&feet.ddelta[slot], foot.ddelta);
   }
@@ -83,22 +81,22 @@ static void combine(double *out, const double *base, double h, const double *wei
   }
 }
 
+static inline double larger(double a, double b) { return b > a ? b : a; }
+
 /* largest error over scale; NaN is the caller's to find */
 static double error_norm(const hxMotion *error, double tolerance) {
   hxReal links = hx_splat(0.0);
   double largest[HX_LANES];
-  double worst = fabs(error->actuator_work) / work_scale;
-  worst = fabs(error->push_work) / work_scale > worst ? fabs(error->push_work) / work_scale : worst;
-  worst = fabs(error->dissipated) / work_scale > worst ? fabs(error->dissipated) / work_scale : worst;
+  double worst = larger(larger(fabs(error->actuator_work), fabs(error->push_work)), fabs(error->dissipated)) / work_scale;
   for (int i = 0; i < HX_BODY_STATE; ++i) {
-    const double scale = 1.0 / error_scale[i], torso = scale * fabs(error->torso[i]);
-    worst = torso > worst ? torso : worst;
+    const double scale = 1.0 / error_scale[i];
+    worst = larger(worst, scale * fabs(error->torso[i]));
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
         links = hx_max(links, scale * hx_abs(hx_load(&error->link[joint][i][slot])));
   }
   hx_store(largest, links);
-  for (int lane = 0; lane < HX_LANES; ++lane) worst = largest[lane] > worst ? largest[lane] : worst;
+  for (int lane = 0; lane < HX_LANES; ++lane) worst = larger(worst, largest[lane]);
   return worst / tolerance;
 }
 
@@ -307,11 +305,6 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, double
     if (status != HX_OK) return status;
   }
   return HX_OK;
-}
-
-static void fill_motion_slots(hxMotion *m) {
-  for (int joint = 0; joint < HX_JOINTS; ++joint)
-    for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(m->link[joint][i]);
 }
 
 /* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */

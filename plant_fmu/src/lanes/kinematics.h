@@ -38,11 +38,22 @@ static inline hxBody hx_link_body(const hxMotion *motion, int joint, int slot) {
   return (hxBody){hx_rotation_matrix(hx_link_quat(motion, joint, slot)), hx_link_vec3(motion, joint, HX_W, slot)};
 }
 
+/* the same of a joint's parent: the link before, or the torso */
+static inline hxVec3 hx_parent_vec3(const hxMotion *motion, int joint, int row, int slot) {
+  return joint > 0 ? hx_link_vec3(motion, joint - 1, row, slot) : hx_torso_vec3(motion, row);
+}
+
+static inline hxQuat hx_parent_quat(const hxMotion *motion, int joint, int slot) {
+  return joint > 0 ? hx_link_quat(motion, joint - 1, slot) : hx_torso_quat(motion);
+}
+
+static inline hxBody hx_parent_body(const hxMotion *motion, int joint, int slot) {
+  return joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion);
+}
+
 /* q from the half-angle in p_rel = conj(p_i zero) p_j, of which the real part and the part along the axis, the child's z, are needed */
 static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQuat i, hxQuat j, hxReal *sine, hxReal *cosine) {
-  const hxQuat o = hx_load_quat(model->zero, slot);
-  const hxQuat from = {i.w * o.w - i.x * o.x - i.y * o.y - i.z * o.z, i.w * o.x + i.x * o.w + i.y * o.z - i.z * o.y,
-                       i.w * o.y - i.x * o.z + i.y * o.w + i.z * o.x, i.w * o.z + i.x * o.y - i.y * o.x + i.z * o.w};
+  const hxQuat from = hx_quat_mul(i, hx_load_quat(model->zero, slot));
   *sine = from.w * j.z - from.z * j.w - from.x * j.y + from.y * j.x;
   *cosine = from.w * j.w + from.x * j.x + from.y * j.y + from.z * j.z;
 }
@@ -59,9 +70,8 @@ static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, i
 
 /* Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s); the rates of rows 4, 5 are (a x s).(w_j - w_i), (b x s).(w_j - w_i). */
 static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxMotion *motion, int joint, int slot) {
-  const hxBody i = joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion), j = hx_link_body(motion, joint, slot);
-  const hxVec3 r_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_R, slot) : hx_torso_vec3(motion, HX_R);
-  const hxVec3 v_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_V, slot) : hx_torso_vec3(motion, HX_V);
+  const hxBody i = hx_parent_body(motion, joint, slot), j = hx_link_body(motion, joint, slot);
+  const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot), v_i = hx_parent_vec3(motion, joint, HX_V, slot);
   const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
   const hxVec3 w = hx_tmul(j.axes, hx_sub(j.w, i.w)); /* child's axes */
   const hxVec3 v_j = hx_link_vec3(motion, joint, HX_V, slot);
@@ -74,15 +84,13 @@ static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxMot
 /* Puts links back on their joints, hip to foot: turned by the least turn that brings the child's z on the axis, moved to the point, and
  * what they turn and move otherwise than about the joint taken away. */
 static inline void project_link(const hxModel *model, int joint, int slot, hxMotion *motion) {
-  const hxBody i = joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion), drifted = hx_link_body(motion, joint, slot);
-  const hxVec3 r_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_R, slot) : hx_torso_vec3(motion, HX_R);
-  const hxVec3 v_i = joint > 0 ? hx_link_vec3(motion, joint - 1, HX_V, slot) : hx_torso_vec3(motion, HX_V);
-  const hxVec3 s = hx_mul(i.axes, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.axes.z, u = hx_cross(z, s);
-  const hxReal scale = 1.0 / hx_sqrt(2.0 * (1.0 + hx_dot(z, s))), w = (1.0 + hx_dot(z, s)) * scale;
-  const hxVec3 turn = hx_scale(scale, u);
-  const hxQuat p = hx_link_quat(motion, joint, slot);
-  const hxVec3 v = {p.x, p.y, p.z}, moved = hx_add(hx_add_scaled(hx_scale(w, v), p.w, turn), hx_cross(turn, v));
-  hx_store_quat(&motion->link[joint][HX_P], slot, (hxQuat){w * p.w - hx_dot(turn, v), moved.x, moved.y, moved.z});
+  const hxBody i = hx_parent_body(motion, joint, slot), drifted = hx_link_body(motion, joint, slot);
+  const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot), v_i = hx_parent_vec3(motion, joint, HX_V, slot);
+  const hxVec3 s = hx_mul(i.axes, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.axes.z;
+  const hxReal twice = 1.0 + hx_dot(z, s), scale = 1.0 / hx_sqrt(2.0 * twice);
+  const hxVec3 u = hx_scale(scale, hx_cross(z, s));
+  const hxQuat turn = {scale * twice, u.x, u.y, u.z};
+  hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(turn, hx_link_quat(motion, joint, slot)));
   const hxVec3 w_j = hx_add_scaled(i.w, hx_dot(s, hx_sub(drifted.w, i.w)), s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);
   const hxBody j = hx_link_body(motion, joint, slot);

@@ -81,6 +81,11 @@ static inline hxMat3 hx_rotation_matrix(hxQuat p) {
   return (hxMat3){{1.0 - (yy + zz), xy + wz, xz - wy}, {xy - wz, 1.0 - (xx + zz), yz + wx}, {xz + wy, yz - wx, 1.0 - (xx + yy)}};
 }
 
+static inline hxQuat hx_quat_mul(hxQuat a, hxQuat b) {
+  return (hxQuat){a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+                  a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+}
+
 /* dp/dt = (0, w) p / 2, w in world axes (eq. 8) */
 static inline hxQuat hx_quaternion_rate(hxQuat p, hxVec3 w) {
   const hxReal x = 0.5 * w.x, y = 0.5 * w.y, z = 0.5 * w.z;
