@@ -4,12 +4,11 @@ from hexapod_cosim.controller.controller import Controller, ControllerError, Dia
 from hexapod_cosim.controller.gains import Gains, GainsError, Margins, Requirements, SlipGains, SuspensionGains, load_gains, save_gains
 from hexapod_cosim.controller.gait import PATTERNS, Gait, Pattern, make_gait
 from hexapod_cosim.controller.kinematics import LegSolver
-from hexapod_cosim.controller.slip_pid import SlipPid
-from hexapod_cosim.controller.suspension import Suspension
+from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
 
 __all__ = [
     "PATTERNS", "BodyCommand", "CommandRamp", "Controller", "ControllerError", "Diagnostics", "FootPaths", "Gains", "GainsError", "Gait",
-    "JointCommand", "LegSolver", "Margins", "Measurement", "Pattern", "Requirements", "SlipGains", "SlipPid", "Suspension",
+    "JointCommand", "LegSolver", "Margins", "Measurement", "Parts", "Pattern", "Requirements", "SlipGains",
     "SuspensionGains", "load_gains", "make_gait", "save_gains",
 ]  # fmt: skip

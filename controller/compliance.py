@@ -1,135 +1,201 @@
-"""Compliant control: what the measured foot forces add to the planned feet, in the walking frame.
+"""The force laws of compliant control: what the planned load and the measured foot forces ask of the joints.
 
-Tangential. Of its force a foot should give way only to what does no work for the body: the legs' common push, shared in proportion to
-the load, moves the robot and is left alone; the rest is legs squeezing against each other. Giving way to the rest moves no body, so
-the loop that is designed with the torso held (controller/design) is the loop that runs. Most squeezing comes from legs that splay under
-their load, so the shift that relieves it is stored per load and goes when the load goes: a foot that is about to lift off is not
-dragged over the ground by the shift it needed under load. The load meant is the planned one. With the measured one the shift would
-answer the normal force, a second loop through the leg's stiffness that rings at the controller's rate.
+Support. The servos are told the torques that carry each leg's planned share of weight and acceleration (support.py), scaled by the weight
+that the feet really measure: a payload is carried too.
 
-Normal. The suspension answers to the difference from the force that the leg carries when all standing legs share the weight evenly
-about the centre of mass. Its preload may exceed that share: then the leg is held longer by what its servos sag, as a vehicle's spring is
-set for its ride height.
+Tangential. Of its force a foot should give way only to what does no work for the body: the legs' common push, shared in proportion to the
+load, moves the robot and is left alone; the rest is legs squeezing against each other. The PID's answer g is a force, and the joints'
+angles are corrected by J^T g/kp: that is what the servos yield under g, so a foot that sticks answers with exactly -g, in every direction
+alike and without a vertical force. The loop's plant is 1, whatever leg, pose and servo, and the height does not feel it. The answer goes
+with the measured load, so that a foot is not dragged over the ground by it while it is being unloaded.
+
+Normal. The virtual suspension answers the force beyond the planned share; its deflection z reaches the joints as the vertical force
+z/C_zz, C = J kp^-1 J^T, and so without a horizontal one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.controller.contact_detection import ContactDetector, SensorWatch
+from hexapod_cosim.controller.foot_law import FootLaw
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
-from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, Mask, Plane
-from hexapod_cosim.controller.slip_pid import SlipPid
-from hexapod_cosim.controller.suspension import Suspension
+from hexapod_cosim.controller.inverse_dynamics import Demand
+from hexapod_cosim.controller.kinematics import LEGS, Array, Mask
+from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.support import Shares, torques
+from hexapod_cosim.controller.touchdown import EARLY, Touchdown
 
 LOAD_FLOOR = 1e-6  # N    below it no foot carries anything
-LARGEST_LOAD = 2.0  # 1    in shares of the weight: the design's margins hold up to it
-DETERMINANT_FLOOR = 1e-9  # m4    feet on one line share no moment
+LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the design's margins hold up to it
+SCALES = 0.5, 2.0  # 1    measured over modelled weight that the support believes
+HIGH = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the coming steps ask, rows are steps. Never changed once made."""
+
+    own: Array  # N m    (n, 6, 3) torques for the legs' own weight and motion
+    carry: Array  # N m    (n, 6, 3) and for the planned load
+    effect: Array  # (n, 6, 6, 3) of a force on the foot: its shift x y z [m/N], and the bend of the joints [rad/N]
+    shares: Shares
+    weight: list[float]  # N    of all shares
+    live: Array  # 1    (n, 6) 1 of feet with a share, else 0
+    standing: Mask  # (n, 6) planned on the ground, where that is certain
+    certain: Mask  # (n, 6)
+    falling: Array  # m    (n, 6) by which feet well above the ground come down in a period
+    high: Mask  # (n, 6) so high that they cannot touch
+    swinging: Mask  # (6,)
 
 
 class Compliance:
-    """The two laws of all feet. Horizontal shifts and forces are complex numbers x + i y.
+    """The laws of all feet.
 
-    What the planned paths ask is laid out beforehand by `plan`; `step` takes it step by step and answers to the forces.
-
-    Attributes, (6,) each:
-        shift, lift: horizontal and vertical correction [m]; shift_rate: of the horizontal one [m/s];
-        squeeze: tangential force the feet give way to [N]; excess: normal force beyond the preload [N].
+    Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos [N m]; shift: (6, 3) of the feet
+    that comes of `bend` [m]; offset: (6,) by which paths are raised for ground met early or late [m]; touching, doubted: (6,) feet on
+    the ground, sensors not believed; scale: measured over planned weight.
     """
 
-    def __init__(self, gains: Gains, *, weight: float, centre: complex, period: float) -> None:
-        """weight [N] and centre of mass x + i y [m] of the robot in the walking frame."""
-        self.pid = SlipPid(gains.slip, period=period)
-        self.suspension = Suspension(gains.suspension, period=period)
-        self._weight, self._centre, self._per_second = weight, centre, 1.0 / period
-        self._preload, self._per_share = gains.suspension.preload, TRIPOD_LEGS / weight
-        self._follow = 1.0 - math.exp(-period / gains.slip.load_time)
-        self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
-        self.lift: Array = np.zeros(LEGS)
+    def __init__(self, gains: Gains, parts: Parts, *, weight: float, cycle: float, kp: float, step_height: float, period: float) -> None:
+        """weight [N] of the robot, cycle [s] and step height [m] of its gait, kp [N m/rad] of its servos."""
+        self._parts, self._softness, self._high, self._period = parts, 1.0 / kp, HIGH * step_height, period
+        share = weight / TRIPOD_LEGS
+        self.law = FootLaw(gains, period=period)
+        self.detector, self.watch, self.touchdown = ContactDetector(weight), SensorWatch(weight, cycle=cycle), Touchdown(period=period)
+        self._tracking, self._memory = min(period / gains.slip.tracking_time, 1.0), math.exp(-period / gains.slip.load_time)
+        self._follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
+        self._largest, self._deepest = gains.slip.limit * share, gains.suspension.limit
+        self._most, self._fastest = gains.limits.torque, gains.limits.speed * period
+        self._mixing = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0 / share], [0.0] * 4])
+        if not parts.slip_pid:
+            self._mixing[0, 0] = self._mixing[1, 1] = 0.0
+        if not parts.suspension:
+            self._mixing[2, 2] = 0.0
+        self.bend, self.torque, self._step = np.zeros((3, LEGS, 3))
+        self._felt, self._inputs, self._ones = np.zeros((LEGS, 4)), np.zeros((LEGS, 4)), np.ones(LEGS)
+        self._force, self._moved = np.zeros((LEGS, 3, 1)), np.zeros((LEGS, 6, 1))
+        self.shift, self._wanted = self._moved[:, :3, 0], self._moved[:, 3:, 0]
+        self._answer = self.law.row.view(np.complex128)[:, 0]
+        self.offset, self.doubted = np.zeros(LEGS), np.zeros(LEGS, dtype=np.bool_)
         self.reset()
 
     def reset(self) -> None:
-        """Both laws at rest, and nothing planned."""
-        self.pid.reset()
-        self.suspension.reset()
-        self.shift[:] = self.lift[:] = 0.0
-        self.squeeze, self.shift_rate, self._last_shift = ([0j] * LEGS for _ in range(3))
-        self.excess = [0.0] * LEGS
-        self._at, self._scale = 0, [(0.0,) * LEGS]
-        self._known: tuple[list[bool], list[bool]] = ([], [])
+        """All laws at rest."""
+        for law in (self.law, self.detector, self.watch, self.touchdown):
+            law.reset()
+        for array in (self.bend, self.torque, self._moved, self.offset, self.doubted):
+            array[...] = 0
+        self.scale, self._at = 0.0, -1
 
-    def save(self) -> tuple[Any, ...]:
-        """What both laws remember."""
-        return self.pid.state, self.pid.output, self.suspension.state, self._scale[self._at], self._last_shift
+    def save(self) -> dict[str, Any]:
+        """What the laws remember, and what is planned."""
+        own = {name: getattr(self, name) for name in ("scale", "_plan", "_at")}
+        kept = [array.copy() for array in (self.law.row, self.bend, self.offset, self.doubted)]
+        return {"own": own, "arrays": kept, "watch": self.watch.save(), "down": self.touchdown.save(), "touch": self.detector.save()}
 
-    def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes back to it; nothing more is planned."""
-        self.pid.state, self.pid.output, self.suspension.state, scale, self._last_shift = state
-        self.shift[:], self.lift[:] = self._last_shift, self.suspension.state[0]
-        self._scale, self._at, self._known = [scale], 0, ([], [])
+    def restore(self, state: dict[str, Any]) -> None:
+        """Goes back to it."""
+        vars(self).update(state["own"])
+        for array, kept in zip((self.law.row, self.bend, self.offset, self.doubted), state["arrays"], strict=True):
+            array[...] = kept
+        self.watch.restore(state["watch"])
+        self.touchdown.restore(state["down"])
+        self.detector.restore(state["touch"])
 
-    def plan(self, plane: Plane, swinging: Mask) -> None:
-        """Lays out what the coming steps ask: planned feet (n, 6) x + i y [m], and which of them (6,) swing throughout."""
-        self.shares = even_shares(plane, ~swinging, self._weight, self._centre)
-        self._preloads, self._swinging = (self._preload * self.shares).tolist(), swinging.tolist()
-        loads = np.minimum(self._per_share * self.shares, LARGEST_LOAD).T.tolist()
-        follow, smoothed = self._follow, []
-        for planned, scale in zip(loads, self._scale[self._at], strict=True):
-            last = scale
-            smoothed.append([last] + [last := last + follow * (load - last) for load in planned])
-        self._scale, self._at = list(zip(*smoothed, strict=True)), 0
+    def plan(self, demand: Demand, shares: Shares, *, height: Array, rise: Array, swinging: Mask) -> None:
+        """Lays out the coming steps, rows of all arguments: height (n, 6) of the feet's paths over the stance [m], rise [m/s]; (6,)."""
+        lever, none = demand.lever, np.zeros_like(demand.torque)
+        standing, supports = shares.activation >= 1.0, self._parts.support
+        self._plan = Plan(
+            own=demand.torque if supports else none, carry=torques(lever, shares) if supports else none,
+            effect=self._softness * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
+            shares=shares, weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
+            certain=standing | (height > EARLY), falling=np.where(height > EARLY, np.maximum(-self._period * rise, 0.0), 0.0),
+            high=height > self._high, swinging=swinging.copy(),
+        )  # fmt: skip
+        self._at = -1
 
-    def step(self, push: Plane, normal: Array, contact: Mask) -> Feet:
-        """One planned period on: shift and lift of the feet, and their rates.
-
-        push, normal: (6,) ground on foot in the walking frame, x + i y and z [N]; contact: (6,) measured.
-        """
-        preloads = self._preloads[self._at]
+    def step(self, force: Array) -> None:
+        """One planned period on. force: (6, 4) ground on foot in the walking frame [N], the last column 0."""
         self._at += 1
-        swinging, touching = self._swinging, contact.tolist()
-        loads = [f if touches and f > 0.0 else 0.0 for f, touches in zip(normal.tolist(), touching, strict=True)]
-        self._split([f if touches else 0j for f, touches in zip(push.tolist(), touching, strict=True)], loads)
-        if (swinging, touching) != self._known:
-            self._forget(swinging, touching)
-        self._yield()
-        self.excess = [0.0 if swings else f - held for f, held, swings in zip(loads, preloads, swinging, strict=True)]
-        lift, lift_rate = self.suspension.step(self.excess)
-        self.lift[:] = lift
-        return self._last_shift, lift, self.shift_rate, lift_rate
+        plan, at, parts = self._plan, self._at, self._parts
+        touching = self.detector.step(force[:, 2])
+        if ((touching != plan.standing[at]) & plan.certain[at]).any() or self.watch.busy or self.touchdown.busy:
+            force = self._wonder(force, touching)
+            touching = self.detector.touching
+        np.multiply(force, touching[:, None], out=self._felt)
+        total = self._mix()
+        low, high = SCALES
+        scale = min(max(total / max(plan.weight[at], LOAD_FLOOR), low), high)
+        self.scale += self._follow_weight * (scale - self.scale)
+        if parts.suspension:
+            excess = self._inputs[:, 2]
+            excess -= self.scale * plan.shares.normal[at]
+            excess *= plan.live[at]
+        self._answer_forces(touching)
+        self._actuate()
 
-    def _split(self, push: Sequence[complex], loads: Sequence[float]) -> None:
-        """squeeze = f_t - (f_n / sum f_n) sum f_t over the feet in contact."""
-        total = sum(loads)
-        common = sum(push) / total if total > LOAD_FLOOR else 0j
-        self.squeeze = [f - load * common for f, load in zip(push, loads, strict=True)]
+    def _mix(self) -> float:
+        """Inputs of the laws from the forces felt: squeeze = f_t - (f_n / sum f_n) sum f_t, f_n, load. Returns sum f_n [N]."""
+        mixing, felt = self._mixing, self._felt
+        x, y, total, _ = np.dot(self._ones, felt).tolist()
+        share = 1.0 / total if total > LOAD_FLOOR and self._parts.slip_pid else 0.0
+        mixing[2, 0], mixing[2, 1] = -x * share, -y * share
+        np.dot(felt, mixing, out=self._inputs)
+        return float(total)
 
-    def _forget(self, swinging: list[bool], touching: list[bool]) -> None:
-        """The PID starts afresh when its foot has lifted off; until it is back nothing pushes it."""
-        self._known = swinging, touching
-        self.pid.reset([swings and not touches for swings, touches in zip(swinging, touching, strict=True)])
+    def _answer_forces(self, touching: Mask) -> None:
+        """The laws one period on, limited, and the forces that come of them."""
+        law, plan, at = self.law, self._plan, self._at
+        law.inputs[...] = self._inputs
+        law.step()
+        size = np.abs(self._answer)
+        if size.max() > self._largest:
+            wanted = law.answer.copy()
+            law.answer *= (self._largest / np.maximum(size, self._largest))[:, None]
+            law.integral += self._tracking * (law.answer - wanted)
+        if np.abs(law.deflection).max() > self._deepest:
+            # at its stop the suspension stands still
+            law.rate[np.abs(law.deflection) > self._deepest] = 0.0
+            np.clip(law.deflection, -self._deepest, self._deepest, out=law.deflection)
+        np.multiply(law.answer, np.minimum(law.load, LARGEST_LOAD)[:, None], out=self._force[:, :2, 0])
+        np.divide(law.deflection, plan.effect[at, :, 2, 2], out=self._force[:, 2, 0])
+        # a foot in the air forgets, within the time in which a leg gives up its load
+        law.integral[plan.swinging & ~touching] *= self._memory
 
-    def _yield(self) -> None:
-        """shift = PID(squeeze) x smoothed share in thirds of the weight."""
-        shift = [u * scale for u, scale in zip(self.pid.step(self.squeeze), self._scale[self._at], strict=True)]
-        self.shift_rate = [(new - old) * self._per_second for new, old in zip(shift, self._last_shift, strict=True)]
-        self._last_shift, self.shift[:] = shift, shift
+    def _actuate(self) -> None:
+        """bend = J^T f/kp, limited in rate; torque = own + scale x carry, limited."""
+        plan, at, bend, torque, wanted = self._plan, self._at, self.bend, self.torque, self._wanted
+        np.matmul(plan.effect[at], self._force, out=self._moved)
+        np.multiply(plan.carry[at], self.scale, out=torque)
+        torque += plan.own[at]
+        if not self._parts.limits:
+            bend[...] = wanted
+            return
+        step = np.subtract(wanted, bend, out=self._step)
+        bend += np.maximum(np.minimum(step, self._fastest, out=step), -self._fastest, out=step)
+        np.maximum(np.minimum(torque, self._most, out=torque), -self._most, out=torque)
 
+    def _wonder(self, force: Array, touching: Mask) -> Array:
+        """Feet that touch and should not, or the other way round: ground met early or late, or a sensor that is wrong.
 
-def even_shares(feet: Plane, standing: Mask, weight: float, centre: complex) -> Array:
-    """(n, 6) what each foot carries [N]: least squares with sum f = weight and no moment about the centre of mass; never negative.
-
-    f = a + b x + c y over the standing feet (6,), the same in all rows, p = x + i y [m] from the centre:
-    (n sx sy; sx sxx sxy; sy sxy syy) (a b c) = (weight 0 0), with sums s over the standing feet.
-    """
-    shares, arm = np.zeros(feet.shape), feet.T[standing] - centre
-    x, y, n = arm.real, arm.imag, max(len(arm), 1)
-    sx, sy, sxx, sxy, syy = x.sum(axis=0), y.sum(axis=0), (x * x).sum(axis=0), (x * y).sum(axis=0), (y * y).sum(axis=0)
-    a, b, c = sxx * syy - sxy * sxy, sxy * sy - sx * syy, sx * sxy - sxx * sy
-    determinant = n * a + sx * b + sy * c
-    solvable = determinant >= DETERMINANT_FLOOR
-    per = weight / np.where(solvable, determinant, 1.0)
-    shares[:, standing] = np.where(solvable, np.maximum((a + b * x + c * y) * per, 0.0), weight / n).T
-    return shares
+        Returns the forces; where a sensor is not believed, those of the plan, and of all feet once a tripod's are not.
+        """
+        plan, at, parts, touches = self._plan, self._at, self._parts, touching.tolist()
+        standing = plan.standing[at].tolist()
+        if parts.fallback:
+            total = float(force[touching, 2].sum())
+            doubted = self.watch.look(touches, total, standing, plan.high[at].tolist(), time=self._period)
+            self.doubted[:] = doubted if sum(doubted) < TRIPOD_LEGS else True
+            if self.doubted.any():
+                force = np.where(self.doubted[:, None], self.scale * plan.shares.forces(at), force)
+                touches = np.where(self.doubted, plan.shares.activation[at] > 0.5, touching).tolist()
+                self.detector.touching = np.array(touches)
+        if parts.touchdown:
+            self.offset[:] = self.touchdown.step(touches, plan.falling[at].tolist(), plan.swinging.tolist(), standing)
+        return force

@@ -1,32 +1,32 @@
 """From body command and measurement to joint commands, once a period.
 
-    command -> ramp -> foot paths -> + compliance (measured forces) -> posture -> inverse kinematics -> angle_ref, speed_ref
+    command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics ---------> angle_ref, speed_ref
+                          ^                                      |                           ^
+                        hold                      inverse dynamics -> support -> compliance -+-> torque_ref
+                          ^------ measured angles, attitude          measured forces --^
 
-Kinematic control is the same chain without the compliance: the commands alone. What depends on these alone, up to the foot paths, is
-planned for many steps at once, in arrays over time; what depends on the last step, in Python's own numbers, leg by leg.
+Kinematic control is the first line alone: the commands, without any measurement. All of it depends on the commands alone, so it is
+planned for many steps at once, in arrays over time; a step takes the next row and, under compliant control, answers to the forces.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from operator import add
-from struct import Struct
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.compliance import Compliance
+from hexapod_cosim.controller.compliant import Compliant
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.gait import Gait
-from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, LegSolver, Mask, Plane
-from hexapod_cosim.controller.posture import Posture
+from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, Joints, LegSolver, Mask, Plane, Pose
+from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.posture import in_torso_frame
 from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
 from hexapod_cosim.models import HexapodError, Robot
-from hexapod_cosim.models.kinematics import axis_rotation
 
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
 PLANNED = 128  # steps at most that are planned at once; nothing depends on it but the time it takes
-PACK = Struct("12d").pack_into  # numbers into an array: half the time of an assignment
 
 
 class ControllerError(HexapodError):
@@ -67,9 +67,10 @@ class Diagnostics:
     """The controller's insides for recorders and tests: arrays of six legs that change at every step."""
 
     swinging: Mask  # planned to be in the air
-    shift: Plane  # m    horizontal correction by the compliance, x + i y in the walking frame
-    lift: Array  # m    vertical correction
+    shift: Plane  # m    horizontal correction of the feet by the compliance, x + i y in the walking frame
+    lift: Array  # m    vertical correction, of all parts
     unreachable: Mask  # the joints could not follow at the last step
+    fallback: Mask  # the foot's force sensor is not believed: its leg walks by the plan
 
 
 class Controller:
@@ -79,64 +80,59 @@ class Controller:
     Raises RobotError for a joint pattern without closed-form kinematics, ControllerError for an impossible period.
     """
 
-    def __init__(self, robot: Robot, *, period: float, gait: Gait, gains: Gains | None = None) -> None:
+    def __init__(
+        self, robot: Robot, *, period: float, gait: Gait, gains: Gains | None = None, parts: Parts = Parts()
+    ) -> None:  # fmt: skip
         phases = (gait.duty * gait.period, (1.0 - gait.duty) * gait.period)
         if not 0.0 < period < min(phases):
             raise ControllerError(
                 "impossible controller period", got=period, expected=f"0 < period < {min(phases):g} s, the gait's shorter phase",
                 fix="shorten the period or slow the gait",
             )  # fmt: skip
-        self.period, self.gait, self.gains = period, gait, gains
+        self.period, self.gait, self.gains, self.parts = period, gait, gains, parts
         self.legs = LegSolver(robot)
         self.ramp = CommandRamp(gait.period, period=period)
         self.stance = np.array([leg.stance for leg in robot.legs])
         self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
-        weight = robot.total_mass * float(np.linalg.norm(robot.gravity))
-        self.compliance = None if gains is None else Compliance(gains, weight=weight, centre=centre_of_mass(robot), period=period)
+        self.compliant = None if gains is None else Compliant(robot, gait, gains, parts, legs=self.legs, period=period)
         mismatch = None if gains is None else gains.mismatch(robot, period=period)
         self.warnings: tuple[str, ...] = () if mismatch is None else (mismatch,)
-        self._per_second, self._radius = 1.0 / period, robot.foot.radius
-        self._stance_pitch = (self.stance[:, 2] - self.stance[:, 1]).tolist()
-        self._allocate()
+        self._radius, self._stance_pitch = robot.foot.radius, self.stance[:, 2] - self.stance[:, 1]
+        self._out = JointCommand()
+        self.diagnostics = self._make_diagnostics()
         self.reset()
 
-    def _allocate(self) -> None:
-        laws, legs = self.compliance, self.legs
-        self._out = JointCommand(*legs.joints)
-        # rows (x y z 0) of forces, seen as x + i y and z without a copy
-        self._force, self._rotation = np.zeros((LEGS, 4)), np.zeros((3, 4))
-        self._push, self._normal = self._force.view(np.complex128)[:, 0], self._force[:, 2]
-        self.diagnostics = Diagnostics(
-            swinging=np.zeros(LEGS, dtype=np.bool_), unreachable=legs.unreachable,
-            shift=np.zeros(LEGS, dtype=np.complex128) if laws is None else laws.shift, lift=np.zeros(LEGS) if laws is None else laws.lift,
-        )  # fmt: skip
+    def _make_diagnostics(self) -> Diagnostics:
+        compliant, (swinging, lost) = self.compliant, np.zeros((2, LEGS), dtype=np.bool_)
+        if compliant is None:
+            still = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
+            return Diagnostics(swinging, *still, lost, np.zeros(LEGS, dtype=np.bool_))
+        return Diagnostics(swinging, compliant.shift, compliant.lift, lost, compliant.laws.doubted)
 
     def reset(self) -> None:
         """Standing in the stance, all memory cleared; the next step is the first."""
         self.ramp.reset()
         self.paths.reset()
-        self.rolled = [0j] * LEGS
         self._start: float | None = None
         self._count = 0
-        if self.compliance is not None:
-            self.compliance.reset()
-        self._lay_out(slice(0, 1), *self.ramp.ahead(0))
+        if self.compliant is not None:
+            self.compliant.reset()
+        self._lay_out(0, *self.ramp.ahead(0))
 
     def save(self) -> dict[str, Any]:
-        """Everything the controller remembers between steps."""
-        laws = None if self.compliance is None else self.compliance.save()
-        own = {"rolled": self.rolled, "_start": self._start, "_count": self._count}
-        return {"ramp": self.ramp.save(), "paths": self.paths.save(), "laws": laws, "legs": self.legs.save(), "own": own}
+        """Everything the controller remembers between steps, and what it has planned."""
+        compliant = None if self.compliant is None else self.compliant.save()
+        own = {name: getattr(self, name) for name in ("_start", "_count", "_plan", "_at", "_last")}
+        return {"ramp": self.ramp.save(), "paths": self.paths.save(), "compliant": compliant, "own": own}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Goes back to a saved state: the steps after it are the same again, bit for bit."""
         self.ramp.restore(state["ramp"])
         self.paths.restore(state["paths"])
-        if self.compliance is not None:
-            self.compliance.restore(state["laws"])
-        self.legs.restore(state["legs"])
+        if self.compliant is not None:
+            self.compliant.restore(state["compliant"])
         vars(self).update(state["own"])
-        self._lay_out(slice(0, 1), *self.ramp.ahead(0))
+        self.diagnostics.swinging[:] = self.paths.steps.swinging[-1]
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """The joint commands for [t, t + period). The result's arrays are reused by the next step.
@@ -147,16 +143,12 @@ class Controller:
             measurement: sensor values at t; kinematic control does not look at it.
         """
         self._advance(t, command)
-        feet = self._feet[self._at]
-        if self.compliance is not None:
-            self._sense(measurement)
-            feet = _sum(feet, self.compliance.step(self._push, self._normal, measurement.contact))
-        if self._count:
-            feet = self._roll(feet)
-        if self._posture is not None:
-            feet = self._posture.apply(self._at, feet)
-        self.legs.solve(feet)
-        return self._out
+        at, out, plan, compliant = self._at, self._out, self._plan, self.compliant
+        out.angle_ref[...], out.speed_ref[...] = plan.angle[at], plan.speed[at]
+        self.diagnostics.unreachable[...] = plan.unreachable[at]
+        if compliant is not None:
+            compliant.step(measurement, out)
+        return out
 
     def _advance(self, t: float, command: BodyCommand) -> None:
         """To the planned step at t."""
@@ -171,74 +163,49 @@ class Controller:
             return
         self._count += 1
         if self._at == self._last:
-            self._plan()
+            self._plan_ahead()
         self._at += 1
         self.paths.advance()
         self.ramp.steps += 1
 
-    def _plan(self) -> None:
+    def _plan_ahead(self) -> None:
         """Plans what depends on the command alone, up to the next lift-off or touch-down."""
         ramp, target, paths = self.ramp, self.ramp.target, self.paths
         moves = (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
         value, rate = ramp.ahead(PLANNED if ramp.settled or moves else min(ramp.remaining, PLANNED))
-        paths.plan(value[:, 0] + 1j * value[:, 1], value[:, 2], going=moves or not ramp.settled)
+        v, yaw_rate = value[:, 0] + 1j * value[:, 1], value[:, 2]
+        if self.compliant is not None:
+            v, yaw_rate = self.compliant.steer(v, yaw_rate, moves=moves)
+        paths.plan(v, yaw_rate, going=moves or not ramp.settled)
         end = paths.left + 1
-        self._lay_out(slice(1, end), value[1:end], rate[1:end])
+        self._lay_out(1, value[:end], rate[:end])
 
-    def _lay_out(self, chosen: slice, value: Array, rate: Array) -> None:
-        """Turns planned steps into what `step` needs: Python's own numbers, faster than arrays of six."""
-        steps = self.paths.steps
-        columns = (steps.plane, steps.height, steps.plane_velocity, steps.rise)
-        self._feet: list[Feet] = list(zip(*(column[chosen].tolist() for column in columns), strict=True))
-        swinging = self.diagnostics.swinging
-        swinging[:] = steps.swinging[-1]  # in all of them the same
+    def _lay_out(self, first: int, value: Array, rate: Array) -> None:
+        """Turns planned steps, rows of commands and their rates, into joint angles and speeds from the row `first` on."""
+        steps, compliant, rows = self.paths.steps, self.compliant, slice(first, None)
+        self.diagnostics.swinging[:] = steps.swinging[-1]  # in all of them the same
+        feet = Feet(steps.plane, steps.height, steps.plane_velocity, steps.rise)
+        if compliant is not None:
+            feet = compliant.lower(feet, steps, walking=self.paths.walking)
         level = not (value[:, 3:].any() or rate[:, 3:].any())
-        self._posture = None if level else Posture(value[:, 3:], rate[:, 3:])
-        if self.compliance is not None:
-            self.compliance.plan(steps.plane[chosen], swinging)
-        self._at, self._last = (0 if chosen.start == 0 else -1), len(self._feet) - 1
+        pose, seen = self._pose(feet, None if level else (value[:, 3:], rate[:, 3:]))
+        joints = self.legs.solve(pose, seen.velocity, seen.rise)
+        if compliant is not None:
+            compliant.plan(first, steps, value, pose, joints.speed, level=level)
+        self._plan = Joints(joints.angle[rows], joints.speed[rows], joints.unreachable[rows])
+        self._at, self._last = -first, len(value) - first - 1
 
-    def _roll(self, feet: Feet) -> Feet:
-        """Keeps the contact point of the round foot, not its centre, on the planned path.
+    def _pose(self, feet: Feet, posture: tuple[Array, Array] | None) -> tuple[Pose, Feet]:
+        """The legs, with the contact point of the round foot, not its centre, on the planned path; and the feet in the torso frame.
 
-        A tibia that pitches by dB rolls its foot's sphere by -R dB along the leg's outward direction; B from the last step's angles.
+        A tibia that pitches by dB rolls its foot's sphere by -R dB along the leg's outward direction. The shift s changes B itself:
+        s = R (C + s dC/du), C = q_3 - q_2 less that of the stance, is solved by one Newton step.
         """
-        angles, radius, per_second, before = self.legs.angles, self._radius, self._per_second, self.rolled
-        legs = zip(self.legs.headings, angles[1::3], angles[2::3], self._stance_pitch, strict=True)
-        self.rolled = rolled = [heading * (radius * (q3 - q2 - stance)) for heading, q2, q3, stance in legs]
-        plane, height, velocity, rise = feet
-        velocity = [v + (new - old) * per_second for v, new, old in zip(velocity, rolled, before, strict=True)]
-        return list(map(add, plane, rolled)), height, velocity, rise
-
-    def _sense(self, measurement: Measurement) -> None:
-        """Foot forces in the walking frame K: rows f_K = f_W R_WT R_TK, the transpose of R_KT R_TW f_W."""
-        w, x, y, z = measurement.quaternion.tolist()
-        xx, yy, zz = x * x, y * y, z * z
-        PACK(
-            self._rotation.data, 0,
-            1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y), 0.0,
-            2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x), 0.0,
-            2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy), 0.0,
-        )  # fmt: skip
-        rotation = self._rotation
-        if self._posture is not None:
-            rotation[:, :3] = rotation[:, :3] @ self._posture.rotation[self._at].T
-        np.dot(measurement.foot_force, rotation, out=self._force)
-
-
-def _sum(feet: Feet, shifts: Feet) -> Feet:
-    (plane, height, velocity, rise), (x, z, v, w) = feet, shifts
-    return list(map(add, plane, x)), list(map(add, height, z)), list(map(add, velocity, v)), list(map(add, rise, w))
-
-
-def centre_of_mass(robot: Robot) -> complex:
-    """x + i y of the robot's centre of mass in its stance, torso frame [m]."""
-    moment = robot.torso.mass * np.array(robot.torso.com)
-    for leg in robot.legs:
-        point, rotation = np.array(leg.hip_position), axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
-        for link, q in zip(leg.links, leg.stance, strict=True):
-            rotation = rotation @ axis_rotation(np.array(link.axis), q)
-            moment = moment + link.mass * (point + rotation @ np.array(link.com))
-            point = point + rotation @ np.array(link.tip)
-    x, y, _ = (moment / robot.total_mass).tolist()
-    return complex(x, y)
+        seen = feet if posture is None else in_torso_frame(feet, *posture)
+        pose, radius = self.legs.pose(seen.plane, seen.height), self._radius
+        bent = pose.angles[..., 2] - pose.angles[..., 1] - self._stance_pitch
+        slope = self.legs.speeds(pose, pose.heading, np.zeros(1))
+        shift = pose.heading * (radius * bent / (1.0 - radius * (slope[..., 2] - slope[..., 1])))
+        drift = np.gradient(shift, self.period, axis=0) if len(shift) > 1 else np.zeros_like(shift)
+        rolling = replace(seen, plane=seen.plane + shift, velocity=seen.velocity + drift)
+        return self.legs.pose(rolling.plane, rolling.height), rolling

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 from hexapod_cosim.models import HexapodError, Robot, nearest_name
 
-FORMAT = 1
+FORMAT = 2
 TRIPOD_LEGS = 3  # legs that share the weight in the hardest gait: loads are counted in weight / 3
 
 
@@ -22,59 +22,103 @@ class GainsError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class SlipGains:
-    """PID from tangential force [N] to foot shift [m] of a leg under a third of the weight.
+    """PID from tangential force [N] to the force [N] that a leg's servos are relieved of; the foot's shift is C times it.
 
     In continuous time: (kp + ki/s + kd s/(derivative_time s + 1)) / (filter_time s + 1).
     """
 
-    kp: float  # m/N
-    ki: float  # m/(N s)
-    kd: float  # m s/N
+    kp: float  # 1
+    ki: float  # 1/s
+    kd: float  # s
     derivative_time: float  # s    filter of the derivative, > 0
     filter_time: float  # s    force filter, > 0
-    load_time: float  # s    smoothing of the planned load that the shift goes with, > 0
+    load_time: float  # s    smoothing of the measured load that the answer goes with, > 0
     tracking_time: float  # s    anti-windup: the integral gives way to the clamp this fast
-    limit: float  # m    largest foot shift
+    limit: float  # 1    largest answer, in thirds of the weight
 
 
 @dataclass(frozen=True, kw_only=True)
 class SuspensionGains:
-    """Virtual m z'' + b z' + k z = f_n - preload x (leg's share of the weight); z lifts the foot towards the torso."""
+    """Virtual m z'' + b z' + k z = f_n - the leg's share of the load; z lifts the foot towards the torso."""
 
     mass: float  # kg
     damping: float  # N s/m
     stiffness: float  # N/m
-    preload: float  # 1    1: at rest under the leg's share of the weight the deflection is 0; more: the leg is held longer
     limit: float  # m    largest deflection
+
+
+@dataclass(frozen=True, kw_only=True)
+class SupportGains:
+    """Feed-forward of the planned load."""
+
+    handover_time: float  # s    in which one set of legs hands the weight to the next, > 0
+    weight_time: float  # s    smoothing of the measured weight that the plan is scaled by, > 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoldGains:
+    """Slow loops: torso attitude and height over the ground, and the walked way."""
+
+    attitude_rate: float  # 1/s    integral of roll and pitch
+    height_rate: float  # 1/s    integral of the height
+    ground_time: float  # s    smoothing of the ground's measured inclination, > 0
+    angle_limit: float  # rad    largest correction of roll and pitch
+    height_limit: float  # m    and of the height
+    path_rate: float  # 1/s    from way and heading lost to a change of the commanded velocity
+    speed_limit: float  # m/s    largest such change
+    turn_limit: float  # rad/s    and of the yaw rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitGains:
+    """What commands never exceed."""
+
+    speed: float  # rad/s    fastest change of a joint angle's correction
+    torque: float  # N m    largest feed-forward torque
 
 
 @dataclass(frozen=True, kw_only=True)
 class Requirements:
     """What a design must meet."""
 
-    phase_margin: float = 60.0  # deg    at least, both loops, at every load
+    phase_margin: float = 60.0  # deg    at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
     delay_periods: float = 1.0  # 1    computing delay in controller periods
+    force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.010  # s    force filter of the tangential loop
-    load_time: float = 0.030  # s    smoothing of the planned load: the time in which legs really hand over the weight
-    shift_limit: float = 0.020  # m    clamp of the tangential correction
-    deflection: float = 0.003  # m    of the suspension under one leg's share of the weight
-    frequency: float = 5.0  # Hz    natural frequency of the suspension
+    load_time: float = 0.030  # s    smoothing of the measured load: the time in which legs really hand over the weight
+    slip_limit: float = 1.0  # 1    clamp of the tangential answer, in thirds of the weight
+    deflection: float = 0.003  # m    of the suspension under a third of the weight beyond the share
+    frequency: float = 5.0  # Hz    natural frequency of the suspension, at most
     damping_ratio: float = 1.0  # 1
-    sag_compensation: float = 1.0  # 1    share of the servos' sag under the weight that the preload makes good
     deflection_limit: float = 0.015  # m    clamp of the suspension
+    handover_time: float = 0.050  # s
+    weight_time: float = 0.5  # s
+    attitude_rate: float = 2.0  # 1/s
+    height_rate: float = 2.0  # 1/s
+    ground_time: float = 2.0  # s
+    angle_limit: float = 0.05  # rad
+    height_limit: float = 0.010  # m
+    path_rate: float = 0.5  # 1/s
+    speed_limit: float = 0.02  # m/s
+    turn_limit: float = 0.05  # rad/s
+    speed_share: float = 0.5  # 1    of the servo's largest speed at which corrections may change
+    torque_share: float = 0.9  # 1    of the servo's largest torque that feed-forward may ask
 
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """What a design reached: the worst over the legs, directions and loads, in discrete time."""
+    """What a design reached: the worst over stances, loads and eigenvalues of the loop, in discrete time."""
 
-    slip_crossover: float  # rad/s    at the stiffest leg under its share of the weight
+    slip_crossover: float  # rad/s
     slip_phase_margin: float  # deg
     slip_gain_margin: float  # dB
+    slip_delay_margin: float  # s    further delay that is borne
     slip_rejection: float  # 1    steady slip speed with the law over without it
     suspension_phase_margin: float  # deg
     suspension_gain_margin: float  # dB
+    spectral_radius: float  # 1    of the whole closed loop, all feet and both laws together, < 1
+    binding: str  # the requirement that kept the tangential loop from more gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +131,9 @@ class Gains:
     requirements: Requirements
     slip: SlipGains
     suspension: SuspensionGains
+    support: SupportGains
+    hold: HoldGains
+    limits: LimitGains
     margins: Margins
 
     def mismatch(self, robot: Robot, *, period: float) -> str | None:
@@ -98,13 +145,20 @@ class Gains:
         return None
 
 
-PARTS: dict[str, type[Any]] = {"requirements": Requirements, "slip": SlipGains, "suspension": SuspensionGains, "margins": Margins}
+PARTS: dict[str, type[Any]] = {
+    "requirements": Requirements, "slip": SlipGains, "suspension": SuspensionGains, "support": SupportGains, "hold": HoldGains,
+    "limits": LimitGains, "margins": Margins,
+}  # fmt: skip
 POSITIVE = {
     "slip": ("derivative_time", "filter_time", "load_time", "tracking_time", "limit"),
     "suspension": ("mass", "damping", "stiffness", "limit"),
-    "requirements": ("phase_margin", "filter_time", "load_time", "deflection", "frequency", "damping_ratio"),
+    "support": ("handover_time", "weight_time"),
+    "hold": ("ground_time",),
+    "limits": ("speed", "torque"),
+    "requirements": ("phase_margin", "filter_time", "load_time", "deflection", "frequency", "damping_ratio", "handover_time"),
     "margins": (),
 }
+TEXTS = ("binding",)  # the rest are numbers
 Record = TypeVar("Record")
 
 
@@ -145,8 +199,7 @@ def load_gains(path: str | Path) -> Gains:
         )
     parts = {name: _read_part(kind, name, table.pop(name, None), where) for name, kind in PARTS.items()}
     for key in ("robot", "robot_hash"):
-        if not isinstance(table.get(key), str):
-            raise GainsError("wrong type", got=table.get(key), expected="a text", fix=f"add {key}", where=f"{where}: {key}")
+        _text(table.get(key), f"{where}: {key}")
     period = _number(table.get("period"), f"{where}: period", positive=True)
     _refuse_unknown(table, ["robot", "robot_hash", "period"], where)
     return Gains(robot=table["robot"], robot_hash=table["robot_hash"], period=period, **parts)
@@ -157,8 +210,18 @@ def _read_part(kind: type[Record], name: str, table: Any, where: str) -> Record:
         raise GainsError("missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where)
     keys = [entry.name for entry in fields(kind)]  # type: ignore[arg-type]
     _refuse_unknown(table, keys, f"{where}: {name}")
-    values = {key: _number(table.get(key), f"{where}: {name}.{key}", positive=key in POSITIVE[name]) for key in keys}
+    values = {key: _value(table.get(key), key, f"{where}: {name}.{key}", positive=key in POSITIVE[name]) for key in keys}
     return kind(**values)
+
+
+def _value(value: Any, key: str, where: str, *, positive: bool) -> Any:
+    return _text(value, where) if key in TEXTS else _number(value, where, positive=positive)
+
+
+def _text(value: Any, where: str) -> str:
+    if not isinstance(value, str):
+        raise GainsError("wrong type", got=value, expected="a text", fix="put it in quotes", where=where)
+    return value
 
 
 def _number(value: Any, where: str, *, positive: bool) -> float:

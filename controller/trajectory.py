@@ -145,15 +145,12 @@ class FootPaths:
         self._rest(self.home, 0)
 
     def save(self) -> tuple[Any, ...]:
-        """What it remembers: the present step."""
-        at = self.at
-        present = {name: rows[at : at + 1].copy() for name, rows in vars(self.steps).items()}
-        return present, self.walking, self._before + at
+        """What it remembers, and what is planned."""
+        return self.steps, self.at, self.walking, self._before
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes back to it; nothing more is planned."""
-        present, self.walking, self._before = state
-        self.steps, self.at = Steps(**present), 0
+        """Goes back to it."""
+        self.steps, self.at, self.walking, self._before = state
 
     @property
     def left(self) -> int:
