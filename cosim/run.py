@@ -19,6 +19,7 @@ import numpy as np
 from hexapod_cosim.controller import Controller, Gains, make_gait
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.force_sensor import ForceSensor
 from hexapod_cosim.cosim.interface import load_interface
 from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
 from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
@@ -27,11 +28,13 @@ from hexapod_cosim.cosim.reach import check_commands
 from hexapod_cosim.cosim.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.schedule import make_schedule
+from hexapod_cosim.cosim.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.signals import Signals, joint_names
+from hexapod_cosim.cosim.variation import delayed, draw, initial_values
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, load_robot
 
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
+WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
 SAME = 1e-9  # relative, of a parameter printed and read again
 UPRIGHT = 0.6  # rad    of roll or pitch: beyond it the robot has fallen
 SUNK = 0.5  # of the height it is commanded to hold: below it the robot has fallen too
@@ -68,19 +71,17 @@ def simulate(
     robot = load_robot(scenario.robot)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
     check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
-    if scenario.control == "kinematic":
-        gains = None
-    elif gains is None:
-        from hexapod_cosim.controller.design import design_gains  # noqa: PLC0415  python-control takes a second to import
-
-        gains = design_gains(robot, period=scenario.macro_step)
-    controller = Controller(robot, period=scenario.macro_step, gait=gait, gains=gains)
-    schedule = make_schedule(scenario)
+    gains = chosen_gains(scenario, gains)
+    controller = Controller(robot, period=scenario.macro_step, gait=gait, gains=gains, parts=scenario.compliance)
+    drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
+    schedule = make_schedule(scenario if drawn is None else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay)))
     with open_plant(scenario, fmu) as plant:
         plant.set_parameters(scenario.parameters)
+        if drawn is not None:
+            plant.set_parameters(initial_values(scenario_robot(scenario), plant.parameters(), drawn))
         plant.initialise(scenario.start, scenario.start + scenario.duration)
         parameters = plant.parameters()
-        signals = Signals(plant, noise=scenario.sensors.foot_force_noise, seed=scenario.seed)
+        signals = Signals(plant, sensor=make_sensor(scenario, schedule))
         recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
         chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")  # told before the run, not after it
         if begin is not None:
@@ -92,7 +93,25 @@ def simulate(
     metrics = compute_metrics(view, realtime_factor=outcome.realtime_factor)
     facts["gains"] = None if gains is None else asdict(gains)
     facts["walk"] = describe_walk(view, robot)
+    facts["drawn"] = None if drawn is None else drawn.as_facts()
     return Result(scenario=scenario, outcome=outcome, metrics=metrics, parameters=parameters, facts=facts)
+
+
+def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None:
+    """The gains a scenario runs with: none under kinematic control, else those given, or designed for its robot and macro-step."""
+    if scenario.control == "kinematic" or gains is not None:
+        return None if scenario.control == "kinematic" else gains
+    from hexapod_cosim.controller.design import design_gains  # noqa: PLC0415  python-control takes a second to import
+
+    return design_gains(load_robot(scenario.robot), period=scenario.macro_step)
+
+
+def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
+    """The feet's force sensors with all that is wrong with them; None when nothing is."""
+    noise, delay = scenario.sensors.foot_force_noise, math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - WHOLE)
+    if not noise and not delay and schedule.faults is None:
+        return None
+    return ForceSensor(noise=noise, seed=scenario.seed, delay=delay, faults=schedule.faults)
 
 
 @contextmanager

@@ -10,10 +10,11 @@ import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.quantities import to_si
 from hexapod_cosim.cosim.scenario_checks import check_parameters, check_steps
 from hexapod_cosim.cosim.scenario_records import (
@@ -23,10 +24,12 @@ from hexapod_cosim.cosim.scenario_records import (
     SETTINGS,
     UNUSED,
     Command,
+    Fault,
     Outputs,
     Push,
     Scenario,
     Sensors,
+    Variation,
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, check_robot, load_robot, unknown_name
 from hexapod_cosim.models.schema import expect_table, read_given, refuse_unknown_keys, require, specs
@@ -112,8 +115,10 @@ def scenario_from_table(table: Mapping[str, Any], *, where: str, given: Collecti
             seed=_seed(table.get("seed", 0)),
             settings={name: _read_setting(name, table[name], name) for name in SETTINGS if name in table},
             commands=_read_commands(table.get("command", {}), "command"),
-            events=tuple(_record(Push, entry, f"events[{k}]") for k, entry in enumerate(_list(table.get("events", []), "events"))),
+            events=tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(_list(table.get("events", []), "events"))),
             sensors=_record(Sensors, table.get("sensors", {}), "sensors"),
+            compliance=_read_parts(table.get("compliance", {}), "compliance"),
+            variation=_record(Variation, table["variation"], "variation") if "variation" in table else None,
             outputs=_read_outputs(table.get("outputs", {}), "outputs"),
             parameters=dict(expect_table(table.get("parameters", {}), "parameters")),
             where=where,
@@ -164,15 +169,34 @@ def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
     return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
 
 
+def _read_event(table: Any, where: str) -> Push | Fault:
+    """A fault says the leg or the fault, a push neither."""
+    push, fault = list(specs(Push)), list(specs(Fault))
+    refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys([*push, *fault])), where)
+    event: Push | Fault = _record(Fault if {"leg", "fault"} & set(table) else Push, table, where)
+    return event
+
+
+def _read_parts(table: Any, where: str) -> Parts:
+    refuse_unknown_keys(expect_table(table, where), [item.name for item in fields(Parts)], where)
+    for key, value in table.items():
+        _truth(value, f"{where}.{key}")
+    return Parts(**table)
+
+
 def _read_outputs(table: Any, where: str) -> Outputs:
     refuse_unknown_keys(expect_table(table, where), ["csv", "plots"], where)
     patterns, plots = table.get("csv", ["*"]), table.get("plots", True)
     if not isinstance(patterns, list | tuple) or not all(isinstance(item, str) for item in patterns):
         fix = 'write csv = ["torso.*", "*.foot.normal_force"]'
         raise ScenarioError("wrong type", got=patterns, expected="a list of name patterns", fix=fix, where=f"{where}.csv")
-    if not isinstance(plots, bool):
-        raise ScenarioError("wrong type", got=plots, expected="true or false", where=f"{where}.plots")
-    return Outputs(csv=tuple(patterns), plots=plots)
+    return Outputs(csv=tuple(patterns), plots=_truth(plots, f"{where}.plots"))
+
+
+def _truth(value: Any, where: str) -> bool:
+    if not isinstance(value, bool):
+        raise ScenarioError("wrong type", got=value, expected="true or false", where=where)
+    return value
 
 
 def _text(table: Mapping[str, Any], key: str, default: str) -> str:

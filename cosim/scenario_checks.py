@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import fields
 
+from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.scenario_records import MAX_STEPS, SETTINGS, Command, Outputs, Scenario, Sensors
+from hexapod_cosim.cosim.scenario_records import MAX_STEPS, SETTINGS, Command, Outputs, Scenario, Sensors, Variation
 from hexapod_cosim.models import ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.schema import specs
 
@@ -60,6 +61,8 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
 
 def _setting_names() -> list[str]:
     """The scenario's dotted keys."""
-    records = {"command": Command, "sensors": Sensors, **SETTINGS}
+    records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
     keys = [(section, key) for section, record in records.items() for key in specs(record)]
-    return [f"{section}.{key}" for section, key in [*keys, *(("outputs", item.name) for item in fields(Outputs))]]
+    plain = {"outputs": Outputs, "compliance": Parts}
+    keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]
+    return [f"{section}.{key}" for section, key in keys]

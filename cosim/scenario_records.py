@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
-from hexapod_cosim.models import Baumgarte, Contact, Friction, Gait, Servo, Solver, Terrain
+from hexapod_cosim.controller import Parts
+from hexapod_cosim.models import LEG_NAMES, Baumgarte, Contact, Friction, Gait, Servo, Solver, Terrain
 from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "compliant")
+FAULTS = ("dead", "stuck")
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait, "terrain": Terrain, "contact": Contact, "friction": Friction, "servo": Servo, "solver": Solver, "baumgarte": Baumgarte,
 }  # fmt: skip
 UNUSED = {"gait": ("stride",)}  # the body velocity of the command says it
 ZERO = (0.0, 0.0, 0.0)
+ALL_PARTS = Parts()
 MAX_STEPS = 1_000_000  # a row of the recording is about 3 kB, and all rows are in memory
 
 
@@ -42,10 +46,31 @@ class Push:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fault:
+    """A foot's force sensor that fails at `time`, counted from the start of the run: dead it reads nothing, stuck its last reading."""
+
+    time: Annotated[float, Number("s", at_least=0.0)]
+    leg: Annotated[str, Choice(LEG_NAMES)]
+    fault: Annotated[str, Choice(FAULTS)]
+    duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf  # for good
+
+
+@dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What is wrong with what the controller is told."""
+    """What is wrong with what the controller is told of all feet: forces, and the contacts that are derived from them."""
 
     foot_force_noise: Annotated[float, Number("1", at_least=0.0, below=1.0, default=0.0)] = 0.0  # standard deviation, share of the force
+    foot_force_delay: Annotated[float, Number("s", at_least=0.0, at_most=1.0, default=0.0)] = 0.0  # rounded up to whole macro-steps
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    """Sizes of small changes to a run, drawn from its seed: how far apart runs lie that are meant to be the same."""
+
+    attitude: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = 0.0  # of the torso at the start, deviation per axis
+    height: Annotated[float, Number("m", at_least=0.0, at_most=0.1, default=0.0)] = 0.0  # it drops from, at most: even from 0 on
+    joint_angle: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = 0.0  # at the start, standard deviation
+    command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0  # of all commands, at most: even from 0 on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +94,10 @@ class Scenario:
     seed: int = 0
     settings: Mapping[str, Mapping[str, Any]]  # what differs from the robot's own, by section
     commands: tuple[Command, ...]  # in order of time
-    events: tuple[Push, ...] = ()
+    events: tuple[Push | Fault, ...] = ()
     sensors: Sensors = Sensors()
+    compliance: Parts = ALL_PARTS  # of the compliant control that are at work
+    variation: Variation | None = None  # None: the file says nothing
     outputs: Outputs = Outputs()
     parameters: Mapping[str, Any]  # further FMU parameters by name
     where: str = "scenario"
@@ -80,19 +107,32 @@ class Scenario:
         """Number of macro-steps."""
         return round(self.duration / self.macro_step)
 
+    @property
+    def pushes(self) -> tuple[Push, ...]:
+        """The events that push."""
+        return tuple(event for event in self.events if isinstance(event, Push))
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The events that are faults of sensors."""
+        return tuple(event for event in self.events if isinstance(event, Fault))
+
     def to_table(self) -> dict[str, Any]:
         """The scenario as tables of a file that says the same."""
         plain = {key: getattr(self, key) for key in ("title", "robot", *PLAIN_KEYS, "seed")}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
         lists = {"command": [_as_table(entry) for entry in self.commands], "events": [_as_table(entry) for entry in self.events]}
-        tail = {"sensors": _as_table(self.sensors), "outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
+        tail = {"sensors": _as_table(self.sensors), "compliance": _as_table(self.compliance)}
+        tail |= {"variation": {} if self.variation is None else _as_table(self.variation)}
+        tail |= {"outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
         return plain | tables | {key: value for key, value in lists.items() if value} | {key: value for key, value in tail.items() if value}
 
 
 PLAIN_KEYS = tuple(specs(Scenario))  # control, start, duration, macro_step
-SECTIONS = ("command", "sensors", "outputs", "parameters", *SETTINGS)
+SECTIONS = ("command", "sensors", "compliance", "variation", "outputs", "parameters", *SETTINGS)
 KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "events", *SECTIONS)
 
 
 def _as_table(record: Any) -> dict[str, Any]:
-    return {item.name: getattr(record, item.name) for item in fields(record)}
+    """Its fields; an endless duration is what a file says by saying nothing."""
+    return {item.name: value for item in fields(record) if (value := getattr(record, item.name)) != math.inf}

@@ -1,4 +1,4 @@
-"""Commands and disturbances of a scenario, laid out by macro-step before the run."""
+"""Commands, disturbances and faults of a scenario, laid out by macro-step before the run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand
-from hexapod_cosim.cosim.scenario_records import Command, Push, Scenario
+from hexapod_cosim.cosim.scenario_records import FAULTS, Command, Fault, Push, Scenario
+from hexapod_cosim.models import LEG_NAMES
 
 ROUND_OFF = 5e-10  # s    of a macro-step's time
 
@@ -23,6 +24,7 @@ class Schedule:
     commands: tuple[BodyCommand, ...]  # (steps,)
     rows: NDArray[np.float64]  # (steps + 1, 6) the same, the last one twice: vx vy yaw_rate height roll pitch
     pushes: NDArray[np.float64] | None  # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: never any
+    faults: NDArray[np.int8] | None  # (steps + 1, 6) of the force sensors: 0 none, else the number in FAULTS, from 1; None: never any
 
 
 def make_schedule(scenario: Scenario) -> Schedule:
@@ -32,8 +34,9 @@ def make_schedule(scenario: Scenario) -> Schedule:
     rows = command_rows(scenario.commands, begins)
     distinct = {row: BodyCommand(*row) for row in set(map(tuple, rows.tolist()))}
     commands = tuple(distinct[row] for row in map(tuple, rows.tolist()))
-    pushes = push_rows(scenario.events, begins, h) if scenario.events else None
-    return Schedule(scenario.start + times, commands, np.vstack([rows, rows[-1:]]), pushes)
+    pushes = push_rows(scenario.pushes, begins, h) if scenario.pushes else None
+    faults = fault_rows(scenario.faults, times) if scenario.faults else None
+    return Schedule(scenario.start + times, commands, np.vstack([rows, rows[-1:]]), pushes, faults)
 
 
 def command_rows(commands: Sequence[Command], times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -49,4 +52,13 @@ def push_rows(events: Sequence[Push], times: NDArray[np.float64], h: float) -> N
     for event in events:
         overlap = np.minimum(times + h, event.time + event.duration) - np.maximum(times, event.time)
         rows += np.outer(np.clip(overlap / h, 0.0, 1.0), [*event.force, *event.torque])
+    return rows
+
+
+def fault_rows(faults: Sequence[Fault], times: NDArray[np.float64]) -> NDArray[np.int8]:
+    """(times, 6) the fault of each foot's force sensor at each time [s] from the start; of several at once the last one in the list."""
+    rows = np.zeros((len(times), len(LEG_NAMES)), dtype=np.int8)
+    for fault in faults:
+        begin, end = np.searchsorted(times, [fault.time - ROUND_OFF, fault.time + fault.duration - ROUND_OFF])
+        rows[begin:end, LEG_NAMES.index(fault.leg)] = FAULTS.index(fault.fault) + 1
     return rows

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import JointCommand, Measurement
 from hexapod_cosim.cosim.fmu import Plant
+from hexapod_cosim.cosim.force_sensor import ForceSensor
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
 
 LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
@@ -52,13 +53,13 @@ CONTACT = foot_names("contact")
 
 
 class Signals:
-    """The plant's blocks and the views on them. `noise` is the standard deviation of the measured foot forces, as a share of them.
+    """The plant's blocks and the views on them. `sensor` stands between the feet and the measurement; None: what is measured is true.
 
     Attributes: names, values: of the whole row, flags as 0 and 1;  outputs, flags, inputs: its blocks;  measurement: what a robot senses;
     push: (6,) force [N] and torque [N m] on the torso, world axes, to be written.
     """
 
-    def __init__(self, plant: Plant, *, noise: float = 0.0, seed: int = 0) -> None:
+    def __init__(self, plant: Plant, *, sensor: ForceSensor | None = None) -> None:
         outputs, inputs, flags = plant.names("output"), plant.names("input"), plant.names("output", "Boolean")
         _refuse_foreign(outputs, inputs, flags)
         seen = _first([name for names in MEASURED.values() for name in names], outputs)
@@ -73,7 +74,7 @@ class Signals:
         self.push: NDArray[np.float64] = input_row[3 * LEGS * JOINTS :]
         self._contact = np.zeros(LEGS, dtype=bool)
         self._touching = self.flags.values[:LEGS]
-        self._noise, self._generator = noise, np.random.default_rng(seed)
+        self._sensor = sensor
         self.measurement = self._make_measurement()
 
     def _make_measurement(self) -> Measurement:
@@ -85,8 +86,8 @@ class Signals:
         return Measurement(
             angle=views["angle"].reshape(LEGS, JOINTS),
             speed=views["speed"].reshape(LEGS, JOINTS),
-            foot_force=self._force.copy() if self._noise else self._force,
-            contact=self._contact,
+            foot_force=self._force if self._sensor is None else self._sensor.force,
+            contact=self._contact if self._sensor is None else self._sensor.contact,
             quaternion=views["quaternion"],
             angular_velocity=views["angular_velocity"],
         )
@@ -97,9 +98,8 @@ class Signals:
         self.flags.get()
         self._contact[...] = self._touching
         self._flag_row[...] = self.flags.values
-        if self._noise:
-            scale = 1.0 + self._noise * self._generator.standard_normal(self._force.shape)
-            np.multiply(self._force, scale, out=self.measurement.foot_force)
+        if self._sensor is not None:
+            self._sensor.read(self._force, self._touching)
 
     def write(self, command: JointCommand) -> None:
         """Hands a joint command, and the push as it stands, to the plant."""

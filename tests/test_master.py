@@ -14,7 +14,7 @@ from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
 from hexapod_cosim.cosim.fmu import Fmu, StepError
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, run
 from hexapod_cosim.cosim.recorder import Recorder, Recording, read_csv, write_csv
-from hexapod_cosim.cosim.run import Result, adopt_settings, simulate
+from hexapod_cosim.cosim.run import Result, adopt_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario_records import Push, Scenario
 from hexapod_cosim.cosim.schedule import make_schedule, push_rows
@@ -29,8 +29,8 @@ def scenario_of(*settings: str) -> Scenario:
 
 
 def run_fake(plant: FakePlant, controller: JointController, scenario: Scenario) -> Outcome:
-    signals = Signals(plant, noise=scenario.sensors.foot_force_noise, seed=scenario.seed)
     schedule = make_schedule(scenario)
+    signals = Signals(plant, sensor=make_sensor(scenario, schedule))
     return run(plant, signals, controller, schedule, Recorder(signals, schedule.times, schedule.rows), h=scenario.macro_step)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
-from hexapod_cosim.controller import Controller, make_gait
+from hexapod_cosim.controller import Controller, Parts, make_gait
 from hexapod_cosim.cosim.scenario import list_scenarios, load_scenario, scenario_from_table, scenario_robot
-from hexapod_cosim.cosim.scenario_records import MAX_STEPS
+from hexapod_cosim.cosim.scenario_records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
 
@@ -64,7 +65,7 @@ def test_units_reach_into_commands_events_and_settings() -> None:
     assert scenario.commands[0].yaw_rate == pytest.approx(math.radians(10.0))
     assert scenario.commands[0].height == -0.005
     assert scenario.settings["terrain"]["incline"] == pytest.approx(math.radians(5.0))
-    assert (scenario.events[0].time, scenario.events[0].force) == (0.01, (1000.0, 0.0, 0.0))
+    assert (scenario.pushes[0].time, scenario.pushes[0].force) == (0.01, (1000.0, 0.0, 0.0))
 
 
 def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
@@ -93,6 +94,29 @@ def test_a_robot_file_is_found_beside_its_scenario(tmp_path: Path) -> None:
     assert Path(scenario.robot) == tmp_path / "robot.toml"
     with pytest.raises(RobotError, match=r"robot\.toml"):
         scenario_robot(scenario)
+
+
+EVERYTHING = [
+    "events=[{time=1, leg='LM', fault='stuck'}, {time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
+    "sensors.foot_force_delay=7 ms", "compliance.slip_pid=false", "variation.attitude=1 deg", "variation.command_delay=50 ms",
+]  # fmt: skip
+
+
+def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
+    scenario = load_scenario("walk_flat", overrides=EVERYTHING)
+    assert [(event.leg, event.fault, event.duration) for event in scenario.faults] == [("LM", "stuck", math.inf), ("RF", "dead", 0.02)]
+    assert [event.force for event in scenario.pushes] == [(1.0, 2.0, 3.0)]
+    assert scenario.sensors.foot_force_delay == 0.007
+    assert scenario.compliance == Parts(slip_pid=False)
+    assert scenario.variation == Variation(attitude=math.radians(1.0), command_delay=0.05)
+    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+
+
+def test_every_part_of_the_compliance_is_a_switch_that_is_on() -> None:
+    assert asdict(load_scenario("walk_flat").compliance) == asdict(Parts())
+    for name in asdict(Parts()):
+        parts = asdict(load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance)
+        assert [key for key, on in parts.items() if not on] == [name]
 
 
 MISTAKES = {
@@ -131,6 +155,21 @@ MISTAKES = {
     "events=[{time=1, duration=1, force=[1, 2]}]": ["events[0].force", "3 numbers"],
     "events=[{time=1, duration=1, force=['1 N', '2 Nm', 0]}]": ["events[0].force[1]", "'2 Nm'", "N"],
     "sensors.foot_force_noise=2": ["foot_force_noise", "got 2", "< 1"],
+    "events=[{time=1, leg='LF'}]": ["events[0].fault", "missing key", "dead, stuck"],
+    "events=[{time=1, leg='LX', fault='dead'}]": ["events[0].leg", "'LX'", "LF, LM"],
+    "events=[{time=1, leg='LF', fault='deaf'}]": ["events[0].fault", "did you mean 'dead'"],
+    "events=[{time=1, leg='LF', fault='dead', duration=0}]": ["events[0].duration", "> 0"],
+    "events=[{time=1, leg='LF', fault='dead', force=[1,2,3]}]": ["events[0]", "'force'", "leg"],
+    "events=[{time=1, leg='LF', falt='dead'}]": ["events[0]", "did you mean 'fault'"],
+    "events=[3]": ["events[0]", "got 3", "table"],
+    "sensors.foot_force_delay=-0.01": ["foot_force_delay", ">= 0"],
+    "sensors.foot_force_delay=10 mm": ["foot_force_delay", "'10 mm'", "ms"],
+    "compliance.slip_pd=false": ["compliance", "did you mean 'slip_pid'"],
+    "compliance.slip_pid=0": ["compliance.slip_pid", "got 0", "true or false"],
+    "complaince.slip_pid=false": ["--set complaince.slip_pid: ", "did you mean 'compliance.slip_pid'"],
+    "compliance=3": ["compliance", "got 3", "table"],
+    "variation.height=-1 mm": ["variation.height", ">= 0"],
+    "variation.hight=1 mm": ["variation", "did you mean 'height'"],
     "outputs.csv=torso": ["outputs.csv", "list"],
     "outputs.plots=1": ["outputs.plots", "true or false"],
     "outputs.png=true": ["outputs", "'png'", "plots"],
