@@ -56,6 +56,19 @@ def interruptible() -> Iterator[None]:
 
 
 @contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes begun within the block never hear Ctrl-C, which a terminal sends to all of them; this one hears it when the block ends."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
 def termination_as_interrupt() -> Iterator[None]:
     """SIGTERM does what Ctrl-C does."""
     if threading.current_thread() is not threading.main_thread():

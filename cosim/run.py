@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.force_sensor import ForceSensor
 from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
+from hexapod_cosim.cosim.master import COMPLETED, FALLBACK, Outcome, Progress, insides, run
 from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.reach import check_commands
@@ -162,11 +162,15 @@ def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
 
 
 def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
-    """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), and whether the robot stayed upright."""
+    """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), whether the robot stayed upright, and the
+    share of time in which the controller fell back to kinematic control, if it tells.
+    """
     walk = cut_walk(view)
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
-    return {"distance": distance, "mean_speed": distance / lasted, "upright": not fall(view, robot)}
+    told = view.recording.column(FALLBACK) if FALLBACK in view.recording.names else np.zeros(0)
+    fallback = {"fallback": float(np.mean(told > 0.5))} if len(told) else {}
+    return {"distance": distance, "mean_speed": distance / lasted, "upright": not fall(view, robot)} | fallback
 
 
 def fall(view: View, robot: Robot) -> str:

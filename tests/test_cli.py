@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 from command import COMMAND, QUICK, Call
 
+from hexapod_cosim.cosim.comparison import read_seeds
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.recorder import read_csv
 from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.scenario_records import Variation
+from hexapod_cosim.cosim.variation import STANDARD
 
 CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]  # the shortest walk with figures
 FIGURES = {"foot_forces", "slip", "posture", "path", "torques", "energy", "footfall"}
@@ -22,31 +25,68 @@ FIGURES = {"foot_forces", "slip", "posture", "path", "torques", "energy", "footf
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory, plant_build: Path) -> tuple[Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("compare") / "out"
-    command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--json", *CYCLES]
+    command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "2", "--json", *CYCLES]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return folder, json.loads(done.stdout)
 
 
 def test_compare_prints_the_shape_of_the_contract(compared: tuple[Path, dict[str, Any]]) -> None:
     folder, printed = compared
-    assert list(printed) == ["kinematic", "compliant", "report"]
+    assert list(printed) == ["kinematic", "compliant", "change", "seeds", "walked", "report"]
     for control in ("kinematic", "compliant"):
         assert list(printed[control]) == list(METRICS)
         assert all(isinstance(value, float) for value in printed[control].values())
+    assert list(printed["change"]) == list(METRICS)
+    assert (printed["seeds"], printed["walked"]) == (2, {"kinematic": 2, "compliant": 2})
+    for name, change in printed["change"].items():
+        assert change["difference"] == pytest.approx(printed["compliant"][name] - printed["kinematic"][name])
+        assert change["pairs"] == 2
     assert Path(printed["report"]) == folder / "report.html"
+
+
+def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_seed(compared: tuple[Path, dict[str, Any]]) -> None:
+    folder, printed = compared
+    runs = read_seeds(folder / "seeds.csv")
+    for control in ("kinematic", "compliant"):
+        assert [run.seed for run in runs[control]] == [0, 1]
+        assert runs[control][0].metrics == json.loads((folder / control / "metrics.json").read_text())
+        slips = [run.metrics["slip_per_metre"] for run in runs[control]]
+        assert slips[0] != slips[1]
+        assert printed[control]["slip_per_metre"] == pytest.approx(sum(slips) / 2.0)
+        assert load_scenario(folder / control / "scenario.toml").variation == STANDARD
+
+
+def test_compare_with_one_seed_is_the_plain_walk_without_intervals(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("compare", "walk_flat", "-o", tmp_path / "one", "--seeds", "1", "--json", *QUICK)
+    printed = json.loads(out)
+    assert (code, printed["seeds"]) == (0, 1)
+    assert printed["change"]["realtime_factor"]["low"] is None
+    assert load_scenario(tmp_path / "one" / "scenario.toml").variation is None
+    assert call("simulate", "walk_flat", "-o", tmp_path / "plain", *QUICK)[0] == 0
+    assert (tmp_path / "one" / "kinematic" / "results.csv").read_bytes() == (tmp_path / "plain" / "results.csv").read_bytes()
+    assert "95 %" not in metric_table(tmp_path / "one")
+
+
+def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("compare", "walk_flat", "-o", tmp_path, "--seeds", "2", *QUICK, "--set", "variation.height=2 mm", "--set", "seed=5")
+    assert code == 0
+    assert "95 % interval" in out
+    assert "2 of 2" in out
+    assert "2 seeds (5 to 6)" in out
+    assert load_scenario(tmp_path / "scenario.toml").variation == Variation(height=0.002)
 
 
 def test_compare_leaves_results_figures_report_and_the_scenario_as_run(compared: tuple[Path, dict[str, Any]]) -> None:
     folder, printed = compared
     assert {path.name for path in folder.iterdir()} == {
-        "kinematic", "compliant", "plots", "metrics.json", "report.html", "run.json", "scenario.toml",
+        "kinematic", "compliant", "plots", "metrics.json", "report.html", "run.json", "scenario.toml", "seeds.csv",
     }  # fmt: skip
     assert {path.name for path in (folder / "plots").iterdir()} == {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
     for control in ("kinematic", "compliant"):
         assert {path.name for path in (folder / control).iterdir()} == {"metrics.json", "results.csv", "run.json", "scenario.toml"}
-        assert json.loads((folder / control / "metrics.json").read_text()) == printed[control]
         assert load_scenario(folder / control / "scenario.toml").control == control
     assert json.loads((folder / "run.json").read_text())["status"] == "completed"
+    assert json.loads((folder / "metrics.json").read_text()) == {key: value for key, value in printed.items() if key != "report"}
 
 
 def test_the_report_needs_no_other_file(compared: tuple[Path, dict[str, Any]]) -> None:
@@ -55,16 +95,23 @@ def test_the_report_needs_no_other_file(compared: tuple[Path, dict[str, Any]]) -
     assert "http" not in page.replace("http-equiv", "")
     assert all(f"<code>{name}</code>" in page for name in METRICS)
     assert "sha256" in page
+    assert "95 % interval" in page
+    assert "2 seeds (0 to 1)" in page
+
+
+def metric_table(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8").partition("<h2>Metrics</h2>")[2].partition("</table>")[0]
 
 
 def test_report_makes_figures_and_page_again(compared: tuple[Path, dict[str, Any]], call: Call) -> None:
     folder, _ = compared
     before = {path.name: path.read_bytes() for path in (folder / "plots").glob("*.svg")}
+    rows = metric_table(folder)
     (folder / "report.html").unlink()
     code, out, _ = call("report", folder, "--json")
     assert code == 0
     assert json.loads(out)["report"] == str(folder / "report.html")
-    assert (folder / "report.html").is_file()
+    assert metric_table(folder) == rows
     assert {path.name: path.read_bytes() for path in (folder / "plots").glob("*.svg")} == before
 
 

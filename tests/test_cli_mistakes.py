@@ -28,6 +28,7 @@ from hexapod_cosim.cosim.cli import main
         (["simulate", "--gains", "missing.toml"], ["cannot read the gains", "missing.toml"]),
         (["simulate", "--fmu", "missing.fmu"], ["no such FMU", "missing.fmu", "hexapod export"]),
         (["compare", "walk_flt"], ["unknown scenario"]),
+        (["compare", "--seeds", "0"], ["--seeds: ", "got 0", "1 to"]),
         (["report", "."], ["not a results folder"]),
         (["validate", "missing.fmu"], ["no such FMU"]),
         (["export", "--robot", "atena"], ["unknown robot", "did you mean 'athena'"]),

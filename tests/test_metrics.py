@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from walks import CYCLES, DISTANCE, PARAMETERS, PERIOD, ROBOT, SPEED, WEIGHT, H, Walk
 
 from hexapod_cosim.cosim.files import to_json
-from hexapod_cosim.cosim.metrics import FLOORS, METRICS, View, commanded_path, compute_metrics, loading_rates
+from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS, View, commanded_path, compute_metrics, loading_rates
 from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.report import metric_rows
+from hexapod_cosim.cosim.report import number
 from hexapod_cosim.cosim.signals import foot_names, joint_names
 
 Array = NDArray[np.float64]
@@ -205,14 +205,7 @@ def test_the_commanded_path_turns_with_the_command() -> None:
     assert path[-1] == pytest.approx([0.5, 0.5])
 
 
-def test_a_change_below_the_floor_reads_same_and_dust_reads_nought() -> None:
-    def row(name: str, before: float, after: float) -> tuple[str, str, list[str]]:
-        rows = metric_rows({"kinematic": {name: before}, "compliant": {name: after}})
-        chosen = next(item for item in rows if item["name"] == name)
-        return chosen["change"], chosen["verdict"], chosen["values"]
-
+def test_every_metric_has_a_floor_and_what_is_dust_to_it_reads_nought() -> None:
     assert set(FLOORS) == set(METRICS)
-    assert row("yaw_drift", 5e-6, 8e-5)[:2] == ("", "same")
-    assert row("slip_net_per_metre", 6.7e-18, 0.0) == ("", "same", ["0", "0"])
-    assert row("slip_per_metre", 0.3, 0.1)[:2] == ("-66.7%", "better")
-    assert row("yaw_drift", 0.0, 0.1)[:2] == ("", "worse")
+    assert number(6.7e-18, dust=DUST * FLOORS["slip_net_per_metre"]) == "0"
+    assert number(-6.7e-18, dust=0.0) == "-6.7e-18"

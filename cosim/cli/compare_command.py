@@ -1,0 +1,121 @@
+"""`hexapod compare`: one walk under both controls, over several seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.batch import Summary, run_batch, summarise
+from hexapod_cosim.cosim.cli.running import (
+    FmuFile,
+    FolderName,
+    GainsFile,
+    Name,
+    Settings,
+    command_line,
+    default_folder,
+    drawing,
+    given_gains,
+    run_into,
+    show_rows,
+)
+from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, warn
+from hexapod_cosim.cosim.comparison import SEEDS, SEEDS_PARTIAL, Comparison, compare_runs, write_seeds
+from hexapod_cosim.cosim.files import RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.interrupts import held_interrupts
+from hexapod_cosim.cosim.master import COMPLETED
+from hexapod_cosim.cosim.report import REPORT, about, comparison_rows, write_report
+from hexapod_cosim.cosim.results import METRICS_FILE, SCENARIO, Folder, Stored, results_folder, stored
+from hexapod_cosim.cosim.run import Result, chosen_gains
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.scenario_records import CONTROLS, Scenario
+from hexapod_cosim.cosim.toml_text import to_toml
+from hexapod_cosim.cosim.variation import STANDARD
+from hexapod_cosim.models import ScenarioError
+
+MAX_SEEDS = 10_000
+Seeds = Annotated[
+    int, typer.Option("--seeds", metavar="N", help="Runs of each control, which small variations tell apart; 1: the plain walk alone.")
+]
+
+
+def compare(
+    scenario: Name = "walk_flat", seeds: Seeds = 10, settings: Settings = None, output: FolderName = None,
+    fmu: FmuFile = None, gains: GainsFile = None, json: Json = False,
+) -> None:  # fmt: skip
+    """Run a walk under kinematic and under compliant control; report."""
+    plan = _plan(scenario, settings or [], seeds)
+    ready = chosen_gains(replace(plan, control="compliant"), given_gains(gains))
+    command = command_line("compare", scenario, seeds=seeds, settings=settings, fmu=fmu, gains=gains)
+    with results_folder(output or default_folder(scenario)) as folder:
+        results, files = _first_seed(plan, folder, command, fmu=fmu, gains=ready)
+        comparison = _all_seeds(plan, results, seeds, folder.path, fmu=fmu, gains=ready)
+        with drawing(folder.path):
+            runs = {control: stored(result) for control, result in results.items()}
+            files += _finish(plan, runs, comparison, folder.path, command)
+    if json:
+        show_json({**comparison.as_table(), "report": str(folder.path / REPORT)})
+        return
+    show_rows(comparison_rows(comparison), CONTROLS)
+    show_files(files)
+    print("\n".join(filter(None, (about(comparison), f"report: {folder.path / REPORT}"))))
+
+
+def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
+    """The scenario; what runs of several seeds differ by is the standard, where it does not say."""
+    if not 1 <= seeds <= MAX_SEEDS:
+        raise ScenarioError("not a number of runs", got=seeds, expected=f"1 to {MAX_SEEDS}", fix="write --seeds 10", where="--seeds")
+    plan = load_scenario(scenario, overrides=settings)
+    return replace(plan, variation=STANDARD) if seeds > 1 and plan.variation is None else plan
+
+
+def _first_seed(
+    plan: Scenario, folder: Folder, command: str, *, fmu: Path | None, gains: Gains | None
+) -> tuple[dict[str, Result], list[Path]]:
+    """The runs whose recordings are kept."""
+    results: dict[str, Result] = {}
+    files: list[Path] = []
+    for control in CONTROLS:
+        with results_folder(folder.path / control) as part:
+            results[control], written = run_into(replace(plan, control=control), [folder, part], command, fmu=fmu, gains=gains)
+        files += written
+    return results, files
+
+
+def _all_seeds(
+    plan: Scenario, results: Mapping[str, Result], seeds: int, folder: Path, *, fmu: Path | None, gains: Gains | None
+) -> Comparison:
+    """Runs the other seeds too; an interrupt keeps what came to its end, under another name."""
+    scenarios = [replace(plan, control=control, seed=seed) for seed in range(plan.seed + 1, plan.seed + seeds) for control in CONTROLS]
+    done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
+    try:
+        with counting_bar("seeds", 2 * seeds) as tell, closing(run_batch(scenarios, fmu=fmu, gains=gains)) as runs:
+            tell(len(done))
+            for run in runs:
+                done.append(run)
+                tell(len(done))
+    except BaseException:
+        with held_interrupts():
+            write_seeds(folder / SEEDS_PARTIAL, done)
+            warn(f"the runs that came to their end are in {folder / SEEDS_PARTIAL}")
+        raise
+    write_seeds(folder / SEEDS, done)
+    comparison = compare_runs(*([run for run in done if run.control == control] for control in CONTROLS))
+    for text in comparison.losses:
+        warn(text)
+    return comparison
+
+
+def _finish(plan: Scenario, runs: Mapping[str, Stored], comparison: Comparison, folder: Path, command: str) -> list[Path]:
+    text = to_toml({key: value for key, value in plan.to_table().items() if key != "control"})  # both were run
+    write_text(folder / SCENARIO, text)
+    write_json(folder / METRICS_FILE, comparison.as_table())
+    write_json(folder / RUN_FILE, {"kind": "compare", "status": COMPLETED, "title": plan.title, "command": command})
+    files = write_report(runs, folder, tell=warn, comparison=comparison, scenario=text, command=command)
+    return [folder / SEEDS, folder / SCENARIO, folder / METRICS_FILE, folder / RUN_FILE, *files]

@@ -1,0 +1,107 @@
+"""What `hexapod simulate` and `compare` share: their options, a run into a folder, tables of metrics."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from hexapod_cosim.controller import Gains, load_gains
+from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, warn
+from hexapod_cosim.cosim.interrupts import held_interrupts
+from hexapod_cosim.cosim.master import INTERRUPTED
+from hexapod_cosim.cosim.results import Folder, write_result
+from hexapod_cosim.cosim.run import Result
+from hexapod_cosim.cosim.run import simulate as run_scenario
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.models import HexapodError
+
+Name = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or a name of `hexapod list scenarios`.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scenario (gait.period=0.8) or an FMU parameter.")
+]
+FolderName = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/SCENARIO.")]
+FmuFile = Annotated[Path | None, typer.Option("--fmu", metavar="FILE", help="Use this FMU instead of exporting the robot's own.")]
+GainsFile = Annotated[
+    Path | None, typer.Option("--gains", metavar="FILE", help="Gains from `hexapod design` instead of designing them now.")
+]
+
+
+class RunError(HexapodError):
+    """A run that started and did not complete."""
+
+
+def command_line(
+    name: str, scenario: str, *, settings: list[str] | None, fmu: Path | None, gains: Path | None, **more: str | int | None
+) -> str:
+    """The command that does the same again."""
+    options = [("--set", text) for text in settings or []]
+    given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
+    options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
+    return shlex.join(["hexapod", name, scenario, *(word for option in options for word in option)])
+
+
+def run_into(
+    plan: Scenario, folders: Sequence[Folder], command: str, *, fmu: Path | None, gains: Gains | None
+) -> tuple[Result, list[Path]]:
+    """Runs, and writes into the last folder, clearing all of them once the run begins; an interrupt waits for what is being written.
+
+    Raises RunError, or KeyboardInterrupt, with what was recorded on disk when the run does not complete.
+    """
+    with ExitStack() as whole:
+
+        def begin() -> None:
+            whole.enter_context(held_interrupts())
+            for folder in folders:
+                folder.begin()
+
+        with progress_bar(plan.control, plan.duration) as progress:
+            result = run_scenario(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
+        result = replace(result, facts={**result.facts, "command": command})
+        files = write_result(result, folders[-1].path)
+    for warning in result.facts["warnings"]:
+        warn(f"{plan.control}: {warning}")
+    outcome = result.outcome
+    if outcome.status == INTERRUPTED:
+        warn(f"stopped at {outcome.simulated:.3f} s; recorded so far: {files[1]}")
+        raise KeyboardInterrupt
+    if not result.completed:
+        what = f"the run ended at {outcome.simulated:.3f} s of {plan.duration:g} s: {outcome.reason}"
+        raise RunError(what, fix=f"what was recorded until then is in {files[1]}") from outcome.cause
+    return result, files
+
+
+@contextmanager
+def drawing(folder: Path) -> Iterator[None]:
+    """Says on an interrupt what is there and what is not."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        warn(f"the results in {folder} are whole, the figures are not: `hexapod report {folder}` draws them")
+        raise
+
+
+def given_gains(path: Path | None) -> Gains | None:
+    """Those of a file, if any. Raises GainsError."""
+    return None if path is None else load_gains(path)
+
+
+def default_folder(scenario: str) -> Path:
+    """Where results go without -o."""
+    return Path("out") / Path(scenario).stem
+
+
+def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> None:
+    """Prints a report's rows; columns in which nothing stands are left out."""
+    columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
+    columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
+    columns |= {"change": [row["change"] for row in rows], "95 % interval": [row["interval"] for row in rows]}
+    columns |= {"": [row["verdict"] for row in rows]}
+    shown = {name: texts for name, texts in columns.items() if any(texts)}
+    right = [k for k, name in enumerate(shown) if name not in {"metric", "unit", ""}]
+    show_table(list(shown), zip(*shown.values(), strict=True), right=right)

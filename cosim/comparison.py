@@ -1,0 +1,195 @@
+"""Runs against runs, seed by seed: means, changes, and how sure they are; seeds.csv, where all runs of a comparison stand.
+
+The change of a metric is paired: with d the difference of a pair, the interval of its mean is mean(d) +- t(0.975, n - 1) sd(d)/sqrt(n),
+Student's, and both are told relative to the first runs' mean, as if that were exact.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from hexapod_cosim.cosim.batch import Summary
+from hexapod_cosim.cosim.files import atomic_text
+from hexapod_cosim.cosim.metrics import FLOORS, METRICS
+from hexapod_cosim.models import HexapodError
+
+SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
+CONFIDENCE = 0.95
+BETTER, WORSE, SAME = "better", "worse", "same"
+LEAST_CHANGE = 0.005  # of a single pair, which has no interval: less is neither better nor worse
+FACTS = tuple(item.name for item in fields(Summary) if item.name != "metrics")
+BETWEEN = " | "  # warnings of a run in one cell
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """Of one metric, from the first runs to the second; values in the metric's unit."""
+
+    before: float  # mean
+    after: float
+    half_width: float  # of the difference's interval; NaN for a single pair
+    pairs: int  # that have the metric
+    floor: float  # less means nothing
+    verdict: str  # BETTER, WORSE, SAME, or "" where neither side is better
+
+    @property
+    def difference(self) -> float:
+        return self.after - self.before
+
+    @property
+    def scale(self) -> float:
+        """What relative figures are relative to; NaN where that is too small to be."""
+        return abs(self.before) if abs(self.before) > self.floor else math.nan
+
+    @property
+    def relative(self) -> float:
+        return self.difference / self.scale
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Relative."""
+        return (self.difference - self.half_width) / self.scale, (self.difference + self.half_width) / self.scale
+
+    def as_table(self) -> dict[str, Any]:
+        """For JSON: relative figures, then those in the metric's unit."""
+        low, high = self.interval
+        return {
+            "relative": self.relative, "low": low, "high": high, "difference": self.difference, "half_width": self.half_width,
+            "pairs": self.pairs, "verdict": self.verdict,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Pairs of runs of the same seed and what lies between them.
+
+    Figures are of the pairs in which both walked to the end; where there is none, of all pairs that have figures.
+    """
+
+    first: tuple[Summary, ...]
+    second: tuple[Summary, ...]
+    changes: Mapping[str, Change]  # by metric
+
+    @property
+    def labels(self) -> tuple[str, str]:
+        return self.first[0].control, self.second[0].control
+
+    @property
+    def seeds(self) -> list[int]:
+        return [run.seed for run in self.first]
+
+    @property
+    def walked(self) -> dict[str, int]:
+        """Number of runs that came to their end with the robot on its feet, by control."""
+        return {label: sum(run.walked for run in runs) for label, runs in zip(self.labels, (self.first, self.second), strict=True)}
+
+    @property
+    def means(self) -> dict[str, dict[str, float]]:
+        """By control, then metric."""
+        first, second = self.labels
+        changes = self.changes.items()
+        return {first: {name: item.before for name, item in changes}, second: {name: item.after for name, item in changes}}
+
+    @property
+    def losses(self) -> list[str]:
+        """In words, the runs whose figures are missing or those of a fall."""
+        return [
+            f"{run.control}, seed {run.seed}: {run.reason or '; '.join(run.warnings) or 'the robot fell'}"
+            for run in (*self.first, *self.second)
+            if not run.walked
+        ]
+
+    def as_table(self) -> dict[str, Any]:
+        """For JSON: means by control, changes, number of seeds, and how many walked to the end."""
+        changes = {name: item.as_table() for name, item in self.changes.items()}
+        return {**self.means, "change": changes, "seeds": len(self.first), "walked": self.walked}
+
+
+def compare_runs(first: Sequence[Summary], second: Sequence[Summary]) -> Comparison:
+    """Compares runs pair by pair. Raises HexapodError when they are not of the same seeds."""
+    if [run.seed for run in first] != [run.seed for run in second] or not first:
+        got = f"seeds {[run.seed for run in first]} and {[run.seed for run in second]}"
+        raise HexapodError("runs that cannot be compared", got=got, expected="the same seeds in the same order", fix="run both again")
+    pairs = list(zip(first, second, strict=True))
+    judged = [pair for pair in pairs if pair[0].walked and pair[1].walked] or pairs
+    changes = {name: change_of(name, [(a.metrics[name], b.metrics[name]) for a, b in judged]) for name in METRICS}
+    return Comparison(tuple(first), tuple(second), changes)
+
+
+def change_of(name: str, pairs: Sequence[tuple[float, float]]) -> Change:
+    """The change of a metric over pairs of its values, of which those without both are left out."""
+    values = np.array([pair for pair in pairs if all(map(math.isfinite, pair))]).reshape(-1, 2)
+    n = len(values)
+    before, after = values.mean(axis=0).tolist() if n else (math.nan, math.nan)
+    half_width = half_width_of(values[:, 1] - values[:, 0])
+    verdict = _verdict(name, before, after, half_width) if n else ""
+    return Change(before=before, after=after, half_width=half_width, pairs=n, floor=FLOORS[name], verdict=verdict)
+
+
+def half_width_of(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    """Half the width of the interval in which the mean of what these are drawn from lies with CONFIDENCE; NaN for fewer than two."""
+    n = len(values)
+    if n < 2:
+        return math.nan
+    return float(stdtrit(n - 1, 0.5 + 0.5 * CONFIDENCE) * np.std(values, ddof=1) / math.sqrt(n))
+
+
+def _verdict(name: str, before: float, after: float, half_width: float) -> str:
+    less_is_better, difference = METRICS[name][1], after - before
+    if less_is_better is None:
+        return ""
+    unsure = LEAST_CHANGE * abs(before) if math.isnan(half_width) else half_width
+    if abs(difference) < FLOORS[name] or abs(difference) <= unsure:
+        return SAME
+    return BETTER if (difference < 0.0) == less_is_better else WORSE
+
+
+def write_seeds(path: Path, runs: Sequence[Summary]) -> None:
+    """One line per run: how it ended, and all its metrics; whole or not at all."""
+    with atomic_text(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*FACTS, *METRICS])
+        for run in runs:
+            writer.writerow([*(_cell(getattr(run, name)) for name in FACTS), *(_cell(run.metrics[name]) for name in METRICS)])
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return BETWEEN.join(value)
+    return "" if isinstance(value, float) and math.isnan(value) else value
+
+
+def read_seeds(path: Path) -> dict[str, list[Summary]]:
+    """The runs of seeds.csv, by control. Raises HexapodError when it is missing or damaged."""
+    fix = "run `hexapod compare` again"
+    runs: dict[str, list[Summary]] = {}
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                runs.setdefault(row["control"], []).append(_summary(row))
+    except OSError as error:
+        raise HexapodError("no runs by seed", got=error.strerror, expected=f"{SEEDS} of a comparison", fix=fix, where=str(path)) from error
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        expected = "a line per run, with all metrics"
+        raise HexapodError("damaged file", got=f"{type(error).__name__}: {error}", expected=expected, fix=fix, where=str(path)) from error
+    return runs
+
+
+def _summary(row: Mapping[str, str]) -> Summary:
+    return Summary(
+        control=row["control"], seed=int(row["seed"]), status=row["status"], reason=row["reason"], upright=row["upright"] == str(True),
+        fallback=_number(row["fallback"]) if row["fallback"] else None, warnings=tuple(filter(None, row["warnings"].split(BETWEEN))),
+        metrics={name: _number(row[name]) for name in METRICS},
+    )  # fmt: skip
+
+
+def _number(text: str) -> float:
+    return float(text) if text else math.nan

@@ -1,0 +1,175 @@
+"""Runs against runs: the statistics against scipy's, verdicts, runs that fell, and the file in which all of them stand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
+from hexapod_cosim.cosim.comparison import BETTER, SAME, WORSE, Change, change_of, compare_runs, read_seeds, write_seeds
+from hexapod_cosim.cosim.master import COMPLETED, FAILED
+from hexapod_cosim.cosim.metrics import FLOORS, METRICS
+from hexapod_cosim.cosim.report import about, comparison_rows
+from hexapod_cosim.models import HexapodError
+
+ROUNDING = 1e-12
+
+
+def pairs(n: int, *, change: float, noise: float, seed: int = 0) -> list[tuple[float, float]]:
+    """Values around 1 that differ by `change` and noise within a pair, and by much more from pair to pair."""
+    generator = np.random.default_rng(seed)
+    before = 1.0 + 0.3 * generator.standard_normal(n)
+    return list(zip(before.tolist(), (before + change + noise * generator.standard_normal(n)).tolist(), strict=True))
+
+
+def runs(control: str, values: Sequence[float], name: str = "slip_per_metre") -> list[Summary]:
+    """A completed walk per value of one metric; the rest of them 1."""
+    plain = dict.fromkeys(METRICS, 1.0)
+    return [
+        Summary(control=control, seed=seed, status=COMPLETED, upright=True, metrics=plain | {name: value})
+        for seed, value in enumerate(values)
+    ]
+
+
+@pytest.mark.parametrize("n", [2, 3, 10, 40])
+def test_the_interval_is_students_for_pairs(n: int) -> None:
+    values = pairs(n, change=-0.2, noise=0.05)
+    before, after = zip(*values, strict=True)
+    expected = stats.ttest_rel(after, before).confidence_interval(0.95)
+    change = change_of("slip_per_metre", values)
+    assert change.difference == pytest.approx(np.mean(after) - np.mean(before), rel=ROUNDING)
+    assert change.interval == pytest.approx((expected.low / np.mean(before), expected.high / np.mean(before)), rel=1e-9)
+    assert change.relative == pytest.approx(np.mean(after) / np.mean(before) - 1.0, rel=1e-9)
+
+
+def test_the_interval_holds_the_true_change_in_95_of_100_cases() -> None:
+    cases = [change_of("slip_per_metre", pairs(10, change=-0.2, noise=0.1, seed=seed)) for seed in range(1000)]
+    held = np.mean([abs(case.difference + 0.2) <= case.half_width for case in cases])
+    assert held == pytest.approx(0.95, abs=0.02)  # of 1000 cases: three standard errors
+
+
+def test_what_all_pairs_share_does_not_widen_the_interval() -> None:
+    values = pairs(10, change=-0.2, noise=0.0)
+    assert np.std([before for before, _ in values]) > 0.1
+    assert change_of("slip_per_metre", values).half_width < ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "verdict"),
+    [
+        ("slip_per_metre", [(1.0, 0.5), (1.1, 0.6), (0.9, 0.41)], BETTER),
+        ("slip_per_metre", [(0.5, 1.0), (0.6, 1.1), (0.41, 0.9)], WORSE),
+        ("stability_margin", [(1.0, 0.5), (1.1, 0.6), (0.9, 0.41)], WORSE),
+        ("realtime_factor", [(1.0, 0.5), (1.1, 0.6), (0.9, 0.41)], ""),
+        ("slip_per_metre", [(1.0, 0.5), (1.0, 1.4), (1.0, 0.9)], SAME),  # the interval holds zero
+        ("yaw_drift", [(5e-6, 8e-5), (5e-6, 8.1e-5)], SAME),  # sure, but no one could measure it
+        ("slip_per_metre", [(0.3, 0.1)], BETTER),
+        ("slip_per_metre", [(0.3, 0.299)], SAME),
+        ("yaw_drift", [(0.0, 0.1)], WORSE),
+        ("slip_net_per_metre", [(6.7e-18, 0.0)], SAME),
+        ("slip_per_metre", [], ""),
+        ("slip_per_metre", [(math.nan, 1.0)], ""),
+    ],
+)
+def test_a_verdict_needs_a_change_that_is_sure_and_can_be_measured(name: str, values: list[tuple[float, float]], verdict: str) -> None:
+    assert change_of(name, values).verdict == verdict
+
+
+def test_a_change_from_next_to_nothing_has_no_percentage() -> None:
+    change = change_of("yaw_drift", [(0.1 * FLOORS["yaw_drift"], 0.1)])
+    assert math.isnan(change.relative)
+    assert change.difference == pytest.approx(0.1 - 0.1 * FLOORS["yaw_drift"])
+
+
+def test_a_metric_that_a_pair_lacks_is_judged_on_the_others() -> None:
+    change = change_of("path_error", [(1.0, 0.5), (math.nan, 0.5), (1.0, 0.7)])
+    assert change.pairs == 2
+    assert change.after == pytest.approx(0.6)
+
+
+def row_of(rows: list[dict[str, object]], name: str) -> dict[str, object]:
+    return next(row for row in rows if row["name"] == name)
+
+
+def test_a_fall_is_counted_and_told_and_its_figures_left_out() -> None:
+    first, second = runs("kinematic", [1.0, 1.0, 1.0]), runs("compliant", [0.5, 0.6, 90.0])
+    second[2] = replace(second[2], upright=False, warnings=("the robot fell at 3 s",))
+    comparison = compare_runs(first, second)
+    assert comparison.changes["slip_per_metre"].after == pytest.approx(0.55)
+    assert comparison.walked == {"kinematic": 3, "compliant": 2}
+    assert comparison.losses == ["compliant, seed 2: the robot fell at 3 s"]
+    walked = comparison_rows(comparison)[0]
+    assert (walked["values"], walked["verdict"]) == (["3 of 3", "2 of 3"], WORSE)
+    assert "of the 2 in which both walked to the end" in about(comparison)
+
+
+@pytest.mark.parametrize("status", [FAILED, REFUSED])
+def test_a_run_without_figures_is_counted_and_told(status: str) -> None:
+    first, second = runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.6])
+    first[0] = Summary(control="kinematic", seed=0, status=status, reason="the step is too long", metrics=NO_FIGURES)
+    comparison = compare_runs(first, second)
+    assert comparison.means["compliant"]["slip_per_metre"] == 0.6
+    assert comparison.losses == ["kinematic, seed 0: the step is too long"]
+    assert comparison.as_table()["walked"] == {"kinematic": 1, "compliant": 2}
+
+
+def test_where_no_pair_walked_the_figures_are_of_all_that_have_any() -> None:
+    first, second = runs("kinematic", [1.0]), [replace(run, upright=False) for run in runs("compliant", [0.5])]
+    comparison = compare_runs(first, second)
+    assert comparison.changes["slip_per_metre"].relative == pytest.approx(-0.5)
+    assert comparison.losses
+
+
+def test_a_single_seed_has_changes_and_no_intervals() -> None:
+    rows = comparison_rows(compare_runs(runs("kinematic", [0.3]), runs("compliant", [0.1])))
+    assert [row["name"] for row in rows] == list(METRICS)
+    slip = row_of(rows, "slip_per_metre")
+    assert (slip["change"], slip["interval"], slip["verdict"]) == ("-66.7%", "", BETTER)
+    assert row_of(rows, "yaw_drift")["change"] == ""
+
+
+def test_several_seeds_show_the_interval() -> None:
+    rows = comparison_rows(compare_runs(runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.5])))
+    slip = row_of(rows, "slip_per_metre")
+    assert (slip["change"], slip["interval"]) == ("-50.0%", "-50.0% .. -50.0%")
+
+
+def test_runs_of_other_seeds_are_not_compared() -> None:
+    with pytest.raises(HexapodError, match=r"seeds \[0, 1\] and \[0\]"):
+        compare_runs(runs("kinematic", [1.0, 1.0]), runs("compliant", [1.0]))
+    with pytest.raises(HexapodError, match="cannot be compared"):
+        compare_runs([], [])
+
+
+def test_the_file_of_all_runs_reads_back_bit_for_bit(tmp_path: Path) -> None:
+    told = runs("kinematic", [1.0 / 3.0, math.nan])
+    told[1] = replace(told[1], warnings=("a, b", 'c "d"'), upright=False, fallback=0.1)
+    told += [Summary(control="compliant", seed=0, status=FAILED, reason="the FMU discards\nthe step", metrics=NO_FIGURES)]
+    write_seeds(tmp_path / "seeds.csv", told)
+    again = read_seeds(tmp_path / "seeds.csv")
+    assert list(again) == ["kinematic", "compliant"]
+    for before, after in zip(told, [*again["kinematic"], *again["compliant"]], strict=True):
+        np.testing.assert_array_equal(list(before.metrics.values()), list(after.metrics.values()))
+        assert replace(before, metrics={}) == replace(after, metrics={})
+
+
+@pytest.mark.parametrize("text", ["control,seed\nkinematic,0\n", "control,seed,status\nkinematic,x,completed\n"])
+def test_a_damaged_file_of_runs_is_refused_by_name(tmp_path: Path, text: str) -> None:
+    (tmp_path / "seeds.csv").write_text(text)
+    with pytest.raises(HexapodError, match=r"seeds.csv: damaged file.*hexapod compare"):
+        read_seeds(tmp_path / "seeds.csv")
+    with pytest.raises(HexapodError, match=r"missing.csv: no runs by seed"):
+        read_seeds(tmp_path / "missing.csv")
+
+
+def test_a_table_for_machines_has_relative_and_plain_figures() -> None:
+    change = Change(before=2.0, after=1.0, half_width=0.2, pairs=3, floor=0.1, verdict=BETTER)
+    told = change.as_table()
+    assert (told["relative"], told["difference"], told["half_width"]) == (-0.5, -1.0, 0.2)
+    assert (told["low"], told["high"]) == (pytest.approx(-0.6), pytest.approx(-0.4))
