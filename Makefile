@@ -9,7 +9,7 @@ TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp)
 
-.PHONY: help setup demo test check bench bench-quick format generate fmu typing clean
+.PHONY: help setup demo test check bench bench-quick control format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -17,6 +17,7 @@ help:
 	@echo "make test      every test"
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
+	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (10 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  plant_fmu/generated/ from plant_fmu/interface.toml"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
@@ -43,7 +44,7 @@ check: setup typing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py
+	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 
@@ -52,6 +53,9 @@ bench: setup
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick
+
+control: setup
+	$(BIN)/python -m benchmarks.control
 
 format: setup
 	$(BIN)/ruff check --fix-only --quiet .

@@ -1,0 +1,103 @@
+"""The cases of scenarios.toml as settings over a scenario: one factor at a time around the judged walk, and the plane of gait and speed."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.controller import Parts
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.variation import STANDARD
+from hexapod_cosim.models import load_robot
+
+DATA: dict[str, Any] = tomllib.loads((Path(__file__).parent / "scenarios.toml").read_text(encoding="utf-8"))
+PARTS = tuple(item.name for item in fields(Parts))
+SWITCH = "compliance."  # what begins so says nothing to kinematic control
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A walk to be walked under both controls: what is set over the scenario (as with --set), and under which name it is shown."""
+
+    name: str
+    scenario: str
+    settings: tuple[str, ...]
+
+    def plan(self, control: str, seed: int) -> Scenario:
+        """The scenario of a seed. Raises ScenarioError for a setting that this version does not know."""
+        kept = [text for text in self.settings if control == "compliant" or not text.startswith(SWITCH)]
+        scenario = load_scenario(self.scenario, overrides=[*kept, f"control={control}", f"seed={seed}", "outputs.plots=false"])
+        return replace(scenario, variation=STANDARD)
+
+
+def seeds(name: str) -> range:
+    """Of a set of cases, or of the robustness table, which has the judged walk's first ones."""
+    table = DATA[name]
+    first = table.get("first_seed", DATA["judged"]["first_seed"])
+    return range(first, first + table["seeds"])
+
+
+def judged_walk(name: str = "judged", *settings: str) -> Case:
+    """The walk that everything is judged on first."""
+    return Case(name=name, scenario=DATA["judged"]["scenario"], settings=settings)
+
+
+def ablation() -> list[Case]:
+    """No part, each part alone, all but each part, all parts."""
+    off = {part: f"{SWITCH}{part}=false" for part in PARTS}
+    alone = [judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part)) for part in PARTS]
+    without = [judged_walk(f"all but {part}", text) for part, text in off.items()]
+    return [judged_walk("no part", *off.values()), *alone, *without, judged_walk("all parts")]
+
+
+def sticking() -> list[Case]:
+    """The judged walk on ground that holds a foot still, with all parts and with the tangential PID alone."""
+    law = DATA["judged"]["sticking"]
+    alone = next(case for case in ablation() if case.name == "slip_pid alone")
+    return [judged_walk("all parts", *law), judged_walk(alone.name, *law, *alone.settings)]
+
+
+def robustness() -> list[Case]:
+    """The judged walk with something wrong."""
+    return [judged_walk(entry["name"], *entry["settings"]) for entry in DATA["robustness"]["cases"]]
+
+
+def grid(robot: str) -> list[Case]:
+    """Of the judged set: every gait at every speed, then friction and payload around the judged walk."""
+    table, own = DATA["judged"], load_robot(robot)
+    frictions = [_walk(table, f"mu {mu:g}", robot, [f"friction.mu={mu}"]) for mu in table["mu"] if mu != own.friction.mu]
+    payloads = [_walk(table, f"payload {load:g} kg", robot, _payload(robot, load)) for load in table["payload"] if load]
+    return [*_plane(table, robot, []), *frictions, *payloads]
+
+
+def tuning(robot: str) -> list[Case]:
+    """Of the tuning set: the same, where every case differs from every judged one in speed, friction, payload and timing at once."""
+    table = DATA["tuning"]
+    (mu, *frictions), (load, *payloads) = table["mu"], table["payload"]
+    gait, speed = next(iter(table["gaits"])), f"command.vx={table['vx'][0]}"
+    first = [f"gait.name={gait}", *table["gaits"][gait], speed, f"friction.mu={mu}", *_payload(robot, load)]
+    others = {f"mu {value:g}": [f"friction.mu={value}"] for value in frictions}
+    others |= {f"payload {value:g} kg": _payload(robot, value) for value in payloads}
+    others |= {f"period {value:g} s": [f"gait.period={value}"] for value in table["period"]}
+    plane = _plane(table, robot, [f"friction.mu={mu}", *_payload(robot, load)])
+    return [*plane, *(_walk(table, name, robot, [*first, *changes]) for name, changes in others.items())]
+
+
+def _plane(table: dict[str, Any], robot: str, rest: Sequence[str]) -> list[Case]:
+    return [
+        _walk(table, f"{gait}, {vx:g} m/s", robot, [f"gait.name={gait}", *timing, f"command.vx={vx}", *rest])
+        for gait, timing in table["gaits"].items()
+        for vx in table["vx"]
+    ]
+
+
+def _walk(table: dict[str, Any], name: str, robot: str, settings: Sequence[str]) -> Case:
+    return Case(name=name, scenario=table["scenario"], settings=(f"robot={robot}", *settings))
+
+
+def _payload(robot: str, load: float) -> list[str]:
+    return [f"torso.mass={load_robot(robot).torso.mass + load}"]

@@ -1,0 +1,68 @@
+"""Cases walked under both controls, over seeds, in one batch: what several cases have in common is walked once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+
+from benchmarks.control.cases import Case
+from hexapod_cosim.controller import make_gait
+from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary, run_batch
+from hexapod_cosim.cosim.comparison import Comparison, compare_runs
+from hexapod_cosim.cosim.scenario_records import CONTROLS, Scenario
+from hexapod_cosim.cosim.toml_text import to_toml
+from hexapod_cosim.models import ScenarioError, load_robot
+
+Tell = Callable[[int, int], None]  # runs done, of how many
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A table's cases."""
+
+    name: str
+    cases: Sequence[Case]
+    seeds: range
+
+
+Measured = Mapping[str, Mapping[str, Comparison]]  # by section, then case
+
+
+def measure(sections: Sequence[Section], *, cycles: float | None = None, workers: int | None = None, tell: Tell | None = None) -> Measured:
+    """Walks all cases of all sections. `cycles` of the gait replace the scenarios' own duration."""
+    places = [(section, case, control) for section in sections for case in section.cases for control in CONTROLS]
+    plans: dict[str, Scenario] = {}
+    wanted = [[_place(plans, case, control, seed, cycles) for seed in section.seeds] for section, case, control in places]
+    runs = dict(zip(plans, _walk(list(plans.values()), workers, tell), strict=True))
+    found: dict[str, dict[str, Comparison]] = {section.name: {} for section in sections}
+    walked = [[run if isinstance(run, Summary) else runs[run] for run in row] for row in wanted]
+    for (section, case, _), first, second in zip(places[::2], walked[::2], walked[1::2], strict=True):
+        found[section.name][case.name] = compare_runs(first, second)
+    return found
+
+
+def _place(plans: dict[str, Scenario], case: Case, control: str, seed: int, cycles: float | None) -> str | Summary:
+    """Where the run of a case will stand among the plans; a case that this version does not know is refused at once."""
+    try:
+        plan = case.plan(control, seed)
+    except ScenarioError as error:
+        return Summary(control=control, seed=seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES)
+    plan = plan if cycles is None else replace(plan, duration=plan.macro_step * round(cycles * _period(plan) / plan.macro_step))
+    key = to_toml(plan.to_table())
+    plans.setdefault(key, plan)
+    return key
+
+
+def _period(plan: Scenario) -> float:
+    return make_gait(load_robot(plan.robot), **dict(plan.settings.get("gait", {}))).period
+
+
+def _walk(plans: Sequence[Scenario], workers: int | None, tell: Tell | None) -> list[Summary]:
+    done: list[Summary] = []
+    with closing(run_batch(plans, workers=workers)) as runs:
+        for run in runs:
+            done.append(run)
+            if tell is not None:
+                tell(len(done), len(plans))
+    return done
