@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import zipfile
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_plant import SPEED, FakeController, FakePlant
 
-from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.fmu import Fmu, StepError
-from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, run
+from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, insides, run
+from hexapod_cosim.cosim.metrics import View
 from hexapod_cosim.cosim.recorder import Recorder, Recording, read_csv, write_csv
-from hexapod_cosim.cosim.run import Result, adopt_settings, make_sensor, simulate
+from hexapod_cosim.cosim.run import Result, adopt_settings, describe_walk, make_sensor, simulate
 from hexapod_cosim.cosim.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario_records import Push, Scenario
 from hexapod_cosim.cosim.schedule import make_schedule, push_rows
@@ -114,6 +115,36 @@ def test_any_error_of_a_controller_ends_the_run_and_keeps_its_rows() -> None:
     outcome = run_fake(FakePlant(), Broken(), scenario_of("duration=0.1"))
     assert (outcome.status, outcome.reason) == (FAILED, "ValueError: shapes differ")
     assert len(outcome.recording.time) == 3
+
+
+@dataclass(frozen=True)
+class Insides(Diagnostics):
+    """Of a controller that falls back."""
+
+    fallback: np.ndarray = field(default_factory=lambda: np.zeros(1, dtype=np.bool_))
+
+
+class Cautious(FakeController):
+    """Falls back to kinematic control in the last quarter of 0.1 s."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        six = np.zeros(6)
+        self.diagnostics = Insides(swinging=six > 0.0, shift=np.zeros(6, dtype=np.complex128), lift=six, unreachable=six > 0.0)
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        self.diagnostics.fallback[0] = t > 0.0749
+        return super().step(t, command, measurement)
+
+
+def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told() -> None:
+    scenario, controller = scenario_of("duration=0.1"), Cautious()
+    signals, schedule = Signals(FakePlant()), make_schedule(scenario)
+    recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
+    recording = run(FakePlant(), signals, controller, schedule, recorder, h=scenario.macro_step).recording
+    assert recording.column("controller.fallback").tolist() == [0.0] * 15 + [1.0] * 6
+    told = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
+    assert told["fallback"] == pytest.approx(6 / 21)
 
 
 def test_progress_reaches_the_whole_duration() -> None:

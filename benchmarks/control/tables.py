@@ -69,7 +69,11 @@ def _walked(comparison: Comparison) -> str:
 
 def _plain(comparison: Comparison) -> list[str]:
     changes = [(comparison.changes[name], scale) for name, (_, scale) in PLAIN.items()]
-    return [f"{scale * change.before:.3g} → {scale * change.after:.3g}" if change.pairs else "-" for change, scale in changes]
+    return [f"{_figure(scale * change.before)} → {_figure(scale * change.after)}" if change.pairs else "-" for change, scale in changes]
+
+
+def _figure(value: float) -> str:
+    return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def _fallback(comparison: Comparison) -> str:
