@@ -24,7 +24,8 @@ from hexapod_cosim.models import Robot
 if TYPE_CHECKING:
     from hexapod_cosim.controller.controller import JointCommand, Measurement
 
-REMEMBERED = ("_steered", "_steering", "_count", "_at", "_rotations", "_command", "_climb", "_planned")
+REMEMBERED = ("_steered", "_count", "_at", "_rotations", "_command", "_climb", "_planned")
+STEERING_TIME = 0.1  # s    in which a change of the added velocity is led over
 PACK = Struct("12d").pack_into  # numbers into an array: half the time of an assignment
 
 
@@ -36,7 +37,7 @@ class Compliant:
 
     def __init__(self, robot: Robot, gait: Gait, gains: Gains, parts: Parts, *, legs: LegSolver, period: float) -> None:
         weight = robot.total_mass * float(np.linalg.norm(robot.gravity))
-        self._parts, self._legs, self._per_second = parts, legs, 1.0 / period
+        self._parts, self._legs, self._per_second, self._leading = parts, legs, 1.0 / period, STEERING_TIME / period
         self._dynamics = InverseDynamics(robot, legs, period=period)
         self._support = Support(robot, gait, gains.support, rest=self._dynamics.rest())
         self.laws = Compliance(
@@ -58,7 +59,7 @@ class Compliant:
         self.hold.reset()
         for array in (self.shift, self.lift, self._raised, self._offset):
             array[...] = 0.0
-        self._steered, self._steering = (0j, 0.0), (np.zeros(1, dtype=np.complex128), np.zeros(1))
+        self._steered = np.zeros(2, dtype=np.complex128), np.zeros(2, dtype=np.complex128), 0
         self._count, self._at = 0, -1
 
     def save(self) -> dict[str, Any]:
@@ -73,11 +74,27 @@ class Compliant:
         self._offset[:] = state["offset"]
         vars(self).update(state["own"])
 
-    def steer(self, v: Plane, yaw_rate: Array, *, moves: bool) -> tuple[Plane, Array]:
-        """Commanded velocities of the coming steps and, while the robot is to move, what the lost way adds, led over without a jump."""
-        (v0, w0), hold, blend = self._steered, self.hold, np.linspace(0.0, 1.0, len(v))
-        self._steering = (v0 + blend * (hold.velocity - v0), w0 + blend * (hold.yaw_rate - w0)) if moves else (0.0 * v, 0.0 * yaw_rate)
-        return v + self._steering[0], yaw_rate + self._steering[1]
+    def steer(self, v: Plane, yaw_rate: Array, *, moves: bool, afresh: bool) -> tuple[Plane, Array]:
+        """Commanded velocities of the coming steps and what the lost way adds to them.
+
+        That is looked at `afresh` when a leg lifts off or touches down, and led over without a jump.
+        """
+        if afresh or not moves:
+            hold = self.hold
+            goal = np.array([hold.velocity, hold.yaw_rate]) if moves else np.zeros(2, dtype=np.complex128)
+            self._steered = self._steering(np.zeros(1))[0], goal, 0
+        added = self._steering(np.arange(len(v), dtype=np.float64))
+        return v + added[:, 0], yaw_rate + added[:, 1].real
+
+    def _steering(self, steps: Array) -> Plane:
+        """(n, 2) the additions to velocity and yaw rate so many steps ahead."""
+        begin, goal, past = self._steered
+        return np.asarray(begin + (goal - begin) * np.minimum((past + steps) / self._leading, 1.0)[:, None])
+
+    def advance(self, steps: int) -> None:
+        """So many of the steps planned last are past: the next are planned from there."""
+        begin, goal, past = self._steered
+        self._steered = begin, goal, past + steps
 
     def lower(self, feet: Feet, steps: Steps, *, walking: bool) -> Feet:
         """Planned feet, all rows, lowered by what the ground will give way under their loads."""
@@ -99,7 +116,7 @@ class Compliant:
         """
         rotation = None if level else rotations(value[:, 4], value[:, 5])
         demand = self._dynamics.demand(pose, speed, Frames(steps.way, cis(steps.turn), value[:, 3:4], rotation))
-        rows, last = slice(first, None), len(value) - 1
+        rows = slice(first, None)
         shares = self._support.shares(steps.plane, self._activation, demand).rows(rows)
         self.laws.plan(
             demand.rows(rows), shares, height=(steps.height - self._home)[rows], rise=steps.rise[rows], swinging=steps.swinging[-1]
@@ -107,7 +124,6 @@ class Compliant:
         self._climb = self._legs.speeds(pose.rows(rows), np.zeros(1), np.ones(1))
         self._rotations, self._command = None if rotation is None else rotation[rows], value[rows].tolist()
         self._planned = steps.plane[rows], self._heights[rows]
-        self._steered = complex(self._steering[0][last]), float(self._steering[1][last])
         self._at = -1
 
     def step(self, measurement: Measurement, out: JointCommand) -> None:

@@ -76,7 +76,9 @@ class SensorWatch:
             standing, high: which legs are planned to carry their whole share, and which to be well above the ground.
         """
         missing = total < self._weight
-        wrong = [(touches and up) or (missing and stands and not touches) for touches, stands, up in zip(touching, standing, high, strict=True)]
+        wrong = [
+            (touches and up) or (missing and stands and not touches) for touches, stands, up in zip(touching, standing, high, strict=True)
+        ]
         contradicted = [past + time if now else 0.0 for past, now in zip(self._contradicted, wrong, strict=True)]
         limits = [AIRBORNE_TIME if up else ABSENT_TIME for up in high]
         left = [

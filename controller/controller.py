@@ -25,6 +25,7 @@ from hexapod_cosim.controller.posture import in_torso_frame
 from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
 from hexapod_cosim.models import HexapodError, Robot
 
+ALL_PARTS = Parts()
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
 PLANNED = 128  # steps at most that are planned at once; nothing depends on it but the time it takes
 
@@ -81,7 +82,7 @@ class Controller:
     """
 
     def __init__(
-        self, robot: Robot, *, period: float, gait: Gait, gains: Gains | None = None, parts: Parts = Parts()
+        self, robot: Robot, *, period: float, gait: Gait, gains: Gains | None = None, parts: Parts = ALL_PARTS
     ) -> None:  # fmt: skip
         phases = (gait.duty * gait.period, (1.0 - gait.duty) * gait.period)
         if not 0.0 < period < min(phases):
@@ -114,7 +115,7 @@ class Controller:
         self.ramp.reset()
         self.paths.reset()
         self._start: float | None = None
-        self._count = 0
+        self._count, self._cut = 0, True
         if self.compliant is not None:
             self.compliant.reset()
         self._lay_out(0, *self.ramp.ahead(0))
@@ -122,7 +123,7 @@ class Controller:
     def save(self) -> dict[str, Any]:
         """Everything the controller remembers between steps, and what it has planned."""
         compliant = None if self.compliant is None else self.compliant.save()
-        own = {name: getattr(self, name) for name in ("_start", "_count", "_plan", "_at", "_last")}
+        own = {name: getattr(self, name) for name in ("_start", "_count", "_plan", "_at", "_last", "_cut")}
         return {"ramp": self.ramp.save(), "paths": self.paths.save(), "compliant": compliant, "own": own}
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -169,16 +170,21 @@ class Controller:
         self.ramp.steps += 1
 
     def _plan_ahead(self) -> None:
-        """Plans what depends on the command alone, up to the next lift-off or touch-down."""
-        ramp, target, paths = self.ramp, self.ramp.target, self.paths
+        """Plans what depends on the command alone, up to the next lift-off or touch-down, and looks one step further where there is one."""
+        ramp, target, paths, compliant = self.ramp, self.ramp.target, self.paths, self.compliant
         moves = (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
-        value, rate = ramp.ahead(PLANNED if ramp.settled or moves else min(ramp.remaining, PLANNED))
+        count = PLANNED + 1 if ramp.settled or moves else min(ramp.remaining, PLANNED + 1)
+        value, rate = ramp.ahead(count)
         v, yaw_rate = value[:, 0] + 1j * value[:, 1], value[:, 2]
-        if self.compliant is not None:
-            v, yaw_rate = self.compliant.steer(v, yaw_rate, moves=moves)
+        if compliant is not None:
+            compliant.advance(paths.at)
+            v, yaw_rate = compliant.steer(v, yaw_rate, moves=moves, afresh=self._cut and not paths.left)
         paths.plan(v, yaw_rate, going=moves or not ramp.settled)
         end = paths.left + 1
+        self._cut = end <= count
         self._lay_out(1, value[:end], rate[:end])
+        if end == PLANNED + 2:
+            self._last -= 1
 
     def _lay_out(self, first: int, value: Array, rate: Array) -> None:
         """Turns planned steps, rows of commands and their rates, into joint angles and speeds from the row `first` on."""

@@ -85,8 +85,8 @@ class InverseDynamics:
         total, weight, moment = (part.sum(axis=(0, 2)) for part in (push, lift, xy * lift - (z - self._floor) * push))
         torso_push, torso_lift, torso_moment = self._torso_demand(frames)
         return Demand(
-            torque=self._torques(pose, speed, points, *_torso(push, lift, frames)), lever=self._lever(pose, frames), push=total + torso_push,
-            weight=weight + torso_lift, moment=moment + torso_moment,
+            torque=self._torques(pose, speed, points, *_torso(push, lift, frames)), lever=self._lever(pose, frames),
+            push=total + torso_push, weight=weight + torso_lift, moment=moment + torso_moment,
         )  # fmt: skip
 
     def _points(self, pose: Pose) -> Plane:
@@ -106,11 +106,9 @@ class InverseDynamics:
         return mass * self._acceleration(place), mass * (self._acceleration(z) + self._gravity)
 
     def _acceleration(self, values: Any) -> Any:
-        """Second differences along the last but one axis; its ends take their neighbours', and fewer than three steps have none."""
+        """Second differences along the last but one axis, 0 at its ends: there feet lift off or touch down, which they do without any."""
         found = np.zeros_like(values)
-        if values.shape[-2] > 2:
-            found[..., 1:-1, :] = (values[..., 2:, :] - 2.0 * values[..., 1:-1, :] + values[..., :-2, :]) / self._period**2
-            found[..., 0, :], found[..., -1, :] = found[..., 1, :], found[..., -2, :]
+        found[..., 1:-1, :] = (values[..., 2:, :] - 2.0 * values[..., 1:-1, :] + values[..., :-2, :]) / self._period**2
         return found
 
     def _torso_demand(self, frames: Frames) -> tuple[Plane, Array, Plane]:

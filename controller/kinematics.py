@@ -136,7 +136,7 @@ class LegSolver:
         if not wrong.any():
             x, y, z = points.T[:, None]
             pose = self.pose(x + 1j * y, z)
-            angle = np.minimum(np.maximum(pose.angles[0], self.angle_min), self.angle_max)
+            angle: Array = np.minimum(np.maximum(pose.angles[0], self.angle_min), self.angle_max)
             wrong = pose.lost[0] | (np.abs(pose.angles[0] - angle) > FLAG_TOLERANCE).any(axis=1)
             if not wrong.any():
                 return angle
@@ -176,7 +176,7 @@ class LegSolver:
         )
         return Pose(point, heading, foot, femur, tibia, angles, (square < RADIUS_FLOOR) | (np.abs(wanted - cosine) > FLAG_TOLERANCE))
 
-    def speeds(self, pose: Pose, velocity: Plane, rise: Array) -> Array:
+    def speeds(self, pose: Pose, velocity: Plane | Array, rise: Array) -> Array:
         """(n, 6, 3) joint speeds [rad/s] of feet that move so, (n, 6) each or what broadcasts to it, torso frame [m/s]."""
         # velocity in the coxa frame v e^-i psi: dq_1 = v_y / rho; then u + i rise, u = v_x + Y dq_1, is left for the leg's plane
         v = velocity * pose.heading.conj()

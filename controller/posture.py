@@ -1,6 +1,6 @@
 """Height, roll and pitch of the torso over its feet: from the walking frame K to the torso frame T.
 
-    p_T = R_TK (p_K - height e_z)        v_T = R_TK (v_K - rate e_z) - w_T x p_T
+p_T = R_TK (p_K - height e_z)        v_T = R_TK (v_K - rate e_z) - w_T x p_T
 """
 
 from __future__ import annotations

@@ -27,6 +27,7 @@ class Touchdown:
 
     def __init__(self, *, period: float) -> None:
         self._period, self._fade = period, math.exp(-period / RETURN_TIME)
+        self.offset: list[float]
         self.reset()
 
     def reset(self) -> None:
@@ -49,16 +50,18 @@ class Touchdown:
             touching: feet that report a force; falling: how far each path, well above its end, comes down in this period [m];
             swinging, loaded: planned in the air, planned to carry their whole share.
         """
-        offsets, late = [], []
-        for offset, waited, touches, fall, swings, loads in zip(self.offset, self._late, touching, falling, swinging, loaded, strict=True):
-            reaches = loads and not touches and waited >= GRACE
-            late.append(waited + self._period if loads and not touches else 0.0)
-            if reaches:
-                offset = max(offset - REACH_SPEED * self._period, -REACH_LIMIT)
-            elif swings and touches and fall > 0.0:
-                offset = min(offset + fall, HOLD_LIMIT)
-            elif swings and not touches:
-                offset = offset * self._fade if abs(offset) > NEGLIGIBLE else 0.0
-            offsets.append(offset)
-        self.restore((offsets, late))
-        return offsets
+        misses = [loads and not touches for loads, touches in zip(loaded, touching, strict=True)]
+        late = [waited + self._period if missing else 0.0 for waited, missing in zip(self._late, misses, strict=True)]
+        legs = zip(self.offset, late, touching, falling, swinging, strict=True)
+        self.restore(([self._move(*leg) for leg in legs], late))
+        return self.offset
+
+    def _move(self, offset: float, late: float, touches: bool, fall: float, swings: bool) -> float:
+        """One foot's next offset."""
+        if late > GRACE:
+            return max(offset - REACH_SPEED * self._period, -REACH_LIMIT)
+        if swings and touches and fall > 0.0:
+            return min(offset + fall, HOLD_LIMIT)
+        if swings and not touches:
+            return offset * self._fade if abs(offset) > NEGLIGIBLE else 0.0
+        return offset

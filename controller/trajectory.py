@@ -138,6 +138,8 @@ class FootPaths:
         self.swing_time = gait.period * (1.0 - gait.duty)
         self._landing_lead = 0.5 * gait.period * gait.duty + self.swing_time  # s    from lift-off to the middle of the next stance
         self._offsets = np.array(gait.offsets) + gait.start_clock() - CLOCK_EPSILON
+        self.steps: Steps
+        self.at, self.walking, self._before = 0, False, 0
         self.reset()
 
     def reset(self) -> None:
@@ -188,7 +190,7 @@ class FootPaths:
         if not (self.walking or going):
             self._rest(steps.plane[at], len(v) - 1)
             return
-        phase = self._phases(np.arange(before, before + len(v)))
+        phase = self._phases(np.arange(before, before + len(v), dtype=np.float64))
         standing = phase < self.gait.duty
         feet, lifted = steps.plane[at], standing[0] & ~standing[1]
         swinging = steps.swinging[at] & ~standing[1]

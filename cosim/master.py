@@ -18,7 +18,6 @@ from hexapod_cosim.cosim.signals import Signals, vector_names
 from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
-FALLBACK = "controller.fallback"  # column: the controller has fallen back to kinematic control
 PROGRESS_STEPS = 20  # macro-steps between two calls of the progress function
 
 Progress = Callable[[float], None]  # simulated time since the start [s]
@@ -73,11 +72,9 @@ def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
     shown = getattr(controller, "diagnostics", None)
     if not isinstance(shown, Diagnostics):
         return {}
-    six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift")}
+    six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift", "fallback")}
     shift = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2))  # x + i y in memory is x, y
-    found = {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()} | {shift: shown.shift.view(float)}
-    fallback = getattr(shown, "fallback", None)
-    return found if fallback is None else found | {(FALLBACK,): fallback}
+    return {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()} | {shift: shown.shift.view(float)}
 
 
 def _loop(

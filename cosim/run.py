@@ -15,17 +15,18 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexapod_cosim.controller import Controller, Gains, make_gait
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.force_sensor import ForceSensor
 from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.master import COMPLETED, FALLBACK, Outcome, Progress, insides, run
+from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
 from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.reach import check_commands
-from hexapod_cosim.cosim.recorder import Recorder, chosen_columns
+from hexapod_cosim.cosim.recorder import Recorder, Recording, chosen_columns
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import Schedule, make_schedule
@@ -168,9 +169,15 @@ def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
     walk = cut_walk(view)
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
-    told = view.recording.column(FALLBACK) if FALLBACK in view.recording.names else np.zeros(0)
-    fallback = {"fallback": float(np.mean(told > 0.5))} if len(told) else {}
+    doubted = fallback_columns(view.recording)
+    fallback = {"fallback": float(np.mean(doubted.any(axis=1)))} if len(doubted) else {}
     return {"distance": distance, "mean_speed": distance / lasted, "upright": not fall(view, robot)} | fallback
+
+
+def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
+    """(rows, 6) when each leg walked by the plan alone, its foot's sensor not believed; no rows when the controller does not tell."""
+    names = [f"controller.{leg}.fallback" for leg in LEG_NAMES]
+    return recording.columns(names) > 0.5 if set(names) <= set(recording.names) else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
 
 
 def fall(view: View, robot: Robot) -> str:
@@ -212,6 +219,11 @@ def doubts(view: View, robot: Robot) -> list[str]:
     if len(recording.time) and set(unreachable) <= set(recording.names):
         share = float(np.mean(recording.columns(unreachable).max(axis=1)))
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
+    doubted = fallback_columns(recording)
+    for leg, share in zip(LEG_NAMES, doubted.mean(axis=0) if len(doubted) else [], strict=False):
+        found += (
+            [f"the force sensor of foot {leg} was not believed for {share:.0%} of the time: its leg walked by the plan"] if share else []
+        )
     if len(recording.time):
         torque = np.sqrt(np.mean(recording.columns(joint_names("torque")) ** 2, axis=0))
         worst, limit = int(np.argmax(torque)), robot.servo.torque_continuous
