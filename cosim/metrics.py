@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.signals import vector_names
 from hexapod_cosim.cosim.support import stability_margins
-from hexapod_cosim.models import TERRAINS
+from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models.contact import sliding_velocity
 
 Array = NDArray[np.float64]
 
@@ -26,11 +27,12 @@ LEAST_DISTANCE = 0.01  # m    less is standing, not walking
 SHOWN_CYCLES = 3  # in figures of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
 FLAT = TERRAINS.index("flat") + 1  # the FMU's number of it
+TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("tanh", "bristle"))  # the FMU's numbers of them
 
 # name -> unit, whether less is better (None: neither), meaning
 METRICS: dict[str, tuple[str, bool | None, str]] = {
     "slip_per_metre": ("m/m", True, "way slipped by all feet under load, per metre walked"),
-    "slip_net_per_metre": ("m/m", True, "the same, less the creep of the tanh friction law"),
+    "slip_net_per_metre": ("m/m", True, "the same, less the creep of the tanh friction law or what bristles give back"),
     "path_error": ("m/m", True, "distance from the end of the commanded path, per metre walked"),
     "yaw_drift": ("rad/m", True, "heading lost against the commanded one, per metre walked"),
     "height_rms": ("m", True, "torso height above the ground, about its mean"),
@@ -131,14 +133,21 @@ def _held_integral(time: Array, rate: Array) -> Array:
 
 
 def _slip(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
-    part, mu, slope = walk.recording, parameters["friction.mu"], parameters["friction.slope"]
-    normal, tangential, speed = part.feet("normal_force"), part.feet("tangential_force"), part.feet("slip_speed")
-    loaded = normal > CONTACT_SHARE * walk.weight
-    share = np.divide(tangential, mu * normal, out=np.zeros_like(normal), where=loaded & (mu > 0.0))
-    creep = np.arctanh(np.minimum(share, TANH_LIMIT)) / slope
-    net = np.maximum(speed - creep, 0.0)
-    slips = {"slip_per_metre": speed, "slip_net_per_metre": net}
+    part = walk.recording
+    loaded = part.feet("normal_force") > CONTACT_SHARE * walk.weight
+    slips = {"slip_per_metre": part.feet("slip_speed"), "slip_net_per_metre": _net_slip(part, parameters, loaded)}
     return {name: _integral(part.time, np.where(loaded, value, 0.0)) / walk.distance for name, value in slips.items()}
+
+
+def _net_slip(part: Recording, parameters: Mapping[str, float], loaded: NDArray[np.bool_]) -> Array:
+    """(rows, 6) slip speed less what the friction law makes of sticking: the tanh law's creep, a bristle's stretching and its return."""
+    mu, normal, speed = parameters["friction.mu"], part.feet("normal_force"), part.feet("slip_speed")
+    if parameters.get("friction.law", TANH) == BRISTLE:
+        sliding = sliding_velocity(parameters["friction.presliding"], part.foot_vectors("velocity"), part.foot_vectors("bristle"))
+        return np.asarray(np.linalg.norm(sliding, axis=-1))
+    share = np.divide(part.feet("tangential_force"), mu * normal, out=np.zeros_like(normal), where=loaded & (mu > 0.0))
+    creep = np.arctanh(np.minimum(share, TANH_LIMIT)) / parameters["friction.slope"]
+    return np.maximum(speed - creep, 0.0)
 
 
 def _integral(time: Array, values: Array) -> float:

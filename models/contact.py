@@ -1,4 +1,4 @@
-"""Foot on ground: normal force with restitution (eq. 4) and friction (eq. 5).
+"""Foot on ground: normal force with restitution (eq. 4) and friction (eq. 5; bristles: eq. 18, 19).
 
 f_n = K delta^1.5 max(0, 1 + d ddelta), with d [s/m] fixed at touch-down from the approach speed there and held to lift-off.
 Most laws are of the form d = chi(e) / v0; chi(e) is what tells them apart.
@@ -16,6 +16,7 @@ from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres
 from hexapod_cosim.models.records import Array, Contact, Friction, Robot
 from hexapod_cosim.models.terrain import ground
 
+BREAK_AWAY = 0.7  # of the presliding: below it a bristle is a spring
 SERIES_BELOW = 1e-2  # where the closed form of _log_rest has lost more digits than its series leaves out
 SERIES_TERMS = 9
 
@@ -73,10 +74,43 @@ def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) 
     return contact.stiffness * float(max(delta, 0.0) ** 1.5) * max(0.0, 1.0 + damping * ddelta)
 
 
-def friction_force(friction: Friction, normal: float, slip: Array) -> Array:
-    """(3,) f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t| [N], with its limit -mu f_n k_t v_t at rest."""
+def bristle_yield(share: Array) -> Array:
+    """alpha (any shape): how much of a bristle's stretching is sliding, from 0 at break-away to 1 at |z| = share z_max = z_max; C1."""
+    s = np.clip((share - BREAK_AWAY) / (1.0 - BREAK_AWAY), 0.0, 1.0)
+    return np.asarray(s * s * (3.0 - 2.0 * s))
+
+
+def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
+    """(..., 3) alpha |z|/z_max (v_t . z^)+ z^: what of the slip velocity (..., 3) [m/s] the foot does not get back (eq. 18)."""
+    u = bristle / presliding
+    share = np.linalg.norm(u, axis=-1, keepdims=True)
+    along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
+    return np.asarray(bristle_yield(share) * along / np.maximum(share, BREAK_AWAY) * u)
+
+
+def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
+    """(3,) dz/dt [m/s] of a closed foot's bristles (eq. 18)."""
+    return slip - sliding_velocity(friction.presliding, slip, bristle)
+
+
+def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
+    """(3,) f_t = -mu f_n (u + d (1 - |u|)/|(1 - |u|, d)|), u = z/z_max, d = tau dz/dt / z_max [N] (eq. 19)."""
+    u, d = bristle / friction.presliding, friction.bristle_damping / friction.presliding * bristle_rate(friction, slip, bristle)
+    share, push = float(np.linalg.norm(u)), float(np.linalg.norm(d))
+    room = 1.0 - min(share, 1.0)
+    damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
+    return -friction.mu * normal * (u / max(share, 1.0) + damped)
+
+
+def friction_force(friction: Friction, normal: float, slip: Array, bristle: Array | None = None) -> Array:
+    """(3,) f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t| [N], with its limit -mu f_n k_t v_t at rest; the bristles' with that law.
+
+    bristle: (3,) their deflection z [m], slack unless given.
+    """
     if friction.law == "none":
         return np.zeros(3)
+    if friction.law == "bristle":
+        return bristle_force(friction, normal, slip, np.zeros(3) if bristle is None else bristle)
     speed = float(np.linalg.norm(slip))
     x = friction.slope * speed
     per_speed = math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
@@ -108,11 +142,11 @@ def foot_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
     return tuple(foot_contact(robot, body[JOINTS * (leg + 1)], centres[leg]) for leg in range(LEGS))
 
 
-def foot_force(robot: Robot, foot: FootContact, damping: float) -> Array:
-    """(3,) ground on foot [N]: f_n n + f_t."""
+def foot_force(robot: Robot, foot: FootContact, damping: float, bristle: Array | None = None) -> Array:
+    """(3,) ground on foot [N]: f_n n + f_t; bristle (3,) as in `friction_force`."""
     f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
     slip = foot.velocity + foot.approach_speed * foot.normal
-    return f_n * foot.normal + friction_force(robot.friction, f_n, slip)
+    return f_n * foot.normal + friction_force(robot.friction, f_n, slip, bristle)
 
 
 def standing_damping(robot: Robot, body: Array) -> Array:

@@ -126,10 +126,10 @@ def mass_matrix(robot: Robot, body: Array) -> Array:
     return M + robot.servo.rotor_inertia * G.T @ G
 
 
-def applied_forces(robot: Robot, body: Array, command: Command, damping: Array) -> Array:
+def applied_forces(robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None) -> Array:
     """(19, 6) force and torque on each body at its centre of mass: gravity, gyroscopic, contact, push; no servo.
 
-    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact.
+    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact; bristle: (6, 3) their deflection [m], slack unless given.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
@@ -137,7 +137,7 @@ def applied_forces(robot: Robot, body: Array, command: Command, damping: Array) 
     g[:, 3:6] = -np.cross(w, np.einsum("kij,kj->ki", J, w))
     for leg, foot in enumerate(foot_contacts(robot, body)):
         tibia = JOINTS * (leg + 1)
-        force = foot_force(robot, foot, damping[leg])
+        force = foot_force(robot, foot, damping[leg], None if bristle is None else bristle[leg])
         g[tibia] += np.concatenate([force, cross(foot.point - body[tibia, 0:3], force)])
     g[0] += np.concatenate([command.push_force, command.push_torque])
     return g
@@ -169,14 +169,14 @@ class Accelerations:
     gear_torque: Array  # (6, 3)  gear on child [N m]
 
 
-def accelerations(robot: Robot, body: Array, command: Command, damping: Array) -> Accelerations:
-    """Solves eq. 1 for bodies (19, 13), drifted joints allowed; damping (6,) as in `applied_forces`.
+def accelerations(robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None) -> Accelerations:
+    """Solves eq. 1 for bodies (19, 13), drifted joints allowed; damping (6,) and bristle (6, 3) as in `applied_forces`.
 
     In kinematic mode each joint adds the row G dv = drive_acceleration, whose multiplier is minus the motor's torque.
     """
     joints = constraints(robot, body)
     motor, gear = joint_torques(robot, body, command)
-    g = applied_forces(robot, body, command, damping).ravel() + joints.G.T @ (motor + gear).ravel()
+    g = applied_forces(robot, body, command, damping, bristle).ravel() + joints.G.T @ (motor + gear).ravel()
     c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi - robot.baumgarte.beta**2 * joints.phi
     D = joints.D
     if robot.servo.mode == "kinematic":

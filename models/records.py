@@ -25,7 +25,7 @@ Vector6 = tuple[float, float, float, float, float, float]
 LEG_NAMES = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINT_NAMES = ("coxa", "femur", "tibia")
 CONTACT_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley", "constant_damping", "hertz")
-FRICTION_LAWS = ("tanh", "none")
+FRICTION_LAWS = ("tanh", "none", "bristle")
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
@@ -95,7 +95,9 @@ class Friction:
     law: Annotated[str, Choice(FRICTION_LAWS)]
     mu: Annotated[float, Number("1", at_least=0.0)]
     mu_static: Annotated[float, Number("1", at_least=0.0)]
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5, tanh law
+    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # z_max of eq. 18, bristle law; absent in a file: Mindlin
+    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]  # tau of eq. 19, bristle law
 
 
 @dataclass(frozen=True, kw_only=True)

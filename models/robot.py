@@ -1,8 +1,9 @@
 """Robots from files: `load_robot("athena")` gives a checked `Robot`. The records themselves stand in records.py.
 
 A robot file shares link data between the legs in [links.coxa], [links.femur], [links.tibia]; any leg may override any of
-those keys in [legs.LF.femur] and so on, so legs need not be equal. Two figures may be left out and are then computed:
-torso.inertia (the homogeneous box of torso.size) and contact.stiffness (Hertz, from the foot's radius and material).
+those keys in [legs.LF.femur] and so on, so legs need not be equal. Three figures may be left out and are then computed:
+torso.inertia (the homogeneous box of torso.size), contact.stiffness (Hertz, from the foot's radius and material) and friction.presliding
+(Mindlin, from the same and the weight).
 """
 
 from __future__ import annotations
@@ -46,13 +47,15 @@ from hexapod_cosim.models.validation import check_robot
 __all__ = [
     "CONTACT_LAWS", "FRICTION_LAWS", "GAITS", "JOINT_NAMES", "LEG_NAMES", "METHODS", "PROJECTIONS", "SERVO_MODES", "TERRAINS",
     "Array", "Baumgarte", "Contact", "Foot", "Friction", "Gait", "Leg", "Link", "Robot", "Servo", "Solver", "Terrain", "Torso",
-    "box_inertia", "check_robot", "hertz_stiffness", "list_robots", "load_robot", "robot_from_table",
+    "box_inertia", "check_robot", "hertz_stiffness", "list_robots", "load_robot",
+    "mindlin_presliding", "robot_from_table",
 ]  # fmt: skip
 
 SECTIONS: dict[str, type[Any]] = {
     "torso": Torso, "foot": Foot, "contact": Contact, "friction": Friction, "servo": Servo, "baumgarte": Baumgarte,
     "solver": Solver, "terrain": Terrain, "gait": Gait,
 }  # fmt: skip
+LEAST_PRESLIDING = 1e-6  # m  where there is no load or no friction to take it from
 STANCE = Number("rad", at_least=-math.pi, at_most=math.pi)
 
 
@@ -88,11 +91,15 @@ def _robot_path(path_or_name: str | Path) -> Path:
 def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
     """A checked robot from the nested tables of a robot file; `where` names the file in messages. Raises RobotError."""
     refuse_unknown_keys(table, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
-    sections = {name: _read_section(table, name, f"{where}: {name}") for name in ("foot", *SECTIONS)}
+    sections = {name: _read_section(table, name, f"{where}: {name}") for name in SECTIONS if name != "friction"}
+    gravity, legs = _read_gravity(table, f"{where}: gravity"), _read_legs(table, where)
+    mass = sections["torso"].mass + sum(link.mass for leg in legs for link in leg.links)
+    standing = mass * math.hypot(*gravity) / 3.0  # N  a foot of a tripod
     robot = Robot(
         name=_read_text(table.get("name"), f"{where}: name"),
-        gravity=_vector3(Vector("m/s2", 3).read(table.get("gravity", (0.0, 0.0, -9.81)), f"{where}: gravity")),
-        legs=_read_legs(table, where),
+        gravity=gravity,
+        legs=legs,
+        friction=_read_friction(table, f"{where}: friction", sections["foot"], sections["contact"], standing),
         source={
             key: _read_text(text, f"{where}: source.{key}")
             for key, text in expect_table(table.get("source", {}), f"{where}: source").items()
@@ -109,16 +116,27 @@ def _read_text(value: Any, where: str) -> str:
     return value
 
 
-def _vector3(value: tuple[float, ...]) -> Vector3:
-    x, y, z = value
+def _read_gravity(table: Mapping[str, Any], where: str) -> Vector3:
+    x, y, z = Vector("m/s2", 3).read(table.get("gravity", (0.0, 0.0, -9.81)), where)
     return (x, y, z)
 
 
-def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
+def _section(table: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
     if name not in table:
         raise RobotError("missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where)
+    return expect_table(table[name], where)
+
+
+def _read_friction(table: Mapping[str, Any], where: str, foot: Foot, contact: Contact, load: float) -> Friction:
+    given = read_given(Friction, _section(table, "friction", where), where)
+    if "presliding" not in given and "mu" in given:
+        given["presliding"] = mindlin_presliding(foot, contact.stiffness, given["mu"], load)
+    return Friction(**require(Friction, given, where))
+
+
+def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     record = SECTIONS[name]
-    given = read_given(record, expect_table(table[name], where), where)
+    given = read_given(record, _section(table, name, where), where)
     if record is Torso and {"mass", "size"} <= given.keys():
         given.setdefault("inertia", box_inertia(given["mass"], given["size"]))
     if record is Contact and "stiffness" not in given:
@@ -168,3 +186,13 @@ def box_inertia(mass: float, size: Vector3) -> Vector6:
 def hertz_stiffness(foot: Foot) -> float:
     """K of F = K delta^1.5 for the foot's sphere on a rigid half-space [N/m^1.5]."""
     return 4.0 / 3.0 * math.sqrt(foot.radius) * foot.youngs_modulus / (1.0 - foot.poisson**2)
+
+
+def mindlin_presliding(foot: Foot, stiffness: float, mu: float, load: float) -> float:
+    """Tangential displacement at which the foot pressed on by a load [N] would slide if it stayed as stiff as at the start [m].
+
+    mu f_n over Mindlin's stiffness 8 G a/(2 - nu), a = sqrt(R delta) the radius of the contact, delta = (f_n/K)^(2/3).
+    """
+    shear_modulus = foot.youngs_modulus / (2.0 * (1.0 + foot.poisson))
+    per_root_depth = 8.0 * shear_modulus * math.sqrt(foot.radius) / (2.0 - foot.poisson)
+    return max(mu * (load**2 * stiffness) ** (1.0 / 3.0) / per_root_depth, LEAST_PRESLIDING)

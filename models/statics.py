@@ -1,7 +1,8 @@
 """How the robot stands: the pose in which nothing accelerates.
 
 Tanh friction holds nothing at rest, so on level ground the feet spread until no tangential force is left. On a slope no such
-pose exists; the robot stands while it creeps, and friction at the creep's velocity carries what pulls it downhill.
+pose exists; the robot stands while it creeps, and friction at the creep's velocity carries what pulls it downhill. Under the
+bristle law it stands still there: what it has given way downhill, as one body, carries it instead.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Standing:
     position: Array  # (3,) m  torso's centre of mass
     quaternion: Array  # (4,)
     angle: Array  # (6, 3) rad
-    velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground
+    velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground and under the bristle law
     foot_force: Array  # (6, 3) N  ground on foot
 
 
@@ -51,7 +52,7 @@ def settled(robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def standing(robot: Robot) -> Standing:
-    """Static equilibrium by Newton on torso height, roll, pitch, creep velocities and joint angles.
+    """Static equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has given way) and joint angles.
 
     Servos in position or torque mode hold the stance by their PD law (a torque servo alone would not stand); kinematic ones exactly.
     Raises RobotError when there is no such pose: servos too weak or soft, or a slope without friction.
@@ -117,13 +118,23 @@ def _bodies(robot: Robot, x: Array) -> Array:
     return body_states(robot, position, _attitude(x), _velocity(robot, x), turning, angle, np.zeros((LEGS, JOINTS)))
 
 
+def _foot_forces(robot: Robot, body: Array) -> Array:
+    """(6, 3) ground on feet [N]. Bristles read the creep as a deflection, in preslidings for each m/s: what holds is at rest."""
+    feet = foot_contacts(robot, body)
+    if robot.friction.law != "bristle":
+        return np.array([foot_force(robot, foot, 0.0) for foot in feet])
+    gone = [robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal) for foot in feet]
+    still = [replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet]
+    return np.array([foot_force(robot, foot, 0.0, bristle) for foot, bristle in zip(still, gone, strict=True)])
+
+
 def _residual(robot: Robot, x: Array) -> Array:
     """(24,) force and moment on the robot at the torso, and the torque left over at each joint (kinematic: rad off the stance)."""
     body = _bodies(robot, x)
     force = masses(robot)[:, None] * np.array(robot.gravity)
     moment = np.zeros_like(force)
-    for leg, foot in enumerate(foot_contacts(robot, body)):
-        tibia, push = JOINTS * (leg + 1), foot_force(robot, foot, 0.0)
+    for leg, (foot, push) in enumerate(zip(foot_contacts(robot, body), _foot_forces(robot, body), strict=True)):
+        tibia = JOINTS * (leg + 1)
         force[tibia] += push
         moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
     left_over = _carry_to_torso(robot, body, force, moment)
@@ -151,5 +162,5 @@ def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> A
 
 def _standing(robot: Robot, x: Array) -> Standing:
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
-    forces = np.array([foot_force(robot, foot, 0.0) for foot in foot_contacts(robot, _bodies(robot, x))])
-    return Standing(position, _attitude(x), angle, _velocity(robot, x), forces)
+    creep = np.zeros(3) if robot.friction.law == "bristle" else _velocity(robot, x)
+    return Standing(position, _attitude(x), angle, creep, _foot_forces(robot, _bodies(robot, x)))

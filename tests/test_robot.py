@@ -156,6 +156,8 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ("restitution 0", lambda t: put(t, "contact.restitution", 0.0), ["contact.restitution", "> 0", "hertz"]),
     ("no floor", lambda t: put(t, "contact.impact_speed_floor", 0.0), ["contact.impact_speed_floor", "> 0 [m/s]"]),
     ("friction order", lambda t: put(t, "friction.mu_static", 0.1), ["friction.mu_static", "at least mu = 0.7"]),
+    ("presliding 0", lambda t: put(t, "friction.presliding", 0.0), ["friction.presliding", "got 0.0", ">= 1e-07"]),
+    ("bristles that pull", lambda t: put(t, "friction.bristle_damping", -1.0), ["friction.bristle_damping", "got -1.0"]),
     ("continuous torque", lambda t: put(t, "servo.torque_continuous", 7.0), ["servo.torque_continuous", "torque_max = 6"]),
     ("rk4 without step", lambda t: put(t, "solver.method", "rk4"), ["solver.step", "fixed step"]),
     ("vertical slope", lambda t: put(t, "terrain.incline", 1.6), ["terrain.incline", "got 1.6", "rad"]),

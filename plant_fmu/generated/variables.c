@@ -302,6 +302,24 @@ static const hxVariable outputs[] = {
     {"RF.foot.slip_speed", "m/s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.slip_speed[3]), HX_REAL},
     {"RM.foot.slip_speed", "m/s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.slip_speed[4]), HX_REAL},
     {"RR.foot.slip_speed", "m/s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.slip_speed[5]), HX_REAL},
+    {"LF.foot.bristle[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[0][0]), HX_REAL},
+    {"LF.foot.bristle[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[0][1]), HX_REAL},
+    {"LF.foot.bristle[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[0][2]), HX_REAL},
+    {"LM.foot.bristle[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[1][0]), HX_REAL},
+    {"LM.foot.bristle[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[1][1]), HX_REAL},
+    {"LM.foot.bristle[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[1][2]), HX_REAL},
+    {"LR.foot.bristle[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[2][0]), HX_REAL},
+    {"LR.foot.bristle[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[2][1]), HX_REAL},
+    {"LR.foot.bristle[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[2][2]), HX_REAL},
+    {"RF.foot.bristle[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[3][0]), HX_REAL},
+    {"RF.foot.bristle[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[3][1]), HX_REAL},
+    {"RF.foot.bristle[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[3][2]), HX_REAL},
+    {"RM.foot.bristle[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[4][0]), HX_REAL},
+    {"RM.foot.bristle[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[4][1]), HX_REAL},
+    {"RM.foot.bristle[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[4][2]), HX_REAL},
+    {"RR.foot.bristle[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[5][0]), HX_REAL},
+    {"RR.foot.bristle[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[5][1]), HX_REAL},
+    {"RR.foot.bristle[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.bristle[5][2]), HX_REAL},
     {"LF.foot.penetration", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.penetration[0]), HX_REAL},
     {"LM.foot.penetration", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.penetration[1]), HX_REAL},
     {"LR.foot.penetration", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.foot.penetration[2]), HX_REAL},
@@ -685,9 +703,11 @@ static const hxVariable parameters[] = {
     {"contact.restitution", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.contact.restitution), HX_REAL},
     {"contact.damping_factor", "s/m", 0.0, 1000000.0, offsetof(struct hxVariables, definition.contact.damping_factor), HX_REAL},
     {"contact.impact_speed_floor", "m/s", 1e-09, 100.0, offsetof(struct hxVariables, definition.contact.impact_speed_floor), HX_REAL},
-    {"friction.law", "", 1, 2, offsetof(struct hxVariables, definition.friction.law), HX_INTEGER},
+    {"friction.law", "", 1, 3, offsetof(struct hxVariables, definition.friction.law), HX_INTEGER},
     {"friction.mu", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction.mu), HX_REAL},
     {"friction.slope", "s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.friction.slope), HX_REAL},
+    {"friction.presliding", "m", 1e-07, 1.0, offsetof(struct hxVariables, definition.friction.presliding), HX_REAL},
+    {"friction.bristle_damping", "s", 0.0, 10.0, offsetof(struct hxVariables, definition.friction.bristle_damping), HX_REAL},
     {"servo.mode", "", 1, 3, offsetof(struct hxVariables, definition.servo.mode), HX_INTEGER},
     {"servo.kp", "N.m/rad", 0.0, 100000000.0, offsetof(struct hxVariables, definition.servo.kp), HX_REAL},
     {"servo.kd", "N.m.s/rad", 0.0, 100000000.0, offsetof(struct hxVariables, definition.servo.kd), HX_REAL},
@@ -774,7 +794,7 @@ const char *const hx_log_category_names[] = {
     "logAll",
 };
 
-const char hx_default_guid[] = "{f20d259f-d166-48c2-9f34-72429959a87c}";
+const char hx_default_guid[] = "{eebeb9fb-47cb-4e09-94a2-66677c1acfab}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -784,6 +804,7 @@ _Static_assert(HX_CONTACT_CONSTANT_DAMPING == 5, "ContactLaw");
 _Static_assert(HX_CONTACT_HERTZ == 6, "ContactLaw");
 _Static_assert(HX_FRICTION_TANH == 1, "FrictionLaw");
 _Static_assert(HX_FRICTION_NONE == 2, "FrictionLaw");
+_Static_assert(HX_FRICTION_BRISTLE == 3, "FrictionLaw");
 _Static_assert(HX_SERVO_POSITION == 1, "ServoMode");
 _Static_assert(HX_SERVO_TORQUE == 2, "ServoMode");
 _Static_assert(HX_SERVO_KINEMATIC == 3, "ServoMode");

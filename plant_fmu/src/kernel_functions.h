@@ -15,6 +15,7 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
   const hxFeet feet = feet_of(model, &state->motion);
   hx_contact_start(model, feet.delta, &state->contact);
+  memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, &work);
   state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) + hx_potential_energy(model, &state->motion, &work);
 }

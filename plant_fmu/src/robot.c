@@ -155,6 +155,7 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   for (int i = 0; i < 3; ++i) model->gravity[i] = d->gravity[i];
   model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
   model->friction_law = d->friction.law, model->mu = d->friction.mu, model->slope = d->friction.slope;
+  model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
   model->servo_mode = d->servo.mode;
   model->kp = d->servo.mode == HX_SERVO_POSITION ? d->servo.kp : 0.0;
   model->kd = d->servo.mode == HX_SERVO_POSITION ? d->servo.kd : 0.0;

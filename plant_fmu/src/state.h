@@ -17,7 +17,9 @@
 enum {
   HX_SLOTS = 8, /* legs in memory, padded: slots past the last leg mirror leg 0 */
   HX_TORSO_SIZE = 16,
-  HX_MOTION_SIZE = HX_TORSO_SIZE + HX_JOINTS * HX_BODY_STATE * HX_SLOTS
+  HX_BODIES_SIZE = HX_TORSO_SIZE + HX_JOINTS * HX_BODY_STATE * HX_SLOTS,
+  HX_BRISTLE_SIZE = 3 * HX_SLOTS,
+  HX_MOTION_SIZE = HX_BODIES_SIZE + HX_BRISTLE_SIZE
 };
 
 /* Where a body state's parts begin. */
@@ -30,6 +32,7 @@ typedef union hxMotion {
     double torso[HX_BODY_STATE];
     double actuator_work, push_work, dissipated; /* J */
     double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
+    double bristle[3][HX_SLOTS]; /* m  z of eq. 18, world axes; 0 and at rest with other laws. The last: they leave it out */
   };
 } hxMotion;
 
@@ -56,6 +59,7 @@ typedef struct hxModel {
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
   double stiffness, damping_scale, impact_speed_floor; /* eq. 4; what damping_scale means is the law's business */
   double mu, slope;                 /* eq. 5 */
+  double presliding, bristle_damping; /* eq. 18, 19 */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;

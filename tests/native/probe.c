@@ -55,6 +55,8 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, friction.law),
     FIELD(hxDefinition, friction.mu),
     FIELD(hxDefinition, friction.slope),
+    FIELD(hxDefinition, friction.presliding),
+    FIELD(hxDefinition, friction.bristle_damping),
     FIELD(hxDefinition, servo.mode),
     FIELD(hxDefinition, servo.kp),
     FIELD(hxDefinition, servo.kd),
@@ -97,6 +99,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, foot.position),
     FIELD(hxOutput, foot.velocity),
     FIELD(hxOutput, foot.slip_speed),
+    FIELD(hxOutput, foot.bristle),
     FIELD(hxOutput, foot.penetration),
     FIELD(hxOutput, foot.impact_speed),
     FIELD(hxOutput, foot.contact),
@@ -303,6 +306,23 @@ HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age, doub
   evaluate(plant, input, age, NULL, &work, &rate);
   hx_bodies_from_motion(&plant->model, &rate.motion, body);
   power[0] = rate.motion.actuator_work, power[1] = rate.motion.push_work, power[2] = rate.motion.dissipated;
+}
+
+static void fill_bristles(const double z[HX_LEGS][3], hxMotion *motion) {
+  for (int i = 0; i < 3; ++i) {
+    for (int leg = 0; leg < HX_LEGS; ++leg) motion->bristle[i][leg] = z[leg][i];
+    hx_fill_slots(motion->bristle[i]);
+  }
+}
+
+/* puts the bristles; rate: their dz/dt there */
+HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3], double rate[HX_LEGS][3]) {
+  hxWork work;
+  hxRate all;
+  fill_bristles(z, &plant->state.motion);
+  evaluate(plant, input, 0.0, NULL, &work, &all);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int i = 0; i < 3; ++i) rate[leg][i] = all.motion.bristle[i][leg];
 }
 
 /* a change from (v, w) of s_x and of s_v: rows of the bodies */

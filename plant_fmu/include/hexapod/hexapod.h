@@ -53,7 +53,7 @@ typedef enum hxContactLaw {
   HX_CONTACT_HERTZ
 } hxContactLaw;
 
-typedef enum hxFrictionLaw { HX_FRICTION_TANH = 1, HX_FRICTION_NONE } hxFrictionLaw;
+typedef enum hxFrictionLaw { HX_FRICTION_TANH = 1, HX_FRICTION_NONE, HX_FRICTION_BRISTLE } hxFrictionLaw;
 
 typedef enum hxTerrainKind { HX_TERRAIN_FLAT = 1, HX_TERRAIN_SLOPE } hxTerrainKind;
 
@@ -106,9 +106,11 @@ typedef struct hxDefinition {
     double impact_speed_floor;  /* m/s      a slower touch-down counts as this fast */
   } contact;
   struct {
-    int law;       /* hxFrictionLaw */
-    double mu;     /* 1 */
-    double slope;  /* s/m  k_t of eq. 5 */
+    int law;                 /* hxFrictionLaw */
+    double mu;               /* 1 */
+    double slope;            /* s/m  k_t of eq. 5, of the tanh law */
+    double presliding;       /* m    z_max of eq. 18, of the bristle law: a foot pushed this far slides */
+    double bristle_damping;  /* s    tau of eq. 19, of the bristle law: damping over stiffness */
   } friction;
   struct {
     int mode;                 /* hxServoMode, all joints */
@@ -170,6 +172,7 @@ typedef struct hxOutput {
     double position[HX_LEGS][3];          /* m    contact point: the foot's lowest towards the ground */
     double velocity[HX_LEGS][3];          /* m/s  of the foot's material point there */
     double slip_speed[HX_LEGS];           /* m/s  tangential part of it */
+    double bristle[HX_LEGS][3];           /* m    z of eq. 18, the bristle law's; 0 with others */
     double penetration[HX_LEGS];          /* m    < 0: clearance */
     double impact_speed[HX_LEGS];         /* m/s  at the last touch-down */
     int contact[HX_LEGS];
@@ -189,7 +192,7 @@ typedef struct hxOutput {
     double potential;      /* J  gravity and the elastic part of the contacts */
     double actuator_work;  /* J  by the motors on the joints, since start */
     double push_work;      /* J  by push_force and push_torque */
-    double dissipated;     /* J  in contact, friction and gears */
+    double dissipated;     /* J  in contact, friction (with what bristles hold) and gears */
     double residual;       /* J  stored - stored at start - work + dissipated: what the books do not explain */
   } energy;
   struct {

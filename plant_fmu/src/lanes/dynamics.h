@@ -46,6 +46,7 @@ typedef struct {
   hxFootWork foot;
   hxVec3 response; /* N  what a stage adds to the foot's force, but for the share of its own acceleration */
   hxVec3 foot_moved, foot_sped; /* m, m/s  shifts of the contact point before this stage's own share (eq. 16) */
+  hxVec3 bristle_force;         /* N  what bristles add to friction in a stage, but for the contact point's own share (eq. 20) */
 } hxLegWork;
 
 typedef struct {
@@ -55,17 +56,19 @@ typedef struct {
   hxLegWork pack[HX_PACKS];
 } hxWork;
 
+enum { HX_TURN_SIZE = 8 + HX_JOINTS * 3 * HX_SLOTS };
+
 /* dy/dt, and the angular velocities that its quaternion rates stand for. The same doubles as a vector for the integrator. */
 typedef union {
-  double y[HX_MOTION_SIZE + 8 + HX_JOINTS * 3 * HX_SLOTS];
+  double y[HX_TURN_SIZE + HX_MOTION_SIZE];
   struct {
-    hxMotion motion;
     double torso_turn[8]; /* the last five are padding */
     double link_turn[HX_JOINTS][3][HX_SLOTS];
+    hxMotion motion;
   };
 } hxRate;
 
-enum { HX_RATE_SIZE = sizeof(hxRate) / sizeof(double) };
+static inline int has_bristles(const hxModel *model) { return model->friction_law == HX_FRICTION_BRISTLE; }
 
 /* A stage of a linearly implicit method (eq. 15). The slopes of contact and servo are the first stage's, kept for the others. */
 typedef struct {
@@ -75,6 +78,7 @@ typedef struct {
   struct {
     hxReal servo_stiffness[HX_JOINTS], servo_damping[HX_JOINTS];
     hxReal stiffness, viscosity, drag;
+    hxReal bristle, yield; /* N/m, 1/s  bristles: stiffness over 1 + z yield (in drag too, z times), how fast they let go */
   } slope[HX_PACKS];
 } hxImplicit;
 
@@ -191,7 +195,7 @@ static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
 
 static inline void leg_foot(const hxModel *model, const hxContactState *contact, const hxMotion *motion, int slot, hxLegWork *leg) {
   leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
-  hx_foot_force(model, contact, slot, &leg->foot);
+  hx_foot_force(model, contact, motion, slot, &leg->foot);
   push_tibia(leg, contact_point(leg), leg->foot.force);
 }
 
@@ -207,7 +211,14 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
       hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), deeper, foot->kin.ddelta);
   implicit->slope[pack].stiffness = ahead.stiffness;
   implicit->slope[pack].viscosity = ahead.viscosity;
-  implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
+  if (has_bristles(model)) {
+    const hxReal stiffness = ahead.force * (model->mu / model->presliding);
+    implicit->slope[pack].yield = foot->bristle.yield;
+    implicit->slope[pack].bristle = stiffness / (1.0 + implicit->z * foot->bristle.yield);
+    implicit->slope[pack].drag = stiffness * foot->bristle.damping + implicit->z * implicit->slope[pack].bristle;
+  } else {
+    implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
+  }
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     implicit->slope[pack].servo_stiffness[joint] = leg->joint[joint].servo.stiffness;
     implicit->slope[pack].servo_damping[joint] = leg->joint[joint].servo.damping + leg->joint[joint].servo.drag;
@@ -270,6 +281,15 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
   push_tibia(leg, contact_point(leg), leg->response);
 }
 
+/* what the bristles' own shift s_z + z dz/dt, shared out by how they let go, takes off the foot's force (eq. 20) */
+static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegWork *leg) {
+  const hxVec3 own = hx_scale(hx_splat(implicit->z), leg->foot.bristle.rate);
+  const hxVec3 moved = implicit->change ? hx_add(hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES), own) : own;
+  leg->bristle_force = hx_scale(implicit->slope[pack].bristle, moved);
+  leg->response = hx_sub(leg->response, leg->bristle_force);
+  push_tibia(leg, contact_point(leg), hx_neg(leg->bristle_force));
+}
+
 /* The contact's share of W: B = across 1 + along n n^T at the contact point, z c_t and z c_n + z^2 k_n - z c_t. */
 typedef struct {
   hxVec3 n;
@@ -301,6 +321,18 @@ static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit 
 /* acceleration of the contact point's material */
 static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *leg) {
   return hx_add(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm), hx_splat_vec3(model->gravity));
+}
+
+/* dz/dt of a stage (eq. 20): k = (f + s_v + z a - yield s_z)/(1 + z yield) along the ground, f what the law says */
+static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *contact, const hxImplicit *implicit, int pack,
+                                  const hxLegWork *leg) {
+  hxVec3 rate = leg->foot.bristle.rate;
+  if (!implicit) return rate;
+  const hxVec3 n = leg->foot.kin.normal, dv = hx_add_scaled(leg->foot_sped, hx_splat(implicit->z), foot_acceleration(model, leg));
+  const hxReal yield = implicit->slope[pack].yield, closed = hx_load(&contact->closed[pack * HX_LANES]);
+  rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
+  if (implicit->change) rate = hx_add_scaled(rate, -yield, hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES));
+  return hx_scale(1.0 / (1.0 + implicit->z * yield), rate);
 }
 
 /* ground on foot, as a stage's accelerations contain it */
@@ -474,6 +506,13 @@ static inline void fill_rate_slots(hxRate *rate) {
     for (int i = 0; i < 3; ++i) hx_fill_slots(rate->link_turn[joint][i]);
 }
 
+static inline void store_bristle_rates(const hxModel *model, const hxContactState *contact, const hxImplicit *implicit, const hxWork *work,
+                                       hxMotion *rate) {
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    hx_store_vec3(rate->bristle, pack * HX_LANES, bristle_rate(model, contact, implicit, pack, &work->pack[pack]));
+  for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
+}
+
 /* power of the motor, and what the gear takes; along a stage's own shift of angle and speed, to first order */
 static inline void joint_powers(const hxJointWork *k, double z, hxReal *in, hxReal *out) {
   *in += k->servo.torque * k->speed;
@@ -486,19 +525,29 @@ static inline void joint_powers(const hxJointWork *k, double z, hxReal *in, hxRe
   *out -= k->servo.friction * dspeed - k->speed * k->servo.drag * dspeed;
 }
 
+/* the same of friction by bristles: what they hold counts as taken until they give it back */
+static inline hxReal bristle_power(const hxLegWork *leg, hxReal drag, hxVec3 dv, hxReal dforce) {
+  const hxFootWork *foot = &leg->foot;
+  const hxReal shifted = foot->normal.force * hx_dot(foot->bristle.grip, dv) + dforce * hx_dot(foot->bristle.grip, foot->slip);
+  return shifted + drag * hx_dot(foot->slip, dv) + hx_dot(leg->bristle_force, foot->slip);
+}
+
 /* what contact damping and friction take */
-static inline hxReal foot_power(const hxModel *model, const hxLegWork *leg, double z) {
+static inline hxReal foot_power(const hxModel *model, const hxImplicit *implicit, int pack, const hxLegWork *leg) {
   const hxFootWork *foot = &leg->foot;
   const hxNormalForce *f = &foot->normal;
   const hxReal slip2 = foot->slip_speed * foot->slip_speed;
-  const hxReal power = (f->force - f->elastic) * foot->kin.ddelta + foot->drag * slip2;
-  if (z == 0.0) return power;
+  const hxReal friction = has_bristles(model) ? f->force * hx_dot(foot->bristle.grip, foot->slip) : foot->drag * slip2;
+  const hxReal power = (f->force - f->elastic) * foot->kin.ddelta + friction;
+  if (!implicit) return power;
+  const double z = implicit->z;
   const hxVec3 a = foot_acceleration(model, leg), n = foot->kin.normal;
   const hxVec3 dv = hx_add_scaled(leg->foot_sped, hx_splat(z), a), dx = hx_add_scaled(leg->foot_moved, hx_splat(z * z), a);
   const hxReal dspeed = -hx_dot(n, dv), ddepth = -hx_dot(n, dx);
   const hxReal dforce = f->viscosity * dspeed + f->stiffness * ddepth;
-  return power + (f->force - f->elastic) * dspeed + foot->kin.ddelta * (dforce - f->stored * ddepth) +
-         2.0 * foot->drag * hx_dot(foot->slip, dv) + foot->drag_per_load * slip2 * dforce;
+  const hxReal normal = power + (f->force - f->elastic) * dspeed + foot->kin.ddelta * (dforce - f->stored * ddepth);
+  if (has_bristles(model)) return normal + bristle_power(leg, implicit->slope[pack].drag, dv, dforce);
+  return normal + 2.0 * foot->drag * hx_dot(foot->slip, dv) + foot->drag_per_load * slip2 * dforce;
 }
 
 static inline void store_powers(const hxModel *model, const hxCommand *command, const hxMotion *motion, const hxImplicit *implicit,
@@ -508,7 +557,7 @@ static inline void store_powers(const hxModel *model, const hxCommand *command, 
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
     actuator[pack] = hx_splat(0.0);
-    dissipated[pack] = foot_power(model, leg, z);
+    dissipated[pack] = foot_power(model, implicit, pack, leg);
     for (int joint = 0; joint < HX_JOINTS; ++joint) joint_powers(&leg->joint[joint], z, &actuator[pack], &dissipated[pack]);
   }
   rate->actuator_work = hx_lane(hx_sum_legs(actuator), 0);
@@ -543,6 +592,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
     leg_response(implicit, motion, pack, &work->pack[pack]);
+    if (has_bristles(model)) bristle_response(implicit, pack, &work->pack[pack]);
   }
 
   /* leaf to root, the torso, root to leaf; packs side by side, for one's operations fill the other's waits */
@@ -561,6 +611,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       store_link_rate(model, motion, implicit, joint, pack * HX_LANES, &work->pack[pack].joint[joint], rate);
+  if (has_bristles(model)) store_bristle_rates(model, contact, implicit, work, &rate->motion);
   fill_rate_slots(rate);
   store_powers(model, command, motion, implicit, work, &rate->motion);
 }

@@ -1,4 +1,4 @@
-/* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels there (eq. 4, 5) */
+/* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels there (eq. 4, 5, 18, 19) */
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
@@ -27,14 +27,25 @@ typedef struct {
   hxReal stored;    /* N/m  d elastic/ddelta */
 } hxNormalForce;
 
+/* What a foot with bristles feels across the normal. */
+typedef struct {
+  hxVec3 grip;    /* 1    -f_t over f_n */
+  hxVec3 rate;    /* m/s  dz/dt */
+  hxReal yield;   /* 1/s  how fast the bristles let go while they slide */
+  hxReal damping; /* s    of grip, over mu and the presliding's share: tau, less near the limit */
+} hxBristle;
+
 typedef struct {
   hxFootKinematics kin;
   hxNormalForce normal;
   hxVec3 slip, force;   /* m/s, N  tangential velocity, ground on foot */
   hxReal slip_speed;
   hxReal drag;          /* N s/m  size of the tangential force over the slip speed */
-  hxReal drag_per_load; /* s/m    the same over mu f_n */
+  hxReal drag_per_load; /* s/m    the same over f_n */
+  hxBristle bristle;    /* of the bristle law alone */
 } hxFootWork;
+
+static const double break_away = 0.7; /* of the presliding: below it a bristle is a spring */
 
 /* The only place a terrain is chosen. */
 static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
@@ -45,12 +56,29 @@ static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
 }
 
 /* g of f_t = -mu f_n g(|v_t|) v_t (eq. 5): tanh(k_t v) / v, whose limit at rest is k_t; the series k_t (1 - (k_t v)^2 / 3) is exact below
- * k_t v = 1e-5. The only place a friction law is chosen. */
+ * k_t v = 1e-5. */
 static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
   if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
   const hxReal x = model->slope * speed;
   const hxMask slow = hx_less(x, hx_splat(1e-5));
   return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0), hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
+}
+
+/* Elasto-plastic bristles (eq. 18, 19), u = z/z_max: dz/dt = v - alpha (v.u)+ u/|u|, grip = mu (u + d (1 - |u|)/|(1 - |u|, d)|) with
+ * d = tau dz/dt / z_max. Neither can u leave the unit disc nor the grip mu. */
+static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 z, hxVec3 slip) {
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
+  const double per_length = 1.0 / model->presliding;
+  const hxVec3 u = hx_scale(hx_splat(per_length), z);
+  const hxReal size = hx_sqrt(hx_dot(u, u));
+  const hxReal s = hx_clip((size - break_away) * (1.0 / (1.0 - break_away)), zero, one);
+  const hxReal let_go = s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) / hx_max(size, hx_splat(break_away));
+  const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -let_go, u));
+  const hxVec3 d = hx_scale(hx_splat(model->bristle_damping * per_length), rate);
+  const hxReal room = 1.0 - hx_min(size, one);
+  const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) + 1e-30); /* tiny: no room and no motion is 0, not 0/0 */
+  const hxVec3 w = hx_add_scaled(hx_scale(1.0 / hx_max(size, one), u), share, d);
+  return (hxBristle){hx_scale(hx_splat(model->mu), w), rate, per_length * let_go, model->bristle_damping * share};
 }
 
 /* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 4) while the contact is closed */
@@ -79,12 +107,17 @@ static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hx
   return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance, -hx_dot(velocity, ground.normal), velocity};
 }
 
-/* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t across it */
-static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, int slot, hxFootWork *foot) {
+/* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t or the bristles' across it. The only place a friction law is chosen. */
+static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, const hxMotion *motion, int slot, hxFootWork *foot) {
   const hxFootKinematics *kin = &foot->kin;
   foot->normal = hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), kin->delta, kin->ddelta);
   foot->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
+  if (model->friction_law == HX_FRICTION_BRISTLE) {
+    foot->bristle = hx_bristle(model, hx_load(&contact->closed[slot]), hx_load_vec3(motion->bristle, slot), foot->slip);
+    foot->force = hx_scale(foot->normal.force, hx_sub(kin->normal, foot->bristle.grip));
+    return;
+  }
   foot->drag_per_load = model->mu * hx_friction(model, foot->slip_speed);
   foot->drag = foot->normal.force * foot->drag_per_load;
   foot->force = hx_add_scaled(hx_scale(foot->normal.force, kin->normal), -foot->drag, foot->slip);

@@ -15,6 +15,7 @@ static const double touch_depth[2] = {1e-10, 1e-6};  /* m, m over the tolerance 
 /* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 1 J for the energy audit. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
 static const double work_scale = 1.0;
+static const double bristle_scale = 10.0; /* preslidings: at the default tolerance a thousandth of the friction force */
 
 /* Where a step starts. */
 typedef struct {
@@ -51,40 +52,50 @@ static inline hxFeet feet_of(const hxModel *model, const hxMotion *motion) {
 
 /* ---- one step --------------------------------------------------------------------------------------------------------------- */
 
-/* base + h sum of weights k, n of them (base NULL: 0); one pass over memory, n known to the compiler */
-static inline void combine_n(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int size) {
+/* base + h sum of weights k, n of them (base NULL: 0), k from its entry `first` on; one pass over memory, n and sizes known to the compiler */
+static inline void combine_n(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int first,
+                             int size) {
   hxReal w[HX_STAGES];
   for (int j = 0; j < n; ++j) w[j] = hx_splat(h * weights[j]);
   for (int i = 0; i < size; i += HX_LANES) {
     hxReal sum = base ? hx_load(&base[i]) : hx_splat(0.0);
-    for (int j = 0; j < n; ++j) sum += w[j] * hx_load(&k[j].y[i]);
+    for (int j = 0; j < n; ++j) sum += w[j] * hx_load(&k[j].y[first + i]);
     hx_store(&out[i], sum);
   }
 }
 
-static void combine(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int size) {
+static inline void combine_part(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int first,
+                                int size) {
   switch (n) {
   case 1:
-    combine_n(out, base, h, weights, k, 1, size);
+    combine_n(out, base, h, weights, k, 1, first, size);
     break;
   case 2:
-    combine_n(out, base, h, weights, k, 2, size);
+    combine_n(out, base, h, weights, k, 2, first, size);
     break;
   case 3:
-    combine_n(out, base, h, weights, k, 3, size);
+    combine_n(out, base, h, weights, k, 3, first, size);
     break;
   case 4:
-    combine_n(out, base, h, weights, k, 4, size);
+    combine_n(out, base, h, weights, k, 4, first, size);
     break;
   default:
-    combine_n(out, base, h, weights, k, n, size);
+    combine_n(out, base, h, weights, k, n, first, size);
   }
+}
+
+/* the same from an entry of k to its end; bristles only where they move */
+static inline void combine(const hxModel *model, double *out, const double *base, double h, const double *weights, const hxRate *k, int n,
+                           int first) {
+  enum { END = HX_TURN_SIZE + HX_BODIES_SIZE };
+  combine_part(out, base, h, weights, k, n, first, END - first);
+  if (has_bristles(model)) combine_n(out + END - first, base ? base + END - first : NULL, h, weights, k, n, END, HX_BRISTLE_SIZE);
 }
 
 static inline double larger(double a, double b) { return b > a ? b : a; }
 
 /* largest error over scale; NaN is the caller's to find */
-static double error_norm(const hxMotion *error, double tolerance) {
+static double error_norm(const hxModel *model, const hxMotion *error) {
   hxReal links = hx_splat(0.0);
   double largest[HX_LANES];
   double worst = larger(larger(fabs(error->actuator_work), fabs(error->push_work)), fabs(error->dissipated)) / work_scale;
@@ -95,9 +106,12 @@ static double error_norm(const hxMotion *error, double tolerance) {
       for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
         links = hx_max(links, scale * hx_abs(hx_load(&error->link[joint][i][slot])));
   }
+  for (int i = 0; i < 3 && has_bristles(model); ++i)
+    for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
+      links = hx_max(links, 1.0 / (bristle_scale * model->presliding) * hx_abs(hx_load(&error->bristle[i][slot])));
   hx_store(largest, links);
   for (int lane = 0; lane < HX_LANES; ++lane) worst = larger(worst, largest[lane]);
-  return worst / tolerance;
+  return worst / model->tolerance;
 }
 
 static void normalise_quaternions(hxMotion *m) {
@@ -115,28 +129,30 @@ static void normalise_quaternions(hxMotion *m) {
 /* One step of the method from a start, kept or not. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
+  const hxModel *model = start->model;
   hxImplicit implicit = {.z = h * m->gamma, .ahead = h};
   hxRate k[HX_STAGES], change;
   hxMotion y;
   hxWork work;
   for (int i = 0; i < m->stages; ++i) {
     if (i > 0) {
-      combine(y.y, start->y->y, h, m->a[i], k, i, HX_MOTION_SIZE);
-      if (m->gamma > 0.0) combine(change.y, NULL, h, m->g[i], k, i, HX_RATE_SIZE);
+      combine(model, y.y, start->y->y, h, m->a[i], k, i, HX_TURN_SIZE);
+      if (m->gamma > 0.0) combine(model, change.y, NULL, h, m->g[i], k, i, 0);
       implicit.change = &change;
     }
-    hx_dynamics_evaluate(start->model, start->contact, start->command, start->t + m->c[i] * h, i > 0 ? &y : start->y,
+    hx_dynamics_evaluate(model, start->contact, start->command, start->t + m->c[i] * h, i > 0 ? &y : start->y,
                          m->gamma > 0.0 ? &implicit : NULL, 0, &work, &k[i]);
     state->evaluations += 1.0;
   }
-  combine(trial->y.y, start->y->y, h, m->b, k, m->stages, HX_MOTION_SIZE);
+  memcpy(trial->y.bristle, start->y->bristle, sizeof trial->y.bristle);
+  combine(model, trial->y.y, start->y->y, h, m->b, k, m->stages, HX_TURN_SIZE);
   trial->error = 0.0;
-  if (m->error_order > 0 && start->model->step == 0.0) {
-    combine(y.y, NULL, h, m->e, k, m->stages, HX_MOTION_SIZE);
-    trial->error = error_norm(&y, start->model->tolerance);
+  if (m->error_order > 0 && model->step == 0.0) {
+    combine(model, y.y, NULL, h, m->e, k, m->stages, HX_TURN_SIZE);
+    trial->error = error_norm(model, &y);
   }
   normalise_quaternions(&trial->y);
-  if (start->model->projection == HX_PROJECTION_STEP) hx_project(start->model, &trial->y);
+  if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial->y);
 }
 
 /* ---- touch-down ------------------------------------------------------------------------------------------------------------- */
@@ -267,6 +283,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   state->motion = trial.y;
   state->steps += 1.0;
   state->touchdowns += hx_contact_switch(model, feet.delta, feet.ddelta, &state->contact);
+  if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
   return HX_OK;
 }
 

@@ -60,16 +60,19 @@ static void fill_joint(const hxJointWork *k, int lane, int leg, int joint, hxOut
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
 
-static void fill_foot(const hxFootWork *foot, hxVec3 tibia, const hxContactState *contact, int lane, int leg, hxOutput *o) {
+static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot, hxVec3 tibia, int lane, int leg, hxOutput *o) {
   get3(foot->force, lane, o->foot.force[leg]);
   get3(hx_add(tibia, foot->kin.arm), lane, o->foot.position[leg]);
   get3(foot->kin.velocity, lane, o->foot.velocity[leg]);
   o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
-  o->foot.tangential_force[leg] = hx_lane(foot->drag * foot->slip_speed, lane);
+  o->foot.tangential_force[leg] = hx_lane(has_bristles(model) ? foot->normal.force * hx_sqrt(hx_dot(foot->bristle.grip, foot->bristle.grip))
+                                                              : foot->drag * foot->slip_speed,
+                                          lane);
   o->foot.slip_speed[leg] = hx_lane(foot->slip_speed, lane);
   o->foot.penetration[leg] = hx_lane(foot->kin.delta, lane);
-  o->foot.impact_speed[leg] = contact->impact_speed[leg];
-  o->foot.contact[leg] = contact->closed[leg] != 0.0;
+  o->foot.impact_speed[leg] = state->contact.impact_speed[leg];
+  for (int i = 0; i < 3; ++i) o->foot.bristle[leg][i] = state->motion.bristle[i][leg];
+  o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
 }
 
 static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) {
@@ -122,7 +125,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     const hxLegWork *w = leg_work(work, leg, &lane);
     for (int joint = 0; joint < HX_JOINTS; ++joint) fill_joint(&w->joint[joint], lane, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
-    fill_foot(&w->foot, tibia, &state->contact, lane, leg, o);
+    fill_foot(model, state, &w->foot, tibia, lane, leg, o);
   }
   fill_torso(&state->motion, work, o);
   fill_energy(model, state, work, o);
