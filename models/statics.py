@@ -43,6 +43,7 @@ class Standing:
     angle: Array  # (6, 3) rad
     velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground and under the bristle law
     foot_force: Array  # (6, 3) N  ground on foot
+    bristle: Array  # (6, 3) m  what the feet have given way, 0 but on a slope under the bristle law
 
 
 def settled(robot: Robot) -> tuple[Array, Array, Array]:
@@ -118,14 +119,19 @@ def _bodies(robot: Robot, x: Array) -> Array:
     return body_states(robot, position, _attitude(x), _velocity(robot, x), turning, angle, np.zeros((LEGS, JOINTS)))
 
 
-def _foot_forces(robot: Robot, body: Array) -> Array:
-    """(6, 3) ground on feet [N]. Bristles read the creep as a deflection, in preslidings for each m/s: what holds is at rest."""
-    feet = foot_contacts(robot, body)
+def _bristles(robot: Robot, body: Array) -> Array:
+    """(6, 3) m. What the feet have given way: the creep of these bodies, read as so many preslidings for each m/s; 0 with other laws."""
     if robot.friction.law != "bristle":
-        return np.array([foot_force(robot, foot, 0.0) for foot in feet])
-    gone = [robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal) for foot in feet]
-    still = [replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet]
-    return np.array([foot_force(robot, foot, 0.0, bristle) for foot, bristle in zip(still, gone, strict=True)])
+        return np.zeros((LEGS, 3))
+    return np.array([robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal) for foot in foot_contacts(robot, body)])
+
+
+def _foot_forces(robot: Robot, body: Array) -> Array:
+    """(6, 3) ground on feet [N]. Feet that bristles hold do not move."""
+    feet, bristle = foot_contacts(robot, body), _bristles(robot, body)
+    if robot.friction.law == "bristle":
+        feet = tuple(replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet)
+    return np.array([foot_force(robot, foot, 0.0, bristle[leg]) for leg, foot in enumerate(feet)])
 
 
 def _residual(robot: Robot, x: Array) -> Array:
@@ -162,5 +168,6 @@ def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> A
 
 def _standing(robot: Robot, x: Array) -> Standing:
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
+    body = _bodies(robot, x)
     creep = np.zeros(3) if robot.friction.law == "bristle" else _velocity(robot, x)
-    return Standing(position, _attitude(x), angle, creep, _foot_forces(robot, _bodies(robot, x)))
+    return Standing(position, _attitude(x), angle, creep, _foot_forces(robot, body), _bristles(robot, body))

@@ -76,6 +76,13 @@ def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL
         assert walk(core, changed(robot, **changes), 2.0).output().solver.evaluations < STIFF * usual
 
 
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+def test_feet_that_stick_cost_no_more_steps_than_feet_that_creep(core: ct.CDLL, name: str) -> None:
+    robot = load_robot(name)
+    creeping, sticking = (walk(core, changed(robot, friction={"law": law}), 2.0).output().solver.evaluations for law in ("tanh", "bristle"))
+    assert sticking < 1.1 * creeping
+
+
 def test_legs_in_another_order_walk_the_same_way(core: ct.CDLL) -> None:
     robot = changed(load_robot("athena"), solver={"step": 1e-3})
     order = [3, 0, 5, 1, 4, 2]

@@ -63,7 +63,7 @@ def test_accelerations_and_multipliers_are_those_of_the_dense_system(core: ct.CD
 
 
 @pytest.mark.parametrize("law", CONTACT_LAWS)
-@pytest.mark.parametrize("friction", ["tanh", "none"])
+@pytest.mark.parametrize("friction", ["tanh", "none", "bristle"])
 def test_accelerations_are_those_of_the_dense_system_under_every_law(core: ct.CDLL, law: str, friction: str) -> None:
     robot = changed(lopsided(4), contact={"law": law, "impact_speed_floor": 2.0}, friction={"law": friction})
     body, command = random_bodies(robot, 4, drift=1e-3), random_command(robot, 4)

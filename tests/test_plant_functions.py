@@ -171,7 +171,7 @@ def test_the_ground_is_the_twins(core: ct.CDLL, terrain: dict[str, Any]) -> None
 
 @pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
 @pytest.mark.parametrize("law", CONTACT_LAWS)
-@pytest.mark.parametrize("friction", ["tanh", "none"])
+@pytest.mark.parametrize("friction", ["tanh", "none", "bristle"])
 def test_foot_kinematics_and_forces_are_the_twins(core: ct.CDLL, terrain: dict[str, Any], law: str, friction: str) -> None:
     robot = changed(
         lopsided(7), terrain=terrain, contact={"law": law, "impact_speed_floor": 2.0, "damping_factor": 0.5}, friction={"law": friction}

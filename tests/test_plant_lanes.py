@@ -83,8 +83,11 @@ def test_smaller_larger_and_absolute_value_are_taken_lane_by_lane(core: ct.CDLL)
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("method", ["rosw3", "dp54"])
-def test_the_motion_does_not_depend_on_the_lane_width(core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, method: str) -> None:
-    robot = changed(load_robot("phantomx_mk4"), solver={"method": method})
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_the_motion_does_not_depend_on_the_lane_width(
+    core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, method: str, law: str
+) -> None:
+    robot = changed(load_robot("phantomx_mk4"), solver={"method": method}, friction={"law": law})
     command, ends = random_command(robot, 5, size=0.3), (0.004, 0.02)
     plants = [Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])]
     for t in ends:
@@ -99,10 +102,13 @@ def test_the_motion_does_not_depend_on_the_lane_width(core: ct.CDLL, other_cores
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("garbage", [0x00, 0xFF])
-def test_what_lies_on_the_stack_does_not_matter(core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int) -> None:
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_what_lies_on_the_stack_does_not_matter(
+    core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
+) -> None:
     """Slots that no pack covers must not be read before they are written: 0xFF... is a NaN."""
-    robot = load_robot("athena")
-    plants = [Plant(library, robot) for library in (core, other_cores[width])]
+    robot = changed(load_robot("athena"), friction={"law": law})
+    plants = [Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])]
     for plant in plants:
         core.hx_probe_stain_stack(garbage)
         plant.step(0.02)

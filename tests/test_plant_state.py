@@ -22,8 +22,9 @@ def test_a_rerun_gives_the_same_bits(core: ct.CDLL, method: str) -> None:
 
 
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])
-def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(core: ct.CDLL, mode: str) -> None:
-    robot, other = changed(lopsided(), servo={"mode": mode}), load_robot("athena")
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(core: ct.CDLL, mode: str, law: str) -> None:
+    robot, other = changed(lopsided(), servo={"mode": mode}, friction={"law": law}), load_robot("athena")
     whole = trail(Plant(core, robot, **landing(robot)), 12)
     touching = set()
     for k in (0, 3, 6, 9, 11):
@@ -57,8 +58,9 @@ def test_interleaved_instances_are_as_good_as_alone(core: ct.CDLL) -> None:
     assert [list(column) for column in zip(*together, strict=True)] == alone
 
 
-def test_a_reset_goes_back_to_the_exact_start(core: ct.CDLL) -> None:
-    robot = load_robot("athena")
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_a_reset_goes_back_to_the_exact_start(core: ct.CDLL, law: str) -> None:
+    robot = changed(load_robot("athena"), friction={"law": law})
     plant = Plant(core, robot, **landing(robot))
     start = plant.save()
     first = trail(plant, 6)

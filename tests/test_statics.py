@@ -22,10 +22,10 @@ ROBOTS = ("athena", "phantomx_mk4")
 MODES = ("position", "torque", "kinematic")
 
 
-def robot_on(name: str, *, mode: str = "position", kind: str = "flat", incline: float = 0.0) -> Robot:
+def robot_on(name: str, *, mode: str = "position", kind: str = "flat", incline: float = 0.0, law: str = "tanh") -> Robot:
     robot = load_robot(name)
     terrain = replace(robot.terrain, kind=kind, incline=incline, heading=0.7, height=0.3)
-    return replace(robot, servo=replace(robot.servo, mode=mode), terrain=terrain)
+    return replace(robot, servo=replace(robot.servo, mode=mode), friction=replace(robot.friction, law=law), terrain=terrain)
 
 
 def bodies(robot: Robot, pose: Standing) -> Array:
@@ -35,11 +35,12 @@ def bodies(robot: Robot, pose: Standing) -> Array:
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 @pytest.mark.parametrize("incline", [0.0, 0.2])
-def test_nothing_accelerates_in_the_standing_pose(name: str, mode: str, incline: float) -> None:
-    robot = robot_on(name, mode=mode, kind="slope", incline=incline)
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_nothing_accelerates_in_the_standing_pose(name: str, mode: str, incline: float, law: str) -> None:
+    robot = robot_on(name, mode=mode, kind="slope", incline=incline, law=law)
     pose = standing(robot)
     body = bodies(robot, pose)
-    result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body))
+    result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle)
     assert float(np.max(np.abs(result.dv))) < AT_REST
 
 
@@ -98,6 +99,16 @@ def test_on_a_slope_the_robot_creeps_downhill_at_the_speed_of_the_tanh_law(incli
     assert pose.velocity == pytest.approx(creep * downhill, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("incline", [0.1, 0.3])
+def test_on_a_slope_bristles_hold_the_robot_where_it_has_given_way_by_their_closed_form(incline: float) -> None:
+    robot = robot_on("athena", kind="slope", incline=incline, law="bristle")
+    pose = standing(robot)
+    downhill = -np.array([math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)])
+    way = robot.friction.presliding * math.tan(incline) / robot.friction.mu
+    assert not pose.velocity.any()
+    assert pose.bristle == pytest.approx(np.tile(way * downhill, (6, 1)), rel=1e-6, abs=1e-6 * way)
+
+
 @pytest.mark.parametrize("servo", [{"torque_max": 0.3, "torque_continuous": 0.3}, {"kp": 0.0}], ids=["weak", "limp"])
 def test_servos_that_cannot_hold_the_robot_are_refused(servo: dict[str, float]) -> None:
     robot = robot_on("athena")
@@ -105,9 +116,10 @@ def test_servos_that_cannot_hold_the_robot_are_refused(servo: dict[str, float]) 
         settled(replace(robot, servo=replace(robot.servo, **servo)))  # type: ignore[arg-type]
 
 
-def test_a_slope_steeper_than_the_friction_angle_is_refused() -> None:
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_a_slope_steeper_than_the_friction_angle_is_refused(law: str) -> None:
     with pytest.raises(RobotError, match="give a slope more friction"):
-        settled(robot_on("athena", kind="slope", incline=math.atan(0.75)))
+        settled(robot_on("athena", kind="slope", incline=math.atan(0.75), law=law))
 
 
 def test_a_robot_with_an_uneven_load_leans_towards_it() -> None:
