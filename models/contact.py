@@ -75,13 +75,13 @@ def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) 
 
 
 def bristle_yield(share: Array) -> Array:
-    """alpha (any shape): how much of a bristle's stretching is sliding, from 0 at break-away to 1 at |z| = share z_max = z_max; C1."""
+    """Y (any shape): how much of the slip along a bristle is sliding, from 0 at break-away to 1 at the presliding, a share of 1; C1."""
     s = np.clip((share - BREAK_AWAY) / (1.0 - BREAK_AWAY), 0.0, 1.0)
     return np.asarray(s * s * (3.0 - 2.0 * s))
 
 
 def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
-    """(..., 3) alpha |z|/z_max (v_t . z^)+ z^: what of the slip velocity (..., 3) [m/s] the foot does not get back (eq. 18)."""
+    """(..., 3) Y (v_t.u)+ u/|u|, u = b/b_max: what of the slip velocity (..., 3) [m/s] the foot does not get back (eq. 18)."""
     u = bristle / presliding
     share = np.linalg.norm(u, axis=-1, keepdims=True)
     along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
@@ -89,23 +89,27 @@ def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
 
 
 def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """(3,) dz/dt [m/s] of a closed foot's bristles (eq. 18)."""
+    """(3,) db/dt [m/s] of a closed foot's bristles (eq. 18)."""
     return slip - sliding_velocity(friction.presliding, slip, bristle)
 
 
 def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """(3,) f_t = -mu f_n (u + d (1 - |u|)/|(1 - |u|, d)|), u = z/z_max, d = tau dz/dt / z_max [N] (eq. 19)."""
-    u, d = bristle / friction.presliding, friction.bristle_damping / friction.presliding * bristle_rate(friction, slip, bristle)
-    share, push = float(np.linalg.norm(u)), float(np.linalg.norm(d))
-    room = 1.0 - min(share, 1.0)
+    """(3,) f_t = -mu f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau db/dt / b_max (eq. 19).
+
+    The spring leaves the damping a room of 1 - |u| (3 - u.u)/2, so that friction stays in its cone; u is cut to its presliding.
+    """
+    u, d = bristle / friction.presliding, 1.5 * friction.bristle_damping / friction.presliding * bristle_rate(friction, slip, bristle)
+    u = u / max(float(np.linalg.norm(u)), 1.0)
+    spring = u * (3.0 - u @ u) / 2.0
+    room, push = 1.0 - float(np.linalg.norm(spring)), float(np.linalg.norm(d))
     damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
-    return -friction.mu * normal * (u / max(share, 1.0) + damped)
+    return -friction.mu * normal * (spring + damped)
 
 
 def friction_force(friction: Friction, normal: float, slip: Array, bristle: Array | None = None) -> Array:
     """(3,) f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t| [N], with its limit -mu f_n k_t v_t at rest; the bristles' with that law.
 
-    bristle: (3,) their deflection z [m], slack unless given.
+    bristle: (3,) their deflection b [m], slack unless given.
     """
     if friction.law == "none":
         return np.zeros(3)

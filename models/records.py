@@ -96,7 +96,7 @@ class Friction:
     mu: Annotated[float, Number("1", at_least=0.0)]
     mu_static: Annotated[float, Number("1", at_least=0.0)]
     slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5, tanh law
-    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # z_max of eq. 18, bristle law; absent in a file: Mindlin
+    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # b_max of eq. 18, bristle law; absent in a file: Mindlin
     bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]  # tau of eq. 19, bristle law
 
 

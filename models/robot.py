@@ -189,10 +189,10 @@ def hertz_stiffness(foot: Foot) -> float:
 
 
 def mindlin_presliding(foot: Foot, stiffness: float, mu: float, load: float) -> float:
-    """Tangential displacement at which the foot pressed on by a load [N] would slide if it stayed as stiff as at the start [m].
+    """Tangential displacement at which the foot's sphere pressed on by a load f_n [N] slides (Mindlin 1949) [m].
 
-    mu f_n over Mindlin's stiffness 8 G a/(2 - nu), a = sqrt(R delta) the radius of the contact, delta = (f_n/K)^(2/3).
+    3 mu f_n (2 - nu)/(16 G a), a = sqrt(R delta) the radius of the contact, delta = (f_n/K)^(2/3).
     """
     shear_modulus = foot.youngs_modulus / (2.0 * (1.0 + foot.poisson))
-    per_root_depth = 8.0 * shear_modulus * math.sqrt(foot.radius) / (2.0 - foot.poisson)
+    per_root_depth = 16.0 / 3.0 * shear_modulus * math.sqrt(foot.radius) / (2.0 - foot.poisson)
     return max(mu * (load**2 * stiffness) ** (1.0 / 3.0) / per_root_depth, LEAST_PRESLIDING)

@@ -123,7 +123,9 @@ def _bristles(robot: Robot, body: Array) -> Array:
     """(6, 3) m. What the feet have given way: the creep of these bodies, read as so many preslidings for each m/s; 0 with other laws."""
     if robot.friction.law != "bristle":
         return np.zeros((LEGS, 3))
-    return np.array([robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal) for foot in foot_contacts(robot, body)])
+    return np.array(
+        [robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal) for foot in foot_contacts(robot, body)]
+    )
 
 
 def _foot_forces(robot: Robot, body: Array) -> Array:

@@ -65,6 +65,21 @@ def test_net_slip_is_what_exceeds_the_largest_creep() -> None:
     assert walk.metrics(friction__mu=mu, friction__slope=slope)["slip_net_per_metre"] == pytest.approx(net / SPEED)
 
 
+@pytest.mark.parametrize(("stretched", "turn", "net"), [(0.5, 1.0, 0.0), (1.0, 1.0, 1.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)])
+def test_net_slip_of_bristles_is_what_they_do_not_give_back(stretched: float, turn: float, net: float) -> None:
+    """A spring below break-away, sliding when full, elastic again on the way back; the normal velocity is no slip."""
+    walk = Walk()
+    walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
+    walk.set("LF.foot.slip_speed", 0.05)
+    for axis, part in (("1", 0.6), ("2", 0.8)):
+        walk.set(f"LF.foot.velocity[{axis}]", turn * part * 0.05)
+        walk.set(f"LF.foot.bristle[{axis}]", part * stretched * 5e-4)
+    walk.set("LF.foot.velocity[3]", 0.4)
+    metrics = walk.metrics(friction__law=3.0, friction__presliding=5e-4)
+    assert metrics["slip_per_metre"] == pytest.approx(0.05 / SPEED)
+    assert metrics["slip_net_per_metre"] == pytest.approx(net * 0.05 / SPEED, abs=1e-12)
+
+
 def test_a_walk_ten_percent_short_has_a_path_error_of_a_ninth() -> None:
     assert Walk(speed=0.9 * SPEED).metrics()["path_error"] == pytest.approx(0.1 / 0.9)
     assert Walk().metrics()["path_error"] == pytest.approx(0.0, abs=1e-12)

@@ -15,6 +15,7 @@ from states import changed, distance, lopsided, random_bodies
 from hexapod_cosim.models import CONTACT_LAWS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
 from hexapod_cosim.models.contact import (
+    bristle_rate,
     contact_damping,
     exact_restitution_chi,
     foot_contacts,
@@ -240,6 +241,32 @@ def test_friction_is_the_twins_through_its_limit_at_rest(core: ct.CDLL) -> None:
         slip = np.array([0.6, -0.8, 0.0]) * speed
         assert distance(-robot.friction.mu * 10.0 * per_speed * slip, friction_force(robot.friction, 10.0, slip)) < SAME
         assert per_speed == pytest.approx(math.tanh(60.0 * speed) / speed if speed else 60.0, rel=SAME)
+
+
+@pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
+def test_bristles_and_their_force_are_the_twins(core: ct.CDLL, terrain: dict[str, Any]) -> None:
+    """Slack, stretched, sliding and overstretched bristles, along the slip and against it; an open foot's do not move."""
+    robot = changed(lopsided(7), terrain=terrain, contact={"impact_speed_floor": 2.0}, friction={"law": "bristle", "bristle_damping": 1e-3})
+    plant, body = drifted(core, robot, 7)
+    damping, rng, seen = contact_damping(robot.contact, 0.0), np.random.default_rng(10), set()
+    for size in (0.0, 0.3, 0.8, 0.8, 0.99, 0.99, 1.0, 1.2, 1.2):
+        feet = foot_contacts(robot, body)
+        z = np.array([along_ground(rng.normal(size=3), foot.normal) for foot in feet]) * size * robot.friction.presliding
+        rate = probed(core.hx_probe_bristles, plant, inputs(plant.hold()), z, size=18).reshape(6, 3)
+        output = plant.output()
+        for leg, foot in enumerate(feet):
+            slip = foot.velocity + foot.approach_speed * foot.normal
+            closed = foot.penetration > 0.0
+            assert distance(rate[leg], bristle_rate(robot.friction, slip, z[leg]) if closed else np.zeros(3)) < SAME
+            assert distance(output.foot.force[leg], foot_force(robot, foot, damping if closed else math.nan, z[leg])) < CONTACT_SAME
+            seen.add((size, closed, bool(slip @ z[leg] > 0.0)))
+        assert np.array_equal(output.foot.bristle, z)
+    assert {(0.99, True, True), (0.99, True, False), (1.2, True, True), (0.8, False, True)} <= seen  # size, closed, slipping on
+
+
+def along_ground(direction: Array, normal: Array) -> Array:
+    flat = direction - (direction @ normal) * normal
+    return np.asarray(flat / np.linalg.norm(flat))
 
 
 @pytest.mark.parametrize("e", [1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999, 1.0])

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ctypes as ct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 from mirror import NOT_FINITE
-from plant import Plant, PlantError, inputs, pointer
+from plant import Plant, PlantError, inputs, pointer, probed
 from slopes import LawSlopes, assembled, law_slopes, resting
 from states import changed, random_command, scaled
 
@@ -36,6 +36,7 @@ class Problem:
     command: Command
     duration: float
     counts: Callable[[int], tuple[int, ...]]
+    bristles: float = 0.0  # at the start, along x, over the presliding
 
 
 def tumbling() -> Problem:
@@ -74,11 +75,32 @@ def pressed() -> Problem:
     return Problem(robot, start, command, 0.05, lambda order: (50, 71, 100) if order == 5 else (128, 181, 256))
 
 
-PROBLEMS = {"tumbling": tumbling(), "driven": driven(), "pressed": pressed()}
+def stuck() -> Problem:
+    """The same on bristles far from letting go."""
+    problem = pressed()
+    robot = changed(problem.robot, friction={"law": "bristle", "presliding": 0.05})
+    return replace(problem, robot=robot, bristles=0.1, counts=lambda order: (57, 80, 113) if order == 5 else problem.counts(order))
+
+
+def sliding() -> Problem:
+    """The same on bristles stretched to the full, the robot sliding on along x."""
+    problem, friction = pressed(), {"law": "bristle", "presliding": 2e-3, "mu": 0.2}
+    start = problem.start | {"velocity": [0.5, 0.0, 0.0]}
+    return replace(problem, robot=changed(problem.robot, friction=friction), start=start, bristles=1.0)
+
+
+PROBLEMS = {"tumbling": tumbling(), "driven": driven(), "pressed": pressed(), "stuck": stuck(), "sliding": sliding()}
+
+
+def started(core: ct.CDLL, problem: Problem, **solver: Any) -> Plant:
+    plant = Plant(core, changed(problem.robot, solver=solver), **problem.start)
+    z = np.tile([problem.bristles * problem.robot.friction.presliding, 0.0, 0.0], (6, 1))
+    probed(core.hx_probe_bristles, plant, inputs(problem.command), z, size=18)
+    return plant
 
 
 def end(core: ct.CDLL, problem: Problem, **solver: Any) -> Array:
-    plant = Plant(core, changed(problem.robot, solver=solver), **problem.start)
+    plant = started(core, problem, **solver)
     plant.step(problem.duration, problem.command)
     return plant.bodies
 
@@ -100,15 +122,20 @@ def test_each_method_has_its_order(core: ct.CDLL, method: str, problem: Problem)
     assert errors[-1] < 1e-3
 
 
-def test_no_foot_lands_or_leaves_while_pressed(core: ct.CDLL) -> None:
-    """What the order of that problem rests on."""
-    problem = PROBLEMS["pressed"]
-    plant = Plant(core, problem.robot, **problem.start)
+@pytest.mark.parametrize("name", ["pressed", "stuck", "sliding"])
+def test_no_foot_lands_or_leaves_while_pressed_and_bristles_stay_stuck_or_sliding(core: ct.CDLL, name: str) -> None:
+    """What the order of those problems rests on."""
+    problem, stretched = PROBLEMS[name], []
+    plant = started(core, problem)
     for k in range(1, 11):
         plant.step(k / 10.0 * problem.duration, problem.command)
-        assert np.all(plant.output(problem.command).foot.normal_force > 0.1)
+        foot = plant.output(problem.command).foot
+        assert np.all(foot.normal_force > 0.1)
+        stretched.extend(np.linalg.norm(foot.bristle, axis=1) / problem.robot.friction.presliding)
     assert plant.output().solver.touchdowns == 0.0
-    assert float(np.max(plant.output().foot.slip_speed)) > 0.05
+    assert float(np.max(plant.output().foot.slip_speed)) > 0.01
+    assert name != "stuck" or 0.05 < max(stretched) < 0.7
+    assert name != "sliding" or 0.99 < min(stretched) < 1.0 + 1e-3
 
 
 @pytest.mark.parametrize("method", EMBEDDED)

@@ -103,9 +103,7 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("garbage", [0x00, 0xFF])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_what_lies_on_the_stack_does_not_matter(
-    core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
-) -> None:
+def test_what_lies_on_the_stack_does_not_matter(core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str) -> None:
     """Slots that no pack covers must not be read before they are written: 0xFF... is a NaN."""
     robot = changed(load_robot("athena"), friction={"law": law})
     plants = [Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])]

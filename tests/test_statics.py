@@ -104,7 +104,7 @@ def test_on_a_slope_bristles_hold_the_robot_where_it_has_given_way_by_their_clos
     robot = robot_on("athena", kind="slope", incline=incline, law="bristle")
     pose = standing(robot)
     downhill = -np.array([math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)])
-    way = robot.friction.presliding * math.tan(incline) / robot.friction.mu
+    way = robot.friction.presliding * 2.0 * math.sin(math.asin(math.tan(incline) / robot.friction.mu) / 3.0)  # u (3 - u^2)/2 = share
     assert not pose.velocity.any()
     assert pose.bristle == pytest.approx(np.tile(way * downhill, (6, 1)), rel=1e-6, abs=1e-6 * way)
 

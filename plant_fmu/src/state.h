@@ -32,7 +32,7 @@ typedef union hxMotion {
     double torso[HX_BODY_STATE];
     double actuator_work, push_work, dissipated; /* J */
     double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
-    double bristle[3][HX_SLOTS]; /* m  z of eq. 18, world axes; 0 and at rest with other laws. The last: they leave it out */
+    double bristle[3][HX_SLOTS]; /* m  b of eq. 18, world axes; 0 and at rest with other laws. The last: they leave it out */
   };
 } hxMotion;
 

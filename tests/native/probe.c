@@ -315,7 +315,7 @@ static void fill_bristles(const double z[HX_LEGS][3], hxMotion *motion) {
   }
 }
 
-/* puts the bristles; rate: their dz/dt there */
+/* puts the bristles; rate: their db/dt there */
 HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3], double rate[HX_LEGS][3]) {
   hxWork work;
   hxRate all;

@@ -109,7 +109,7 @@ typedef struct hxDefinition {
     int law;                 /* hxFrictionLaw */
     double mu;               /* 1 */
     double slope;            /* s/m  k_t of eq. 5, of the tanh law */
-    double presliding;       /* m    z_max of eq. 18, of the bristle law: a foot pushed this far slides */
+    double presliding;       /* m    b_max of eq. 18, of the bristle law: a foot pushed this far slides */
     double bristle_damping;  /* s    tau of eq. 19, of the bristle law: damping over stiffness */
   } friction;
   struct {
@@ -172,7 +172,7 @@ typedef struct hxOutput {
     double position[HX_LEGS][3];          /* m    contact point: the foot's lowest towards the ground */
     double velocity[HX_LEGS][3];          /* m/s  of the foot's material point there */
     double slip_speed[HX_LEGS];           /* m/s  tangential part of it */
-    double bristle[HX_LEGS][3];           /* m    z of eq. 18, the bristle law's; 0 with others */
+    double bristle[HX_LEGS][3];           /* m    b of eq. 18, the bristle law's; 0 with others */
     double penetration[HX_LEGS];          /* m    < 0: clearance */
     double impact_speed[HX_LEGS];         /* m/s  at the last touch-down */
     int contact[HX_LEGS];

@@ -212,10 +212,9 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
   implicit->slope[pack].stiffness = ahead.stiffness;
   implicit->slope[pack].viscosity = ahead.viscosity;
   if (has_bristles(model)) {
-    const hxReal stiffness = ahead.force * (model->mu / model->presliding);
     implicit->slope[pack].yield = foot->bristle.yield;
-    implicit->slope[pack].bristle = stiffness / (1.0 + implicit->z * foot->bristle.yield);
-    implicit->slope[pack].drag = stiffness * foot->bristle.damping + implicit->z * implicit->slope[pack].bristle;
+    implicit->slope[pack].bristle = ahead.force * foot->bristle.stiffness / (1.0 + implicit->z * foot->bristle.yield);
+    implicit->slope[pack].drag = ahead.force * foot->bristle.damping + implicit->z * implicit->slope[pack].bristle;
   } else {
     implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
   }
@@ -281,7 +280,7 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
   push_tibia(leg, contact_point(leg), leg->response);
 }
 
-/* what the bristles' own shift s_z + z dz/dt, shared out by how they let go, takes off the foot's force (eq. 20) */
+/* what the bristles' own shift s_b + z db/dt, shared out by how they let go, takes off the foot's force (eq. 20) */
 static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegWork *leg) {
   const hxVec3 own = hx_scale(hx_splat(implicit->z), leg->foot.bristle.rate);
   const hxVec3 moved = implicit->change ? hx_add(hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES), own) : own;
@@ -323,7 +322,7 @@ static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *le
   return hx_add(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm), hx_splat_vec3(model->gravity));
 }
 
-/* dz/dt of a stage (eq. 20): k = (f + s_v + z a - yield s_z)/(1 + z yield) along the ground, f what the law says */
+/* db/dt of a stage (eq. 20): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the ground, f what the law says */
 static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *contact, const hxImplicit *implicit, int pack,
                                   const hxLegWork *leg) {
   hxVec3 rate = leg->foot.bristle.rate;

@@ -29,10 +29,11 @@ typedef struct {
 
 /* What a foot with bristles feels across the normal. */
 typedef struct {
-  hxVec3 grip;    /* 1    -f_t over f_n */
-  hxVec3 rate;    /* m/s  dz/dt */
-  hxReal yield;   /* 1/s  how fast the bristles let go while they slide */
-  hxReal damping; /* s    of grip, over mu and the presliding's share: tau, less near the limit */
+  hxVec3 grip;      /* 1    -f_t over f_n */
+  hxVec3 rate;      /* m/s  db/dt */
+  hxReal stiffness; /* 1/m  secant of grip by b */
+  hxReal damping;   /* s/m  of grip by db/dt */
+  hxReal yield;     /* 1/s  of db/dt by -b: how fast the bristles let go while they slide */
 } hxBristle;
 
 typedef struct {
@@ -64,21 +65,29 @@ static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
   return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0), hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
 }
 
-/* Elasto-plastic bristles (eq. 18, 19), u = z/z_max: dz/dt = v - alpha (v.u)+ u/|u|, grip = mu (u + d (1 - |u|)/|(1 - |u|, d)|) with
- * d = tau dz/dt / z_max. Neither can u leave the unit disc nor the grip mu. */
-static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 z, hxVec3 slip) {
+/* Elasto-plastic bristles (eq. 18, 19), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+ u/|u|, of which friction is the share
+ * w = u (3 - u.u)/2 + d room/|(room, d)|, d = 3/2 tau db/dt / b_max. The room that the spring leaves, 1 - |u| (3 - u.u)/2, is all that the
+ * damping can have: w never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages scatter. */
+static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const double per_length = 1.0 / model->presliding;
-  const hxVec3 u = hx_scale(hx_splat(per_length), z);
-  const hxReal size = hx_sqrt(hx_dot(u, u));
+  const hxVec3 u = hx_scale(hx_splat(per_length), b);
+  const hxReal size = hx_sqrt(hx_dot(u, u)), within = hx_min(size, one);
   const hxReal s = hx_clip((size - break_away) * (1.0 / (1.0 - break_away)), zero, one);
   const hxReal let_go = s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) / hx_max(size, hx_splat(break_away));
   const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -let_go, u));
-  const hxVec3 d = hx_scale(hx_splat(model->bristle_damping * per_length), rate);
-  const hxReal room = 1.0 - hx_min(size, one);
+  const hxVec3 d = hx_scale(hx_splat(1.5 * model->bristle_damping * per_length), rate);
+  const hxReal spring = (1.5 - 0.5 * within * within) / hx_max(size, one);
+  const hxReal room = 1.0 - spring * size;
   const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) + 1e-30); /* tiny: no room and no motion is 0, not 0/0 */
-  const hxVec3 w = hx_add_scaled(hx_scale(1.0 / hx_max(size, one), u), share, d);
-  return (hxBristle){hx_scale(hx_splat(model->mu), w), rate, per_length * let_go, model->bristle_damping * share};
+  const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
+  return (hxBristle){
+      .grip = hx_scale(hx_splat(model->mu), w),
+      .rate = rate,
+      .stiffness = (model->mu * per_length) * spring,
+      .damping = (1.5 * model->mu * model->bristle_damping * per_length) * share,
+      .yield = per_length * let_go,
+  };
 }
 
 /* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 4) while the contact is closed */

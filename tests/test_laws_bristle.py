@@ -1,0 +1,197 @@
+"""Feet that stick: what the bristle law promises of a block on an incline, of pushes, and of a walk."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from states import changed
+from test_laws_standing import ACCURATE, block, laid, marching, stood, tilted
+
+from hexapod_cosim.models import load_robot
+from hexapod_cosim.models.contact import BREAK_AWAY, bristle_force, bristle_rate
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.records import Array
+
+FRICTION = replace(load_robot("athena").friction, law="bristle")
+EXACT = 1e-12  # relative: rounding
+HELD = 1e-9  # m in a minute: the tanh law creeps 0.1 m in that time at a share of 0.3
+CLOSED = 1e-6  # relative, of the way given: at rest but for what is left of the first swing
+UNEVEN = 1e-3  # relative, of one foot's bristle against another's: the leaning block turns a little
+LEANING = 0.03  # relative: the block leans as its downhill feet take more of its weight, and its feet roll
+OVERSHOT = 5e-3  # of the presliding: some steps' error, 1e-3 each at the default tolerance; the force keeps its cone all the same
+RETURNED = 1e-8  # m: where a push that comes back leaves the block; a thousandth of what one swing moves it
+
+
+# the law by itself
+
+
+def test_below_break_away_a_bristle_is_a_spring() -> None:
+    rng = np.random.default_rng(0)
+    for share in (0.0, 0.3, BREAK_AWAY):
+        slip, z = rng.normal(size=3), share * FRICTION.presliding * np.array([0.6, 0.8, 0.0])
+        assert bristle_rate(FRICTION, slip, z) == pytest.approx(slip, rel=EXACT)
+        still = bristle_force(FRICTION, 10.0, np.zeros(3), z)
+        assert still == pytest.approx(-FRICTION.mu * 10.0 * 0.5 * share * (3.0 - share**2) * np.array([0.6, 0.8, 0.0]), rel=EXACT)
+
+
+def test_a_full_bristle_follows_the_slip_and_comes_back_elastically() -> None:
+    z = FRICTION.presliding * np.array([0.6, 0.8, 0.0])
+    along, across = z / FRICTION.presliding, np.array([-0.8, 0.6, 0.0])
+    assert bristle_rate(FRICTION, 0.3 * along, z) == pytest.approx(np.zeros(3), abs=EXACT)
+    assert bristle_rate(FRICTION, 0.3 * across, z) == pytest.approx(0.3 * across, rel=EXACT)
+    assert bristle_rate(FRICTION, -0.3 * along, z) == pytest.approx(-0.3 * along, rel=EXACT)
+
+
+def test_no_motion_takes_a_bristle_past_its_presliding_or_friction_past_its_cone() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        direction, slip = rng.normal(size=3) * [1.0, 1.0, 0.0], rng.normal(size=3) * [1.0, 1.0, 0.0]
+        direction /= np.linalg.norm(direction)
+        z = rng.uniform(0.0, 1.0) * FRICTION.presliding * direction
+        assert float(bristle_rate(FRICTION, slip, FRICTION.presliding * direction) @ direction) <= EXACT
+        force = bristle_force(FRICTION, 10.0, slip, z)
+        assert float(np.linalg.norm(force)) <= FRICTION.mu * 10.0 * (1.0 + EXACT)
+
+
+def test_turning_slip_and_bristle_turns_the_force() -> None:
+    rng, (c, s) = np.random.default_rng(2), (math.cos(0.8), math.sin(0.8))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    for _ in range(20):
+        slip, z = rng.normal(0.0, 0.05, 3), rng.normal(0.0, 3e-4, 3)
+        for law in (lambda v, x: bristle_rate(FRICTION, v, x), lambda v, x: bristle_force(FRICTION, 10.0, v, x)):
+            assert law(turn @ slip, turn @ z) == pytest.approx(turn @ law(slip, z), rel=EXACT, abs=EXACT)
+
+
+def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
+    """C1 in the deflection: slopes on either side of break-away and of the presliding agree to first order in the distance."""
+    x_axis = np.array([1.0, 0.0, 0.0])
+    for share in (BREAK_AWAY, 1.0):
+        slopes = [
+            (bristle_rate(FRICTION, x_axis, (share + side + 1e-6) * FRICTION.presliding * x_axis)[0]
+             - bristle_rate(FRICTION, x_axis, (share + side - 1e-6) * FRICTION.presliding * x_axis)[0]) / 2e-6
+            for side in (-1e-4, 1e-4)
+        ]  # fmt: skip
+        assert slopes[0] == pytest.approx(slopes[1], abs=0.05)
+
+
+# the incline
+
+
+def given(share: float) -> float:
+    """Of the presliding: where a share of the limit is held, u (3 - u^2)/2 = share."""
+    return 2.0 * math.sin(math.asin(share) / 3.0)
+
+
+@pytest.mark.parametrize("by", ["gravity", "slope"])
+@pytest.mark.parametrize(("angle", "heading"), [(0.1, 0.0), (0.2, 2.0), (0.35, math.pi)])
+def test_below_the_friction_angle_a_block_holds_still_where_it_has_given_way(core: ct.CDLL, by: str, angle: float, heading: float) -> None:
+    plant, downhill, _ = tilted(core, angle, heading, by=by, law="bristle")
+    friction, start = plant.robot.friction, plant.output().foot.position
+    plant.step(2.0)
+    settled = plant.output()
+    plant.step(62.0)
+    held = plant.output()
+    way = friction.presliding * given(math.tan(angle) / friction.mu)
+    assert way < BREAK_AWAY * friction.presliding
+    u = held.foot.bristle @ downhill / friction.presliding
+    share = held.foot.normal_force @ (u * (3.0 - u**2) / 2.0) / held.foot.normal_force.sum()
+    assert share == pytest.approx(math.tan(angle) / friction.mu, rel=CLOSED)
+    assert u == pytest.approx(np.full(6, way / friction.presliding), rel=UNEVEN)
+    assert (held.foot.position - start) @ downhill == pytest.approx(np.full(6, way), rel=LEANING)
+    assert float(np.max(np.abs(held.torso.position - settled.torso.position))) < HELD
+    creep = math.atanh(math.tan(angle) / friction.mu) / friction.slope
+    assert 60.0 * creep > 1e6 * HELD
+
+
+def test_a_constant_force_between_break_away_and_the_limit_is_held_too(core: ct.CDLL) -> None:
+    plant, downhill, _ = tilted(core, 0.58, 0.0, by="gravity", law="bristle")
+    assert given(math.tan(0.58) / plant.robot.friction.mu) > BREAK_AWAY
+    plant.step(5.0)
+    settled = plant.output()
+    plant.step(25.0)
+    held = plant.output()
+    assert float(np.max(np.abs(held.torso.position - settled.torso.position))) < HELD
+    assert held.foot.force.sum(axis=0) @ downhill == pytest.approx(-plant.robot.total_mass * 9.81 * math.sin(0.58), rel=CLOSED)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0])
+def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(core: ct.CDLL, heading: float) -> None:
+    plant, downhill, _ = tilted(core, 0.15, 0.0, by="gravity", law="bristle")
+    weight, mu = plant.robot.total_mass * 9.81, plant.robot.friction.mu
+    size = 0.35 * mu * weight
+    assert given(math.tan(0.15) / mu + 0.35 / math.cos(0.15)) < 0.9 * BREAK_AWAY
+    way = np.array([math.cos(heading), math.sin(heading), 0.0])
+    places, swing = [], 0.0
+    for k in range(1200):  # 60 swings of 0.1 s, from the third on compared at their ends
+        t = 5e-3 * k
+        plant.step(t + 5e-3, replace(plant.hold(), push_force=size * math.sin(20.0 * math.pi * t) * way))
+        place = plant.output().torso.position @ downhill
+        places.append(place)
+        swing = max(swing, abs(place - places[0]))
+    ends = np.array(places[219::20])
+    assert swing > 1e3 * RETURNED
+    assert float(np.max(np.abs(ends - ends[-1]))) < RETURNED
+
+
+def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
+    """Pushed aside and let go below break-away, slowly: the books show the loan, and its return."""
+    robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
+    plant = laid(core, robot, np.eye(4)[0])
+    plant.step(1.0)
+    force, start, taken = 0.3 * robot.friction.mu * robot.total_mass * 9.81, plant.output().energy.dissipated, []
+    for k in range(400):
+        share = math.sin(math.pi * (k + 1) / 400.0) ** 2
+        plant.step(1.0 + 0.01 * (k + 1), replace(plant.hold(), push_force=np.array([0.0, share * force, 0.0])))
+        taken.append(plant.output().energy.dissipated - start)
+    u = given(0.3)
+    held = force / 0.3 * robot.friction.presliding * (0.75 * u**2 - 0.125 * u**4)
+    assert max(taken) == pytest.approx(held, rel=0.05)  # the push is held in steps of 10 ms
+    assert taken[-1] < 0.05 * held
+
+
+# walking
+
+
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+def test_bristles_are_slack_in_the_air_and_never_past_their_presliding(core: ct.CDLL, name: str) -> None:
+    robot = changed(load_robot(name), friction={"law": "bristle"})
+    plant, stretched = stood(core, robot), 0.0
+    for k in range(200):
+        plant.step(5e-3 * (k + 1), marching(robot, 5e-3 * k))
+        foot = plant.output().foot
+        share = np.linalg.norm(foot.bristle, axis=1) / robot.friction.presliding
+        assert not foot.bristle[foot.contact == 0].any()
+        assert np.all(share < 1.0 + OVERSHOT)
+        stretched = max(stretched, float(np.max(share)))
+    assert stretched > 0.9
+
+
+def test_a_walk_converges_in_proportion_to_the_tolerance(core: ct.CDLL) -> None:
+    def end(**solver: Any) -> Array:
+        robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=solver)
+        plant = stood(core, robot)
+        for k in range(100):
+            plant.step(5e-3 * (k + 1), marching(robot, 5e-3 * k))
+        return np.asarray(plant.output().torso.position)
+
+    exact = end(**ACCURATE)
+    for tolerance in (1e-4, 1e-6):
+        assert end(tolerance=tolerance) == pytest.approx(exact, abs=tolerance)  # m, after half a second
+
+
+def test_a_stuck_leg_does_not_ring(core: ct.CDLL) -> None:
+    """Pushed and let go, the standing robot is quiet after a fifth of a second: its bristles damp what its servos leave."""
+    robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=ACCURATE)
+    plant, speeds = stood(core, robot), []
+    pushed = Command(angle_ref=robot.stance, push_force=np.array([0.0, 5.0, 0.0]))
+    plant.step(0.5, pushed)
+    for k in range(60):
+        plant.step(0.5 + 0.01 * (k + 1))
+        speeds.append(float(np.max(plant.output().foot.slip_speed)))
+    assert max(speeds) > 1e-5
+    assert max(speeds[20:]) < 0.05 * max(speeds)
