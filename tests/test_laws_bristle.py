@@ -63,8 +63,9 @@ def test_turning_slip_and_bristle_turns_the_force() -> None:
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     for _ in range(20):
         slip, z = rng.normal(0.0, 0.05, 3), rng.normal(0.0, 3e-4, 3)
-        for law in (lambda v, x: bristle_rate(FRICTION, v, x), lambda v, x: bristle_force(FRICTION, 10.0, v, x)):
-            assert law(turn @ slip, turn @ z) == pytest.approx(turn @ law(slip, z), rel=EXACT, abs=EXACT)
+        rate, force = bristle_rate(FRICTION, slip, z), bristle_force(FRICTION, 10.0, slip, z)
+        assert bristle_rate(FRICTION, turn @ slip, turn @ z) == pytest.approx(turn @ rate, rel=EXACT, abs=EXACT)
+        assert bristle_force(FRICTION, 10.0, turn @ slip, turn @ z) == pytest.approx(turn @ force, rel=EXACT, abs=EXACT)
 
 
 def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:

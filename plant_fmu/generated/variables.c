@@ -794,7 +794,7 @@ const char *const hx_log_category_names[] = {
     "logAll",
 };
 
-const char hx_default_guid[] = "{e4675f54-e76b-49b7-8e86-bd6e769cf908}";
+const char hx_default_guid[] = "{3c61b690-3b1a-4175-96fc-4685385a2699}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
