@@ -76,6 +76,13 @@ def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL
         assert walk(core, changed(robot, **changes), 2.0).output().solver.evaluations < STIFF * usual
 
 
+def test_the_books_of_feet_that_stick_balance(core: ct.CDLL) -> None:
+    """To a hundredth of the usual: a stage's powers follow the bristles too, without which they are some hundred times further off."""
+    robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver={"tolerance": 1e-5})
+    energy = walk(core, robot, 5.0).output().energy
+    assert abs(energy.residual) < 0.01 * BOOKS * energy.actuator_work
+
+
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
 def test_feet_that_stick_cost_no_more_steps_than_feet_that_creep(core: ct.CDLL, name: str) -> None:
     robot = load_robot(name)

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from mirror import NOT_FINITE
-from plant import Plant, PlantError, inputs, pointer, probed
-from slopes import LawSlopes, assembled, law_slopes, resting
-from states import changed, random_command, scaled
+from plant import Plant, PlantError, inputs, probed
+from states import changed, random_command
 
 from hexapod_cosim.models import METHODS, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts
-from hexapod_cosim.models.dynamics import Command, constraints, mass_matrix
-from hexapod_cosim.models.kinematics import body_states, quaternion_rate
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
 
 ORDER = {"rosw3": 3, "ros2": 2, "dp54": 5, "bs32": 3, "rk4": 4}
@@ -200,112 +199,6 @@ def test_an_explicit_method_that_blows_up_says_so_and_leaves_the_plant_alone(cor
         plant.step(20.0)
     assert caught.value.status == NOT_FINITE
     assert plant.save() == before
-
-
-# one linearly implicit step against the textbook's formula
-
-
-@dataclass(frozen=True)
-class Tableau:
-    """A row of the plant's methods."""
-
-    stages: int
-    gamma: float
-    a: Array
-    g: Array
-    b: Array
-    e: Array
-
-
-def coefficients(core: ct.CDLL, method: str) -> Tableau:
-    shape, gamma = (ct.c_int * 3)(), ct.c_double()
-    a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
-    core.hx_probe_method(METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e)))
-    return Tableau(shape[0], gamma.value, a, g, b, e)
-
-
-def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Array]:
-    """dy/dt of bodies (247,), by the plant put there."""
-
-    def rate(y: Array) -> Array:
-        plant.bodies = y.reshape(19, 13)
-        result, power = np.zeros((19, 13)), np.zeros(3)
-        core.hx_probe_rate(ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(result), pointer(power))
-        return result.ravel()
-
-    return rate
-
-
-@dataclass
-class DenseStages:
-    """The stages of eq. 15 one after the other, solved as the dense system: nu (114,) that positions advance with, and alpha."""
-
-    robot: Robot
-    law: LawSlopes
-    rate: Callable[[Array], Array]
-    z: float
-
-    def solve(self, body: Array, s_x: Array, s_v: Array) -> tuple[Array, Array]:
-        """W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0; alpha = a + u, nu = v + s_v + z alpha."""
-        z, v, a = self.z, body[:, 7:13].ravel(), self.rate(body.ravel()).reshape(19, 13)[:, 7:13].ravel()
-        G_x, G_v = assembled(self.robot, body, self.law)
-        D = constraints(self.robot, body).D
-        W = mass_matrix(self.robot, body) - z * G_v - z * z * G_x
-        right = G_v @ (s_v + z * a) + G_x @ (s_x + z * (v + s_v) + z * z * a)
-        u = np.linalg.solve(np.block([[W, D.T], [D, np.zeros((90, 90))]]), np.concatenate([right, np.zeros(90)]))[:114]
-        return v + s_v + z * (a + u), a + u
-
-
-def body_rates(body: Array, nu: Array, alpha: Array) -> Array:
-    """(247,) dy/dt of positions that advance with nu."""
-    w = nu.reshape(19, 6)
-    turns = np.array([quaternion_rate(p, turn) for p, turn in zip(body[:, 3:7], w[:, 3:6], strict=True)])
-    return np.hstack([w[:, 0:3], turns, alpha.reshape(19, 6)]).ravel()
-
-
-@pytest.mark.parametrize("method", ["rosw3", "ros2"])
-def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str) -> None:
-    """Contact and servo keep the first stage's slopes, masses and joints are each stage's own; h is many of friction's times."""
-    h, robot = 2e-3, changed(load_robot("athena"), solver={"method": method, "step": 2e-3})
-    body, command = resting(robot, 1), Command(angle_ref=robot.stance)
-    body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
-    plant, there = Plant(core, robot), Plant(core, robot)
-    plant.bodies = body
-
-    m = coefficients(core, method)
-    stages = DenseStages(robot, law_slopes(robot, command, body), rates(core, there, command), h * m.gamma)
-    k, nu, alpha = np.zeros((7, 247)), np.zeros((7, 114)), np.zeros((7, 114))
-    for i in range(m.stages):
-        y = (body.ravel() + h * m.a[i] @ k).reshape(19, 13)
-        nu[i], alpha[i] = stages.solve(y, h * m.g[i] @ nu, h * m.g[i] @ alpha)
-        k[i] = body_rates(y, nu[i], alpha[i])
-    exact = (body.ravel() + h * m.b @ k).reshape(19, 13)
-    exact[:, 3:7] /= np.linalg.norm(exact[:, 3:7], axis=1, keepdims=True)
-    plant.step(h, command)
-    moved = np.max(np.abs(exact - body), axis=0)
-    assert np.all(np.max(np.abs(plant.bodies - exact), axis=0) < 1e-5 * moved)
-    fastest = np.max(np.abs(np.linalg.eigvals(np.linalg.solve(mass_matrix(robot, body), assembled(robot, body, stages.law)[1]))))
-    assert h * fastest > 10.0
-
-
-@pytest.mark.parametrize("margin", [0.99, 1.01])
-@pytest.mark.parametrize(("size", "deciding"), [(1.0, range(7, 10)), (0.05, range(10, 13))], ids=["velocity", "angular velocity"])
-def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
-    core: ct.CDLL, size: float, deciding: range, margin: float
-) -> None:
-    """Scales 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s; the smaller a robot, the more its turning counts. The first step tried is 1e-4 s."""
-    h, robot = 1e-4, scaled(PROBLEMS["tumbling"].robot, size)
-    start = PROBLEMS["tumbling"].start | {"speed": 20.0 * np.random.default_rng(1).normal(size=(6, 3))}
-    plant, command = Plant(core, robot, **start), Command(angle_ref=robot.stance)
-    m, k, y0, rate = coefficients(core, "bs32"), np.zeros((7, 247)), plant.bodies.ravel(), rates(core, plant, command)
-    for i in range(m.stages):
-        k[i] = h * rate(y0 + m.a[i] @ k)
-    largest = np.max(np.abs(m.e @ k).reshape(19, 13), axis=0) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3)
-    assert int(np.argmax(largest)) in deciding
-    solver = {"method": "bs32", "step": 0.0, "tolerance": margin * float(np.max(largest)), "step_max": 1.0}
-    tried = Plant(core, changed(robot, solver=solver), **start)
-    tried.step(h, command)
-    assert (tried.output().solver.rejected > 0) == (margin < 1.0)
 
 
 @pytest.mark.parametrize("method", METHODS)
