@@ -191,3 +191,30 @@ def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
     tried = Plant(core, changed(robot, solver=solver), **start)
     tried.step(h, command)
     assert (tried.output().solver.rejected > 0) == (margin < 1.0)
+
+
+@pytest.mark.parametrize("margin", [0.99, 1.01])
+def test_bristles_count_by_their_error_over_ten_preslidings(core: ct.CDLL, margin: float) -> None:
+    """Feet set sliding on slack bristles, short and weak ones: what is first to go wrong. The first step tried is 1e-4 s."""
+    h, m, still = 1e-4, coefficients(core, "bs32"), Command(angle_ref=load_robot("athena").stance)
+    robot = changed(load_robot("athena"), friction={"law": "bristle", "presliding": 1e-5, "mu": 0.01})
+    body, k, k_b = resting(robot, 1), np.zeros((7, 247)), np.zeros((7, 6, 3))
+    body[:, 7:9] += np.array([0.3, 0.1])
+
+    def put(target: Plant, bodies: Array, bristles: Array) -> Array:
+        target.bodies = bodies
+        return probed(core.hx_probe_bristles, target, inputs(still), bristles, size=18).reshape(6, 3)
+
+    there = Plant(core, robot)
+    for i in range(m.stages):
+        y, b = (body.ravel() + m.a[i] @ k).reshape(19, 13), np.tensordot(m.a[i], k_b, 1)
+        result, power = np.zeros((19, 13)), np.zeros(3)
+        k_b[i] = h * put(there, y, b)
+        core.hx_probe_rate(ct.c_void_p(there.handle), ct.byref(inputs(still)), ct.c_double(0.0), pointer(result), pointer(power))
+        k[i] = h * result.ravel()
+    largest = float(np.max(np.abs(np.tensordot(m.e, k_b, 1)))) / (10.0 * robot.friction.presliding)
+    assert largest > float(np.max(np.abs(m.e @ k).reshape(19, 13) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3)))
+    tried = Plant(core, changed(robot, solver={"method": "bs32", "step": 0.0, "tolerance": margin * largest, "step_max": 1.0}))
+    put(tried, body, np.zeros((6, 3)))
+    tried.step(h, still)
+    assert (tried.output().solver.rejected > 0) == (margin < 1.0)
