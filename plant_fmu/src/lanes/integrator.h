@@ -52,7 +52,7 @@ static inline hxFeet feet_of(const hxModel *model, const hxMotion *motion) {
 
 /* ---- one step --------------------------------------------------------------------------------------------------------------- */
 
-/* base + h sum of weights k, n of them (base NULL: 0), k from its entry `first` on; one pass over memory, n and sizes known to the compiler */
+/* base + h sum of weights k, n of them (base NULL: 0), k from entry `first` on; one pass over memory, n and sizes known to the compiler */
 static inline void combine_n(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int first,
                              int size) {
   hxReal w[HX_STAGES];
