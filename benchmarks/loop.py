@@ -10,7 +10,7 @@ from time import perf_counter
 
 from benchmarks.toolchain import Tools
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.controller.design import design_gains
+from hexapod_cosim.cosim.design import design_for
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.master import run
 from hexapod_cosim.cosim.recorder import Recorder
@@ -38,7 +38,7 @@ class Still:
 def realtime_factor(tools: Tools, control: str) -> float:
     """Of the whole loop, plant and Python controller, at a macro-step of 5 ms."""
     scenario = load_scenario(SCENARIO, overrides=[f"control={control}"])
-    gains = None if control == "kinematic" else design_gains(load_robot(scenario.robot), period=scenario.macro_step)
+    gains = None if control == "kinematic" else design_for(load_robot(scenario.robot), scenario.macro_step)
     return median(simulate(scenario, fmu=tools.fmu, gains=gains).outcome.realtime_factor for _ in range(REPEATS))
 
 

@@ -130,6 +130,7 @@ class Fmu:
             raise
         self._slave = slave
         self._begin, self._length = ctypes.c_double(), ctypes.c_double()
+        self._reset = self.bind("fmi2Reset")
         self._do_step = self.bind("fmi2DoStep", self._begin, self._length, ctypes.c_int(1))  # 1: nothing before is needed again
 
     def _make_callbacks(self) -> fmi2CallbackFunctions:
@@ -240,6 +241,13 @@ class Fmu:
             except Exception as error:
                 said = self._log[-1] if self._log else str(error)
                 raise FmuError("the FMU cannot be initialised", got=said, where=str(self.path)) from error
+
+    def reset(self) -> None:
+        """Back to how it was made: start values, not initialised. Raises FmuError."""
+        self.forget()
+        status = self._reset()
+        if status > WARNING:
+            raise self.failure("the FMU cannot be reset", status)
 
     def step(self, t: float, h: float) -> None:
         """Steps from t to t + h [s]. Raises StepError."""

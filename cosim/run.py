@@ -102,9 +102,9 @@ def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None
     """The gains a scenario runs with: none under kinematic control, else those given, or designed for its robot and macro-step."""
     if scenario.control == "kinematic" or gains is not None:
         return None if scenario.control == "kinematic" else gains
-    from hexapod_cosim.controller.design import design_gains  # noqa: PLC0415  python-control takes a second to import
+    from hexapod_cosim.cosim.design import design_for  # noqa: PLC0415  python-control takes a second to import
 
-    return design_gains(load_robot(scenario.robot), period=scenario.macro_step)
+    return design_for(load_robot(scenario.robot), scenario.macro_step)
 
 
 def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:

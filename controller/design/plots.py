@@ -1,91 +1,68 @@
-"""Figures of a design: the step response of the closed loops and their Bode diagrams with the margins."""
+"""Figures of a design: Bode and Nyquist diagrams of all eigenloci, answers to disturbances, margins over delay and load."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import control
 import numpy as np
 
-from hexapod_cosim.controller.design.loops import frequencies, response
-from hexapod_cosim.controller.design.synthesis import NOMINAL, normal_loops, tangential_loops
+from hexapod_cosim.controller.design.closed import closed_loop, disturbed, splay
+from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps
+from hexapod_cosim.controller.design.loci import Loci, Plants, Response, all_loci, critical_size, frequencies, quick_margins
+from hexapod_cosim.controller.design.standing import StandingPlant, answers, relieved, weight_share
 from hexapod_cosim.controller.gains import Gains, GainsError
 from hexapod_cosim.controller.kinematics import Array
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot
 
-STEP_TIME = 0.5  # s    shown of a step response
-NOMINAL_LOAD = 2  # index of a third of the weight in synthesis.LOADS
+DRAWN = 200  # frequencies
+STEP_TIME = 0.6  # s    shown of an answer
+BUMP = 0.001  # m    under one foot
+MOST_DELAY, DELAYS = 0.05, 21  # s    further delay shown, and in how many points
+DECIBELS = (-40.0, 30.0)
+SCALES = (40.0, 180.0)  # dB, deg    ends of the margins' scales
+COLOURS = {"worst": "#D55E00", "others": "0.75", "asked": "#0072B2", "without": "#E69F00"}
+TITLES = ("tangential PID", "suspension")
+NAMES = ("bode", "nyquist", "step", "margins")
 
 
-def plot_design(gains: Gains, directory: str | Path, *, robot: Robot | None = None) -> list[Path]:
-    """Writes `slip_bode`, `slip_step`, `suspension_bode` and `suspension_step` as SVG and PNG; returns the paths.
+def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Path) -> list[Path]:
+    """Writes `bode`, `nyquist`, `step` and `margins` as SVG and PNG; returns the paths.
 
-    `robot` is the one the gains were designed for; by default the packaged robot of that name. Raises GainsError when its hash
-    is another, or when the figures cannot be written.
+    robot, plants: what the gains were designed for. Raises GainsError when they are another robot's, or the figures cannot be written.
     """
-    owner = load_robot(gains.robot) if robot is None else robot
-    if owner.hash != gains.robot_hash:
+    if robot.hash != gains.robot_hash:
         fix = "pass the robot they were designed for"
-        raise GainsError("not the robot of these gains", got=owner.hash[:12], expected=gains.robot_hash[:12], fix=fix)
-    delay = gains.requirements.delay_periods
-    loops = {
-        "slip": (tangential_loops(owner, gains.slip, period=gains.period, delay_periods=delay), NOMINAL, "tangential force"),
-        "suspension": (normal_loops(owner, gains.suspension, period=gains.period, delay_periods=delay), NOMINAL_LOAD, "normal force"),
-    }
-    folder, written = Path(directory), []
+        raise GainsError("not the robot of these gains", got=robot.hash[:12], expected=gains.robot_hash[:12], fix=fix)
+    laws = Laws(
+        slip=gains.slip, suspension=gains.suspension, period=gains.period, delays=delay_steps(gains.requirements, period=gains.period)
+    )
+    loci = all_loci(robot, plants, frequencies(gains.period, DRAWN))
+    loops = [one.values * law for one, law in zip(loci, laws.responses(loci[0].omega), strict=True)]
+    figures = (_bode(loops, loci[0].omega, gains), _nyquist(loops, loci[0].omega, gains), _step(robot, plants, laws, gains),
+               _margins(robot, plants, loci, loops, gains))  # fmt: skip
+    folder = Path(directory)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, (systems, nominal, quantity) in loops.items():
-            written += _save(_bode(systems, nominal, gains, f"{owner.name}: loop of the {quantity}"), folder, f"{name}_bode")
-            written += _save(_step(systems[nominal], gains, f"{owner.name}: {quantity} after a jump"), folder, f"{name}_step")
+        return [path for name, figure in zip(NAMES, figures, strict=True) for path in _save(figure, folder, name)]
     except OSError as error:
         raise GainsError(
             "cannot write the design's figures", got=error.strerror, fix="choose a writable folder", where=str(folder)
         ) from error
-    return written
 
 
-def _figure(rows: int) -> tuple[Any, Any]:
+def _figure(rows: int, columns: int, gains: Gains, **options: Any) -> tuple[Any, Any]:
     # a figure without pyplot: no global state, no display
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(7.0, 2.6 * rows), layout="constrained")
-    return figure, figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-
-
-def _bode(loops: list[control.StateSpace], nominal: int, gains: Gains, title: str) -> Any:
-    omega = frequencies(gains.period)
-    figure, (size, angle) = _figure(2)
-    for k, loop in enumerate(loops):
-        values = response(loop, omega, period=gains.period)[:, 0, 0]
-        style = {"color": "C0", "lw": 2.0, "label": "a third of the weight"} if k == nominal else {"color": "0.7", "lw": 0.8}
-        size.semilogx(omega, 20.0 * np.log10(np.abs(values)), **style)
-        angle.semilogx(omega, np.degrees(np.unwrap(np.angle(values))), **style)
-    needs = gains.requirements
-    size.axhline(0.0, color="k", lw=0.6)
-    size.axhline(-needs.gain_margin, color="C1", ls="--", lw=0.8, label=f"gain margin asked: {needs.gain_margin:g} dB")
-    angle.axhline(-180.0, color="k", lw=0.6)
-    angle.axhline(-180.0 + needs.phase_margin, color="C1", ls="--", lw=0.8, label=f"phase margin asked: {needs.phase_margin:g} deg")
-    size.set(title=title, ylabel="gain (dB)", ylim=(-60.0, 40.0))
-    angle.set(xlabel="frequency (rad/s)", ylabel="phase (deg)")
-    for axes in (size, angle):
+    figure = Figure(figsize=(5.2 * columns, 2.8 * rows), layout="constrained")
+    figure.suptitle(f"{gains.robot}, controller period {1e3 * gains.period:g} ms", fontsize="medium")
+    grid = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes in grid.flat:
         axes.grid(alpha=0.3)
-        axes.legend(fontsize="small")
-    return figure
-
-
-def _step(loop: control.StateSpace, gains: Gains, title: str) -> Any:
-    figure, (axes,) = _figure(1)
-    time: Array = np.arange(0.0, STEP_TIME, gains.period)
-    sensitivity = control.feedback(control.ss([], [], [], [[1.0]], gains.period), loop)
-    answer = control.forced_response(sensitivity, time, np.ones_like(time)).outputs
-    axes.step(time, answer, where="post", label="part of the disturbing force that is left")
-    axes.axhline(0.0, color="k", lw=0.6)
-    axes.set(title=title, xlabel="time (s)", ylabel="force left (1)")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize="small")
-    return figure
+    return figure, grid
 
 
 def _save(figure: Any, folder: Path, name: str) -> list[Path]:
@@ -93,3 +70,111 @@ def _save(figure: Any, folder: Path, name: str) -> list[Path]:
     for path in paths:
         figure.savefig(path, dpi=150)
     return paths
+
+
+def _each(loops: Response, draw: Callable[..., Any]) -> None:
+    """Draws all loci, last and on top the one that comes nearest to -1."""
+    worst = int(np.abs(1.0 + loops).min(axis=1).argmin())
+    for k, loop in enumerate(loops):
+        if k != worst:
+            draw(loop, color=COLOURS["others"], lw=0.6, label="_")
+    draw(loops[worst], color=COLOURS["worst"], lw=1.8, label="nearest to -1")
+
+
+def _bode(loops: list[Response], omega: Array, gains: Gains) -> Any:
+    figure, grid = _figure(2, 2, gains, sharex=True)
+    needs = gains.requirements
+    for (size, angle), all_of, title in zip(grid.T, loops, TITLES, strict=True):
+        _each(all_of, lambda loop, axes=size, **style: axes.semilogx(omega, 20.0 * np.log10(np.abs(loop)), **style))
+        _each(all_of, lambda loop, axes=angle, **style: axes.semilogx(omega, _degrees(loop), **style))
+        size.axhline(0.0, color="k", lw=0.6)
+        size.axhline(-needs.gain_margin, color=COLOURS["asked"], ls="--", lw=1.0, label=f"gain margin asked: {needs.gain_margin:g} dB")
+        angle.axhline(-180.0, color="k", lw=0.6)
+        label = f"phase margin asked: {needs.phase_margin:g} deg"
+        angle.axhline(needs.phase_margin - 180.0, color=COLOURS["asked"], ls="--", lw=1.0, label=label)
+        size.set(title=f"loops of the {title}", ylabel="gain (dB)", ylim=DECIBELS)
+        angle.set(xlabel="frequency (rad/s)", ylabel="phase (deg)", ylim=(-540.0, 180.0), yticks=range(-540, 181, 90))
+        for axes in (size, angle):
+            axes.legend(fontsize="small", loc="lower left")
+    return figure
+
+
+def _degrees(loop: Response) -> Array:
+    return np.degrees(np.unwrap(np.angle(loop)))
+
+
+def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
+    figure, grid = _figure(1, 2, gains)
+    figure.set_figheight(5.2)
+    needs, turn = gains.requirements, np.linspace(0.0, 2.0 * np.pi, 200)
+    edge = np.radians(needs.phase_margin)
+    for axes, all_of, title in zip(grid[0], loops, TITLES, strict=True):
+        _each(all_of, lambda loop, axes=axes, **style: axes.plot(loop.real, loop.imag, **style))
+        axes.plot(np.cos(turn), np.sin(turn), color="k", lw=0.5)
+        arc = np.pi + np.linspace(-edge, edge, 60)
+        axes.plot(np.cos(arc), np.sin(arc), color=COLOURS["asked"], lw=2.0, label="margins asked: not through here")
+        axes.plot([-1.0, -(10.0 ** (-needs.gain_margin / 20.0))], [0.0, 0.0], color=COLOURS["asked"], lw=2.0)
+        axes.plot([-1.0], [0.0], "k+", ms=10)
+        axes.set(title=f"loops of the {title}", xlabel="real", ylabel="imaginary", xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
+        axes.legend(fontsize="small", loc="upper right")
+    return figure
+
+
+def _nominal(robot: Robot, plants: Plants) -> StandingPlant:
+    """Of the plants on most legs, where these can work against each other in all ways, the one nearest to a third of the weight a leg."""
+    most = max(plant.standing.sum() for plant in plants.values())
+    return min((plant for plant in plants.values() if plant.standing.sum() == most), key=lambda p: abs(p.load(robot).mean() - 1.0))
+
+
+def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
+    figure, (row,) = _figure(1, 3, gains)
+    plant = _nominal(robot, plants)
+    with_laws, without = closed_loop(robot, plant, laws), relieved(robot, plant)
+    squeezed, bump, share = splay(robot, plant), np.zeros(3 * int(plant.standing.sum())), weight_share(robot)
+    bump[2] = -BUMP * answers(robot, plant)[1][0]
+    for system, label, colour in ((without, "without the laws", COLOURS["without"]), (with_laws, "with both laws", COLOURS["worst"])):
+        time, forces = disturbed(system, squeezed, duration=STEP_TIME)
+        row[0].step(time, -squeezed @ forces, where="post", color=colour, label=label)
+        time, forces = disturbed(system, bump, duration=STEP_TIME)
+        row[1].step(time, forces[2] / share, where="post", color=colour, label=label)
+    late = laws.systems[1] * delay(laws.delays, period=laws.period)
+    deflection = np.asarray(control.forced_response(late, time, forces[2][None]).outputs)
+    row[2].step(time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension")
+    row[0].set(title="squeezing force left of 1", ylabel="force (1)")
+    row[1].set(title=f"a foot on a bump of {1e3 * BUMP:g} mm", ylabel="excess load (thirds of the weight)")
+    row[2].set(title="the same", ylabel="deflection (mm)")
+    for axes in row:
+        axes.axhline(0.0, color="k", lw=0.6)
+        axes.set(xlabel="time (s)")
+        axes.legend(fontsize="small")
+    return figure
+
+
+def _margins(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[Response], gains: Gains) -> Any:
+    """Least margins of all loops, further delay or one load chosen."""
+    figure, grid = _figure(2, 2, gains, sharey="row", sharex="col")
+    needs, load = gains.requirements, {name: round(float(plant.load(robot).mean()), 2) for name, plant in plants.items()}
+    delays, loads, omega = np.linspace(0.0, MOST_DELAY, DELAYS), sorted(set(load.values())), loci[0].omega
+    for all_of, one, title, marker in zip(loops, loci, TITLES, "os", strict=True):
+        late = [_least(all_of * delay_response(1, omega, period=float(more)), omega) for more in delays]
+        borne = [_least(all_of[[load[name] == value for name in one.names]], omega) for value in loads]
+        for column, x, found in ((0, 1e3 * delays, late), (1, loads, borne)):
+            for axes, values in zip(grid[:, column], np.array(found).T, strict=True):
+                axes.plot(x, values, marker=marker, ms=4, label=title)
+    for axes, asked, label in zip(
+        grid, (needs.gain_margin, needs.phase_margin), ("gain margin (dB)", "phase margin (deg; 180: no crossing)"), strict=True
+    ):
+        axes[0].set(ylabel=label)
+        for one_of in axes:
+            one_of.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label="asked")
+            one_of.legend(fontsize="small")
+    grid[1, 0].set(xlabel="further delay (ms)")
+    grid[1, 1].set(xlabel="mean load of the standing feet (thirds of the weight)")
+    return figure
+
+
+def _least(loops: Response, omega: Array) -> tuple[float, float]:
+    """Least gain [dB] and phase [deg] margins of loops; where none has a crossing the scale's end. Negative: unstable."""
+    critical, phase = float(critical_size(loops).max()), min(quick_margins(loop, omega).phase for loop in loops)
+    gain = -20.0 * np.log10(critical) if critical else np.inf
+    return min(float(gain), SCALES[0]), float(np.copysign(min(phase, SCALES[1]), gain))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hexapod_cosim.controller import save_gains
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json
+from hexapod_cosim.controller import Gains, save_gains
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
 from hexapod_cosim.cosim.validation import find_problems
@@ -60,24 +61,47 @@ def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The F
 
 def design(
     robot: RobotName = "athena",
-    macro_step: Annotated[float, typer.Option("--macro-step", help="Period of the controller [s].")] = DEFAULT_PERIOD,
+    macro_step: Annotated[float, typer.Option("--period", "--macro-step", help="Period of the controller [s].")] = DEFAULT_PERIOD,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="REQUIREMENT=VALUE", help="Ask for something else (phase_margin=50).")
+    ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/design.")] = None,
     json: Json = False,
 ) -> None:
     """Design the gains of the compliant control, with plots."""
     from hexapod_cosim.controller.design import design_gains, plot_design  # noqa: PLC0415  slow to import: python-control, matplotlib
+    from hexapod_cosim.cosim.design import read_requirements, standing_plants  # noqa: PLC0415
 
-    made = load_robot(robot)
-    folder = output or Path("out") / "design"
-    gains = design_gains(made, period=macro_step)
+    made, needs, folder = load_robot(robot), read_requirements(settings or []), output or Path("out") / "design"
+    plants = standing_plants(made, macro_step)
+    gains = design_gains(made, macro_step, plants=plants, requirements=needs)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [save_gains(gains, folder / "gains.toml"), *plot_design(gains, folder)]
+        files = [save_gains(gains, folder / "gains.toml"), *plot_design(made, gains, plants, folder)]
     except OSError as error:
         raise not_writable(folder, error) from error
     if json:
         show_json({"gains": asdict(gains), "files": [str(file) for file in files]})
         return
-    margins = asdict(gains.margins)
-    print("\n".join(f"{name.replace('_', ' ')}: {value:.4g}" for name, value in margins.items()))
+    show_table(["requirement", "asked", "reached"], design_rows(gains), right=(1, 2))
+    print(f"binding: {gains.margins.binding}")
     show_files(files)
+
+
+def design_rows(gains: Gains) -> list[tuple[str, str, str]]:
+    """What was asked for and what was reached, as they are shown."""
+    needs, reached, spring = gains.requirements, gains.margins, gains.suspension
+    frequency = math.sqrt(spring.stiffness / spring.mass) / (2.0 * math.pi)
+    rows = (
+        ("phase margin, tangential [deg]", f">= {needs.phase_margin:g}", reached.slip_phase_margin),
+        ("gain margin, tangential [dB]", f">= {needs.gain_margin:g}", reached.slip_gain_margin),
+        ("phase margin, suspension [deg]", f">= {needs.phase_margin:g}", reached.suspension_phase_margin),
+        ("gain margin, suspension [dB]", f">= {needs.gain_margin:g}", reached.suspension_gain_margin),
+        ("frequency, suspension [Hz]", f"<= {needs.frequency:g}", frequency),
+        ("spectral radius, all feet and laws [1]", "< 1", reached.spectral_radius),
+        ("integral action ki [1/s]", "most", gains.slip.ki),
+        ("crossover, tangential [rad/s]", "", reached.slip_crossover),
+        ("further delay borne, tangential [s]", "", reached.slip_delay_margin),
+        ("steady slip with the law, of that without [1]", "", reached.slip_rejection),
+    )
+    return [(name, asked, "no crossing" if math.isinf(value) else f"{value:.4g}") for name, asked, value in rows]

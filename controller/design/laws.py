@@ -1,0 +1,86 @@
+"""The two laws as python-control systems, as they run: discrete, with the delays of sensors and computing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import control
+import numpy as np
+
+from hexapod_cosim.controller.design.loci import Response, response
+from hexapod_cosim.controller.gains import Requirements, SlipGains, SuspensionGains
+from hexapod_cosim.controller.kinematics import Array
+from hexapod_cosim.controller.suspension import discretise
+
+ROUNDING = 1e-9  # 1    of a period
+
+
+def slip_law(gains: SlipGains) -> control.TransferFunction:
+    """The PID with its force filter in continuous time, force to force."""
+    s = control.tf("s")
+    pid = gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)
+    return pid / (gains.filter_time * s + 1.0)
+
+
+def sampled_slip_law(gains: SlipGains, *, period: float) -> control.StateSpace:
+    """The same as it runs (Tustin, part by part)."""
+    s = control.tf("s")
+    smooth = control.sample_system(1.0 / (gains.filter_time * s + 1.0), period, method="bilinear")
+    integral = control.sample_system(1.0 / s, period, method="bilinear")
+    derivative = control.sample_system(s / (gains.derivative_time * s + 1.0), period, method="bilinear")
+    return control.ss(smooth * (gains.kp + gains.ki * integral + gains.kd * derivative))
+
+
+def slip_response(gains: SlipGains, omega: Array, *, period: float) -> Response:
+    """Its response in closed form, for searching."""
+    z = np.exp(1j * omega * period)
+    s = 2.0 / period * (z - 1.0) / (z + 1.0)
+    pid = gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)
+    return np.asarray(pid / (gains.filter_time * s + 1.0))
+
+
+def sampled_suspension(gains: SuspensionGains, *, period: float) -> control.StateSpace:
+    """The suspension as it runs, force to deflection: x+ = A x + B f and the new z is used at once."""
+    a, b = discretise(gains, period=period)
+    return control.ss(a, b.reshape(2, 1), a[:1], b[:1].reshape(1, 1), period)
+
+
+def delay_steps(needs: Requirements, *, period: float) -> int:
+    """Periods that pass between a force and the command that answers it; parts of one count whole."""
+    return math.ceil(needs.delay_periods - ROUNDING) + math.ceil(needs.force_delay / period - ROUNDING)
+
+
+def delay_response(steps: int, omega: Array, *, period: float) -> Response:
+    """A delay of whole periods."""
+    return np.asarray(np.exp(-1j * omega * period * steps))
+
+
+def delay(steps: int, *, period: float) -> control.StateSpace:
+    """The same as a system."""
+    chain = np.eye(steps, k=-1)
+    if not steps:
+        return control.ss([], [], [], [[1.0]], period)
+    return control.ss(chain, np.eye(steps)[:, :1], np.eye(steps)[-1:], 0, period)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Laws:
+    """Both laws at work with a period [s], `delays` of them late."""
+
+    slip: SlipGains
+    suspension: SuspensionGains
+    period: float
+    delays: int
+
+    @cached_property
+    def systems(self) -> tuple[control.StateSpace, control.StateSpace]:
+        """The PID and the suspension as they run, without the delay."""
+        return sampled_slip_law(self.slip, period=self.period), sampled_suspension(self.suspension, period=self.period)
+
+    def responses(self, omega: Array) -> tuple[Response, Response]:
+        """Of the PID and of the suspension (frequencies,)."""
+        late = delay_response(self.delays, omega, period=self.period)
+        spring = response(sampled_suspension(self.suspension, period=self.period), omega)[:, 0, 0]
+        return slip_response(self.slip, omega, period=self.period) * late, spring * late

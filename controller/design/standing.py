@@ -1,0 +1,84 @@
+"""What the design starts from: the standing robot as a linear system, and what the controller does to it.
+
+The controller speaks to a leg in forces: G (3,) [N] is what its servos are told to push less. The foot's target moves by C G with
+C = J J^T / kp, so the joints are told J^-1 C G = J^T G / kp, and the difference quotient of that as a speed. A foot that sticks then
+answers with the force -G.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller.gains import TRIPOD_LEGS
+from hexapod_cosim.controller.kinematics import LEGS, Array, LegSolver, Mask
+from hexapod_cosim.models import Robot
+
+Places = NDArray[np.int_]
+
+JOINTS = 3
+ANGLES = FORCES = 3 * LEGS
+LARGEST_LOAD = 2.0  # 1    the answer to a force goes with the load up to this one
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandingPlant:
+    """The plant linearised about a pose in which some legs stand.
+
+    system: sampled at the controller's period, inputs held over it. Inputs: 18 angle_ref, 18 speed_ref, 18 torque_ref. Outputs: 18 foot
+    forces (ground on foot, world axes), then whatever else. Legs slowest.
+    """
+
+    system: control.StateSpace
+    angle: Array  # rad    (6, 3)
+    force: Array  # N    (6, 3) ground on foot
+    standing: Mask  # (6,)
+
+    def load(self, robot: Robot) -> Array:
+        """1    (n,) normal forces of the standing feet in thirds of the weight"""
+        return np.asarray(self.force[self.standing, 2] / weight_share(robot))
+
+
+def weight_share(robot: Robot) -> float:
+    """N    one leg's share of the weight while three legs stand"""
+    return robot.total_mass * float(np.linalg.norm(robot.gravity)) / TRIPOD_LEGS
+
+
+def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
+    """Forces of the standing feet (3 n) after forces G (3 n) that their servos are relieved of [N], both legs slowest.
+
+    One more state per input than the plant: the last G, of which the speed is told.
+    """
+    chosen, told = np.repeat(plant.standing, 3), np.zeros((ANGLES, FORCES))
+    for leg, jacobian in enumerate(LegSolver(robot).jacobian(plant.angle)):
+        rows = slice(JOINTS * leg, JOINTS * (leg + 1))
+        told[rows, rows] = jacobian.T / robot.servo.kp
+    told, period = told[:, chosen], plant.system.dt
+    a, b, c = plant.system.A, plant.system.B, plant.system.C[:FORCES][chosen]
+    by_angle, by_speed = b[:, :ANGLES] @ told, b[:, ANGLES : 2 * ANGLES] @ told / period
+    states, inputs = by_angle.shape
+    step = np.block([[a, -by_speed], [np.zeros((inputs, states + inputs))]])
+    return control.ss(step, np.vstack([by_angle + by_speed, np.eye(inputs)]), np.hstack([c, np.zeros((inputs, inputs))]), 0, period)
+
+
+def squeeze(plant: StandingPlant) -> Array:
+    """(2 n, 2 n) e = S f, e_i = f_i - (n_i / sum n) sum f: the horizontal forces of the standing feet less their common push."""
+    normal = plant.force[plant.standing, 2]
+    common = np.outer(normal / normal.sum(), np.ones(len(normal)))
+    return np.asarray(np.kron(np.eye(len(normal)) - common, np.eye(2)), dtype=np.float64)
+
+
+def answers(robot: Robot, plant: StandingPlant) -> tuple[Array, Array]:
+    """What a standing foot's G is per answer of its laws: (n,) loads [1] of the PID's force, (n,) 1/C_zz [N/m] of the suspension's z."""
+    jacobian = LegSolver(robot).jacobian(plant.angle)[plant.standing]
+    vertical = (jacobian[:, 2] ** 2).sum(axis=1) / robot.servo.kp
+    return np.minimum(plant.load(robot), LARGEST_LOAD), 1.0 / vertical
+
+
+def axes_of(count: int) -> tuple[Places, Places]:
+    """Places of the horizontal (2 n) and the vertical (n) entries among the 3 n of n feet."""
+    places = np.arange(3 * count).reshape(count, 3)
+    return places[:, :2].reshape(-1), places[:, 2]

@@ -1,0 +1,96 @@
+"""What a design reached, in discrete time, by python-control; and whether it is what was asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from hexapod_cosim.controller.design.closed import closed_loop, spectral_radius
+from hexapod_cosim.controller.design.laws import Laws
+from hexapod_cosim.controller.design.loci import Loci, LoopMargins, Plants, eigenloci, frequencies, loop_margins, quick_margins
+from hexapod_cosim.controller.gains import GainsError, Margins, Requirements
+from hexapod_cosim.models import Robot
+
+JUDGED = 400  # frequencies
+STEADY = 1e-2  # rad/s    slow against every creep
+NOMINAL = (0.8, 1.25)  # 1    mean loads at which the steady slip is told
+CRITERIA = ("gain", "phase", "delay")
+
+
+def verify(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], laws: Laws, needs: Requirements, *, binding: str) -> Margins:
+    """Margins of the worst loops and the stability of all feet together. loci: of the search. Raises GainsError when one is missed."""
+    judged = _Judged(robot, plants, laws)
+    slip, suspension = (judged.worst(loci[which], which) for which in (0, 1))
+    for what, reached, asked in (
+        ("phase_margin of the tangential loop", slip.phase, needs.phase_margin),
+        ("gain_margin of the tangential loop", slip.gain, needs.gain_margin),
+        ("phase_margin of the suspension", suspension.phase, needs.phase_margin),
+        ("gain_margin of the suspension", suspension.gain, needs.gain_margin),
+    ):
+        if reached < asked:
+            raise _missed(robot, what, got=round(reached, 2), expected=f"at least {asked:g}")
+    return Margins(
+        slip_crossover=slip.crossover, slip_phase_margin=slip.phase, slip_gain_margin=slip.gain, slip_delay_margin=slip.delay,
+        slip_rejection=steady_slip(robot, plants, laws), suspension_phase_margin=suspension.phase, suspension_gain_margin=suspension.gain,
+        spectral_radius=_slowest(robot, plants, laws), binding=binding,
+    )  # fmt: skip
+
+
+def _slowest(robot: Robot, plants: Plants, laws: Laws) -> float:
+    """Largest spectral radius of the whole closed loops. Raises GainsError when one is unstable."""
+    worst = 0.0
+    for name, plant in plants.items():
+        radius = spectral_radius(closed_loop(robot, plant, laws), feet=int(plant.standing.sum()))
+        if not radius < 1.0:
+            raise _missed(robot, f"stability ({name})", got=f"spectral radius {radius:.6f}", expected="less than 1")
+        worst = max(worst, radius)
+    return worst
+
+
+def _missed(robot: Robot, what: str, *, got: object, expected: str) -> GainsError:
+    fix = "shorten the period or the delays, allow less deflection, or ask for less margin"
+    return GainsError(f"the design misses its {what}", got=got, expected=expected, fix=fix, where=f"robot {robot.name}")
+
+
+class _Judged:
+    """Margins by python-control of those loops that a quick estimate finds worst."""
+
+    def __init__(self, robot: Robot, plants: Plants, laws: Laws) -> None:
+        self._omega = frequencies(laws.period, JUDGED)
+        self._laws, self._responses = laws, laws.responses(self._omega)
+        self._loci = cache(lambda name: eigenloci(robot, plants[name], self._omega))
+
+    def worst(self, loci: Loci, which: int) -> LoopMargins:
+        """Of the tangential (which = 0) or the vertical (1) loops."""
+        law = self._laws.responses(loci.omega)[which]
+        found = [quick_margins(locus * law, loci.omega) for locus in loci.values]
+        judged = [self._margins(loci.names[_least(found, criterion)], which, criterion) for criterion in CRITERIA]
+        least = {criterion: min(getattr(margins, criterion) for margins in judged) for criterion in CRITERIA}
+        return LoopMargins(**least, crossover=max(margins.crossover for margins in judged))
+
+    def _margins(self, name: str, which: int, criterion: str) -> LoopMargins:
+        loops = self._loci(name)[which] * self._responses[which]
+        found = [quick_margins(loop, self._omega) for loop in loops]
+        return loop_margins(loops[_least(found, criterion)], self._omega)
+
+
+def _least(found: Sequence[LoopMargins], criterion: str) -> int:
+    return int(np.argmin([getattr(margins, criterion) for margins in found]))
+
+
+def steady_slip(robot: Robot, plants: Plants, laws: Laws) -> float:
+    """Steady slip with the tangential law over that without it, worst of the squeezes that feet near their nominal load can have.
+
+    Of the 2 n - 2 eigenvalues the least is the turn of the body, which is no squeeze: friction holds nothing there.
+    """
+    omega = np.array([STEADY])
+    law = laws.responses(omega)[0]
+    worst = 0.0
+    for plant in plants.values():
+        if NOMINAL[0] <= plant.load(robot).mean() <= NOMINAL[1]:
+            loops = (eigenloci(robot, plant, omega)[0] * law)[:, 0]
+            inner = loops[np.argsort(np.abs(loops))[1:]]
+            worst = max(worst, float(np.abs(1.0 / (1.0 + inner)).max()))
+    return worst
