@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import SlipGains, SlipPid
-from hexapod_cosim.controller.design.loops import sampled_slip_law, slip_law
+from hexapod_cosim.controller.design.laws import sampled_slip_law, slip_law
 
 PERIOD = 0.005  # s
 GAINS = SlipGains(kp=2e-4, ki=5e-3, kd=3e-6, derivative_time=0.01, filter_time=0.012, load_time=0.02, tracking_time=0.04, limit=1.0)

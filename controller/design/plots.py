@@ -161,14 +161,12 @@ def _margins(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[
         for column, x, found in ((0, 1e3 * delays, late), (1, loads, borne)):
             for axes, values in zip(grid[:, column], np.array(found).T, strict=True):
                 axes.plot(x, values, marker=marker, ms=4, label=title)
-    for axes, asked, label in zip(
-        grid, (needs.gain_margin, needs.phase_margin), ("gain margin (dB)", "phase margin (deg; 180: no crossing)"), strict=True
-    ):
+    for axes, asked, label in zip(grid, (needs.gain_margin, needs.phase_margin), ("gain margin (dB)", "phase margin (deg)"), strict=True):
         axes[0].set(ylabel=label)
         for one_of in axes:
             one_of.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label="asked")
             one_of.legend(fontsize="small")
-    grid[1, 0].set(xlabel="further delay (ms)")
+    grid[1, 0].set(xlabel="further delay (ms)", title=f"{SCALES[1]:g} deg: no crossing")
     grid[1, 1].set(xlabel="mean load of the standing feet (thirds of the weight)")
     return figure
 

@@ -35,7 +35,7 @@ CURVATURES = (0.0, 1e-5, 2e-5, 5e-5, 2e-4, 5e-4)  # s2    tried kd/ki
 DERIVATIVE_PERIODS = 2.0  # 1    filter of the derivative in controller periods
 SEARCHED, FINER = 100, 4  # frequencies, and how many times as many with the laws, which turn faster
 FREQUENCY_STEPS, FREQUENCY_FACTOR = 24, 0.85  # 1    how far the suspension's frequency may give way
-SAFETY = 0.98  # 1    the search's frequencies may miss the worst by a hair
+SAFETY, SPARE = 0.98, 0.5  # 1, deg    the search's frequencies may miss the worst by a hair
 TINY = 1e-9  # 1    size of a loop that stops nothing
 SAME = 1e-9  # relative, of periods
 
@@ -108,7 +108,7 @@ def _largest_gain(loops: Response, needs: Requirements, loci: Loci) -> tuple[flo
 
     Out of the sector of the phase margin beyond gain 1 at all frequencies: more than the margin at the crossings asks for.
     """
-    inside = np.abs(np.angle(-loops)) < math.radians(needs.phase_margin)
+    inside = np.abs(np.angle(-loops)) < math.radians(needs.phase_margin + SPARE)
     near, critical = np.where(inside, np.abs(loops), TINY).max(axis=1), np.maximum(critical_size(loops), TINY)
     allowed = {"phase_margin": 1.0 / near, "gain_margin": 10.0 ** (-needs.gain_margin / 20.0) / critical}
     name = min(allowed, key=lambda margin: float(allowed[margin].min()))
