@@ -1,8 +1,7 @@
 """What the design starts from: the standing robot as a linear system, and what the controller does to it.
 
-The controller speaks to a leg in forces: G (3,) [N] is what its servos are told to push less. The foot's target moves by C G with
-C = J J^T / kp, so the joints are told J^-1 C G = J^T G / kp, and the difference quotient of that as a speed. A foot that sticks then
-answers with the force -G.
+The controller speaks to a leg in forces: G (3,) [N] is what its servos are told to push less. The joints' angles are bent by J^T G / kp,
+which shifts the foot's target by C G, C = J J^T / kp. A foot that sticks then answers with the force -G.
 """
 
 from __future__ import annotations
@@ -48,20 +47,13 @@ def weight_share(robot: Robot) -> float:
 
 
 def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
-    """Forces of the standing feet (3 n) after forces G (3 n) that their servos are relieved of [N], both legs slowest.
-
-    One more state per input than the plant: the last G, of which the speed is told.
-    """
+    """Forces of the standing feet (3 n) after forces G (3 n) that their servos are relieved of [N], both legs slowest."""
     chosen, told = np.repeat(plant.standing, 3), np.zeros((ANGLES, FORCES))
     for leg, jacobian in enumerate(LegSolver(robot).jacobian(plant.angle)):
         rows = slice(JOINTS * leg, JOINTS * (leg + 1))
         told[rows, rows] = jacobian.T / robot.servo.kp
-    told, period = told[:, chosen], plant.system.dt
-    a, b, c = plant.system.A, plant.system.B, plant.system.C[:FORCES][chosen]
-    by_angle, by_speed = b[:, :ANGLES] @ told, b[:, ANGLES : 2 * ANGLES] @ told / period
-    states, inputs = by_angle.shape
-    step = np.block([[a, -by_speed], [np.zeros((inputs, states + inputs))]])
-    return control.ss(step, np.vstack([by_angle + by_speed, np.eye(inputs)]), np.hstack([c, np.zeros((inputs, inputs))]), 0, period)
+    system = plant.system
+    return control.ss(system.A, system.B[:, :ANGLES] @ told[:, chosen], system.C[:FORCES][chosen], 0, system.dt)
 
 
 def squeeze(plant: StandingPlant) -> Array:

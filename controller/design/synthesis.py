@@ -55,7 +55,7 @@ def design_gains(robot: Robot, period: float, *, plants: Plants, requirements: R
     return Gains(
         robot=robot.name, robot_hash=robot.hash, period=period, requirements=needs, slip=slip, suspension=suspension, margins=margins,
         support=_taken(SupportGains, needs), hold=_taken(HoldGains, needs),
-        limits=LimitGains(shift_rate=needs.shift_rate, torque=needs.torque_share * robot.servo.torque_max),
+        limits=LimitGains(speed=needs.speed_share * robot.servo.speed_max, torque=needs.torque_share * robot.servo.torque_max),
     )  # fmt: skip
 
 
