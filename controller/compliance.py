@@ -47,7 +47,7 @@ class Plan:
     weight: list[float]  # N    of all shares
     live: Array  # 1    (n, 6) 1 of feet with a share, else 0
     standing: Mask  # (n, 6) planned on the ground, where that is certain
-    certain: Mask  # (n, 6)
+    sure: list[tuple[int, int]]  # n standing, and where that is certain, as `_bits`
     falling: Array  # m    (n, 6) by which feet well above the ground come down in a period
     high: Mask  # (n, 6) so high that they cannot touch
     swinging: Mask  # (6,)
@@ -57,7 +57,7 @@ class Compliance:
     """The laws of all feet.
 
     Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos [N m]; shift: (6, 3) of the feet
-    that comes of `bend` [m]; offset: (6,) by which paths are raised for ground met early or late [m]; touching, doubted: (6,) feet on
+    that comes of `bend` [m], shift_plane: (6,) the same x + i y; offset: (6,) by which paths are raised for ground met early or late [m]; touching, doubted: (6,) feet on
     the ground, sensors not believed; scale: measured over planned weight.
     """
 
@@ -79,6 +79,7 @@ class Compliance:
         self.bend, self.torque, self._step = np.zeros((3, LEGS, 3))
         self._felt, self._inputs, self._ones = np.zeros((LEGS, 4)), np.zeros((LEGS, 4)), np.ones(LEGS)
         self._force, self._moved = np.zeros((LEGS, 3, 1)), np.zeros((LEGS, 6, 1))
+        self.shift_plane = self._moved[..., 0].view(np.complex128)[:, 0]
         self.shift, self._wanted = self._moved[:, :3, 0], self._moved[:, 3:, 0]
         self._answer = self.law.row.view(np.complex128)[:, 0]
         self.offset, self.doubted = np.zeros(LEGS), np.zeros(LEGS, dtype=np.bool_)
@@ -115,7 +116,7 @@ class Compliance:
             own=demand.torque if supports else none, carry=torques(lever, shares) if supports else none,
             effect=self._softness * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
             shares=shares, weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
-            certain=standing | (height > EARLY), falling=np.where(height > EARLY, np.maximum(-self._period * rise, 0.0), 0.0),
+            sure=list(zip(_bits(standing), _bits(standing | (height > EARLY)), strict=True)), falling=np.where(height > EARLY, np.maximum(-self._period * rise, 0.0), 0.0),
             high=height > self._high, swinging=swinging.copy(),
         )  # fmt: skip
         self._at = -1
@@ -125,7 +126,8 @@ class Compliance:
         self._at += 1
         plan, at, parts = self._plan, self._at, self._parts
         touching = self.detector.step(force[:, 2])
-        if ((touching != plan.standing[at]) & plan.certain[at]).any() or self.watch.busy or self.touchdown.busy:
+        standing, certain = plan.sure[at]
+        if (int.from_bytes(touching.tobytes(), "little") ^ standing) & certain or self.watch.busy or self.touchdown.busy:
             force = self._wonder(force, touching)
             touching = self.detector.touching
         np.multiply(force, touching[:, None], out=self._felt)
@@ -154,19 +156,27 @@ class Compliance:
         law, plan, at = self.law, self._plan, self._at
         law.inputs[...] = self._inputs
         law.step()
-        size = np.abs(self._answer)
-        if size.max() > self._largest:
-            wanted = law.answer.copy()
-            law.answer *= (self._largest / np.maximum(size, self._largest))[:, None]
-            law.integral += self._tracking * (law.answer - wanted)
-        if np.abs(law.deflection).max() > self._deepest:
-            # at its stop the suspension stands still
-            law.rate[np.abs(law.deflection) > self._deepest] = 0.0
-            np.clip(law.deflection, -self._deepest, self._deepest, out=law.deflection)
+        # no single one is beyond its limit when all together are not
+        if np.vdot(self._answer, self._answer).real > self._largest**2:
+            self._limit_answers()
+        if np.dot(law.deflection, law.deflection) > self._deepest**2:
+            self._limit_deflections()
         np.multiply(law.answer, np.minimum(law.load, LARGEST_LOAD)[:, None], out=self._force[:, :2, 0])
         np.divide(law.deflection, plan.effect[at, :, 2, 2], out=self._force[:, 2, 0])
         # a foot in the air forgets, within the time in which a leg gives up its load
-        law.integral[plan.swinging & ~touching] *= self._memory
+        law.integral *= np.where(plan.swinging > touching, self._memory, 1.0)[:, None]
+
+    def _limit_answers(self) -> None:
+        """The PID's answers no larger than allowed, their direction kept; integrals give way."""
+        law, wanted = self.law, self.law.answer.copy()
+        law.answer *= (self._largest / np.maximum(np.abs(self._answer), self._largest))[:, None]
+        law.integral += self._tracking * (law.answer - wanted)
+
+    def _limit_deflections(self) -> None:
+        """At its stop a suspension stands still."""
+        law = self.law
+        law.rate[np.abs(law.deflection) > self._deepest] = 0.0
+        np.clip(law.deflection, -self._deepest, self._deepest, out=law.deflection)
 
     def _actuate(self) -> None:
         """bend = J^T f/kp, limited in rate; torque = own + scale x carry, limited."""
@@ -199,3 +209,8 @@ class Compliance:
         if parts.touchdown:
             self.offset[:] = self.touchdown.step(touches, plan.falling[at].tolist(), plan.swinging.tolist(), standing)
         return force
+
+
+def _bits(flags: Mask) -> list[int]:
+    """Rows (n, 6) of flags as numbers, a byte for each flag: compared in no time."""
+    return [int.from_bytes(row.tobytes(), "little") for row in flags]

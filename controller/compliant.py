@@ -24,7 +24,7 @@ from hexapod_cosim.models import Robot
 if TYPE_CHECKING:
     from hexapod_cosim.controller.controller import JointCommand, Measurement
 
-REMEMBERED = ("_steered", "_count", "_at", "_rotations", "_command", "_climb", "_planned")
+REMEMBERED = ("_steered", "_count", "_at", "_moving", "_rotations", "_command", "_climb", "_planned")
 STEERING_TIME = 0.1  # s    in which a change of the added velocity is led over
 PACK = Struct("12d").pack_into  # numbers into an array: half the time of an assignment
 
@@ -60,7 +60,7 @@ class Compliant:
         for array in (self.shift, self.lift, self._raised, self._offset):
             array[...] = 0.0
         self._steered = np.zeros(2, dtype=np.complex128), np.zeros(2, dtype=np.complex128), 0
-        self._count, self._at = 0, -1
+        self._count, self._at, self._moving = 0, -1, False
 
     def save(self) -> dict[str, Any]:
         """What it remembers and has planned. Planned arrays are never changed, so they are shared."""
@@ -140,11 +140,12 @@ class Compliant:
         angle += laws.bend
         angle += climb * raised[:, None]
         np.maximum(np.minimum(angle, self._legs.angle_max, out=angle), self._legs.angle_min, out=angle)
-        if laws.touchdown.busy or before.any():
+        if laws.touchdown.busy or self._moving:
+            self._moving = laws.touchdown.busy
             out.speed_ref += climb * ((laws.offset - before) * self._per_second)[:, None]
             before[...] = laws.offset
         out.torque_ref[...] = laws.torque
-        self.shift.real, self.shift.imag = laws.shift[:, 0], laws.shift[:, 1]
+        self.shift[...] = laws.shift_plane
         np.add(laws.shift[:, 2], raised, out=self.lift)
 
     def _sense(self, measurement: Measurement) -> None:
