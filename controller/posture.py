@@ -27,8 +27,8 @@ def rotations(roll: Array, pitch: Array) -> Array:
 
 
 def turned(plane: Plane, z: Array, rotation: Array) -> tuple[Plane, Array]:
-    """Vectors (..., n, m), x + i y and z, turned by (n, 3, 3)."""
-    vectors = np.stack([plane.real, plane.imag, z], axis=-1) @ rotation.transpose(0, 2, 1)
+    """Vectors (..., n, m), x + i y and z, turned by (n, 3, 3); or (m,) by (3, 3)."""
+    vectors = np.stack([plane.real, plane.imag, z], axis=-1) @ rotation.swapaxes(-1, -2)
     return vectors[..., 0] + 1j * vectors[..., 1], vectors[..., 2]
 
 
