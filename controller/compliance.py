@@ -57,8 +57,8 @@ class Compliance:
     """The laws of all feet.
 
     Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos [N m]; shift: (6, 3) of the feet
-    that comes of `bend` [m], shift_plane: (6,) the same x + i y; offset: (6,) by which paths are raised for ground met early or late [m]; touching, doubted: (6,) feet on
-    the ground, sensors not believed; scale: measured over planned weight.
+    that comes of `bend` [m], shift_plane: (6,) the same x + i y; offset: (6,) by which paths are raised for ground met early or late [m];
+    doubted: (6,) sensors not believed; scale: measured over planned weight.
     """
 
     def __init__(self, gains: Gains, parts: Parts, *, weight: float, cycle: float, kp: float, step_height: float, period: float) -> None:
@@ -111,13 +111,13 @@ class Compliance:
     def plan(self, demand: Demand, shares: Shares, *, height: Array, rise: Array, swinging: Mask) -> None:
         """Lays out the coming steps, rows of all arguments: height (n, 6) of the feet's paths over the stance [m], rise [m/s]; (6,)."""
         lever, none = demand.lever, np.zeros_like(demand.torque)
-        standing, supports = shares.activation >= 1.0, self._parts.support
+        standing, well_up, supports = shares.activation >= 1.0, height > EARLY, self._parts.support
         self._plan = Plan(
             own=demand.torque if supports else none, carry=torques(lever, shares) if supports else none,
             effect=self._softness * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
             shares=shares, weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
-            sure=list(zip(_bits(standing), _bits(standing | (height > EARLY)), strict=True)), falling=np.where(height > EARLY, np.maximum(-self._period * rise, 0.0), 0.0),
-            high=height > self._high, swinging=swinging.copy(),
+            sure=list(zip(_bits(standing), _bits(standing | well_up), strict=True)),
+            falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0), high=height > self._high, swinging=swinging.copy(),
         )  # fmt: skip
         self._at = -1
 

@@ -92,7 +92,7 @@ class Hold:
         if self._before is not None:
             before, loads, yaw = self._before
             both = [min(a, b) if min(a, b) > LOADED else 0.0 for a, b in zip(loads, seen.load, strict=True)]
-            commanded, total = rect(1.0, yaw + 0.5 * seen.yaw_rate * time) * seen.velocity * time, sum(both)
+            commanded, total = rect(1.0, yaw + self.heading + 0.5 * seen.yaw_rate * time) * seen.velocity * time, sum(both)
             walked = -sum(w * (p - q) for w, p, q in zip(both, feet, before, strict=True)) / total if total else commanded
             self.way += commanded - walked
             self.heading += seen.yaw_rate * time - math.remainder(seen.yaw - yaw, math.tau)
