@@ -164,7 +164,8 @@ class Controller:
             return
         self._count += 1
         if self._at == self._last:
-            self._plan_ahead()
+            with np.errstate(over="ignore", invalid="ignore"):  # absurd commands lead to legs that do not reach, and are told so
+                self._plan_ahead()
         self._at += 1
         self.paths.advance()
         self.ramp.steps += 1

@@ -174,7 +174,7 @@ class LegSolver:
             [np.angle(heading * self._upright), np.angle(femur * self._femur_zero), np.arccos(cosine) - self.femur_tilt + self.tibia_tilt],
             axis=-1,
         )
-        return Pose(point, heading, foot, femur, tibia, angles, (square < RADIUS_FLOOR) | (np.abs(wanted - cosine) > FLAG_TOLERANCE))
+        return Pose(point, heading, foot, femur, tibia, angles, ~((square >= RADIUS_FLOOR) & (np.abs(wanted - cosine) <= FLAG_TOLERANCE)))
 
     def speeds(self, pose: Pose, velocity: Plane | Array, rise: Array) -> Array:
         """(n, 6, 3) joint speeds [rad/s] of feet that move so, (n, 6) each or what broadcasts to it, torso frame [m/s]."""
@@ -189,7 +189,7 @@ class LegSolver:
     def solve(self, pose: Pose, velocity: Plane, rise: Array) -> Joints:
         """Angles within the joints' limits, and speeds that servos can reach: a joint held by its limit has none."""
         angle = np.minimum(np.maximum(pose.angles, self.angle_min), self.angle_max)
-        held = np.abs(pose.angles - angle) > FLAG_TOLERANCE
+        held = ~(np.abs(pose.angles - angle) <= FLAG_TOLERANCE)
         speed = self.speeds(pose, velocity, rise)
         np.minimum(np.maximum(speed, -self.speed_max, out=speed), self.speed_max, out=speed)
         speed[held] = 0.0

@@ -34,9 +34,9 @@ def test_a_large_squeeze_does_not(gains: Gains) -> None:
     assert check_design(load_robot("athena"), gains, size=40.0).error > 4.0 * AGREEMENT
 
 
-@pytest.mark.parametrize(("by", "shakes"), [(3.5, False), (6.0, True)])
+@pytest.mark.parametrize(("by", "shakes"), [(4.5, False), (9.0, True)])
 def test_the_fmu_shakes_where_the_linear_loop_does(gains: Gains, by: float, shakes: bool) -> None:
-    """The gain margin, 13.8 dB under a third of the weight a leg, is the FMU's."""
+    """The gain margin, 16.5 dB (6.7 times) under a third of the weight a leg, is the FMU's."""
     eager = replace(gains, slip=replace(gains.slip, kp=by * gains.slip.kp, ki=by * gains.slip.ki, kd=by * gains.slip.kd))
     check = check_design(load_robot("athena"), eager, size=1e-3)
     for force in (check.predicted, check.simulated):
