@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import LegSolver
+from hexapod_cosim.controller.kinematics import Joints
 from hexapod_cosim.models import ReachError, Robot, RobotError, foot_positions, load_robot
 
 ROUND_OFF = 1e-12  # m, rad    of a dozen operations on numbers of order 1
@@ -47,9 +48,14 @@ def reachable_poses(robot: Robot, count: int = POSES) -> np.ndarray:
     return np.array(found)
 
 
-def seen(rows: np.ndarray) -> tuple[list[complex], list[float]]:
-    """x + i y and z of rows (6, 3), as Python's own numbers."""
-    return (rows[:, 0] + 1j * rows[:, 1]).tolist(), rows[:, 2].tolist()
+def plane(rows: np.ndarray) -> np.ndarray:
+    """x + i y of rows (..., 3)."""
+    return np.asarray(rows[..., 0] + 1j * rows[..., 1])
+
+
+def solved(solver: LegSolver, foot: np.ndarray, velocity: np.ndarray) -> Joints:
+    """Joints of feet (n, 6, 3) that move so."""
+    return solver.solve(solver.pose(plane(foot), foot[..., 2]), plane(velocity), velocity[..., 2])
 
 
 def test_forward_kinematics_are_the_twins(robot: Robot) -> None:
@@ -74,19 +80,40 @@ def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
             np.testing.assert_allclose(jacobian[:, :, joint], slope, atol=DIFFERENCE_ERROR)
 
 
+def test_many_steps_at_once_are_the_same_as_each_by_itself(robot: Robot) -> None:
+    solver, poses = LegSolver(robot), reachable_poses(robot, 20)
+    foot = solver.forward(poses)
+    together = solver.pose(plane(foot), foot[..., 2])
+    for k, angle in enumerate(poses):
+        np.testing.assert_array_equal(foot[k], solver.forward(angle))
+        np.testing.assert_array_equal(together.angles[k], solver.pose(plane(foot[k : k + 1]), foot[k : k + 1, :, 2]).angles[0])
+    assert not together.lost.any()
+
+
+def test_a_pose_says_where_the_links_point(robot: Robot) -> None:
+    """Foot and knee put together again from the directions, against forward kinematics of the angles."""
+    solver, foot = LegSolver(robot), LegSolver(robot).forward(reachable_poses(robot, 50))
+    pose = solver.pose(plane(foot), foot[..., 2])
+    for direction in (pose.heading, pose.femur, pose.tibia):
+        np.testing.assert_allclose(np.abs(direction), 1.0, atol=ROUND_OFF)
+    np.testing.assert_allclose(pose.foot, solver.femur * pose.femur + solver.tibia * pose.tibia, atol=ROUND_OFF)
+    outward = pose.heading * (solver.coxa_length + pose.foot.real + 1j * solver.offset_y)
+    np.testing.assert_allclose(outward, pose.point, atol=ROUND_OFF)
+    np.testing.assert_allclose(solver.place + pose.point, plane(foot), atol=ROUND_OFF)
+    np.testing.assert_allclose(solver.hip[2] + solver.coxa_height + pose.foot.imag, foot[..., 2], atol=ROUND_OFF)
+
+
 def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot) -> None:
     solver, generator = LegSolver(robot), np.random.default_rng(3)
-    compared = 0
-    for pose in reachable_poses(robot, 50):
-        foot, velocity = solver.forward(pose), generator.normal(size=(6, 3)) * 0.02
-        solver.solve((*seen(foot), *seen(velocity)))
-        speed = solver.joints[1]
-        expected = np.linalg.solve(solver.jacobian(pose), velocity[:, :, None])[:, :, 0]
-        slow = np.abs(expected).max(axis=1) < robot.servo.speed_max
-        compared += int(slow.sum())
-        np.testing.assert_allclose(speed[slow], expected[slow], rtol=1e-7, atol=1e-9)
-        assert not solver.unreachable.any()
-    assert compared > 100
+    poses = reachable_poses(robot, 50)
+    velocity = generator.normal(size=(50, 6, 3)) * 0.02
+    joints = solved(solver, solver.forward(poses), velocity)
+    expected = np.array([np.linalg.solve(solver.jacobian(q), v[:, :, None])[:, :, 0] for q, v in zip(poses, velocity, strict=True)])
+    slow = np.abs(expected).max(axis=-1) < robot.servo.speed_max
+    assert slow.sum() > 100
+    np.testing.assert_allclose(joints.speed[slow], expected[slow], rtol=1e-7, atol=1e-9)
+    assert not joints.unreachable.any()
+    assert np.abs(joints.speed).max() <= robot.servo.speed_max
 
 
 def test_the_stance_is_found_again(robot: Robot) -> None:
@@ -128,12 +155,22 @@ def test_solve_stays_within_the_limits_and_flags_the_leg() -> None:
     foot = solver.forward(robot.stance)
     foot[0] *= 3.0
     foot[5] = solver.hip[:, 5]  # on the coxa's axis
-    solver.solve((*seen(foot), [0.1 + 0j] * 6, [0.0] * 6))
-    angle, speed = solver.joints
-    assert solver.unreachable.tolist() == [True, False, False, False, False, True]
-    assert (angle >= solver.angle_min).all()
-    assert (angle <= solver.angle_max).all()
-    assert np.isfinite(speed).all()
+    joints = solved(solver, foot[None], np.tile([0.1, 0.0, 0.0], (1, 6, 1)))
+    assert joints.unreachable.tolist() == [[True, False, False, False, False, True]]
+    assert (joints.angle >= solver.angle_min).all()
+    assert (joints.angle <= solver.angle_max).all()
+    assert np.isfinite(joints.speed).all()
+
+
+def test_a_joint_held_by_its_limit_has_no_speed_and_the_others_of_its_leg_keep_theirs() -> None:
+    robot = load_robot("athena")
+    solver, angle = LegSolver(robot), robot.stance
+    angle[2, 0] = solver.angle_max[2, 0] + 0.1
+    joints = solved(solver, solver.forward(angle)[None], np.tile([0.01, 0.02, 0.03], (1, 6, 1)))
+    assert joints.unreachable.tolist() == [[False, False, True, False, False, False]]
+    assert joints.angle[0, 2, 0] == solver.angle_max[2, 0]
+    assert joints.speed[0, 2, 0] == 0.0
+    assert np.count_nonzero(joints.speed) == 17
 
 
 def test_another_axis_pattern_is_refused() -> None:

@@ -1,4 +1,4 @@
-"""The PID on the tangential force: python-control's system, its clamp, its memory."""
+"""The PID against slip: python-control's sampling of the continuous law."""
 
 from __future__ import annotations
 
@@ -7,93 +7,61 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
+from gains import PERIOD, SLIP
 
-from hexapod_cosim.controller import SlipGains, SlipPid
-from hexapod_cosim.controller.design.laws import sampled_slip_law, slip_law
+from hexapod_cosim.controller import SlipGains
+from hexapod_cosim.controller.slip_pid import system
 
-PERIOD = 0.005  # s
-GAINS = SlipGains(kp=2e-4, ki=5e-3, kd=3e-6, derivative_time=0.01, filter_time=0.012, load_time=0.02, tracking_time=0.04, limit=1.0)
-STEPS = 200
-ROUND_OFF = 1e-12  # m
-
-
-def random_forces() -> np.ndarray:
-    """(steps, 6) forces x + i y [N]."""
-    generator = np.random.default_rng(5)
-    return generator.normal(size=(STEPS, 6)) * 3.0 + 1j * generator.normal(size=(STEPS, 6))
-
-
-def outputs(gains: SlipGains, forces: np.ndarray) -> np.ndarray:
-    pid = SlipPid(gains, period=PERIOD)
-    return np.array([pid.step(force.tolist()) for force in forces])
+FORCE = 4  # of the row that goes in, behind the states
+ANSWER, STATES = 0, slice(1, 5)  # of the row that comes out
+FREQUENCIES = np.geomspace(0.1, 0.99 * np.pi / PERIOD, 50)  # rad/s
+RELATIVE = 1e-9  # of the response: round-off of python-control's polynomials of order 3
+WITH_SLOPE = replace(SLIP, kd=0.003, derivative_time=0.007)
+GAINS = {
+    "pi": SLIP,
+    "pid": WITH_SLOPE,
+    "p": replace(SLIP, ki=0.0),
+    "i": replace(SLIP, kp=0.0),
+    "slow": replace(WITH_SLOPE, filter_time=0.1),
+}
 
 
-def simulated(system: control.StateSpace, force: np.ndarray) -> np.ndarray:
-    found: np.ndarray = np.atleast_2d(control.forced_response(system, np.arange(STEPS) * PERIOD, force).outputs)[0]
-    return found
+def continuous(gains: SlipGains) -> control.TransferFunction:
+    s = control.tf("s")
+    return (gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)) / (gains.filter_time * s + 1.0)
 
 
-@pytest.mark.parametrize("part", ["real", "imag"])
-def test_the_law_is_python_controls_tustin_sampling_of_its_transfer_function(part: str) -> None:
-    forces = random_forces()
-    whole = control.ss(control.sample_system(slip_law(GAINS), PERIOD, method="bilinear"))
-    mine = getattr(outputs(GAINS, forces), part)
-    for leg in range(6):
-        np.testing.assert_allclose(mine[:, leg], simulated(whole, getattr(forces, part)[:, leg]), atol=1e-9)  # tf of order 3
+def running(gains: SlipGains, *, period: float = PERIOD) -> control.StateSpace:
+    """The law that runs, as python-control sees it: rows that act from the right, transposed."""
+    matrix = system(gains, period=period).T
+    a, b = matrix[STATES, :FORCE], matrix[STATES, FORCE:]
+    return control.ss(a, b, matrix[ANSWER : ANSWER + 1, :FORCE], matrix[ANSWER, FORCE], period)
 
 
-def test_the_designs_system_is_the_law_that_runs() -> None:
-    forces = random_forces()
-    np.testing.assert_allclose(
-        outputs(GAINS, forces)[:, 2].real, simulated(sampled_slip_law(GAINS, period=PERIOD), forces[:, 2].real), atol=ROUND_OFF
-    )
+def response(law: control.LTI, at: np.ndarray) -> np.ndarray:
+    return np.asarray(law(at, squeeze=True))
 
 
-def test_the_foot_gives_way_in_the_direction_of_the_force() -> None:
-    pid = SlipPid(GAINS, period=PERIOD)
-    for _ in range(20):
-        shift = np.array(pid.step([3.0 - 4.0j] * 6))
-    np.testing.assert_allclose(shift / np.abs(shift), 0.6 - 0.8j, atol=1e-12)
+@pytest.mark.parametrize("name", GAINS)
+@pytest.mark.parametrize("period", [0.001, PERIOD, 0.02])
+def test_the_law_is_tustins_sampling_of_its_transfer_function(name: str, period: float) -> None:
+    law, frequency = GAINS[name], FREQUENCIES * PERIOD / period
+    z = np.exp(1j * frequency * period)
+    sampled = response(control.sample_system(continuous(law), period, method="bilinear"), z)
+    np.testing.assert_allclose(response(running(law, period=period), z), sampled, rtol=RELATIVE)
 
 
-def test_the_shift_is_clamped_in_length_with_its_direction_kept() -> None:
-    pid = SlipPid(replace(GAINS, limit=0.01), period=PERIOD)
-    for _ in range(500):
-        shift = pid.step([30.0 + 40.0j] * 6)
-    np.testing.assert_allclose(shift, 0.006 + 0.008j, atol=ROUND_OFF)
+@pytest.mark.parametrize("name", GAINS)
+def test_its_frequency_response_is_the_continuous_one_at_the_warped_frequency(name: str) -> None:
+    z = np.exp(1j * FREQUENCIES * PERIOD)
+    warped = 2.0 / PERIOD * np.tan(FREQUENCIES * PERIOD / 2.0)
+    np.testing.assert_allclose(response(running(GAINS[name]), z), response(continuous(GAINS[name]), 1j * warped), rtol=RELATIVE)
 
 
-def test_back_calculation_frees_the_shift_soon_after_the_force_turns() -> None:
-    bounded, naive = (
-        SlipPid(replace(GAINS, limit=0.005), period=PERIOD),
-        SlipPid(replace(GAINS, limit=0.005, tracking_time=1e9), period=PERIOD),
-    )
-    for pid in (bounded, naive):
-        for _ in range(600):
-            pid.step([5.0 + 0j] * 6)
-    counts = []
-    for pid in (bounded, naive):
-        count = 0
-        while pid.step([-5.0 + 0j] * 6)[0].real > 0.0 and count < 2000:
-            count += 1
-        counts.append(count)
-    recovery = 0.25 / PERIOD  # the limit alone takes 0.005/(0.005 x 5) = 0.2 s to integrate away
-    assert counts[0] < recovery
-    assert counts[1] > 2.0 * recovery
-
-
-def test_reset_forgets_the_legs_it_is_told_and_no_other() -> None:
-    pid, fresh = SlipPid(GAINS, period=PERIOD), SlipPid(GAINS, period=PERIOD)
-    for force in random_forces().tolist():
-        pid.step(force)
-    kept, gone = pid.state, [True, False, False, False, True, False]
-    pid.reset(gone)
-    assert not np.array(pid.state)[gone].any()
-    assert not np.array(pid.output)[gone].any()
-    assert [pid.state[leg] for leg in (1, 2, 3, 5)] == [kept[leg] for leg in (1, 2, 3, 5)]
-    force = random_forces()[0].tolist()
-    np.testing.assert_array_equal(np.array(pid.step(force))[gone], np.array(fresh.step(force))[gone])
-
-
-def test_no_force_no_shift() -> None:
-    assert not outputs(GAINS, np.zeros((STEPS, 6), dtype=complex)).any()
+def test_a_steady_force_is_answered_by_kp_and_an_integral_that_lacks_the_filters_lag() -> None:
+    """u = kp f + ki f (t - T_f) once the filter has settled: the trapezoid loses nothing of the area."""
+    matrix, states, force, count = system(SLIP, period=PERIOD), np.zeros(4), 3.0, 400
+    for _ in range(count):
+        answer, *states = np.append(states, force) @ matrix
+    lasted = (count - 0.5) * PERIOD  # a force first seen at a step counts from half a period before it
+    assert answer == pytest.approx(force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9)

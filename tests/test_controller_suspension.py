@@ -1,4 +1,4 @@
-"""The virtual suspension against its closed form."""
+"""The virtual suspension against the differential equation it stands for."""
 
 from __future__ import annotations
 
@@ -7,58 +7,56 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete
+from gains import PERIOD, suspension
+from scipy.integrate import solve_ivp
 
-from hexapod_cosim.controller import Suspension, SuspensionGains
+from hexapod_cosim.controller import SuspensionGains
+from hexapod_cosim.controller.suspension import discretise
+from hexapod_cosim.models import load_robot
 
-PERIOD = 0.005  # s
-GAINS = SuspensionGains(mass=5.0, damping=60.0, stiffness=4000.0, preload=1.0, limit=1.0)
+GAINS = suspension(load_robot("athena"))
+CRITICAL = GAINS.damping
+TOLERANCE = 1e-9  # relative, of the solver
 ROUND_OFF = 1e-13  # m
 
 
-def test_the_step_response_is_the_closed_form_at_every_sample() -> None:
-    suspension, force = Suspension(GAINS, period=PERIOD), 20.0
-    omega = math.sqrt(GAINS.stiffness / GAINS.mass)
-    zeta = GAINS.damping / (2.0 * math.sqrt(GAINS.stiffness * GAINS.mass))
-    damped = omega * math.sqrt(1.0 - zeta**2)
-    for k in range(1, 400):
-        z, _ = suspension.step([force] * 6)
-        t = k * PERIOD
-        swing = math.cos(damped * t) + zeta * omega / damped * math.sin(damped * t)
-        np.testing.assert_allclose(z, force / GAINS.stiffness * (1.0 - math.exp(-zeta * omega * t) * swing), atol=ROUND_OFF)
-
-
-@pytest.mark.parametrize("damping", [60.0, 2.0 * math.sqrt(4000.0 * 5.0), 900.0])
-def test_any_force_history_gives_the_zero_order_hold_response(damping: float) -> None:
-    gains = replace(GAINS, damping=damping)
-    system = np.array([[0.0, 1.0], [-gains.stiffness / gains.mass, -damping / gains.mass]])
-    a, b, *_ = cont2discrete((system, np.array([[0.0], [1.0 / gains.mass]]), np.eye(2), np.zeros((2, 1))), PERIOD)
-    suspension, state = Suspension(gains, period=PERIOD), np.zeros((2, 6))
-    for force in np.random.default_rng(2).normal(size=(100, 6)) * 20.0:
+def responses(gains: SuspensionGains, forces: np.ndarray) -> np.ndarray:
+    """(n, 2) deflection and its rate after each period under forces (n,)."""
+    (a, b), state, found = discretise(gains, period=PERIOD), np.zeros(2), []
+    for force in forces:
         state = a @ state + b * force
-        np.testing.assert_allclose(suspension.step(force.tolist()), state, atol=1e-12)
+        found.append(state)
+    return np.array(found)
 
 
-def test_the_rest_position_is_force_over_stiffness() -> None:
-    suspension = Suspension(GAINS, period=PERIOD)
-    for _ in range(4000):
-        z, rate = suspension.step([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
-    np.testing.assert_allclose(z, np.arange(6.0) / GAINS.stiffness, atol=ROUND_OFF)
-    np.testing.assert_allclose(rate, 0.0, atol=ROUND_OFF)
+@pytest.mark.parametrize("damping", [0.2 * CRITICAL, CRITICAL, 3.0 * CRITICAL])
+def test_any_history_of_held_forces_gives_the_solution_of_its_equation(damping: float) -> None:
+    gains, forces = replace(GAINS, damping=damping), np.random.default_rng(2).normal(size=30) * 20.0
+    state = np.zeros(2)
+    for force, found in zip(forces, responses(gains, forces), strict=True):
+
+        def rate(_: float, x: np.ndarray, force: float = force) -> list[float]:
+            return [x[1], (force - damping * x[1] - gains.stiffness * x[0]) / gains.mass]
+
+        state = solve_ivp(rate, (0.0, PERIOD), state, rtol=TOLERANCE, atol=1e-14, method="DOP853").y[:, -1]
+        np.testing.assert_allclose(found, state, rtol=1e-6, atol=1e-11)
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_deflection_stops_at_its_limit_and_stands_still_there(sign: float) -> None:
-    suspension = Suspension(replace(GAINS, limit=0.004), period=PERIOD)
-    for _ in range(100):
-        z, rate = suspension.step([sign * 100.0] * 6)
-    assert z == [sign * 0.004] * 6
-    assert rate == [0.0] * 6
-    assert np.abs(suspension.step([0.0] * 6)[0]).max() < 0.004
+def test_critically_damped_it_follows_a_step_by_the_closed_form_and_never_passes_it() -> None:
+    force, omega = 20.0, math.sqrt(GAINS.stiffness / GAINS.mass)
+    t = PERIOD * np.arange(1, 201)
+    z = responses(GAINS, np.full(200, force))[:, 0]
+    np.testing.assert_allclose(z, force / GAINS.stiffness * (1.0 - (1.0 + omega * t) * np.exp(-omega * t)), atol=ROUND_OFF)
+    assert (np.diff(z) > 0.0).all()
 
 
-def test_reset_relaxes_it() -> None:
-    suspension = Suspension(GAINS, period=PERIOD)
-    suspension.step([10.0] * 6)
-    suspension.reset()
-    assert suspension.state == ([0.0] * 6, [0.0] * 6)
+def test_at_rest_it_gives_way_by_force_over_stiffness() -> None:
+    z, rate = responses(GAINS, np.full(4000, 3.0))[-1]
+    assert z == pytest.approx(3.0 / GAINS.stiffness, abs=ROUND_OFF)
+    assert rate == pytest.approx(0.0, abs=ROUND_OFF)
+
+
+def test_two_half_periods_make_a_whole() -> None:
+    (half, push), (whole, pushed) = (discretise(GAINS, period=h) for h in (PERIOD / 2.0, PERIOD))
+    np.testing.assert_allclose(half @ half, whole, atol=ROUND_OFF)
+    np.testing.assert_allclose(half @ push + push, pushed, atol=ROUND_OFF)

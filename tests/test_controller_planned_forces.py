@@ -1,0 +1,116 @@
+"""The plan of a walking controller, given to the multibody twin: its torques and foot forces make the planned motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gains import PERIOD, make_gains, weight
+from states import changed, with_links
+from twin_motion import Motion, Z, twin_needs
+
+from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, make_gait
+from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models.actuator import GEAR_SPEED
+from hexapod_cosim.models.dynamics import mass_matrix
+from hexapod_cosim.models.kinematics import foot_centres
+
+ROBOTS = ("athena", "phantomx_mk4")
+POINT = (1e-12, 1e-12, 1e-12, 0.0, 0.0, 0.0)  # kg m2
+BEGUN = 250  # steps    a cycle to ramp the command up, and some
+COMMANDS = {
+    "straight": BodyCommand(vx=0.08),
+    "sideways": BodyCommand(vx=0.03, vy=0.03),
+    "turning": BodyCommand(vx=0.04, yaw_rate=0.2),
+    "leaning": BodyCommand(vx=0.05, height=0.01, roll=0.05, pitch=-0.04),
+}
+CARRIED = 0.01  # N    of 55: the feet that touch are so few that RIDGE still shows, and no foot pulls
+ROLLED = 1.2e-3  # m    from the path, along which the shares are reckoned, to the contact point of the foot that rolls on it
+LEGS_SWING = 0.015  # N m    of 12 links of up to 5e-4 kg m2 at some 10 rad/s2, half of them against the others
+SWEPT = 1e-5  # N m    the twin's axes turn by (h w)^2 in a period
+LINK_TURNS = 0.01  # N m    5e-4 kg m2 x 20 rad/s2: what is left out of a joint's torque
+INERTIAS = {"points": SWEPT, "real": LINK_TURNS}
+
+
+def planned(robot: Robot, command: BodyCommand, gait: Gait | None = None) -> Controller:
+    """A controller in its walk, at the begin of a plan."""
+    gait = make_gait(robot, step_height=0.02) if gait is None else gait
+    controller = Controller(robot, period=PERIOD, gait=gait, gains=make_gains(robot))
+    steps = 0
+    while steps < BEGUN or controller._at != 0:
+        controller.step(steps * PERIOD, command, Measurement())
+        steps += 1
+    return controller
+
+
+def given_and_needed(robot: Robot, controller: Controller, at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(24,) what the plan gives the twin, (24,) what its motion needs, and the mass matrix (24, 24) of torso and joints."""
+    compliant, steps = controller.compliant, controller.paths.steps
+    assert compliant is not None
+    plan, posture = compliant.laws._plan, np.array(compliant._command)[:, 3:]
+    motion = Motion(PERIOD, steps.way[1:, 0], steps.turn[1:, 0], posture, controller._plan.angle, controller._plan.speed)
+    needed, body, reach = twin_needs(robot, motion, at)
+    c, s = np.cos(motion.yaw[at]), np.sin(motion.yaw[at])
+    force = plan.shares.forces(at)[:, :3] @ np.array([[c, s, 0.0], [-s, c, 0.0], Z])
+    given, moves = np.zeros(24), reach.reshape(19, 6, 24)
+    for leg, (f, centre) in enumerate(zip(force, foot_centres(robot, body), strict=True)):
+        tibia = 3 * leg + 3
+        arm = centre - robot.foot.radius * Z - body[tibia, :3]
+        given += moves[tibia, :3].T @ f + moves[tibia, 3:].T @ np.cross(arm, f)
+    gear = robot.servo.coulomb_friction * np.tanh(motion.speed[at] / GEAR_SPEED)
+    given[6:] += (plan.own[at] + plan.carry[at] - gear).ravel()
+    return given, needed, reach.T @ mass_matrix(robot, body) @ reach
+
+
+@pytest.mark.parametrize("inertias", INERTIAS)
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_planned_torques_and_forces_move_the_twin_as_planned(name: str, command: str, inertias: str) -> None:
+    """All but the turning about the vertical: the feet push in proportion to their loads, whatever moment that makes."""
+    robot, leans = load_robot(name), command == "leaning"
+    if inertias == "points":
+        robot = changed(robot, torso={"inertia": POINT})
+        for joint in range(3):
+            robot = with_links(robot, joint, inertia=POINT)
+    controller = planned(robot, COMMANDS[command])
+    for at in np.linspace(1, len(controller._plan.angle) - 2, 4, dtype=int).tolist():
+        given, needed, inertia = given_and_needed(robot, controller, at)
+        error = given - needed
+        assert np.abs(error[:3]).max() < CARRIED
+        assert np.abs(error[3:5]).max() < weight(robot) * ROLLED + (0.0 if inertias == "points" else LEGS_SWING)
+        # the contact point is sought below the foot along the torso's axis
+        aslant = 0.5 * weight(robot) * robot.foot.radius * 0.07 if leans else 0.0
+        assert np.abs(error[6:]).max() < INERTIAS[inertias] + aslant
+        error[5] = 0.0
+        acceleration = np.linalg.solve(inertia, error)
+        assert np.abs(acceleration[:3]).max() < 0.01  # m/s2
+        assert np.abs(acceleration[3:6]).max() < 0.7  # rad/s2    unplanned, a leg's swing alone makes 5
+        assert leans or np.abs(acceleration[6:]).max() < 0.7  # of up to 30
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_standing_still_is_planned_to_round_off(name: str) -> None:
+    robot = load_robot(name)
+    controller = Controller(robot, period=PERIOD, gait=make_gait(robot), gains=make_gains(robot))
+    for k in range(3):
+        controller.step(k * PERIOD, BodyCommand(), Measurement())
+    given, needed, _ = given_and_needed(robot, controller, 2)
+    indented = 5e-6  # N m    two hundredths of a millimetre of lowering shift the mass of the legs, and the shares stand on the stance
+    np.testing.assert_allclose(given, needed, atol=indented)
+
+
+@pytest.mark.parametrize("command", ["straight", "turning", "leaning"])
+def test_a_mirrored_plan_is_the_plan_in_a_mirror(command: str) -> None:
+    robot, mirror, straight = load_robot("athena"), [3, 4, 5, 0, 1, 2], COMMANDS[command]
+    gait = make_gait(robot, "ripple", step_height=0.02)
+    left = planned(robot, straight, gait)
+    other = replace(straight, vy=-straight.vy, yaw_rate=-straight.yaw_rate, roll=-straight.roll)
+    right = planned(robot, other, replace(gait, offsets=tuple(np.array(gait.offsets)[mirror])))
+    assert left.compliant is not None
+    assert right.compliant is not None
+    mine, seen = left.compliant.laws._plan, right.compliant.laws._plan
+    for wanted, found in ((mine.own, seen.own), (mine.carry, seen.carry)):
+        np.testing.assert_allclose(found, wanted[:, mirror] * [-1.0, 1.0, 1.0], atol=1e-9)
+    np.testing.assert_allclose(seen.shares.normal, mine.shares.normal[:, mirror], atol=1e-9)
+    np.testing.assert_allclose(seen.shares.push, mine.shares.push[:, mirror].conj(), atol=1e-9)

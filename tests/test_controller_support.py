@@ -1,0 +1,178 @@
+"""Who carries what: the hand-over between legs, and shares that balance forces and moments."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gains import make_gains, weight
+
+from hexapod_cosim.controller import LegSolver, make_gait
+from hexapod_cosim.controller.gains import SupportGains
+from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
+from hexapod_cosim.controller.support import RIDGE, Shares, Support, torques
+from hexapod_cosim.models import GAITS, Robot, load_robot
+
+ROBOT = load_robot("athena")
+WEIGHT = weight(ROBOT)
+HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
+REST = InverseDynamics(ROBOT, LegSolver(ROBOT), period=0.005).rest()
+CLOCKS = np.linspace(0.0, 1.0, 1000, endpoint=False) + 1e-7  # cycles
+ALL = np.ones(6, dtype=bool)
+RIDGED = 10.0 * RIDGE * WEIGHT  # N, N m    what the ridge takes from the balance
+BALANCED = ("111111", "101010", "010101", "110111", "101101", "011110")
+
+
+def make(gait: str | None = None, *, robot: Robot = ROBOT, handover: float | None = None) -> Support:
+    gains = make_gains(robot).support if handover is None else SupportGains(handover_time=handover, weight_time=0.5)
+    return Support(robot, make_gait(robot, gait), gains, rest=InverseDynamics(robot, LegSolver(robot), period=0.005).rest())
+
+
+def demand(*, push: complex = 0j, moment: complex = 0j, load: float = WEIGHT) -> Demand:
+    """Of one step that asks no torques."""
+    none = np.zeros((1, 6, 3))
+    return Demand(none, np.zeros((1, 6, 3, 3)), np.array([push]), np.array([load]), np.array([moment]))
+
+
+def legs(standing: str) -> np.ndarray:
+    return np.array([[float(flag) for flag in standing]])
+
+
+def phases(gait: str) -> np.ndarray:
+    timing = make_gait(ROBOT, gait)
+    return np.array([timing.phase(clock) for clock in CLOCKS])
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_a_leg_is_active_in_its_stance_and_hands_over_half_before_and_half_after(gait: str) -> None:
+    support, timing, phase = make(gait), make_gait(ROBOT, gait), phases(gait)
+    active = support.activation(phase, ALL, walking=True)
+    half = 0.5 * make_gains(ROBOT).support.handover_time / timing.period
+    from_begin, to_end = (phase + 0.5) % 1.0 - 0.5, (phase - timing.duty + 0.5) % 1.0 - 0.5
+    inside = (phase > half) & (phase < timing.duty - half)
+    outside = (phase > timing.duty + half) & (phase < 1.0 - half)
+    assert (active[inside] == 1.0).all()
+    assert (active[outside] == 0.0).all()
+    for since, sign in ((from_begin, 1.0), (to_end, -1.0)):
+        near = np.abs(since) < half
+        x = 0.5 + 0.5 * sign * since[near] / half
+        np.testing.assert_allclose(active[near], x**3 * (10.0 - 15.0 * x + 6.0 * x**2), atol=1e-9)
+
+
+def test_what_one_tripod_gives_up_the_other_takes() -> None:
+    active = make("tripod").activation(phases("tripod"), ALL, walking=True)
+    np.testing.assert_allclose(active[:, :3].sum(axis=1) + active[:, 3:].sum(axis=1), 3.0, atol=1e-9)
+    np.testing.assert_allclose(active[:, 0] + active[:, 1], 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_hand_overs_are_smooth(gait: str) -> None:
+    active = make(gait).activation(phases(gait), ALL, walking=True)
+    width = 0.05 / make_gait(ROBOT, gait).period  # cycles
+    slope = np.diff(active, axis=0) * len(CLOCKS)
+    assert np.abs(slope).max() < 1.9 / width  # a quintic's steepest is 1.875
+    assert np.abs(np.diff(slope, axis=0)).max() * len(CLOCKS) < 5.8 / width**2  # and its strongest bend 5.77
+
+
+def test_a_hand_over_is_never_longer_than_stance_or_swing() -> None:
+    support = make("wave", handover=10.0)
+    active = support.activation(phases("wave"), ALL, walking=True)
+    assert active.max() == pytest.approx(1.0, abs=1e-6)
+    assert active.min() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
+    support, phase = make(), phases("tripod")
+    assert (support.activation(phase, ALL, walking=False) == 1.0).all()
+    stays = support.activation(phase, ~ALL, walking=True)
+    steps = support.activation(phase, ALL, walking=True)
+    swinging = phase >= 0.5
+    assert (stays[swinging] == 1.0).all()
+    np.testing.assert_array_equal(stays[~swinging], steps[~swinging])
+
+
+@pytest.mark.parametrize("standing", BALANCED)
+def test_shares_balance_force_and_moment(standing: str) -> None:
+    asked = demand(push=3.0 - 2.0j, moment=WEIGHT * (0.02 - 0.01j))
+    shares = make().shares(HOME[None], legs(standing), asked)
+    assert shares.normal.sum() == pytest.approx(WEIGHT, abs=RIDGED)
+    assert shares.normal[0] @ HOME == pytest.approx(asked.moment[0], abs=RIDGED)
+    assert shares.push.sum() == pytest.approx(3.0 - 2.0j, abs=1e-9)
+    np.testing.assert_allclose(shares.push, shares.normal * (3.0 - 2.0j) / WEIGHT, rtol=1e-6)
+    assert not shares.normal[legs(standing) == 0.0].any()
+    np.testing.assert_array_equal(
+        shares.forces(0), np.column_stack([shares.push[0].real, shares.push[0].imag, shares.normal[0], np.zeros(6)])
+    )
+
+
+def test_of_all_shares_that_balance_the_sum_of_squares_is_least() -> None:
+    """Any change that keeps force and moment makes sum f^2/a greater, by second order."""
+    active = np.array([[1.0, 0.4, 1.0, 0.7, 1.0, 0.2]])
+    normal = make().normal(HOME[None], active, demand(moment=WEIGHT * 0.01))[0]
+    balance = np.array([np.ones(6), HOME.real, HOME.imag])
+    free = np.linalg.svd(balance)[2][3:]
+    np.testing.assert_allclose(free @ (normal / active[0]), 0.0, atol=1e-6)
+
+
+def test_shares_follow_activation_without_a_jump_to_nothing() -> None:
+    shares = [make().normal(HOME[None], np.array([[a, 1.0, 1.0, 1.0, 1.0, 1.0]]), demand())[0, 0] for a in (1.0, 0.5, 0.1, 0.01, 0.0)]
+    assert (np.diff(shares) < 0.0).all()
+    assert shares[-2] < 0.03 * WEIGHT / 6.0
+    assert shares[-1] == 0.0
+
+
+@pytest.mark.parametrize(("standing", "least"), [("010010", 0.999), ("100001", 0.999), ("010000", 0.8)])
+def test_two_feet_or_one_carry_what_they_can_without_their_moment(standing: str, least: float) -> None:
+    normal = make().normal(HOME[None], legs(standing), demand())[0]
+    assert least * WEIGHT < normal.sum() < 1.001 * WEIGHT
+    assert not normal[legs(standing)[0] == 0.0].any()
+    assert normal.min() >= 0.0
+
+
+def test_no_foot_at_all_is_asked_for_nothing() -> None:
+    shares = make().shares(HOME[None], legs("000000"), demand(push=1.0 + 0j))
+    assert not shares.normal.any()
+    assert np.isfinite(shares.push).all()
+
+
+def test_no_foot_is_asked_to_pull() -> None:
+    normal = make().normal(HOME[None], legs("111111"), demand(moment=WEIGHT * 0.5))
+    assert normal.min() == 0.0
+
+
+def test_rows_are_steps() -> None:
+    support, active = make(), np.vstack([legs(standing) for standing in BALANCED])
+    together = support.normal(np.tile(HOME, (len(active), 1)), active, demand())
+    for row, one in zip(together, active, strict=True):
+        np.testing.assert_allclose(row, support.normal(HOME[None], one[None], demand())[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+def test_feet_are_lowered_by_what_they_press_in_beyond_the_stance(name: str) -> None:
+    robot = load_robot(name)
+    support, home = make(robot=robot), LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
+    rest = (weight(robot) / 6.0 / robot.contact.stiffness) ** (2.0 / 3.0)
+    three = support.lowering(home[None], legs("101010"))[0]
+    load = support.normal(home[None], legs("101010"), InverseDynamics(robot, LegSolver(robot), period=0.005).rest())[0]
+    np.testing.assert_allclose(three, (load / robot.contact.stiffness) ** (2.0 / 3.0) - rest, atol=1e-12)
+    assert (three[[0, 2, 4]] > 0.0).all()
+    np.testing.assert_allclose(three[[1, 3, 5]], -rest, atol=1e-12)
+    np.testing.assert_allclose(support.lowering(home[None], legs("111111")).mean(), 0.0, atol=0.02 * rest)
+
+
+def test_torques_are_the_levers_against_the_shares() -> None:
+    generator = np.random.default_rng(4)
+    lever = generator.normal(size=(5, 6, 3, 3))
+    shares = Shares(np.ones((5, 6)), generator.normal(size=(5, 6)), generator.normal(size=(5, 6)) + 1j * generator.normal(size=(5, 6)))
+    found = torques(lever, shares)
+    force = shares.forces(2)[4, :3]
+    np.testing.assert_allclose(found[2, 4], -lever[2, 4] @ force, atol=1e-12)
+
+
+def test_some_of_the_steps_are_a_slice_of_all() -> None:
+    whole = make().shares(np.tile(HOME, (4, 1)), np.vstack([legs("111111")] * 4), demand())
+    part = whole.rows(slice(1, 3))
+    np.testing.assert_array_equal(part.normal, whole.normal[1:3])
+    np.testing.assert_array_equal(part.push, whole.push[1:3])
+    assert len(replace(part).activation) == 2
