@@ -1,0 +1,68 @@
+"""The force laws of a robot that is planned to stand in its stance, on all legs or some."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from gains import PERIOD, make_gains, weight
+
+from hexapod_cosim.controller import Gains, LegSolver, Parts, make_gait
+from hexapod_cosim.controller.compliance import Compliance
+from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
+from hexapod_cosim.controller.support import Support
+from hexapod_cosim.models import Robot, load_robot
+
+ROBOT = load_robot("athena")
+WEIGHT = weight(ROBOT)  # N
+GAINS = make_gains(ROBOT)
+HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
+ALL = "111111"
+RAISED = 0.03  # m    a foot in mid-swing: beyond doubt in the air
+
+
+@cache
+def rest(robot: Robot) -> Demand:
+    return InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
+
+
+def make_laws(robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None) -> Compliance:
+    """The laws at rest, with no plan yet."""
+    gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
+    return Compliance(
+        gains, Parts() if parts is None else parts, weight=weight(robot), cycle=gait.period, kp=robot.servo.kp,
+        step_height=gait.step_height, period=PERIOD,
+    )  # fmt: skip
+
+
+def plan(laws: Compliance, steps: int, *, robot: Robot = ROBOT, standing: str = ALL, height: float = RAISED, rise: float = 0.0) -> None:
+    """Lays out steps in which these legs stand and the others are in the air, so high [m] and rising so fast [m/s]."""
+    still = rest(robot)
+    demand = Demand(*(np.repeat(getattr(still, name), steps, axis=0) for name in ("torque", "lever", "push", "weight", "moment")))
+    stands = np.array([flag == "1" for flag in standing])
+    home = LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
+    support = Support(robot, make_gait(robot), make_gains(robot).support, rest=still)
+    rows = np.tile(stands.astype(float), (steps, 1))
+    shares = support.shares(np.tile(home, (steps, 1)), rows, demand)
+    air = 1.0 - rows
+    laws.plan(demand, shares, height=height * air, rise=rise * air, swinging=~stands)
+
+
+def shared(laws: Compliance) -> np.ndarray:
+    """(6, 4) the planned forces."""
+    return np.asarray(laws._plan.shares.forces(0))
+
+
+def squeezing(size: float = 2.0) -> np.ndarray:
+    """(6, 4) all feet carry alike, the middle ones are pushed apart."""
+    force = np.zeros((6, 4))
+    force[:, 2] = WEIGHT / 6.0
+    force[1, 1], force[4, 1] = size, -size
+    return force
+
+
+def run(laws: Compliance, force: np.ndarray, steps: int, **planned: str | float) -> None:
+    """Plans and takes so many steps under the same forces."""
+    plan(laws, steps, **planned)  # type: ignore[arg-type]
+    for _ in range(steps):
+        laws.step(force)

@@ -1,0 +1,136 @@
+"""Touch-down and lift-off without flicker, and sensors that are wrong told from ground that is not there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.controller.contact_detection import (
+    ABSENT_TIME,
+    AIRBORNE_TIME,
+    LIFT,
+    MEMORY,
+    MISSING,
+    TOUCH,
+    ContactDetector,
+    SensorWatch,
+)
+
+WEIGHT, CYCLE, PERIOD = 50.0, 1.0, 0.005  # N, s, s
+NONE, ALL = [False] * 6, [True] * 6
+
+
+def only(*legs: int) -> list[bool]:
+    return [leg in legs for leg in range(6)]
+
+
+def but(*legs: int) -> list[bool]:
+    return [leg not in legs for leg in range(6)]
+
+
+def steps(time: float) -> int:
+    """Periods until more than a time has passed, summed up as the watch does."""
+    return math.floor(time / PERIOD + 1e-6) + 1
+
+
+def test_a_foot_touches_down_above_one_threshold_and_lifts_off_below_the_lower() -> None:
+    detector, between = ContactDetector(WEIGHT), 0.5 * (TOUCH + LIFT)
+    forces = [0.0, between, 1.01 * TOUCH, between, 1.01 * LIFT, 0.99 * LIFT, between, 1.01 * TOUCH]
+    found = [bool(detector.step(np.full(6, share * WEIGHT))[2]) for share in forces]
+    assert found == [False, False, True, True, True, False, False, True]
+
+
+@pytest.mark.parametrize("level", [TOUCH, LIFT, 0.5 * (TOUCH + LIFT)])
+def test_noise_on_a_force_near_a_threshold_makes_no_foot_flicker(level: float) -> None:
+    detector, generator = ContactDetector(WEIGHT), np.random.default_rng(0)
+    noise = (TOUCH - LIFT) / 3.0  # a third of the hysteresis to either side
+    states = np.array([detector.step((level + generator.uniform(-noise, noise, 6)) * WEIGHT) for _ in range(2000)])
+    assert np.count_nonzero(np.diff(states.astype(int), axis=0), axis=0).max() <= 1
+
+
+def test_feet_are_told_apart_and_what_was_found_before_is_left_alone() -> None:
+    detector = ContactDetector(WEIGHT)
+    first = detector.step(np.array([1.0, 0.0, 1.0, 0.0, 1.0, 0.0]) * WEIGHT)
+    state = detector.save()
+    second = detector.step(np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0]) * WEIGHT)
+    np.testing.assert_array_equal(first, ~second)
+    detector.restore(state)
+    np.testing.assert_array_equal(detector.touching, first)
+
+
+def until_doubted(watch: SensorWatch, leg: int, **seen: list[bool] | float) -> int:
+    """Looks until the sensor is doubted, none of the others ever."""
+    for count in range(1, 1000):
+        doubted = watch.look(**seen, time=PERIOD)  # type: ignore[arg-type]
+        assert not any(doubted[other] for other in range(6) if other != leg)
+        if doubted[leg]:
+            return count
+    return 0
+
+
+def test_a_dead_sensor_of_a_foot_that_carries_is_doubted_after_the_stated_time() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    count = until_doubted(watch, 2, touching=but(2), total=0.8 * WEIGHT, standing=ALL, high=NONE)
+    assert abs(count - steps(ABSENT_TIME)) <= 1  # times are sums
+
+
+def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_the_stated_time() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    count = until_doubted(watch, 2, touching=ALL, total=WEIGHT, standing=but(2), high=only(2))
+    assert abs(count - steps(AIRBORNE_TIME)) <= 1
+
+
+def test_a_missing_foothold_whose_weight_the_others_carry_is_not_a_dead_sensor() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    for _ in range(1000):
+        assert not any(watch.look(but(2), 1.001 * MISSING * WEIGHT, ALL, NONE, time=PERIOD))
+    assert not watch.busy
+
+
+def test_contradictions_shorter_than_that_never_add_up() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    for _ in range(50):
+        for _ in range(steps(ABSENT_TIME) - 3):
+            assert not any(watch.look(but(2), 0.5 * WEIGHT, ALL, NONE, time=PERIOD))
+        assert not any(watch.look(ALL, WEIGHT, ALL, NONE, time=PERIOD))
+
+
+def test_a_foot_that_need_not_carry_or_is_not_high_contradicts_nothing() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    for _ in range(200):
+        assert not any(watch.look(NONE, 0.0, NONE, ALL, time=PERIOD))
+        assert not any(watch.look(ALL, WEIGHT, NONE, NONE, time=PERIOD))
+    assert not watch.busy
+
+
+def test_a_sensor_is_believed_again_when_it_has_contradicted_nothing_for_the_stated_cycles() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
+    count = 0
+    while watch.look(ALL, WEIGHT, ALL, NONE, time=PERIOD)[2]:
+        assert watch.busy
+        count += 1
+    assert abs(count - steps(MEMORY * CYCLE)) <= 2
+    assert not watch.busy
+
+
+def test_a_sensor_that_stays_dead_stays_doubted() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
+    for k in range(1000):
+        stands = k // 100 % 2 == 0  # walking: dead in the stance only
+        assert watch.look(but(2), 0.5 * WEIGHT, ALL if stands else but(2), NONE if stands else only(2), time=PERIOD)[2]
+
+
+def test_what_is_saved_does_not_change() -> None:
+    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    for _ in range(10):
+        watch.look(but(2), 0.5 * WEIGHT, ALL, NONE, time=PERIOD)
+    state = watch.save()
+    left = until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
+    watch.restore(state)
+    assert not any(watch.doubted)
+    assert watch.busy
+    assert until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE) == left

@@ -1,0 +1,223 @@
+"""The slow loops, seen through ideal geometry: feet fixed to the ground under a torso that lies or walks otherwise than planned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gains import HOLD, PERIOD
+from standing import HOME
+
+from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller.hold import LOADED, Hold, Sight, fit_plane
+
+LEVEL = [-0.12] * 6  # m    planned heights of the feet
+LOADS = [0.5] * 6  # of a third of the weight
+LOOKS = 200
+EXACT = 1e-12
+
+
+def make(parts: Parts | None = None, **changes: float) -> Hold:
+    return Hold(replace(HOLD, **changes), Parts() if parts is None else parts, period=PERIOD)
+
+
+def sight(**changes: object) -> Sight:
+    """At rest, as planned."""
+    still = Sight(HOME.tolist(), LEVEL, HOME.tolist(), LEVEL, LOADS, (0.0, 0.0), 0.0, 0j, 0.0)
+    return still._replace(**changes)  # type: ignore[arg-type]
+
+
+def seen_heights(low: float, roll: float, pitch: float) -> list[float]:
+    """Feet on a plane, seen from a torso that is so much too low and turned against it: to first order."""
+    return [z + low + p.real * pitch - p.imag * roll for z, p in zip(LEVEL, HOME.tolist(), strict=True)]
+
+
+def settle(
+    hold: Hold, *, low: float = 0.0, roll: float = 0.0, pitch: float = 0.0, ground: tuple[float, float] = (0.0, 0.0)
+) -> Iterator[np.ndarray]:
+    """What is left of a wrong height and tilt [m, rad, rad] against level feet, as the lift of the feet takes effect.
+
+    Raising the feet by lift = a + b x + c y (torso axes) lowers the torso by a, and turns it.
+    """
+    base = np.column_stack([np.ones(6), HOME.real, HOME.imag])
+    for _ in range(LOOKS):
+        a, b, c = np.linalg.lstsq(base, np.array(hold.lift), rcond=None)[0]
+        # with the feet raised by b x in the torso's axes and standing on the ground, the nose comes down: pitch grows by b, roll by -c
+        now = np.array([low, roll, pitch]) + [a, -c, b]
+        tilt = now[1] + ground[0], now[2] + ground[1]
+        hold.look(sight(height=seen_heights(*now), tilt=tilt))
+        yield now
+
+
+def test_a_plane_through_points_is_found_whatever_their_weights() -> None:
+    generator = np.random.default_rng(2)
+    for _ in range(20):
+        c, along, across = generator.normal(size=3)
+        weights = generator.uniform(LOADED + 0.01, 2.0, 6)
+        height = c + along * HOME.real + across * HOME.imag
+        np.testing.assert_allclose(fit_plane(HOME.tolist(), height.tolist(), weights.tolist()), (c, along, across), atol=EXACT)
+
+
+def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
+    generator = np.random.default_rng(3)
+    height, weights = generator.normal(size=6), generator.uniform(LOADED + 0.01, 2.0, 6)
+    base, root = np.column_stack([np.ones(6), HOME.real, HOME.imag]), np.sqrt(weights)
+    expected = np.linalg.lstsq(base * root[:, None], height * root, rcond=None)[0]
+    np.testing.assert_allclose(fit_plane(HOME.tolist(), height.tolist(), weights.tolist()), expected, atol=EXACT)
+
+
+def test_feet_in_the_air_tell_nothing_and_two_or_three_in_a_line_no_plane() -> None:
+    height = [5.0, 0.0, 5.0, 0.0, 5.0, 0.0]
+    assert fit_plane(HOME.tolist(), height, [0.9 * LOADED, 1.0, 0.0, 1.0, 0.0, 1.0]) == pytest.approx((0.0, 0.0, 0.0), abs=EXACT)
+    assert fit_plane(HOME.tolist(), height, [0.0, 1.0, 0.0, 0.0, 1.0, 0.0]) is None
+    assert fit_plane([0j, 0.1 + 0.1j, 0.2 + 0.2j, 0j, 0j, 0j], height, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) is None
+
+
+@pytest.mark.parametrize(
+    ("low", "roll", "pitch"), [(0.005, 0.0, 0.0), (-0.005, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, -0.02), (0.004, -0.01, 0.02)]
+)
+def test_a_torso_that_lies_wrong_is_driven_back_at_the_stated_rates(low: float, roll: float, pitch: float) -> None:
+    hold = make()
+    left = np.array(list(settle(hold, low=low, roll=roll, pitch=pitch)))
+    time = hold.every * PERIOD * np.arange(LOOKS)
+    # an integral over rate x time steps: (1 - rate h)^k, which is e^(-rate t) but for rate h / 2
+    np.testing.assert_allclose(left[:, 0], low * (1.0 - HOLD.height_rate * hold.every * PERIOD) ** np.arange(LOOKS), atol=1e-9)
+    for column, start in ((1, roll), (2, pitch)):
+        np.testing.assert_allclose(left[:, column], start * np.exp(-HOLD.attitude_rate * time), atol=0.1 * abs(start) + EXACT)
+    assert np.abs(left[-1]).max() < 1e-5
+
+
+def test_on_a_slope_the_torso_is_held_parallel_to_it() -> None:
+    left = np.array(list(settle(make(), roll=0.01, pitch=-0.015, ground=(0.1, 0.2))))
+    assert np.abs(left[-1]).max() < 1e-5
+
+
+def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
+    """The tilt that the sensor gives is at first held against; then it is the ground's."""
+    hold = make()
+    list(settle(hold))
+    first = np.array(list(settle(hold, ground=(0.0, 0.03))))
+    assert np.abs(first).max() > 0.005
+    for _ in range(4):
+        last = np.array(list(settle(hold, ground=(0.0, 0.03))))
+    assert np.abs(last[-1]).max() < 1e-3
+
+
+def test_commanded_tilts_are_no_errors() -> None:
+    """The tilt given is beyond the command, the feet are where they were planned: nothing is corrected."""
+    hold = make()
+    for _ in range(50):
+        hold.look(sight())
+    assert not any(hold.lift)
+
+
+def test_corrections_of_the_posture_have_limits() -> None:
+    hold = make()
+    for _ in range(500):
+        hold.look(sight(height=seen_heights(0.05, 0.0, 0.0)))
+    np.testing.assert_allclose(hold.lift, -HOLD.height_limit)
+    hold.reset()
+    hold.look(sight())
+    for _ in range(60):
+        hold.look(sight(height=seen_heights(0.0, 0.4, 0.0), tilt=(0.4, 0.0)))
+    np.testing.assert_allclose(hold.lift, HOLD.angle_limit * HOME.imag, atol=EXACT)
+
+
+def walk(
+    hold: Hold, v: complex, yaw_rate: float, *, legs: tuple[int, ...], told: tuple[complex, float], looks: int = 100
+) -> tuple[complex, float]:
+    """Feet fixed to the ground under a torso that moves with a steady twist, all but `legs` in the air. The true way and heading."""
+    way, yaw, time = 0j, 0.0, hold.every * PERIOD
+    loads = [1.0 if leg in legs else 0.0 for leg in range(6)]
+    for k in range(looks + 1):
+        yaw = yaw_rate * k * time
+        way = v * k * time if yaw_rate == 0.0 else v * (np.exp(1j * yaw) - 1.0) / (1j * yaw_rate)
+        feet = np.exp(-1j * yaw) * (HOME - way)
+        shaken = np.where(np.array(loads) > 0.0, feet, feet + 0.1 * np.sin(k))  # feet in the air go anywhere
+        hold.look(sight(plane=shaken.tolist(), load=loads, yaw=yaw, velocity=told[0], yaw_rate=told[1]))
+    return way, yaw
+
+
+@pytest.mark.parametrize("legs", [(0, 2, 4), (1, 3, 5), (0, 1, 2, 3, 4, 5), (2,)])
+@pytest.mark.parametrize("yaw_rate", [0.0, 0.3, -0.2])
+def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever_legs_stand(yaw_rate: float, legs: tuple[int, ...]) -> None:
+    hold, looks = make(), 100
+    told = 0.08 + 0.01j, 0.25
+    way, yaw = walk(hold, 0.07 - 0.02j, yaw_rate, legs=legs, told=told, looks=looks)
+    time = hold.every * PERIOD * looks
+    assert hold.heading == pytest.approx(told[1] * time - yaw, abs=1e-9)
+    # the commanded way, along the true heading half-way through each look
+    middle = yaw_rate * hold.every * PERIOD * np.arange(looks) + 0.5 * told[1] * hold.every * PERIOD
+    commanded = (told[0] * np.exp(1j * middle) * hold.every * PERIOD).sum()
+    assert hold.way == pytest.approx(commanded - way, abs=1e-9)
+
+
+def test_a_walk_as_commanded_loses_nothing() -> None:
+    hold = make()
+    walk(hold, 0.08 - 0.02j, 0.3, legs=(0, 2, 4), told=(0.08 - 0.02j, 0.3))
+    arc = (0.3 * hold.every * PERIOD) ** 2 / 24.0 * 0.08 * 4.0  # m    chord and arc differ by so much of the way
+    assert abs(hold.way) < 1.1 * arc
+    assert hold.heading == pytest.approx(0.0, abs=EXACT)
+
+
+def test_the_heading_is_counted_on_through_half_a_turn() -> None:
+    hold = make()
+    for k in range(400):
+        yaw = 0.02 * k
+        hold.look(sight(yaw=(yaw + np.pi) % (2.0 * np.pi) - np.pi, yaw_rate=0.0))
+    assert hold.heading == pytest.approx(-0.02 * 399, abs=1e-9)
+
+
+def test_without_a_foot_that_stood_all_the_time_the_way_is_taken_as_commanded() -> None:
+    hold = make()
+    for k in range(10):
+        loads = [1.0 if (leg + k) % 2 else 0.0 for leg in range(6)]
+        hold.look(sight(plane=(HOME * k).tolist(), load=loads, velocity=0.1 + 0j))
+    assert hold.way == 0j
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good(heading: float) -> None:
+    """The robot walks 6 mm/s less than it is told, and turns 0.01 rad/s more."""
+    hold, time, way, yaw = make(), make().every * PERIOD, 0j, heading
+    for _ in range(600):
+        feet = np.exp(-1j * yaw) * (HOME - way)
+        hold.look(sight(plane=feet.tolist(), yaw=yaw, velocity=0.08 + 0j, yaw_rate=0.0))
+        way += np.exp(1j * yaw) * (0.08 + hold.velocity - 0.006) * time
+        yaw += (hold.yaw_rate + 0.01) * time
+    assert hold.velocity == pytest.approx(0.006, abs=1e-4)
+    assert hold.yaw_rate == pytest.approx(-0.01, abs=1e-6)
+    assert abs(hold.way) == pytest.approx(0.006 / HOLD.path_rate, rel=0.02)
+
+
+def test_steering_has_limits_and_keeps_its_direction() -> None:
+    hold = make()
+    hold.way, hold.heading = 3.0 - 4.0j, -9.0
+    hold.look(sight(yaw=0.5))
+    assert abs(hold.velocity) == pytest.approx(HOLD.speed_limit)
+    assert hold.velocity / abs(hold.velocity) == pytest.approx((0.6 - 0.8j) * np.exp(-0.5j))
+    assert hold.yaw_rate == -HOLD.turn_limit
+
+
+def test_parts_switched_off_do_nothing() -> None:
+    hold = make(Parts(posture=False, path=False))
+    walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), told=(0.08 + 0j, 0.0))
+    hold.look(sight(height=seen_heights(0.01, 0.1, 0.1), tilt=(0.1, 0.1)))
+    assert not any(hold.lift)
+    assert hold.velocity == 0j
+    assert hold.yaw_rate == 0.0
+
+
+def test_a_saved_hold_goes_on_the_same() -> None:
+    hold, other = make(), make()
+    walk(hold, 0.07 + 0j, 0.1, legs=(0, 2, 4), told=(0.08 + 0j, 0.0))
+    state = hold.save()
+    assert {"_gains", "_parts", "every"}.isdisjoint(state)
+    other.restore(state)
+    for one in (hold, other):
+        one.look(sight(height=seen_heights(0.003, 0.01, 0.0), yaw=0.5))
+    assert vars(hold)["lift"] == vars(other)["lift"]
+    assert (hold.way, hold.heading, hold.velocity) == (other.way, other.heading, other.velocity)
+    assert state["lift"] != hold.lift

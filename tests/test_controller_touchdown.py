@@ -1,0 +1,152 @@
+"""Ground met early or late: a foot is not pressed into it, and reaches for it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from standing import ROBOT, WEIGHT, make_laws, plan, squeezing
+
+from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller.compliance import Compliance
+from hexapod_cosim.controller.touchdown import (
+    EARLY,
+    GRACE,
+    HOLD_LIMIT,
+    NEGLIGIBLE,
+    REACH_LIMIT,
+    REACH_SPEED,
+    RETURN_TIME,
+    Touchdown,
+)
+
+PERIOD = 0.005  # s
+YES, NO, STILL = [True] * 6, [False] * 6, [0.0] * 6
+ONLY_TOUCHDOWN = Parts(slip_pid=False, suspension=False, support=False, fallback=False)
+
+
+def only(leg: int) -> list[bool]:
+    return [other == leg for other in range(6)]
+
+
+def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched() -> None:
+    down, height, total = Touchdown(period=PERIOD), 0.02, 0.0
+    heights = []
+    for _ in range(15):
+        fall = 0.001
+        height -= fall
+        down.step(only(2), [fall] * 6, YES, NO)
+        total += fall
+        heights.append(height + down.offset[2])
+    np.testing.assert_allclose(heights, 0.02, atol=1e-12)
+    assert down.offset[2] == pytest.approx(total)
+    assert [down.offset[leg] for leg in (0, 1, 3, 4, 5)] == [0.0] * 5
+
+
+def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> None:
+    down = Touchdown(period=PERIOD)
+    for _ in range(5):
+        down.step(only(2), [0.002] * 6, YES, NO)
+    for _ in range(100):
+        down.step(YES, STILL, NO, YES)
+    assert down.offset[2] == pytest.approx(0.01)
+    for k in range(1, 40):
+        down.step(NO, STILL, YES, NO)
+        assert down.offset[2] == pytest.approx(0.01 * math.exp(-k * PERIOD / RETURN_TIME))
+    for _ in range(60):
+        down.step(NO, STILL, YES, NO)
+    assert down.offset[2] == 0.0
+    assert not down.busy
+
+
+def test_a_foot_is_held_no_higher_than_it_may() -> None:
+    down = Touchdown(period=PERIOD)
+    for _ in range(30):
+        down.step(only(2), [0.002] * 6, YES, NO)
+    assert down.offset[2] == HOLD_LIMIT
+
+
+def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_with_the_speed_and_to_the_limit() -> None:
+    down, missing = Touchdown(period=PERIOD), [leg != 2 for leg in range(6)]
+    offsets = []
+    for _ in range(100):
+        down.step(missing, STILL, NO, YES)
+        offsets.append(down.offset[2])
+    waited = math.floor(GRACE / PERIOD + 1e-9)
+    assert not any(offsets[:waited])
+    begun = next(k for k, offset in enumerate(offsets) if offset)
+    assert begun - waited <= 1
+    reach = -REACH_SPEED * PERIOD * np.arange(1, 101 - begun)
+    np.testing.assert_allclose(offsets[begun:], np.maximum(reach, -REACH_LIMIT), atol=1e-12)
+
+
+def test_it_stops_where_it_finds_the_ground() -> None:
+    down, missing = Touchdown(period=PERIOD), [leg != 2 for leg in range(6)]
+    for _ in range(20):
+        down.step(missing, STILL, NO, YES)
+    found = down.offset[2]
+    assert -REACH_LIMIT < found < 0.0
+    for _ in range(50):
+        down.step(YES, STILL, NO, YES)
+    assert down.offset[2] == found
+    for _ in range(7):
+        down.step(missing, STILL, NO, YES)  # and a short loss of contact does not move it
+    assert down.offset[2] == found
+
+
+def test_on_flat_ground_nothing_happens() -> None:
+    down = Touchdown(period=PERIOD)
+    for k in range(400):
+        swings = k // 100 % 2 == 0
+        down.step(NO if swings else YES, [0.001] * 6 if swings else STILL, YES if swings else NO, NO if swings else YES)
+        assert not down.busy
+        assert not any(down.offset)
+
+
+def test_what_is_negligible_goes_at_once() -> None:
+    down = Touchdown(period=PERIOD)
+    down.restore(([0.99 * NEGLIGIBLE] * 6, STILL))
+    assert not any(down.step(NO, STILL, YES, NO))
+
+
+def test_a_saved_state_does_not_change() -> None:
+    down = Touchdown(period=PERIOD)
+    down.step(only(2), [0.002] * 6, YES, NO)
+    state = down.save()
+    down.step(only(2), [0.002] * 6, YES, NO)
+    down.restore(state)
+    assert down.offset[2] == 0.002
+
+
+def descend(laws: Compliance, touching: bool) -> list[float]:
+    """Offsets of foot 1 while it comes down from 20 mm at 0.2 m/s, with a force on it from 8 mm on or not."""
+    offsets, height, rise = [], 0.02, -0.2
+    while height > 0.0:
+        force = squeezing(0.0)
+        force[1, 2] = 0.05 * WEIGHT if touching and height < 0.008 else 0.0
+        plan(laws, 1, standing="101111", height=height, rise=rise)
+        laws.step(force)
+        height += rise * PERIOD
+        offsets.append(float(laws.offset[1]))
+    return offsets
+
+
+def test_the_laws_hold_a_foot_that_touches_well_above_the_end_of_its_path() -> None:
+    offsets = descend(make_laws(parts=ONLY_TOUCHDOWN), touching=True)
+    # from the first force at 7 mm to EARLY the path falls 1 mm a step
+    assert offsets[-1] == pytest.approx(0.007 - EARLY, abs=1.01e-3)
+    assert not any(descend(make_laws(parts=ONLY_TOUCHDOWN), touching=False))
+    assert not any(descend(make_laws(parts=Parts(touchdown=False)), touching=True))
+
+
+def test_the_laws_reach_for_ground_that_is_missing_while_the_others_carry_the_weight() -> None:
+    laws, force = make_laws(), squeezing(0.0)
+    force[:, 2] *= 6.0 / 5.0
+    force[1] = 0.0
+    plan(laws, 100)
+    for _ in range(100):
+        laws.step(force)
+    assert laws.offset[1] == -REACH_LIMIT
+    assert not laws.doubted.any()
+    assert ROBOT.gait.step_height > REACH_LIMIT
