@@ -79,7 +79,7 @@ class Compliant:
 
         That is looked at `afresh` when a leg lifts off or touches down, and led over without a jump.
         """
-        if afresh or not moves:
+        if afresh or (not moves and self._steered[1].any()):
             hold = self.hold
             goal = np.array([hold.velocity, hold.yaw_rate]) if moves else np.zeros(2, dtype=np.complex128)
             self._steered = self._steering(np.zeros(1))[0], goal, 0
