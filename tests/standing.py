@@ -61,8 +61,10 @@ def squeezing(size: float = 2.0) -> np.ndarray:
     return force
 
 
-def run(laws: Compliance, force: np.ndarray, steps: int, **planned: str | float) -> None:
+def run(
+    laws: Compliance, force: np.ndarray, steps: int, *, robot: Robot = ROBOT, standing: str = ALL, height: float = RAISED
+) -> None:  # fmt: skip
     """Plans and takes so many steps under the same forces."""
-    plan(laws, steps, **planned)  # type: ignore[arg-type]
+    plan(laws, steps, robot=robot, standing=standing, height=height)
     for _ in range(steps):
         laws.step(force)

@@ -34,6 +34,13 @@ def seen_heights(low: float, roll: float, pitch: float) -> list[float]:
     return [z + low + p.real * pitch - p.imag * roll for z, p in zip(LEVEL, HOME.tolist(), strict=True)]
 
 
+def plane(height: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(3,) of the feet in the stance."""
+    found = fit_plane(HOME.tolist(), height.tolist(), weights.tolist())
+    assert found is not None
+    return np.array(found)
+
+
 def settle(
     hold: Hold, *, low: float = 0.0, roll: float = 0.0, pitch: float = 0.0, ground: tuple[float, float] = (0.0, 0.0)
 ) -> Iterator[np.ndarray]:
@@ -45,7 +52,7 @@ def settle(
     for _ in range(LOOKS):
         a, b, c = np.linalg.lstsq(base, np.array(hold.lift), rcond=None)[0]
         # with the feet raised by b x in the torso's axes and standing on the ground, the nose comes down: pitch grows by b, roll by -c
-        now = np.array([low, roll, pitch]) + [a, -c, b]
+        now = np.add([low, roll, pitch], [a, -c, b])
         tilt = now[1] + ground[0], now[2] + ground[1]
         hold.look(sight(height=seen_heights(*now), tilt=tilt))
         yield now
@@ -57,7 +64,7 @@ def test_a_plane_through_points_is_found_whatever_their_weights() -> None:
         c, along, across = generator.normal(size=3)
         weights = generator.uniform(LOADED + 0.01, 2.0, 6)
         height = c + along * HOME.real + across * HOME.imag
-        np.testing.assert_allclose(fit_plane(HOME.tolist(), height.tolist(), weights.tolist()), (c, along, across), atol=EXACT)
+        np.testing.assert_allclose(plane(height, weights), (c, along, across), atol=EXACT)
 
 
 def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
@@ -65,7 +72,7 @@ def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
     height, weights = generator.normal(size=6), generator.uniform(LOADED + 0.01, 2.0, 6)
     base, root = np.column_stack([np.ones(6), HOME.real, HOME.imag]), np.sqrt(weights)
     expected = np.linalg.lstsq(base * root[:, None], height * root, rcond=None)[0]
-    np.testing.assert_allclose(fit_plane(HOME.tolist(), height.tolist(), weights.tolist()), expected, atol=EXACT)
+    np.testing.assert_allclose(plane(height, weights), expected, atol=EXACT)
 
 
 def test_feet_in_the_air_tell_nothing_and_two_or_three_in_a_line_no_plane() -> None:

@@ -60,8 +60,8 @@ def test_its_frequency_response_is_the_continuous_one_at_the_warped_frequency(na
 
 def test_a_steady_force_is_answered_by_kp_and_an_integral_that_lacks_the_filters_lag() -> None:
     """u = kp f + ki f (t - T_f) once the filter has settled: the trapezoid loses nothing of the area."""
-    matrix, states, force, count = system(SLIP, period=PERIOD), np.zeros(4), 3.0, 400
+    matrix, row, force, count = system(SLIP, period=PERIOD), np.zeros(5), 3.0, 400
     for _ in range(count):
-        answer, *states = np.append(states, force) @ matrix
+        row = np.append(row[STATES], force) @ matrix
     lasted = (count - 0.5) * PERIOD  # a force first seen at a step counts from half a period before it
-    assert answer == pytest.approx(force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9)
+    assert row[ANSWER] == pytest.approx(force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9)

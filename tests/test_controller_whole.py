@@ -3,58 +3,59 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
+from gains import PERIOD, make_gains
 
-from hexapod_cosim.controller import BodyCommand, Controller, ControllerError, Gains, Gait, Measurement, make_gait
-from hexapod_cosim.controller.design import design_gains
+from hexapod_cosim.controller import BodyCommand, Controller, ControllerError, Gait, Measurement, Parts, make_gait
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
+from hexapod_cosim.models.kinematics import quaternion_product
 
-PERIOD = 0.005  # s
 ROUND_OFF = 1e-12  # rad
+LOWERED = 5e-5  # rad    some hundredths of a millimetre over 0.1 m
 MIRROR = np.array([3, 4, 5, 0, 1, 2])  # legs seen in a mirror
 MIRRORED_JOINT = np.array([-1.0, 1.0, 1.0])
 ROBOTS = ("athena", "phantomx_mk4")
 
 
-@cache
-def designed(name: str) -> Gains:
-    return design_gains(load_robot(name), PERIOD)
-
-
-def make(name: str = "athena", *, gait: Gait | None = None, compliant: bool = False) -> Controller:
+def make(name: str = "athena", *, gait: Gait | None = None, compliant: bool = False, parts: Parts | None = None) -> Controller:
     robot = load_robot(name)
-    gains = designed(robot.name) if compliant else None
-    return Controller(robot, period=PERIOD, gait=make_gait(robot) if gait is None else gait, gains=gains)
+    return Controller(
+        robot, period=PERIOD, gait=make_gait(robot) if gait is None else gait, gains=make_gains(robot) if compliant else None,
+        parts=Parts() if parts is None else parts,
+    )  # fmt: skip
 
 
 def run(controller: Controller, command: BodyCommand, steps: int, *, first: int = 0, measurement: Measurement | None = None) -> np.ndarray:
-    """(steps, 2, 6, 3) angle_ref and speed_ref of consecutive steps."""
+    """(steps, 3, 6, 3) angle_ref, speed_ref and torque_ref of consecutive steps."""
     found = []
     for k in range(first, first + steps):
         out = controller.step(k * PERIOD, command, measurement or Measurement())
-        found.append(np.stack([out.angle_ref, out.speed_ref]))
+        found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
     return np.array(found)
 
 
 def squeezed(generator: np.random.Generator | None = None) -> Measurement:
-    """A measurement with all feet on the ground and unequal forces."""
+    """A measurement with all feet on the ground, unequal forces, joints off the stance and a torso that leans."""
+    generator = generator or np.random.default_rng(4)
     measurement = Measurement(contact=np.ones(6, dtype=bool))
-    measurement.foot_force[:] = (generator or np.random.default_rng(4)).normal(size=(6, 3)) * 2.0 + [0.0, 0.0, 9.0]
+    measurement.foot_force[:] = generator.normal(size=(6, 3)) * 2.0 + [0.0, 0.0, 9.0]
+    measurement.angle[:] = load_robot("athena").stance + 0.01 * generator.normal(size=(6, 3))
+    measurement.quaternion[:] = [np.cos(0.01), 0.6 * np.sin(0.01), -0.8 * np.sin(0.01), 0.0]
     return measurement
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("compliant", [False, True])
 def test_the_first_command_is_the_stance(name: str, compliant: bool) -> None:
-    controller = make(name, compliant=compliant)
-    out = controller.step(0.0, BodyCommand(vx=0.08), Measurement())
-    if not compliant:
-        np.testing.assert_allclose(out.angle_ref, load_robot(name).stance, atol=ROUND_OFF)
-        assert not out.speed_ref.any()
-    assert not out.torque_ref.any()
+    """Compliant: but for what the ground gives way, with torques for the legs' own weight; the support grows with the weight felt."""
+    robot, controller = load_robot(name), make(name, compliant=compliant)
+    out = controller.step(0.0, BodyCommand(vx=0.08), Measurement(angle=robot.stance))
+    np.testing.assert_allclose(out.angle_ref, robot.stance, atol=LOWERED if compliant else ROUND_OFF)
+    assert not out.speed_ref.any()
+    assert out.torque_ref.any() == compliant
+    assert np.abs(out.torque_ref).max() < 9.81 * sum(link.mass for link in robot.legs[0].links) * 0.1  # N m    0.1 m: the legs' centres
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -97,17 +98,41 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
             worst, compared = max(worst, float(np.abs(over_ground[still]).max(initial=0.0))), compared + int(still.sum())
         before, swinging = (foot, pitch), controller.diagnostics.swinging.copy()
     assert compared > 600
-    # roll is followed one period late, and headings turn meanwhile: R dB dpsi/dt ~ 0.015 m x 0.4 x 0.5 /s; the body moves at 50 mm/s
-    assert worst < 3e-3
+    # rolling is solved by one Newton step, chords lack h^2/24 of an arc and headings turn meanwhile; the body moves at 50 mm/s
+    assert worst < 3e-4
+
+
+def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray:
+    """As `run`, of a robot that does all that is planned: its feet feel the planned shares, its joints are where they were told to be."""
+    measurement, compliant, found = Measurement(angle=controller.stance.copy()), controller.compliant, []
+    for k in range(steps):
+        out = controller.step(k * PERIOD, command, measurement)
+        found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
+        if compliant is not None:
+            measurement.foot_force[:] = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
+            measurement.angle[:] = out.angle_ref - compliant.laws.bend
+    return np.array(found)
 
 
 @pytest.mark.parametrize("compliant", [False, True])
 def test_speed_ref_is_the_slope_of_angle_ref(compliant: bool) -> None:
-    controller = make(compliant=compliant)
-    walk = run(controller, BodyCommand(vx=0.08, roll=0.05, pitch=-0.03, height=0.01), 800)
+    controller = make(compliant=compliant, parts=Parts(suspension=False, slip_pid=False))  # what answers to forces has no speed_ref
+    walk = obey(controller, BodyCommand(vx=0.08, height=0.01), 800)
     slope = np.diff(walk[:, 0], axis=0) / PERIOD
     mean = 0.5 * (walk[1:, 1] + walk[:-1, 1])
-    assert np.abs(slope - mean)[20:].max() < 0.05  # rad/s    of speeds up to 3: trapezoid's error and the roll's delay
+    assert np.abs(slope - mean)[20:].max() < (
+        0.1 if compliant else 0.05
+    )  # rad/s    of speeds up to 3: the trapezoid's error; slow loops look every 40 ms
+
+
+def test_a_robot_that_does_what_is_planned_is_hardly_corrected() -> None:
+    controller, kinematic = make(compliant=True), make()
+    corrected, plain = obey(controller, BodyCommand(vx=0.08), 800), obey(kinematic, BodyCommand(vx=0.08), 800)
+    assert np.abs(corrected[:, 0] - plain[:, 0])[600:].max() < 8e-3  # rad    0.8 mm: of that the ground gives way by half
+    shown = controller.diagnostics
+    assert not shown.fallback.any()
+    assert controller.compliant is not None
+    assert controller.compliant.laws.scale == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize("compliant", [False, True])
@@ -118,6 +143,8 @@ def test_a_mirrored_command_gives_mirrored_joints(compliant: bool) -> None:
     measurement = squeezed()
     mirrored = Measurement(contact=measurement.contact)
     mirrored.foot_force[:] = measurement.foot_force[MIRROR] * [1.0, -1.0, 1.0]
+    mirrored.angle[:] = measurement.angle[MIRROR] * MIRRORED_JOINT
+    mirrored.quaternion[:] = measurement.quaternion * [1.0, -1.0, 1.0, -1.0]
     command, other = BodyCommand(0.05, 0.02, 0.1, 0.01, 0.05, 0.03), BodyCommand(0.05, -0.02, -0.1, 0.01, -0.05, 0.03)
     left = run(make(gait=gait, compliant=compliant), command, 500, measurement=measurement)
     right = run(make(gait=mirrored_gait, compliant=compliant), other, 500, measurement=mirrored)
@@ -151,13 +178,27 @@ def test_a_restored_controller_goes_on_bit_for_bit(compliant: bool) -> None:
     np.testing.assert_array_equal(run(other, command, 300, first=197, measurement=squeezed()), first)
 
 
+def test_a_restored_controller_goes_on_bit_for_bit_amid_doubts_and_missing_ground() -> None:
+    controller, measurement, command = make(compliant=True), squeezed(), BodyCommand(vx=0.08)
+    run(controller, command, 250, measurement=measurement)  # feet in mid-swing that feel a force are doubted
+    measurement.foot_force[:, 2] *= [0.0, 2.0, 0.0, 2.0, 0.0, 2.0]
+    run(controller, command, 33, first=250, measurement=measurement)
+    state, shown = controller.save(), controller.diagnostics
+    before = shown.fallback.copy()
+    first = run(controller, command, 400, first=283, measurement=measurement)
+    controller.restore(state)
+    np.testing.assert_array_equal(shown.fallback, before)
+    np.testing.assert_array_equal(run(controller, command, 400, first=283, measurement=measurement), first)
+    assert before.any()
+
+
 @pytest.mark.parametrize("compliant", [False, True])
 def test_commands_do_not_depend_on_how_many_steps_are_planned_at_once(compliant: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     walks = []
     for planned in (1, 11, 1000):
         monkeypatch.setattr("hexapod_cosim.controller.controller.PLANNED", planned)
         controller, parts, first = make(compliant=compliant), [], 0
-        for command, steps in ((BodyCommand(vx=0.08), 333), (BodyCommand(0.03, 0.01, 0.2, roll=0.1), 250), (BodyCommand(), 600)):
+        for command, steps in ((BodyCommand(vx=0.08), 233), (BodyCommand(0.03, 0.01, 0.2, roll=0.1), 150), (BodyCommand(), 450)):
             parts.append(run(controller, command, steps, first=first, measurement=squeezed()))
             first += steps
         walks.append(np.concatenate(parts))
@@ -171,17 +212,20 @@ def test_kinematic_control_does_not_look_at_the_forces() -> None:
     )
 
 
-def test_the_corrections_are_added_to_the_feet_before_the_inverse_kinematics() -> None:
-    robot = load_robot("athena")
-    controller = make(compliant=True)
+def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
+    """To first order: the angles are corrected, not the feet."""
+    controller, robot = make(compliant=True), load_robot("athena")
     for k in range(30):
         out = controller.step(k * PERIOD, BodyCommand(), squeezed())
     shown = controller.diagnostics
-    feet = foot_positions(robot, out.angle_ref)
-    home = foot_positions(robot, robot.stance)
-    assert np.abs(shown.shift).max() > 1e-4
-    np.testing.assert_allclose(feet[:, :2] @ [1.0, 1.0j], home[:, :2] @ [1.0, 1.0j] + shown.shift + controller.rolled, atol=1e-9)
-    np.testing.assert_allclose(feet[:, 2], home[:, 2] + shown.lift, atol=1e-9)
+    moved = foot_positions(robot, out.angle_ref) - foot_positions(robot, robot.stance)
+    rolled = (
+        robot.foot.radius * (out.angle_ref - robot.stance) @ [0.0, -1.0, 1.0] * np.exp(1j * (controller.legs.hip_yaw + robot.stance[:, 0]))
+    )
+    size = np.abs(shown.shift).max()
+    assert size > 2e-4
+    np.testing.assert_allclose(moved[:, :2] @ [1.0, 1.0j] - rolled, shown.shift, atol=0.1 * size)
+    np.testing.assert_allclose(moved[:, 2], shown.lift, atol=0.1 * np.abs(shown.lift).max())
 
 
 def test_forces_are_judged_in_the_torsos_axes() -> None:
@@ -190,8 +234,9 @@ def test_forces_are_judged_in_the_torsos_axes() -> None:
     turned = squeezed()
     c, s = np.cos(yaw), np.sin(yaw)
     turned.foot_force[:] = straight.foot_force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    turned.quaternion[:] = [np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)]
-    plain, rotated = (run(make(compliant=True), BodyCommand(vx=0.05), 200, measurement=m) for m in (straight, turned))
+    turned.quaternion[:] = quaternion_product(np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)]), straight.quaternion)
+    command = BodyCommand(vx=0.05, roll=0.05, pitch=-0.03)
+    plain, rotated = (run(make(compliant=True), command, 200, measurement=m) for m in (straight, turned))
     np.testing.assert_allclose(rotated, plain, atol=1e-9)
 
 
@@ -203,8 +248,8 @@ def test_posture_and_height_turn_and_lift_the_torso_over_its_feet() -> None:
     turn = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]]) @ np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
     on_ground = foot_positions(robot, angle) @ turn.T + [0.0, 0.0, 0.02]
     home = foot_positions(robot, robot.stance)
-    np.testing.assert_allclose(on_ground[:, 2], home[:, 2], atol=1e-9)
-    np.testing.assert_allclose(on_ground[:, :2], home[:, :2], atol=0.015)  # the feet roll: R times the tibias' change of pitch
+    np.testing.assert_allclose(on_ground[:, 2], home[:, 2], atol=1e-3)  # the feet roll along the tilted torso: 0.2 of below 5 mm
+    np.testing.assert_allclose(on_ground[:, :2], home[:, :2], atol=0.005)  # they roll by R times the tibias' change of pitch
 
 
 def test_a_leg_that_cannot_follow_is_flagged_and_stays_within_its_limits() -> None:
@@ -239,7 +284,7 @@ def test_an_impossible_period_is_refused(period: float) -> None:
 
 def test_gains_of_another_robot_or_period_warn() -> None:
     athena, phantom = load_robot("athena"), load_robot("phantomx_mk4")
-    gains = designed("athena")
+    gains = make_gains(athena)
     assert Controller(athena, period=PERIOD, gait=make_gait(athena), gains=gains).warnings == ()
     assert "athena" in Controller(phantom, period=PERIOD, gait=make_gait(phantom), gains=gains).warnings[0]
     assert "0.004" in Controller(athena, period=0.004, gait=make_gait(athena), gains=gains).warnings[0]
