@@ -83,6 +83,8 @@ class Requirements:
 
     phase_margin: float = 60.0  # deg    at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
+    bandwidth: float = 5.0  # rad/s    crossover of the tangential loop, at least: quicker than feet creep
+    slip_rejection: float = 0.6  # 1    steady slip with the tangential law over that without, at most
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.010  # s    force filter of the tangential loop
@@ -103,7 +105,7 @@ class Requirements:
     speed_limit: float = 0.02  # m/s
     turn_limit: float = 0.05  # rad/s
     speed_share: float = 0.5  # 1    of the servo's largest speed at which corrections may change
-    torque_share: float = 0.9  # 1    of the servo's largest torque that feed-forward may ask
+    torque_share: float = 0.9  # 1    of the servo's largest torque that feed-forward may ask; a tripod must stand within it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +119,7 @@ class Margins:
     slip_rejection: float  # 1    steady slip speed with the law over without it
     suspension_phase_margin: float  # deg
     suspension_gain_margin: float  # dB
+    support_torque: float  # N m    largest that a leg of a standing tripod asks of a servo
     spectral_radius: float  # 1    of the whole closed loop, all feet and both laws together, < 1
     binding: str  # the requirement that kept the tangential loop from more gain
 

@@ -213,7 +213,8 @@ def linearise(
         a, np.hstack([robot.servo.kp * b, robot.servo.kd * b, b]), np.vstack([c, shown]), 0, period,
         states=_plain(STATE_NAMES), inputs=_plain(INPUT_NAMES), outputs=_plain(OUTPUT_NAMES),
     )  # fmt: skip
-    return StandingPlant(system=system, angle=motion.angle.copy(), force=force, standing=force[:, 2] > 0.0)
+    torque = inputs[2 * ANGLES : 3 * ANGLES].reshape(LEGS, JOINTS)
+    return StandingPlant(system=system, angle=motion.angle.copy(), force=force, torque=torque, standing=force[:, 2] > 0.0)
 
 
 def _plain(names: Sequence[str]) -> list[str]:

@@ -34,6 +34,7 @@ class StandingPlant:
     system: control.StateSpace
     angle: Array  # rad    (6, 3)
     force: Array  # N    (6, 3) ground on foot
+    torque: Array  # N m    (6, 3) that the servos were told, to carry it
     standing: Mask  # (6,)
 
     def load(self, robot: Robot) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from hexapod_cosim.controller.design.closed import closed_loop, spectral_radius
 from hexapod_cosim.controller.design.laws import Laws
 from hexapod_cosim.controller.design.loci import Loci, LoopMargins, Plants, eigenloci, frequencies, loop_margins, quick_margins
+from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.gains import GainsError, Margins, Requirements
 from hexapod_cosim.models import Robot
 
@@ -23,19 +24,35 @@ def verify(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], laws: Laws, ne
     """Margins of the worst loops and the stability of all feet together. loci: of the search. Raises GainsError when one is missed."""
     judged = _Judged(robot, plants, laws)
     slip, suspension = (judged.worst(loci[which], which) for which in (0, 1))
+    margins = Margins(
+        slip_crossover=slip.crossover, slip_phase_margin=slip.phase, slip_gain_margin=slip.gain, slip_delay_margin=slip.delay,
+        slip_rejection=steady_slip(robot, plants, laws), suspension_phase_margin=suspension.phase, suspension_gain_margin=suspension.gain,
+        support_torque=support_torque(robot, plants), spectral_radius=_slowest(robot, plants, laws), binding=binding,
+    )  # fmt: skip
     for what, reached, asked in (
         ("phase_margin of the tangential loop", slip.phase, needs.phase_margin),
         ("gain_margin of the tangential loop", slip.gain, needs.gain_margin),
         ("phase_margin of the suspension", suspension.phase, needs.phase_margin),
         ("gain_margin of the suspension", suspension.gain, needs.gain_margin),
+        ("bandwidth", margins.slip_crossover, needs.bandwidth),
     ):
-        if reached < asked:
+        if not reached >= asked:
             raise _missed(robot, what, got=round(reached, 2), expected=f"at least {asked:g}")
-    return Margins(
-        slip_crossover=slip.crossover, slip_phase_margin=slip.phase, slip_gain_margin=slip.gain, slip_delay_margin=slip.delay,
-        slip_rejection=steady_slip(robot, plants, laws), suspension_phase_margin=suspension.phase, suspension_gain_margin=suspension.gain,
-        spectral_radius=_slowest(robot, plants, laws), binding=binding,
-    )  # fmt: skip
+    most = needs.torque_share * robot.servo.torque_max
+    for what, reached, asked in (("slip_rejection", margins.slip_rejection, needs.slip_rejection),
+                                 ("torque_share of a standing tripod", margins.support_torque, most)):  # fmt: skip
+        if not reached <= asked:
+            raise _missed(robot, what, got=round(reached, 3), expected=f"at most {asked:g}")
+    return margins
+
+
+def support_torque(robot: Robot, plants: Plants) -> float:
+    """N m    largest feed-forward torque of a servo in the stances near the nominal load"""
+    return max(float(np.abs(plant.torque).max()) for plant in plants.values() if _nominal(robot, plant))
+
+
+def _nominal(robot: Robot, plant: StandingPlant) -> bool:
+    return bool(NOMINAL[0] <= plant.load(robot).mean() <= NOMINAL[1])
 
 
 def _slowest(robot: Robot, plants: Plants, laws: Laws) -> float:
@@ -89,7 +106,7 @@ def steady_slip(robot: Robot, plants: Plants, laws: Laws) -> float:
     law = laws.responses(omega)[0]
     worst = 0.0
     for plant in plants.values():
-        if NOMINAL[0] <= plant.load(robot).mean() <= NOMINAL[1]:
+        if _nominal(robot, plant):
             loops = (eigenloci(robot, plant, omega)[0] * law)[:, 0]
             inner = loops[np.argsort(np.abs(loops))[1:]]
             worst = max(worst, float(np.abs(1.0 / (1.0 + inner)).max()))
