@@ -44,6 +44,12 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
     assert [down.offset[leg] for leg in (0, 1, 3, 4, 5)] == [0.0] * 5
 
 
+def test_only_a_foot_that_swings_is_held_up() -> None:
+    down = Touchdown(period=PERIOD)
+    down.step(YES, [0.002] * 6, NO, NO)
+    assert not any(down.offset)
+
+
 def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(5):

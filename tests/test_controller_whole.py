@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from controllers import make, obey, run, squeezed
 from gains import PERIOD, make_gains
 
-from hexapod_cosim.controller import BodyCommand, Controller, ControllerError, Gait, Measurement, Parts, make_gait
+from hexapod_cosim.controller import BodyCommand, Controller, ControllerError, Measurement, Parts, make_gait
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
 
@@ -17,33 +18,6 @@ LOWERED = 5e-5  # rad    some hundredths of a millimetre over 0.1 m
 MIRROR = np.array([3, 4, 5, 0, 1, 2])  # legs seen in a mirror
 MIRRORED_JOINT = np.array([-1.0, 1.0, 1.0])
 ROBOTS = ("athena", "phantomx_mk4")
-
-
-def make(name: str = "athena", *, gait: Gait | None = None, compliant: bool = False, parts: Parts | None = None) -> Controller:
-    robot = load_robot(name)
-    return Controller(
-        robot, period=PERIOD, gait=make_gait(robot) if gait is None else gait, gains=make_gains(robot) if compliant else None,
-        parts=Parts() if parts is None else parts,
-    )  # fmt: skip
-
-
-def run(controller: Controller, command: BodyCommand, steps: int, *, first: int = 0, measurement: Measurement | None = None) -> np.ndarray:
-    """(steps, 3, 6, 3) angle_ref, speed_ref and torque_ref of consecutive steps."""
-    found = []
-    for k in range(first, first + steps):
-        out = controller.step(k * PERIOD, command, measurement or Measurement())
-        found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
-    return np.array(found)
-
-
-def squeezed(generator: np.random.Generator | None = None) -> Measurement:
-    """A measurement with all feet on the ground, unequal forces, joints off the stance and a torso that leans."""
-    generator = generator or np.random.default_rng(4)
-    measurement = Measurement(contact=np.ones(6, dtype=bool))
-    measurement.foot_force[:] = generator.normal(size=(6, 3)) * 2.0 + [0.0, 0.0, 9.0]
-    measurement.angle[:] = load_robot("athena").stance + 0.01 * generator.normal(size=(6, 3))
-    measurement.quaternion[:] = [np.cos(0.01), 0.6 * np.sin(0.01), -0.8 * np.sin(0.01), 0.0]
-    return measurement
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -100,18 +74,6 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
     assert compared > 600
     # rolling is solved by one Newton step, chords lack h^2/24 of an arc and headings turn meanwhile; the body moves at 50 mm/s
     assert worst < 3e-4
-
-
-def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray:
-    """As `run`, of a robot that does all that is planned: its feet feel the planned shares, its joints are where they were told to be."""
-    measurement, compliant, found = Measurement(angle=controller.stance.copy()), controller.compliant, []
-    for k in range(steps):
-        out = controller.step(k * PERIOD, command, measurement)
-        found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
-        if compliant is not None:
-            measurement.foot_force[:] = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
-            measurement.angle[:] = out.angle_ref - compliant.laws.bend
-    return np.array(found)
 
 
 @pytest.mark.parametrize("compliant", [False, True])

@@ -1,0 +1,48 @@
+"""Controllers with hand-made gains, and what drives them in tests."""
+
+from __future__ import annotations
+
+import numpy as np
+from gains import PERIOD, make_gains
+
+from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, Parts, make_gait
+from hexapod_cosim.models import load_robot
+
+
+def make(name: str = "athena", *, gait: Gait | None = None, compliant: bool = False, parts: Parts | None = None) -> Controller:
+    robot = load_robot(name)
+    return Controller(
+        robot, period=PERIOD, gait=make_gait(robot) if gait is None else gait, gains=make_gains(robot) if compliant else None,
+        parts=Parts() if parts is None else parts,
+    )  # fmt: skip
+
+
+def run(controller: Controller, command: BodyCommand, steps: int, *, first: int = 0, measurement: Measurement | None = None) -> np.ndarray:
+    """(steps, 3, 6, 3) angle_ref, speed_ref and torque_ref of consecutive steps."""
+    found = []
+    for k in range(first, first + steps):
+        out = controller.step(k * PERIOD, command, measurement or Measurement())
+        found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
+    return np.array(found)
+
+
+def squeezed(generator: np.random.Generator | None = None) -> Measurement:
+    """A measurement with all feet on the ground, unequal forces, joints off the stance and a torso that leans."""
+    generator = generator or np.random.default_rng(4)
+    measurement = Measurement(contact=np.ones(6, dtype=bool))
+    measurement.foot_force[:] = generator.normal(size=(6, 3)) * 2.0 + [0.0, 0.0, 9.0]
+    measurement.angle[:] = load_robot("athena").stance + 0.01 * generator.normal(size=(6, 3))
+    measurement.quaternion[:] = [np.cos(0.01), 0.6 * np.sin(0.01), -0.8 * np.sin(0.01), 0.0]
+    return measurement
+
+
+def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray:
+    """As `run`, of a robot that does all that is planned: its feet feel the planned shares, its joints are where they were told to be."""
+    measurement, compliant, found = Measurement(angle=controller.stance.copy()), controller.compliant, []
+    for k in range(steps):
+        out = controller.step(k * PERIOD, command, measurement)
+        found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
+        if compliant is not None:
+            measurement.foot_force[:] = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
+            measurement.angle[:] = out.angle_ref - compliant.laws.bend
+    return np.array(found)
