@@ -74,7 +74,7 @@ def test_planned_torques_and_forces_move_the_twin_as_planned(name: str, command:
         for joint in range(3):
             robot = with_links(robot, joint, inertia=POINT)
     controller = planned(robot, COMMANDS[command])
-    for at in np.linspace(1, len(controller._plan.angle) - 2, 4, dtype=int).tolist():
+    for at in np.linspace(1, len(controller._plan.angle) - 2, 3, dtype=int).tolist():
         given, needed, inertia = given_and_needed(robot, controller, at)
         error = given - needed
         assert np.abs(error[:3]).max() < CARRIED
