@@ -3,11 +3,11 @@
 Support. The servos are told the torques that carry each leg's planned share of weight and acceleration (support.py), scaled by the weight
 that the feet really measure: a payload is carried too.
 
-Tangential. Of its force a foot should give way only to what does no work for the body: the legs' common push, shared in proportion to the
-load, moves the robot and is left alone; the rest is legs squeezing against each other. The PID's answer g is a force, and the joints'
-angles are corrected by J^T g/kp: that is what the servos yield under g, so a foot that sticks answers with exactly -g, in every direction
-alike and without a vertical force. The loop's plant is 1, whatever leg, pose and servo, and the height does not feel it. The answer goes
-with the measured load, so that a foot is not dragged over the ground by it while it is being unloaded.
+Tangential. Of its force a foot should give way only to what does no work for the body. What the plan asks of it is left alone, and so is
+the legs' common push beyond that, shared in proportion to the load; the rest is legs squeezing against each other. The PID's answer g
+is a force, and the joints' angles are corrected by J^T g/kp: that is what the servos yield under g, so a foot that sticks answers with
+exactly -g, in every direction alike and without a vertical force. The loop's plant is 1, whatever leg, pose and servo, and the height does
+not feel it. The answer goes with the measured load, so that a foot is not dragged over the ground by it while it is being unloaded.
 
 Normal. The virtual suspension answers the force beyond the planned share; its deflection z reaches the joints as the vertical force
 z/C_zz, C = J kp^-1 J^T, and so without a horizontal one.
@@ -44,6 +44,7 @@ class Plan:
     carry: Array  # N m    (n, 6, 3) and for the planned load
     effect: Array  # (n, 6, 6, 3) of a force on the foot: its shift x y z [m/N], and the bend of the joints [rad/N]
     shares: Shares
+    push: Array  # N    (n, 6, 4) planned tangential forces x y 0 0
     weight: list[float]  # N    of all shares
     live: Array  # 1    (n, 6) 1 of feet with a share, else 0
     standing: Mask  # (n, 6) planned on the ground, where that is certain
@@ -111,11 +112,13 @@ class Compliance:
     def plan(self, demand: Demand, shares: Shares, *, height: Array, rise: Array, swinging: Mask) -> None:
         """Lays out the coming steps, rows of all arguments: height (n, 6) of the feet's paths over the stance [m], rise [m/s]; (6,)."""
         lever, none = demand.lever, np.zeros_like(demand.torque)
+        still = np.zeros_like(height)
         standing, well_up, supports = shares.activation >= 1.0, height > EARLY, self._parts.support
         self._plan = Plan(
             own=demand.torque if supports else none, carry=torques(lever, shares) if supports else none,
             effect=self._softness * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
-            shares=shares, weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
+            shares=shares, push=np.stack([shares.push.real, shares.push.imag, still, still], axis=-1),
+            weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
             sure=list(zip(_bits(standing), _bits(standing | well_up), strict=True)),
             falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0), high=height > self._high, swinging=swinging.copy(),
         )  # fmt: skip
@@ -130,7 +133,8 @@ class Compliance:
         if (int.from_bytes(touching.tobytes(), "little") ^ standing) & certain or self.watch.busy or self.touchdown.busy:
             force = self._wonder(force, touching)
             touching = self.detector.touching
-        np.multiply(force, touching[:, None], out=self._felt)
+        felt = np.subtract(force, self.scale * plan.push[at], out=self._felt)
+        felt *= touching[:, None]
         total = self._mix()
         low, high = SCALES
         scale = min(max(total / max(plan.weight[at], LOAD_FLOOR), low), high)
@@ -143,7 +147,10 @@ class Compliance:
         self._actuate()
 
     def _mix(self) -> float:
-        """Inputs of the laws from the forces felt: squeeze = f_t - (f_n / sum f_n) sum f_t, f_n, load. Returns sum f_n [N]."""
+        """Inputs of the laws from the forces felt, tangential ones beyond the plan's: f_t - (f_n / sum f_n) sum f_t, f_n, load.
+
+        Returns sum f_n [N].
+        """
         mixing, felt = self._mixing, self._felt
         x, y, total, _ = np.dot(self._ones, felt).tolist()
         share = 1.0 / total if total > LOAD_FLOOR and self._parts.slip_pid else 0.0

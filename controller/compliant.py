@@ -107,17 +107,17 @@ class Compliant:
         self._heights = feet.height - lowering
         return replace(feet, height=self._heights, rise=feet.rise - rate)
 
-    def plan(self, first: int, steps: Steps, value: Array, pose: Pose, speed: Array, *, level: bool) -> None:
+    def plan(self, first: int, steps: Steps, value: Array, pose: Pose, speed: Array, *, shift: Plane, level: bool) -> None:
         """Lays out planned steps from the row `first` on.
 
         Args:
             value: (n, 6) commanded vx vy yaw_rate height roll pitch;  pose, speed: the legs, and the joints' speeds [rad/s];
-            level: height, roll and pitch are all 0.
+            shift: (n, 6) of the feet from their paths for rolling [m];  level: height, roll and pitch are all 0.
         """
         rotation = None if level else rotations(value[:, 4], value[:, 5])
         demand = self._dynamics.demand(pose, speed, Frames(steps.way, cis(steps.turn), value[:, 3:4], rotation))
         rows = slice(first, None)
-        shares = self._support.shares(steps.plane, self._activation, demand).rows(rows)
+        shares = self._support.shares(steps.plane + shift, self._activation, demand).rows(rows)
         self.laws.plan(
             demand.rows(rows), shares, height=(steps.height - self._home)[rows], rise=steps.rise[rows], swinging=steps.swinging[-1]
         )

@@ -195,15 +195,15 @@ class Controller:
         if compliant is not None:
             feet = compliant.lower(feet, steps, walking=self.paths.walking)
         level = not (value[:, 3:].any() or rate[:, 3:].any())
-        pose, seen = self._pose(feet, None if level else (value[:, 3:], rate[:, 3:]))
+        pose, seen, shift = self._pose(feet, None if level else (value[:, 3:], rate[:, 3:]))
         joints = self.legs.solve(pose, seen.velocity, seen.rise)
         if compliant is not None:
-            compliant.plan(first, steps, value, pose, joints.speed, level=level)
+            compliant.plan(first, steps, value, pose, joints.speed, shift=shift, level=level)
         self._plan = Joints(joints.angle[rows], joints.speed[rows], joints.unreachable[rows])
         self._at, self._last = -first, len(value) - first - 1
 
-    def _pose(self, feet: Feet, posture: tuple[Array, Array] | None) -> tuple[Pose, Feet]:
-        """The legs, with the contact point of the round foot, not its centre, on the planned path; and the feet in the torso frame.
+    def _pose(self, feet: Feet, posture: tuple[Array, Array] | None) -> tuple[Pose, Feet, Plane]:
+        """The legs, with the ground rolling off the round foot along the planned path; the feet in the torso frame; their shift by that.
 
         A tibia that pitches by dB rolls its foot's sphere by -R dB along the leg's outward direction. The shift s changes B itself:
         s = R (C + s dC/du), C = q_3 - q_2 less that of the stance, is solved by one Newton step.
@@ -214,5 +214,6 @@ class Controller:
         slope = self.legs.speeds(pose, pose.heading, np.zeros(1))
         shift = pose.heading * (radius * bent / (1.0 - radius * (slope[..., 2] - slope[..., 1])))
         drift = np.gradient(shift, self.period, axis=0) if len(shift) > 1 else np.zeros_like(shift)
-        rolling = replace(seen, plane=seen.plane + shift, velocity=seen.velocity + drift)
-        return self.legs.pose(rolling.plane, rolling.height), rolling
+        rolling = replace(feet, plane=feet.plane + shift, velocity=feet.velocity + drift)
+        seen = rolling if posture is None else in_torso_frame(rolling, *posture)
+        return self.legs.pose(seen.plane, seen.height), seen, shift

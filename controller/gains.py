@@ -101,7 +101,7 @@ class Requirements:
     ground_time: float = 2.0  # s
     angle_limit: float = 0.05  # rad
     height_limit: float = 0.010  # m
-    path_rate: float = 0.5  # 1/s
+    path_rate: float = 1.0  # 1/s
     speed_limit: float = 0.02  # m/s
     turn_limit: float = 0.05  # rad/s
     speed_share: float = 0.5  # 1    of the servo's largest speed at which corrections may change

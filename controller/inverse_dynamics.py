@@ -43,6 +43,7 @@ class Demand:
     push: Plane  # N    (n,) horizontal force the ground must give the robot, x + i y, walking frame
     weight: Array  # N    (n,) and the vertical one
     moment: Plane  # N m    (n,) what the sum of p f_n over the feet must be, p = x + i y
+    twist: Array  # N m    (n,) and that of Im(p^* f_h), the moment about the vertical
 
     def rows(self, chosen: slice) -> Demand:
         """Some of the steps."""
@@ -82,11 +83,12 @@ class InverseDynamics:
         xy, z = _walking(place, self._legs.hip[2] + points.imag, frames)
         push, lift = self._forces(frames.way + frames.turn * xy, z, self._mass)
         push *= back
-        total, weight, moment = (part.sum(axis=(0, 2)) for part in (push, lift, xy * lift - (z - self._floor) * push))
-        torso_push, torso_lift, torso_moment = self._torso_demand(frames)
+        parts = (push, lift, xy * lift - (z - self._floor) * push, (xy.conj() * push).imag)
+        legs, torso = (part.sum(axis=(0, 2)) for part in parts), self._torso_demand(frames)
+        total, weight, moment, twist = (ours + its for ours, its in zip(legs, torso, strict=True))
         return Demand(
             torque=self._torques(pose, speed, points, *_torso(push, lift, frames)), lever=self._lever(pose, frames),
-            push=total + torso_push, weight=weight + torso_lift, moment=moment + torso_moment,
+            push=total, weight=weight, moment=moment, twist=twist,
         )  # fmt: skip
 
     def _points(self, pose: Pose) -> Plane:
@@ -111,12 +113,13 @@ class InverseDynamics:
         found[..., 1:-1, :] = (values[..., 2:, :] - 2.0 * values[..., 1:-1, :] + values[..., :-2, :]) / self._period**2
         return found
 
-    def _torso_demand(self, frames: Frames) -> tuple[Plane, Array, Plane]:
+    def _torso_demand(self, frames: Frames) -> tuple[Plane, Array, Plane, Array]:
         com = self._torso.com
         xy, z = _walking(np.full_like(frames.way, complex(com[0], com[1])), np.full_like(frames.height, com[2]), frames)
         push, lift = self._forces(frames.way + frames.turn * xy, z, np.array(self._torso.mass))
         push *= frames.turn.conj()
-        return push[:, 0], lift[:, 0], (xy * lift - (z - self._floor) * push)[:, 0]
+        spin = self._torso.inertia[2] * (self._acceleration(frames.turn) * frames.turn.conj()).imag
+        return push[:, 0], lift[:, 0], (xy * lift - (z - self._floor) * push)[:, 0], ((xy.conj() * push).imag + spin)[:, 0]
 
     def _torques(self, pose: Pose, speed: Array, points: Plane, push: Plane, lift: Array) -> Array:
         """(n, 6, 3) from the forces (3, n, 6) that the links need, torso frame."""

@@ -2,12 +2,13 @@
 
 The ground must give the robot the force and the moment that its planned motion demands (inverse_dynamics.py). The feet's shares are
 
-    f_n = a (alpha + beta x + gamma y)       sum f_n = F_z     sum p f_n = moment     p = x + i y       f_h = (f_n / sum f_n) F_h
+    f_n = a (alpha + beta x + gamma y)       sum f_n = F_z     sum p f_n = moment     p = x + i y
+    f_h = (f_n / sum f_n) (F_h + i w (p - c))      c = sum p f_n / sum f_n      w such that sum Im(p^* f_h) = twist
 
-with the least sum of f_n^2/a that does it, a in [0, 1] each leg's activation: 1 while it stands, 0 in the air, and in between over the
-hand-over, which lies half before and half after the moment at which the paths say that one foot lifts off and the next has landed.
-The servos are told the torques -J^T f that balance the shares, so that no leg sags under its load; and as the ground gives way by
-delta = (f_n/K)^(2/3), a foot is lowered by what it will press in more than in the stance.
+with the least sum of f_n^2/a that does it, so that no foot squeezes another, a in [0, 1] each leg's activation: 1 while it stands, 0 in
+the air, and in between over the hand-over, which lies half before and half after the moment at which the paths say that one foot lifts
+off and the next has landed. The servos are told the torques -J^T f that balance the shares, so that no leg sags under its load; and as
+the ground gives way by delta = (f_n/K)^(2/3), a foot is lowered by what it will press in more than in the stance.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from hexapod_cosim.models import Robot
 
 RIDGE = 1e-9  # 1    of the mean square arm: feet on one line share no moment about it
 LEAST_ARM = 1e-12  # m2    keeps the equations of no standing foot at all solvable
+LEAST_SPREAD = 1e-4  # m2    of the feet about their centre: less takes no moment about the vertical
 LEAST_LOAD = 1e-6  # N    less is no load to share by
 
 
@@ -77,8 +79,13 @@ class Support:
     def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
         """Shares of feet (n, 6) x + i y in the walking frame."""
         normal = self.normal(feet, activation, demand)
-        total = np.maximum(normal.sum(axis=1), LEAST_LOAD)
-        return Shares(activation, normal, normal * (demand.push / total)[:, None])
+        part = normal / np.maximum(normal.sum(axis=1), LEAST_LOAD)[:, None]
+        centre = (part * feet).sum(axis=1)
+        arm = feet - centre[:, None]
+        spread = (part * (arm.real**2 + arm.imag**2)).sum(axis=1)
+        turn = (demand.twist - (centre.conj() * demand.push).imag) / np.maximum(spread, LEAST_ARM)
+        turn[spread < LEAST_SPREAD] = 0.0
+        return Shares(activation, normal, part * (demand.push[:, None] + 1j * turn[:, None] * arm))
 
     def normal(self, feet: Plane, activation: Array, demand: Demand) -> Array:
         """(n, 6) the vertical shares [N], never negative; the demand is of as many steps, or of one that holds for all."""

@@ -11,7 +11,7 @@ from hexapod_cosim.models import Robot
 PERIOD = 0.005  # s
 MARGINS = Margins(
     slip_crossover=20.0, slip_phase_margin=60.0, slip_gain_margin=8.0, slip_delay_margin=0.02, slip_rejection=0.1,
-    suspension_phase_margin=60.0, suspension_gain_margin=8.0, spectral_radius=0.99, binding="none",
+    suspension_phase_margin=60.0, suspension_gain_margin=8.0, support_torque=0.0, spectral_radius=0.99, binding="none",
 )  # fmt: skip
 SLIP = SlipGains(
     kp=0.2, ki=20.0, kd=0.0, derivative_time=0.01, filter_time=0.01, load_time=0.03, tracking_time=0.02, limit=1.0

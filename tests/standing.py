@@ -38,7 +38,7 @@ def make_laws(robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts 
 def plan(laws: Compliance, steps: int, *, robot: Robot = ROBOT, standing: str = ALL, height: float = RAISED, rise: float = 0.0) -> None:
     """Lays out steps in which these legs stand and the others are in the air, so high [m] and rising so fast [m/s]."""
     still = rest(robot)
-    demand = Demand(*(np.repeat(getattr(still, name), steps, axis=0) for name in ("torque", "lever", "push", "weight", "moment")))
+    demand = Demand(*(np.repeat(getattr(still, name), steps, axis=0) for name in ("torque", "lever", "push", "weight", "moment", "twist")))
     stands = np.array([flag == "1" for flag in standing])
     home = LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
     support = Support(robot, make_gait(robot), make_gains(robot).support, rest=still)

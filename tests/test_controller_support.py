@@ -29,10 +29,10 @@ def make(gait: str | None = None, *, robot: Robot = ROBOT, handover: float | Non
     return Support(robot, make_gait(robot, gait), gains, rest=InverseDynamics(robot, LegSolver(robot), period=0.005).rest())
 
 
-def demand(*, push: complex = 0j, moment: complex = 0j, load: float = WEIGHT) -> Demand:
+def demand(*, push: complex = 0j, moment: complex = 0j, twist: float = 0.0, load: float = WEIGHT) -> Demand:
     """Of one step that asks no torques."""
     none = np.zeros((1, 6, 3))
-    return Demand(none, np.zeros((1, 6, 3, 3)), np.array([push]), np.array([load]), np.array([moment]))
+    return Demand(none, np.zeros((1, 6, 3, 3)), np.array([push]), np.array([load]), np.array([moment]), np.array([twist]))
 
 
 def legs(standing: str) -> np.ndarray:
@@ -94,12 +94,17 @@ def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
 
 @pytest.mark.parametrize("standing", BALANCED)
 def test_shares_balance_force_and_moment(standing: str) -> None:
-    asked = demand(push=3.0 - 2.0j, moment=WEIGHT * (0.02 - 0.01j))
+    asked = demand(push=3.0 - 2.0j, moment=WEIGHT * (0.02 - 0.01j), twist=0.4)
     shares = make().shares(HOME[None], legs(standing), asked)
     assert shares.normal.sum() == pytest.approx(WEIGHT, abs=RIDGED)
     assert shares.normal[0] @ HOME == pytest.approx(asked.moment[0], abs=RIDGED)
     assert shares.push.sum() == pytest.approx(3.0 - 2.0j, abs=1e-9)
-    np.testing.assert_allclose(shares.push, shares.normal * (3.0 - 2.0j) / WEIGHT, rtol=1e-6)
+    assert (HOME.conj() * shares.push[0]).imag.sum() == pytest.approx(0.4, abs=1e-9)
+    # per load the pushes are those of a body that moves and turns: none squeezes another
+    carries = shares.normal[0] > 0.0
+    per, arm = shares.push[0, carries] / shares.normal[0, carries], HOME[carries] - HOME[carries].mean()
+    spin = (arm.conj() * per).imag.sum() / (abs(arm) ** 2).sum()
+    np.testing.assert_allclose(per, per.mean() + 1j * spin * arm, rtol=1e-6, atol=1e-9)
     assert not shares.normal[legs(standing) == 0.0].any()
     np.testing.assert_array_equal(
         shares.forces(0), np.column_stack([shares.push[0].real, shares.push[0].imag, shares.normal[0], np.zeros(6)])
