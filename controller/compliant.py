@@ -169,7 +169,7 @@ class Compliant:
         angle = measurement.angle
         foot = self._legs.forward(angle)
         rolled = self._radius * (angle[:, 2] - angle[:, 1] - self._stance_pitch) * np.exp(1j * (self._legs.hip_yaw + angle[:, 0]))
-        plane, heights = foot[:, 0] + 1j * foot[:, 1] - rolled, foot[:, 2]
+        plane, heights = foot[:, 0] + 1j * foot[:, 1], foot[:, 2]
         if self._rotations is not None:
             plane, heights = turned(plane, heights, self._rotations[self._at])
         w, x, y, z = self._quaternion
@@ -178,7 +178,7 @@ class Compliant:
         planned, planned_heights = (rows[self._at].tolist() for rows in self._planned)
         self.hold.look(
             Sight(
-                plane=plane.tolist(), height=(heights + height).tolist(), planned=planned, planned_height=planned_heights,
+                plane=(plane - rolled).tolist(), height=(heights + height).tolist(), planned=planned, planned_height=planned_heights,
                 load=self.laws.law.load.tolist(), tilt=(leaning[0] - roll, leaning[1] - pitch), yaw=yaw, velocity=complex(vx, vy),
                 yaw_rate=yaw_rate,
             )

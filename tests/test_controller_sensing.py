@@ -33,7 +33,6 @@ def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planne
     obey(controller, command, 600)
     for sight in seen[-10:]:
         lag = PERIOD * (0.05 + 0.1 * 0.3) if command.vx else 0.0  # m    the joints are where they were told to be a period ago
-        lag += 0.006 * (1.0 - np.cos(np.hypot(command.roll, command.pitch)))  # the feet roll by 6 mm, told level and seen aslant
         standing = np.array(sight.load) > 0.5
         np.testing.assert_allclose(np.array(sight.plane)[standing], np.array(sight.planned)[standing], atol=lag + 2e-5)
         np.testing.assert_allclose(np.array(sight.height)[standing], np.array(sight.planned_height)[standing], atol=1e-4)
