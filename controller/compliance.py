@@ -31,6 +31,9 @@ from hexapod_cosim.controller.support import Shares, torques
 from hexapod_cosim.controller.touchdown import EARLY, Touchdown
 
 LOAD_FLOOR = 1e-6  # N    below it no foot carries anything
+SLIDING = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that slides, or a slope of 29 degrees, has it
+CALM = 0.5  # 1    gait cycles without it until feet are trusted again
+GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the design's margins hold up to it
 SCALES = 0.5, 2.0  # 1    measured over modelled weight that the support believes
 HIGH = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
@@ -59,7 +62,8 @@ class Compliance:
 
     Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos [N m]; shift: (6, 3) of the feet
     that comes of `bend` [m], shift_plane: (6,) the same x + i y; offset: (6,) by which paths are raised for ground met early or late [m];
-    doubted: (6,) sensors not believed; scale: measured over planned weight.
+    doubted: (6,) sensors not believed; fallback: (6,) legs that walk without feedback, for that or because the robot slides;
+    scale: measured over planned weight; trust: 1, or less while the robot slides.
     """
 
     def __init__(self, gains: Gains, parts: Parts, *, weight: float, cycle: float, kp: float, step_height: float, period: float) -> None:
@@ -69,6 +73,8 @@ class Compliance:
         self.law = FootLaw(gains, period=period)
         self.detector, self.watch, self.touchdown = ContactDetector(weight), SensorWatch(weight, cycle=cycle), Touchdown(period=period)
         self._tracking, self._memory = min(period / gains.slip.tracking_time, 1.0), math.exp(-period / gains.slip.load_time)
+        self._follow_load = 1.0 - self._memory
+        self._calm = round(CALM * cycle / period)
         self._follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
         self._largest, self._deepest = gains.slip.limit * share, gains.suspension.limit
         self._most, self._fastest = gains.limits.torque, gains.limits.speed * period
@@ -83,27 +89,31 @@ class Compliance:
         self.shift_plane = self._moved[..., 0].view(np.complex128)[:, 0]
         self.shift, self._wanted = self._moved[:, :3, 0], self._moved[:, 3:, 0]
         self._answer = self.law.row.view(np.complex128)[:, 0]
-        self.offset, self.doubted = np.zeros(LEGS), np.zeros(LEGS, dtype=np.bool_)
+        self.offset, self.grip = np.zeros(LEGS), np.ones(LEGS)
+        self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
         self.reset()
 
     def reset(self) -> None:
         """All laws at rest."""
         for law in (self.law, self.detector, self.watch, self.touchdown):
             law.reset()
-        for array in (self.bend, self.torque, self._moved, self.offset, self.doubted):
+        for array in (self.bend, self.torque, self._moved, self.offset, self.doubted, self.fallback):
             array[...] = 0
-        self.scale, self._at = 0.0, -1
+        self.scale, self.trust, self._at, self._slack, self._sliding = 0.0, 1.0, -1, False, 0
+        self.grip[...] = 1.0
 
     def save(self) -> dict[str, Any]:
         """What the laws remember, and what is planned."""
-        own = {name: getattr(self, name) for name in ("scale", "_plan", "_at")}
-        kept = [array.copy() for array in (self.law.row, self.bend, self.offset, self.doubted)]
+        own = {name: getattr(self, name) for name in ("scale", "trust", "_plan", "_at", "_slack", "_sliding")}
+        kept = [array.copy() for array in (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback)]
         return {"own": own, "arrays": kept, "watch": self.watch.save(), "down": self.touchdown.save(), "touch": self.detector.save()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Goes back to it."""
         vars(self).update(state["own"])
-        for array, kept in zip((self.law.row, self.bend, self.offset, self.doubted), state["arrays"], strict=True):
+        for array, kept in zip(
+            (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback), state["arrays"], strict=True
+        ):
             array[...] = kept
         self.watch.restore(state["watch"])
         self.touchdown.restore(state["down"])
@@ -138,7 +148,8 @@ class Compliance:
         total = self._mix()
         low, high = SCALES
         scale = min(max(total / max(plan.weight[at], LOAD_FLOOR), low), high)
-        self.scale += self._follow_weight * (scale - self.scale)
+        if not self.doubted.any():
+            self.scale += self._follow_weight * (scale - self.scale)
         if parts.suspension:
             excess = self._inputs[:, 2]
             excess -= self.scale * plan.shares.normal[at]
@@ -153,10 +164,29 @@ class Compliance:
         """
         mixing, felt = self._mixing, self._felt
         x, y, total, _ = np.dot(self._ones, felt).tolist()
-        share = 1.0 / total if total > LOAD_FLOOR and self._parts.slip_pid else 0.0
-        mixing[2, 0], mixing[2, 1] = -x * share, -y * share
+        share = 1.0 / total if total > LOAD_FLOOR else 0.0
+        if self._parts.fallback:
+            self._watch_slide(math.hypot(x, y) * share)
+        if self._parts.slip_pid:
+            mixing[2, 0], mixing[2, 1] = -x * share, -y * share
         np.dot(felt, mixing, out=self._inputs)
         return float(total)
+
+    def _watch_slide(self, drag: float) -> None:
+        """A robot whose feet slide has no use for the plan of who carries what: it walks under kinematic control until they hold again.
+
+        drag: of the feet's common tangential force beyond the plan, the share of the normal one.
+        """
+        if drag > SLIDING:
+            self._sliding = self._calm
+        elif self._sliding:
+            self._sliding -= 1
+        goal = 0.0 if self._sliding else 1.0
+        if self.trust != goal:
+            self.trust += self._follow_load * (goal - self.trust)
+            if abs(goal - self.trust) < 1.0 - GRIPPED:
+                self.trust = goal
+            self.fallback[:] = self.doubted | (self._sliding > 0)
 
     def _answer_forces(self, touching: Mask) -> None:
         """The laws one period on, limited, and the forces that come of them."""
@@ -190,13 +220,26 @@ class Compliance:
         plan, at, bend, torque, wanted = self._plan, self._at, self.bend, self.torque, self._wanted
         np.matmul(plan.effect[at], self._force, out=self._moved)
         np.multiply(plan.carry[at], self.scale, out=torque)
+        if self._slack:
+            self._take_up(torque)
         torque += plan.own[at]
+        if self.trust != 1.0:
+            torque *= self.trust
+            wanted *= self.trust
         if not self._parts.limits:
             bend[...] = wanted
             return
         step = np.subtract(wanted, bend, out=self._step)
         bend += np.maximum(np.minimum(step, self._fastest, out=step), -self._fastest, out=step)
         np.maximum(np.minimum(torque, self._most, out=torque), -self._most, out=torque)
+
+    def _take_up(self, torque: Array) -> None:
+        """A leg that stands in the plan and not on the ground is given its share back as it loads."""
+        missing = self._plan.standing[self._at] & ~self.detector.touching
+        self.grip += self._follow_load * (1.0 - self.grip)
+        self.grip[missing] = 0.0
+        torque *= self.grip[:, None]
+        self._slack = bool((self.grip < GRIPPED).any())
 
     def _wonder(self, force: Array, touching: Mask) -> Array:
         """Feet that touch and should not, or the other way round: ground met early or late, or a sensor that is wrong.
@@ -209,11 +252,15 @@ class Compliance:
             total = float(force[touching, 2].sum())
             doubted = self.watch.look(touches, total, standing, plan.high[at].tolist(), time=self._period)
             self.doubted[:] = doubted if sum(doubted) < TRIPOD_LEGS else True
+            self.fallback[:] = self.doubted | (self._sliding > 0)
             if self.doubted.any():
                 force = np.where(self.doubted[:, None], self.scale * plan.shares.forces(at), force)
                 touches = np.where(self.doubted, plan.shares.activation[at] > 0.5, touching).tolist()
                 self.detector.touching = np.array(touches)
         if parts.touchdown:
+            self._slack = True
+            if self.watch.missing:
+                standing = [False] * LEGS  # it may be a sensor that is dead, not ground that is late
             self.offset[:] = self.touchdown.step(touches, plan.falling[at].tolist(), plan.swinging.tolist(), standing)
         return force
 

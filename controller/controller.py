@@ -27,7 +27,7 @@ from hexapod_cosim.models import HexapodError, Robot
 
 ALL_PARTS = Parts()
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
-PLANNED = 128  # steps at most that are planned at once; nothing depends on it but the time it takes
+PLANNED = 40  # steps at most that are planned at once; nothing depends on it but how time is spread over the calls
 
 
 class ControllerError(HexapodError):
@@ -71,7 +71,7 @@ class Diagnostics:
     shift: Plane  # m    horizontal correction of the feet by the compliance, x + i y in the walking frame
     lift: Array  # m    vertical correction, of all parts
     unreachable: Mask  # the joints could not follow at the last step
-    fallback: Mask  # the foot's force sensor is not believed: its leg walks by the plan
+    fallback: Mask  # walks without feedback: the foot's force sensor is not believed, or the whole robot slides
 
 
 class Controller:
@@ -108,7 +108,7 @@ class Controller:
         if compliant is None:
             still = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
             return Diagnostics(swinging, *still, lost, np.zeros(LEGS, dtype=np.bool_))
-        return Diagnostics(swinging, compliant.shift, compliant.lift, lost, compliant.laws.doubted)
+        return Diagnostics(swinging, compliant.shift, compliant.lift, lost, compliant.laws.fallback)
 
     def reset(self) -> None:
         """Standing in the stance, all memory cleared; the next step is the first."""

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
 from hexapod_cosim.cosim.master import COMPLETED, INTERRUPTED
 from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.run import Result, chosen_gains, simulate
+from hexapod_cosim.cosim.run import Result, chosen_gains, known_robot, simulate
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.models import HexapodError, load_robot
 
@@ -96,8 +96,8 @@ def _prepare(scenarios: Sequence[Scenario], folder: Path, *, fmu: Path | None, g
     designs: dict[tuple[str, str, float], Gains | None] = {}
     tasks: list[_Task | Summary] = []
     for scenario in scenarios:
-        key = (scenario.robot, scenario.control, scenario.macro_step)
         try:
+            key = (known_robot(scenario).hash, scenario.control, scenario.macro_step)
             if key not in designs:
                 designs[key] = chosen_gains(scenario, gains)
             if fmu is None and scenario.robot not in fmus:

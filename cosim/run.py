@@ -69,7 +69,7 @@ def simulate(
     `begin` is called once nothing can be refused any more, before the first step. Raises HexapodError for anything that keeps the run
     from starting; how a run that started ended is in the result.
     """
-    robot = load_robot(scenario.robot)
+    robot = known_robot(scenario)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
     check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     gains = chosen_gains(scenario, gains)
@@ -104,7 +104,12 @@ def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None
         return None if scenario.control == "kinematic" else gains
     from hexapod_cosim.cosim.design import design_for  # noqa: PLC0415  python-control takes a second to import
 
-    return design_for(load_robot(scenario.robot), scenario.macro_step)
+    return design_for(known_robot(scenario), scenario.macro_step)
+
+
+def known_robot(scenario: Scenario) -> Robot:
+    """The robot as its controller knows it: its own file with the scenario's servos. Ground, contact and payload it has to find out."""
+    return replace(load_robot(scenario.robot), servo=scenario_robot(scenario).servo)
 
 
 def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
@@ -175,7 +180,7 @@ def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
 
 
 def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
-    """(rows, 6) when each leg walked by the plan alone, its foot's sensor not believed; no rows when the controller does not tell."""
+    """(rows, 6) when each leg walked without feedback; no rows when the controller does not tell."""
     names = [f"controller.{leg}.fallback" for leg in LEG_NAMES]
     return recording.columns(names) > 0.5 if set(names) <= set(recording.names) else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
 
@@ -222,7 +227,9 @@ def doubts(view: View, robot: Robot) -> list[str]:
     doubted = fallback_columns(recording)
     for leg, share in zip(LEG_NAMES, doubted.mean(axis=0) if len(doubted) else [], strict=False):
         found += (
-            [f"the force sensor of foot {leg} was not believed for {share:.0%} of the time: its leg walked by the plan"] if share else []
+            [f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan, or the robot slid"]
+            if share
+            else []
         )
     if len(recording.time):
         torque = np.sqrt(np.mean(recording.columns(joint_names("torque")) ** 2, axis=0))

@@ -173,8 +173,8 @@ def comparison(*, fallback: float | None = None, status: str = COMPLETED) -> Com
 
 def test_the_robustness_table_shows_both_figures_and_the_fallback() -> None:
     table = robustness_table({"as judged": comparison(), "a push": comparison(fallback=0.25), "a giant": comparison(status=REFUSED)})
-    assert "| as judged | 2 → 2 of 2 | 10 → 10 | 10 → 10 | 10 → 10 | - |" in table
-    assert "| a push | 2 → 2 of 2 | 10 → 10 | 10 → 10 | 10 → 10 | 25% |" in table
+    assert "| as judged | 2 → 2 of 2 " + 5 * "| 10 → 10 " + "| 0.01 → 0.01 | - |" in table
+    assert "| a push | 2 → 2 of 2 " + 5 * "| 10 → 10 " + "| 0.01 → 0.01 | 25% |" in table
     assert "Left out: a giant. legs too short" in table
 
 
@@ -208,7 +208,7 @@ def test_the_command_walks_a_quick_section_without_touching_the_page(plant_build
     before = command.PAGE.read_bytes()
     assert command.main(["--quick", "--only", "robustness"]) == 0
     out = capsys.readouterr().out
-    assert "| macro-step 20 ms | 2 → 2 of 2 |" in out
+    assert "| slope of 10 degrees, upwards | 2 → 2 of 2 |" in out
     assert command.PAGE.read_bytes() == before
 
 

@@ -21,7 +21,10 @@ COLUMNS = {
     "torque_rms": "torque", "cost_of_transport": "cost",
 }  # fmt: skip
 # metric -> heading, and what the figure is multiplied by for people
-PLAIN = {"slip_per_metre": ("slip [mm/m]", 1e3), "height_rms": ("height [mm]", 1e3), "roll_rms": ("roll [mrad]", 1e3)}
+PLAIN = {
+    "slip_per_metre": ("slip [mm/m]", 1e3), "height_rms": ("height [mm]", 1e3), "roll_rms": ("roll [mrad]", 1e3),
+    "pitch_rms": ("pitch [mrad]", 1e3), "path_error": ("path error [mm/m]", 1e3), "peak_force": ("peak force [BW]", 1.0),
+}  # fmt: skip
 BEGIN, END = "<!-- control:{} -->", "<!-- /control:{} -->"
 LEGEND = (
     "Changes from kinematic to compliant, means over {} seeds; ± half a 95 % interval where it shows; ≈ not sure, or too small to measure."
@@ -40,9 +43,7 @@ def robustness_table(cases: Cases) -> str:
     """A row per case: how many runs walked to the end, a few figures under either control, and how long compliance was given up."""
     headings = ["case", "walked", *(text for text, _ in PLAIN.values()), "fallback"]
     rows = [[name, _walked(item), *_plain(item), _fallback(item)] for name, item in cases.items() if not refused(item)]
-    note = (
-        "Kinematic → compliant, means over {} seeds. Fallback: share of the time in which the compliant controller gave up its compliance."
-    )
+    note = "Kinematic → compliant, means over {} seeds. Fallback: share of the time in which a leg walked without feedback."
     return "\n\n".join(filter(None, [_markdown(headings, rows), _legend(cases, note), _left_out(cases)]))
 
 
