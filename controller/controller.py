@@ -27,7 +27,7 @@ from hexapod_cosim.models import HexapodError, Robot
 
 ALL_PARTS = Parts()
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
-PLANNED = 40  # steps at most that are planned at once; nothing depends on it but how time is spread over the calls
+PLANNED = 128  # steps at most that are planned at once; nothing depends on it but how time is spread over the calls
 
 
 class ControllerError(HexapodError):

@@ -216,3 +216,9 @@ def test_an_unknown_section_is_refused_with_the_names_there_are(capsys: pytest.C
     with pytest.raises(SystemExit):
         command.main(["--only", "ablaton"])
     assert "no section 'ablaton': choose one of ablation" in capsys.readouterr().err
+
+
+def test_a_table_without_a_single_walk_is_no_result() -> None:
+    with pytest.raises(HexapodError, match="no case of this table could be walked: got 'legs too short'"):
+        command.expect_walks({"ablation": {"a giant": comparison(status=REFUSED)}})
+    command.expect_walks({"ablation": {"a giant": comparison(status=REFUSED), "as judged": comparison()}})

@@ -298,3 +298,50 @@ def test_saved_laws_go_on_bit_for_bit() -> None:
     laws.restore(state)
     np.testing.assert_array_equal(go_on(), first)
     assert first[:, 2, -1].any()
+
+
+def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds() -> None:
+    """All feet drag by more than half of what they carry: no share and no answer is told any more, and every leg says so."""
+    laws, calm, sliding = make_laws(), squeezing(), squeezing()
+    sliding[:, 0] = -0.6 * WEIGHT / 6.0
+    run(laws, calm, 400)
+    carried, bent = np.abs(laws.torque).max(), np.abs(laws.bend).max()
+    assert bent > 0.0
+    assert not laws.fallback.any()
+    run(laws, sliding, 60)
+    assert laws.fallback.all()
+    assert not laws.doubted.any()
+    assert np.abs(laws.torque).max() < 0.02 * carried
+    assert np.abs(laws.bend).max() < 0.02 * bent
+    run(laws, calm, 400)
+    assert not laws.fallback.any()
+    assert np.abs(laws.torque).max() == pytest.approx(carried, rel=0.05)
+    deaf = make_laws(parts=Parts(fallback=False))
+    run(deaf, calm, 400)
+    run(deaf, sliding, 60)
+    assert np.abs(deaf.torque).max() > 0.5 * carried
+
+
+def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() -> None:
+    laws, force = make_laws(parts=Parts(fallback=False)), squeezing(0.0)
+    run(laws, force, 400)
+    full = laws.torque.copy()
+    off = force.copy()
+    off[2] = 0.0
+    run(laws, off, 1)
+    own = rest(ROBOT).torque[0]
+    np.testing.assert_allclose(laws.torque[2], own[2], atol=1e-9)
+    assert np.abs(laws.torque - own)[1].max() > 0.3
+    run(laws, force, 60)
+    np.testing.assert_allclose(laws.torque[2], full[2], rtol=0.05)
+
+
+def test_no_foot_reaches_down_for_a_force_that_no_one_reports() -> None:
+    """Two legs silent, one of them truly off the ground: with the whole weight on the others it reaches, with weight missing it waits."""
+    for share, reaches in ((1.0, True), (0.8, False)):
+        laws, force = make_laws(), squeezing(0.0)
+        run(laws, force, 400)
+        force[2] = 0.0
+        force[:, 2] *= share * WEIGHT / force[:, 2].sum()
+        run(laws, force, 18)
+        assert bool(laws.offset[2] < 0.0) is reaches

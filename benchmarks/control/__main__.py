@@ -13,7 +13,7 @@ from rich.progress import Progress
 from benchmarks import BUILD, ROOT
 from benchmarks.control.cases import DATA, ablation, grid, robustness, seeds, sticking, tuning
 from benchmarks.control.measure import Measured, Section, measure
-from benchmarks.control.tables import changes_table, put_into, robustness_table, write_csv
+from benchmarks.control.tables import changes_table, put_into, refused, robustness_table, write_csv
 from hexapod_cosim.models import HexapodError
 
 PAGE, RESULTS = ROOT / "docs" / "control.md", ROOT / "benchmarks" / "results" / "control"
@@ -62,6 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"no section {given.only!r}: choose one of " + ", ".join(one.name for one in offered))
     try:
         measured = walked(quick(chosen) if given.quick else chosen, QUICK_CYCLES if given.quick else None)
+        expect_walks(measured)
         kept = write(measured, page=None if given.quick or given.tuning else PAGE)
     except HexapodError as error:
         print(f"benchmarks.control: {error}", file=sys.stderr)
@@ -69,6 +70,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print("\n\n".join(f"{name}\n\n{table}" for name, table in tables(measured).items()))
     print(f"\nwritten to {kept}")
     return 0
+
+
+def expect_walks(measured: Measured) -> None:
+    """Raises HexapodError when a whole table would be empty: that is no result."""
+    for name, cases in measured.items():
+        if all(map(refused, cases.values())):
+            reason = next(run.reason for case in cases.values() for run in case.first)
+            raise HexapodError("no case of this table could be walked", got=reason, fix="mend that first; nothing was written", where=name)
 
 
 def walked(chosen: Sequence[Section], cycles: float | None) -> Measured:
