@@ -33,6 +33,9 @@ from hexapod_cosim.controller.touchdown import EARLY, Touchdown
 LOAD_FLOOR = 1e-6  # N    below it no foot carries anything
 SLIDING = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that slides, or a slope of 29 degrees, has it
 CALM = 0.5  # 1    gait cycles without it until feet are trusted again
+SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
+SETTLED = 0.5  # 1    of the weight: feet that carry less together have only just met the ground
+OUTRUN = 0.35, 0.45  # 1    share of the time in which paths ask more speed than a servo has: below joints follow, above they do not
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the design's margins hold up to it
 SCALES = 0.5, 2.0  # 1    measured over modelled weight that the support believes
@@ -63,7 +66,7 @@ class Compliance:
     Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos [N m]; shift: (6, 3) of the feet
     that comes of `bend` [m], shift_plane: (6,) the same x + i y; offset: (6,) by which paths are raised for ground met early or late [m];
     doubted: (6,) sensors not believed; fallback: (6,) legs that walk without feedback, for that or because the robot slides;
-    scale: measured over planned weight; trust: 1, or less while the robot slides.
+    scale: measured over planned weight; trust: 1, or less while the robot slides or its joints cannot follow, which `outrun` tells.
     """
 
     def __init__(self, gains: Gains, parts: Parts, *, weight: float, cycle: float, kp: float, step_height: float, period: float) -> None:
@@ -74,6 +77,7 @@ class Compliance:
         self.detector, self.watch, self.touchdown = ContactDetector(weight), SensorWatch(weight, cycle=cycle), Touchdown(period=period)
         self._tracking, self._memory = min(period / gains.slip.tracking_time, 1.0), math.exp(-period / gains.slip.load_time)
         self._follow_load = 1.0 - self._memory
+        self._settled = SETTLED * weight
         self._calm = round(CALM * cycle / period)
         self._follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
         self._largest, self._deepest = gains.slip.limit * share, gains.suspension.limit
@@ -99,12 +103,15 @@ class Compliance:
             law.reset()
         for array in (self.bend, self.torque, self._moved, self.offset, self.doubted, self.fallback):
             array[...] = 0
+        self.outrun, self._asked, self._dragged = False, 0.0, 0
         self.scale, self.trust, self._at, self._slack, self._sliding = 0.0, 1.0, -1, False, 0
         self.grip[...] = 1.0
 
     def save(self) -> dict[str, Any]:
         """What the laws remember, and what is planned."""
-        own = {name: getattr(self, name) for name in ("scale", "trust", "_plan", "_at", "_slack", "_sliding")}
+        own = {
+            name: getattr(self, name) for name in ("scale", "trust", "_plan", "_at", "_slack", "_sliding", "outrun", "_asked", "_dragged")
+        }
         kept = [array.copy() for array in (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback)]
         return {"own": own, "arrays": kept, "watch": self.watch.save(), "down": self.touchdown.save(), "touch": self.detector.save()}
 
@@ -119,8 +126,14 @@ class Compliance:
         self.touchdown.restore(state["down"])
         self.detector.restore(state["touch"])
 
-    def plan(self, demand: Demand, shares: Shares, *, height: Array, rise: Array, swinging: Mask) -> None:
-        """Lays out the coming steps, rows of all arguments: height (n, 6) of the feet's paths over the stance [m], rise [m/s]; (6,)."""
+    def plan(self, demand: Demand, shares: Shares, *, height: Array, rise: Array, swinging: Mask, hurried: Mask | None = None) -> None:
+        """Lays out the coming steps, rows of all arguments but `swinging`.
+
+        Args:
+            height, rise: (n, 6) of the feet's paths over the stance [m, m/s];  swinging: (6,) in the air throughout;
+            hurried: (n,) some joint is asked for more speed than its servo has, default never.
+        """
+        self._ask(len(rise), 0.0 if hurried is None else float(hurried.mean()))
         lever, none = demand.lever, np.zeros_like(demand.torque)
         still = np.zeros_like(height)
         standing, well_up, supports = shares.activation >= 1.0, height > EARLY, self._parts.support
@@ -133,6 +146,12 @@ class Compliance:
             falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0), high=height > self._high, swinging=swinging.copy(),
         )  # fmt: skip
         self._at = -1
+
+    def _ask(self, steps: int, share: float) -> None:
+        """Whether the joints can follow, by the share of the time in which they cannot, smoothed over a gait cycle."""
+        low, high = OUTRUN
+        self._asked += (1.0 - math.exp(-0.5 * steps / self._calm)) * (share - self._asked)
+        self.outrun = self._parts.fallback and self._asked > (low if self.outrun else high)
 
     def step(self, force: Array) -> None:
         """One planned period on. force: (6, 4) ground on foot in the walking frame [N], the last column 0."""
@@ -166,27 +185,28 @@ class Compliance:
         x, y, total, _ = np.dot(self._ones, felt).tolist()
         share = 1.0 / total if total > LOAD_FLOOR else 0.0
         if self._parts.fallback:
-            self._watch_slide(math.hypot(x, y) * share)
+            self._judge(math.hypot(x, y) * share if total > self._settled else 0.0)
         if self._parts.slip_pid:
             mixing[2, 0], mixing[2, 1] = -x * share, -y * share
         np.dot(felt, mixing, out=self._inputs)
         return float(total)
 
-    def _watch_slide(self, drag: float) -> None:
-        """A robot whose feet slide has no use for the plan of who carries what: it walks under kinematic control until they hold again.
+    def _judge(self, drag: float) -> None:
+        """A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who carries what: kinematic control for it.
 
         drag: of the feet's common tangential force beyond the plan, the share of the normal one.
         """
-        if drag > SLIDING:
+        self._dragged = self._dragged + 1 if drag > SLIDING else 0
+        if self._dragged * self._period > SLIDING_TIME:
             self._sliding = self._calm
         elif self._sliding:
             self._sliding -= 1
-        goal = 0.0 if self._sliding else 1.0
+        goal = 0.0 if self._sliding or self.outrun else 1.0
         if self.trust != goal:
             self.trust += self._follow_load * (goal - self.trust)
             if abs(goal - self.trust) < 1.0 - GRIPPED:
                 self.trust = goal
-            self.fallback[:] = self.doubted | (self._sliding > 0)
+            self.fallback[:] = self.doubted | (goal == 0.0)
 
     def _answer_forces(self, touching: Mask) -> None:
         """The laws one period on, limited, and the forces that come of them."""
@@ -252,15 +272,16 @@ class Compliance:
             total = float(force[touching, 2].sum())
             doubted = self.watch.look(touches, total, standing, plan.high[at].tolist(), time=self._period)
             self.doubted[:] = doubted if sum(doubted) < TRIPOD_LEGS else True
-            self.fallback[:] = self.doubted | (self._sliding > 0)
+            self.fallback[:] = self.doubted | (self.trust < 1.0)
             if self.doubted.any():
                 force = np.where(self.doubted[:, None], self.scale * plan.shares.forces(at), force)
                 touches = np.where(self.doubted, plan.shares.activation[at] > 0.5, touching).tolist()
                 self.detector.touching = np.array(touches)
-        if parts.touchdown:
+        if self.trust < 1.0:
+            self.touchdown.reset()
+            self.offset[:] = 0.0
+        elif parts.touchdown:
             self._slack = True
-            if self.watch.missing:
-                standing = [False] * LEGS  # it may be a sensor that is dead, not ground that is late
             self.offset[:] = self.touchdown.step(touches, plan.falling[at].tolist(), plan.swinging.tolist(), standing)
         return force
 

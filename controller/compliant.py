@@ -119,7 +119,12 @@ class Compliant:
         rows = slice(first, None)
         shares = self._support.shares(steps.plane + shift, self._activation, demand).rows(rows)
         self.laws.plan(
-            demand.rows(rows), shares, height=(steps.height - self._home)[rows], rise=steps.rise[rows], swinging=steps.swinging[-1]
+            demand.rows(rows),
+            shares,
+            height=(steps.height - self._home)[rows],
+            rise=steps.rise[rows],
+            swinging=steps.swinging[-1],
+            hurried=np.asarray((np.abs(speed[rows]) >= self._legs.speed_max).any(axis=(1, 2))),
         )
         self._climb = self._legs.speeds(pose.rows(rows), np.zeros(1), np.ones(1))
         self._rotations, self._command = None if rotation is None else rotation[rows], value[rows].tolist()
@@ -133,7 +138,7 @@ class Compliant:
         self._sense(measurement)
         laws.step(self._force)
         if self._count % self.hold.every == 0:
-            self._look(measurement)
+            self._look(measurement) if laws.trust == 1.0 else self.hold.reset()
         self._count += 1
         np.add(laws.offset, self.hold.lift, out=raised)
         angle, climb = out.angle_ref, self._climb[at]

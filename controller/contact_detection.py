@@ -50,7 +50,7 @@ class ContactDetector:
 class SensorWatch:
     """Which foot sensors contradict the plan for too long.
 
-    `doubted`: of each leg; `missing`: some force is not being reported; `busy`: there is something to look after.
+    `doubted`: of each leg; `busy`: there is something to look after.
     """
 
     def __init__(self, weight: float, *, cycle: float) -> None:
@@ -60,7 +60,6 @@ class SensorWatch:
 
     def reset(self) -> None:
         """All believed."""
-        self.missing = False
         self.restore(([0.0] * LEGS, [0.0] * LEGS))
 
     def save(self) -> tuple[Any, ...]:
@@ -79,10 +78,9 @@ class SensorWatch:
             touching, total: which feet report a force, and the sum of all [N].
             standing, high: which legs are planned to carry their whole share, and which to be well above the ground.
         """
-        self.missing = total < self._weight
+        missing = total < self._weight
         wrong = [
-            (touches and up) or (self.missing and stands and not touches)
-            for touches, stands, up in zip(touching, standing, high, strict=True)
+            (touches and up) or (missing and stands and not touches) for touches, stands, up in zip(touching, standing, high, strict=True)
         ]
         contradicted = [past + time if now else 0.0 for past, now in zip(self._contradicted, wrong, strict=True)]
         limits = [AIRBORNE_TIME if up else ABSENT_TIME for up in high]

@@ -71,7 +71,7 @@ class Diagnostics:
     shift: Plane  # m    horizontal correction of the feet by the compliance, x + i y in the walking frame
     lift: Array  # m    vertical correction, of all parts
     unreachable: Mask  # the joints could not follow at the last step
-    fallback: Mask  # walks without feedback: the foot's force sensor is not believed, or the whole robot slides
+    fallback: Mask  # walks without feedback: its foot's sensor is not believed, or the robot slides or outruns its joints
 
 
 class Controller:

@@ -185,6 +185,22 @@ def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
     return recording.columns(names) > 0.5 if set(names) <= set(recording.names) else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
 
 
+def fallen_back(recording: Recording) -> list[str]:
+    """For how long which legs walked without feedback."""
+    doubted = fallback_columns(recording)
+    if not doubted.any():
+        return []
+    together = float(doubted.all(axis=1).mean())
+    legs = {leg: float(share) - together for leg, share in zip(LEG_NAMES, doubted.mean(axis=0), strict=True)}
+    found = [f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan"
+             for leg, share in legs.items() if share]  # fmt: skip
+    slid = (
+        f"all legs walked without feedback for {together:.0%} of the time: "
+        "the robot slid, its joints could not follow, or too many sensors failed"
+    )
+    return [slid, *found] if together else found
+
+
 def fall(view: View, robot: Robot) -> str:
     """When and how the robot fell, "" when it stayed upright: roll and pitch within bounds, the torso off the ground and not sunk."""
     recording = view.recording
@@ -224,13 +240,7 @@ def doubts(view: View, robot: Robot) -> list[str]:
     if len(recording.time) and set(unreachable) <= set(recording.names):
         share = float(np.mean(recording.columns(unreachable).max(axis=1)))
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
-    doubted = fallback_columns(recording)
-    for leg, share in zip(LEG_NAMES, doubted.mean(axis=0) if len(doubted) else [], strict=False):
-        found += (
-            [f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan, or the robot slid"]
-            if share
-            else []
-        )
+    found += fallen_back(recording)
     if len(recording.time):
         torque = np.sqrt(np.mean(recording.columns(joint_names("torque")) ** 2, axis=0))
         worst, limit = int(np.argmax(torque)), robot.servo.torque_continuous

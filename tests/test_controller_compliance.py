@@ -334,14 +334,3 @@ def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() 
     assert np.abs(laws.torque - own)[1].max() > 0.3
     run(laws, force, 60)
     np.testing.assert_allclose(laws.torque[2], full[2], rtol=0.05)
-
-
-def test_no_foot_reaches_down_for_a_force_that_no_one_reports() -> None:
-    """Two legs silent, one of them truly off the ground: with the whole weight on the others it reaches, with weight missing it waits."""
-    for share, reaches in ((1.0, True), (0.8, False)):
-        laws, force = make_laws(), squeezing(0.0)
-        run(laws, force, 400)
-        force[2] = 0.0
-        force[:, 2] *= share * WEIGHT / force[:, 2].sum()
-        run(laws, force, 18)
-        assert bool(laws.offset[2] < 0.0) is reaches
