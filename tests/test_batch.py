@@ -93,11 +93,18 @@ def alive(group: int) -> bool:
     return True
 
 
+def _hear_interrupts() -> None:
+    """A test run in the background starts with them ignored, and its children with it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def begun(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
     """A comparison in a process group of its own, whose batch has come to run."""
     plain = settings(long, "gait.period=0.4", "outputs.csv=['torso.roll']")
     command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "200", *plain]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear_interrupts
+    )
     deadline = time.monotonic() + PATIENCE
     done = folder / "compliant" / "run.json"
     while time.monotonic() < deadline and not (done.exists() and json.loads(done.read_text())["status"] == COMPLETED):
