@@ -58,6 +58,7 @@ class Plan:
     falling: Array  # m    (n, 6) by which feet well above the ground come down in a period
     high: Mask  # (n, 6) so high that they cannot touch
     swinging: Mask  # (6,)
+    hurried: list[bool]  # n some joint is asked for more speed than its servo has
 
 
 class Compliance:
@@ -78,7 +79,7 @@ class Compliance:
         self._tracking, self._memory = min(period / gains.slip.tracking_time, 1.0), math.exp(-period / gains.slip.load_time)
         self._follow_load = 1.0 - self._memory
         self._settled = SETTLED * weight
-        self._calm = round(CALM * cycle / period)
+        self._calm, self._follow_cycle = round(CALM * cycle / period), 1.0 - math.exp(-period / cycle)
         self._follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
         self._largest, self._deepest = gains.slip.limit * share, gains.suspension.limit
         self._most, self._fastest = gains.limits.torque, gains.limits.speed * period
@@ -133,7 +134,6 @@ class Compliance:
             height, rise: (n, 6) of the feet's paths over the stance [m, m/s];  swinging: (6,) in the air throughout;
             hurried: (n,) some joint is asked for more speed than its servo has, default never.
         """
-        self._ask(len(rise), 0.0 if hurried is None else float(hurried.mean()))
         lever, none = demand.lever, np.zeros_like(demand.torque)
         still = np.zeros_like(height)
         standing, well_up, supports = shares.activation >= 1.0, height > EARLY, self._parts.support
@@ -144,14 +144,9 @@ class Compliance:
             weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
             sure=list(zip(_bits(standing), _bits(standing | well_up), strict=True)),
             falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0), high=height > self._high, swinging=swinging.copy(),
+            hurried=[False] * len(rise) if hurried is None else hurried.tolist(),
         )  # fmt: skip
         self._at = -1
-
-    def _ask(self, steps: int, share: float) -> None:
-        """Whether the joints can follow, by the share of the time in which they cannot, smoothed over a gait cycle."""
-        low, high = OUTRUN
-        self._asked += (1.0 - math.exp(-0.5 * steps / self._calm)) * (share - self._asked)
-        self.outrun = self._parts.fallback and self._asked > (low if self.outrun else high)
 
     def step(self, force: Array) -> None:
         """One planned period on. force: (6, 4) ground on foot in the walking frame [N], the last column 0."""
@@ -185,6 +180,8 @@ class Compliance:
         x, y, total, _ = np.dot(self._ones, felt).tolist()
         share = 1.0 / total if total > LOAD_FLOOR else 0.0
         if self._parts.fallback:
+            self._asked += self._follow_cycle * (self._plan.hurried[self._at] - self._asked)
+            self.outrun = self._asked > (OUTRUN[0] if self.outrun else OUTRUN[1])
             self._judge(math.hypot(x, y) * share if total > self._settled else 0.0)
         if self._parts.slip_pid:
             mixing[2, 0], mixing[2, 1] = -x * share, -y * share

@@ -334,3 +334,17 @@ def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() 
     assert np.abs(laws.torque - own)[1].max() > 0.3
     run(laws, force, 60)
     np.testing.assert_allclose(laws.torque[2], full[2], rtol=0.05)
+
+
+def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> None:
+    """By the share of the time in which some joint is asked for too much, smoothed over a gait cycle; and back when it is less."""
+    laws, force = make_laws(), squeezing()
+    run(laws, force, 400)
+    for share, outrun in ((0.3, False), (0.6, True), (0.4, True), (0.2, False)):
+        for _ in range(12):
+            plan(laws, 100)
+            laws._plan.hurried[:] = [k % 10 < round(10 * share) for k in range(100)]
+            for _ in range(100):
+                laws.step(force)
+        assert laws.outrun is outrun
+        assert bool(laws.fallback.all()) is outrun
