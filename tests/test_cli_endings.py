@@ -46,13 +46,13 @@ def test_a_comparison_that_ends_early_says_so_in_both_folders(call: Call, tmp_pa
 
 def test_ctrl_c_keeps_what_was_recorded_under_another_name(plant_build: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    command = [*COMMAND, "simulate", "walk_flat", "-o", str(folder), "--set", "duration=300", "--set", "outputs.csv=['torso.*']"]
+    command = [*COMMAND, "simulate", "walk_flat", "-o", str(folder), "--set", "duration=900", "--set", "outputs.csv=['torso.*']"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     try:
         deadline = time.monotonic() + 60.0
         while not (folder / "run.json").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
-        time.sleep(3.0)  # into the loop
+        time.sleep(1.0)  # into the loop, which takes some ten times as long
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=120.0)
     finally:
