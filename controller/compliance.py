@@ -6,8 +6,9 @@ that the feet really measure: a payload is carried too.
 Tangential. Of its force a foot should give way only to what does no work for the body. What the plan asks of it is left alone, and so is
 the legs' common push beyond that, shared in proportion to the load; the rest is legs squeezing against each other. The PID's answer g
 is a force, and the joints' angles are corrected by J^T g/kp: that is what the servos yield under g, so a foot that sticks answers with
-exactly -g, in every direction alike and without a vertical force. The loop's plant is 1, whatever leg, pose and servo, and the height does
-not feel it. The answer goes with the measured load, so that a foot is not dragged over the ground by it while it is being unloaded.
+exactly -g, in every direction alike and without a vertical force: the loop's plant is at most 1, whatever leg, pose and servo, and the
+height does not feel it. The answer goes with the measured load, so that a foot is not dragged over the ground by it while it is being
+unloaded.
 
 Normal. The virtual suspension answers the force beyond the planned share; its deflection z reaches the joints as the vertical force
 z/C_zz, C = J kp^-1 J^T, and so without a horizontal one.
@@ -40,6 +41,8 @@ GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the design's margins hold up to it
 SCALES = 0.5, 2.0  # 1    measured over modelled weight that the support believes
 HIGH = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
+
+REMEMBERED = ("scale", "trust", "_plan", "_at", "_slack", "_sliding", "outrun", "_asked", "_dragged")
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,7 @@ class Compliance:
         self._answer = self.law.row.view(np.complex128)[:, 0]
         self.offset, self.grip = np.zeros(LEGS), np.ones(LEGS)
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
+        self._arrays = (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback)
         self.reset()
 
     def reset(self) -> None:
@@ -110,18 +114,13 @@ class Compliance:
 
     def save(self) -> dict[str, Any]:
         """What the laws remember, and what is planned."""
-        own = {
-            name: getattr(self, name) for name in ("scale", "trust", "_plan", "_at", "_slack", "_sliding", "outrun", "_asked", "_dragged")
-        }
-        kept = [array.copy() for array in (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback)]
+        own, kept = {name: getattr(self, name) for name in REMEMBERED}, [array.copy() for array in self._arrays]
         return {"own": own, "arrays": kept, "watch": self.watch.save(), "down": self.touchdown.save(), "touch": self.detector.save()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Goes back to it."""
         vars(self).update(state["own"])
-        for array, kept in zip(
-            (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback), state["arrays"], strict=True
-        ):
+        for array, kept in zip(self._arrays, state["arrays"], strict=True):
             array[...] = kept
         self.watch.restore(state["watch"])
         self.touchdown.restore(state["down"])
@@ -180,8 +179,6 @@ class Compliance:
         x, y, total, _ = np.dot(self._ones, felt).tolist()
         share = 1.0 / total if total > LOAD_FLOOR else 0.0
         if self._parts.fallback:
-            self._asked += self._follow_cycle * (self._plan.hurried[self._at] - self._asked)
-            self.outrun = self._asked > (OUTRUN[0] if self.outrun else OUTRUN[1])
             self._judge(math.hypot(x, y) * share if total > self._settled else 0.0)
         if self._parts.slip_pid:
             mixing[2, 0], mixing[2, 1] = -x * share, -y * share
@@ -193,6 +190,8 @@ class Compliance:
 
         drag: of the feet's common tangential force beyond the plan, the share of the normal one.
         """
+        self._asked += self._follow_cycle * (self._plan.hurried[self._at] - self._asked)
+        self.outrun = self._asked > (OUTRUN[0] if self.outrun else OUTRUN[1])
         self._dragged = self._dragged + 1 if drag > SLIDING else 0
         if self._dragged * self._period > SLIDING_TIME:
             self._sliding = self._calm

@@ -14,7 +14,7 @@ from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.gait import Gait
 from hexapod_cosim.controller.hold import Hold, Sight
 from hexapod_cosim.controller.inverse_dynamics import Frames, InverseDynamics
-from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, LegSolver, Plane, Pose
+from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, LegSolver, Plane, Pose, rates
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.posture import rotations, turned
 from hexapod_cosim.controller.support import Support
@@ -36,12 +36,11 @@ class Compliant:
     """
 
     def __init__(self, robot: Robot, gait: Gait, gains: Gains, parts: Parts, *, legs: LegSolver, period: float) -> None:
-        weight = robot.total_mass * float(np.linalg.norm(robot.gravity))
         self._parts, self._legs, self._per_second, self._leading = parts, legs, 1.0 / period, STEERING_TIME / period
         self._dynamics = InverseDynamics(robot, legs, period=period)
         self._support = Support(robot, gait, gains.support, rest=self._dynamics.rest())
         self.laws = Compliance(
-            gains, parts, weight=weight, cycle=gait.period, kp=robot.servo.kp, step_height=gait.step_height, period=period
+            gains, parts, weight=robot.weight, cycle=gait.period, kp=robot.servo.kp, step_height=gait.step_height, period=period
         )
         self.hold = Hold(gains.hold, parts, period=period)
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
@@ -49,8 +48,7 @@ class Compliant:
         # rows (x y z 0) of forces, the last column so that rows pair up
         self._force, self._rotation = np.zeros((LEGS, 4)), np.zeros((3, 4))
         self._raised, self._offset = np.zeros((2, LEGS))
-        stance = np.array([leg.stance for leg in robot.legs])
-        self._radius, self._stance_pitch, self._home = robot.foot.radius, stance[:, 2] - stance[:, 1], legs.forward(stance)[:, 2]
+        self._home = legs.forward(robot.stance)[:, 2]
         self.reset()
 
     def reset(self) -> None:
@@ -103,9 +101,8 @@ class Compliant:
         if not self._parts.support:
             return feet
         lowering = self._support.lowering(steps.plane, self._activation)
-        rate = np.gradient(lowering, axis=0) * self._per_second if len(lowering) > 1 else np.zeros_like(lowering)
         self._heights = feet.height - lowering
-        return replace(feet, height=self._heights, rise=feet.rise - rate)
+        return replace(feet, height=self._heights, rise=feet.rise - self._per_second * rates(lowering, 1.0))
 
     def plan(self, first: int, steps: Steps, value: Array, pose: Pose, speed: Array, *, shift: Plane, level: bool) -> None:
         """Lays out planned steps from the row `first` on.
@@ -173,7 +170,7 @@ class Compliant:
         vx, vy, yaw_rate, height, roll, pitch = self._command[self._at]
         angle = measurement.angle
         foot = self._legs.forward(angle)
-        rolled = self._radius * (angle[:, 2] - angle[:, 1] - self._stance_pitch) * np.exp(1j * (self._legs.hip_yaw + angle[:, 0]))
+        rolled = self._legs.rolling(angle) * np.exp(1j * (self._legs.hip_yaw + angle[:, 0]))
         plane, heights = foot[:, 0] + 1j * foot[:, 1], foot[:, 2]
         if self._rotations is not None:
             plane, heights = turned(plane, heights, self._rotations[self._at])

@@ -19,7 +19,7 @@ import numpy as np
 from hexapod_cosim.controller.compliant import Compliant
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.gait import Gait
-from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, Joints, LegSolver, Mask, Plane, Pose
+from hexapod_cosim.controller.kinematics import LEGS, Array, Feet, Joints, LegSolver, Mask, Plane, Pose, rates
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.posture import in_torso_frame
 from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
@@ -93,12 +93,11 @@ class Controller:
         self.period, self.gait, self.gains, self.parts = period, gait, gains, parts
         self.legs = LegSolver(robot)
         self.ramp = CommandRamp(gait.period, period=period)
-        self.stance = np.array([leg.stance for leg in robot.legs])
+        self.stance = robot.stance
         self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
         self.compliant = None if gains is None else Compliant(robot, gait, gains, parts, legs=self.legs, period=period)
         mismatch = None if gains is None else gains.mismatch(robot, period=period)
         self.warnings: tuple[str, ...] = () if mismatch is None else (mismatch,)
-        self._radius, self._stance_pitch = robot.foot.radius, self.stance[:, 2] - self.stance[:, 1]
         self._out = JointCommand()
         self.diagnostics = self._make_diagnostics()
         self.reset()
@@ -209,11 +208,9 @@ class Controller:
         s = R (C + s dC/du), C = q_3 - q_2 less that of the stance, is solved by one Newton step.
         """
         seen = feet if posture is None else in_torso_frame(feet, *posture)
-        pose, radius = self.legs.pose(seen.plane, seen.height), self._radius
-        bent = pose.angles[..., 2] - pose.angles[..., 1] - self._stance_pitch
+        pose = self.legs.pose(seen.plane, seen.height)
         slope = self.legs.speeds(pose, pose.heading, np.zeros(1))
-        shift = pose.heading * (radius * bent / (1.0 - radius * (slope[..., 2] - slope[..., 1])))
-        drift = np.gradient(shift, self.period, axis=0) if len(shift) > 1 else np.zeros_like(shift)
-        rolling = replace(feet, plane=feet.plane + shift, velocity=feet.velocity + drift)
+        shift = pose.heading * (self.legs.rolling(pose.angles) / (1.0 - self.legs.radius * (slope[..., 2] - slope[..., 1])))
+        rolling = replace(feet, plane=feet.plane + shift, velocity=feet.velocity + rates(shift, self.period))
         seen = rolling if posture is None else in_torso_frame(rolling, *posture)
         return self.legs.pose(seen.plane, seen.height), seen, shift

@@ -57,7 +57,7 @@ class InverseDynamics:
         self._legs, self._period, self._radius, self._torso = legs, period, robot.foot.radius, robot.torso
         self._gravity = float(np.linalg.norm(robot.gravity))
         self._rotor, self._friction = robot.servo.rotor_inertia, robot.servo.coulomb_friction
-        self._stance = legs.forward(np.array([leg.stance for leg in robot.legs]))
+        self._stance = legs.forward(robot.stance)
         self._floor = float(np.mean(self._stance[:, 2])) - robot.foot.radius
         links = [[leg.links[joint] for leg in robot.legs] for joint in range(3)]
         com = np.array([[link.com for link in joint] for joint in links])  # (3, 6, 3)

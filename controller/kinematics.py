@@ -14,6 +14,7 @@ above and u + i w, outward and up, in the leg's own plane: a turn is one product
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,11 @@ class Joints:
     unreachable: Mask  # (n, 6) legs whose angles do not put the foot on its target
 
 
+def rates(values: Any, period: float) -> Any:
+    """Differences over time of rows a period [s] apart, one-sided at the ends; a single row has none."""
+    return np.gradient(values, period, axis=0) if len(values) > 1 else np.zeros_like(values)
+
+
 class LegSolver:
     """Forward and inverse kinematics of a robot's legs in the torso frame. Raises RobotError on another axis pattern."""
 
@@ -95,6 +101,7 @@ class LegSolver:
         self.angle_min = np.array([[link.angle_min for link in leg.links] for leg in robot.legs])  # rad    (6, 3)
         self.angle_max = np.array([[link.angle_max for link in leg.links] for leg in robot.legs])  # rad    (6, 3)
         self.speed_max = robot.servo.speed_max  # rad/s
+        self.radius, self._stance_pitch = robot.foot.radius, robot.stance[:, 2] - robot.stance[:, 1]  # m, rad
         self.place = self.hip[0] + 1j * self.hip[1]  # m    (6,) of the coxa axes, torso frame
         self._upright, self._femur_zero = (np.exp(-1j * tilt) for tilt in (self.hip_yaw, self.femur_tilt))
 
@@ -105,6 +112,10 @@ class LegSolver:
         c, s = np.cos(heading), np.sin(heading)
         foot: Array = np.stack([c * x - s * self.offset_y, s * x + c * self.offset_y, z], axis=-1) + self.hip.T
         return foot
+
+    def rolling(self, angle: Array) -> Array:
+        """(..., 6) m    how far the round feet have rolled outwards since the stance, R (q_3 - q_2 less that of the stance)"""
+        return np.asarray(self.radius * (angle[..., 2] - angle[..., 1] - self._stance_pitch))
 
     def _plane(self, angle: Array) -> tuple[Array, Array, Array, Array]:
         """x, z of the foot in the coxa frame [m] and the angles A, B [rad], (..., 6) each."""
@@ -135,11 +146,10 @@ class LegSolver:
         wrong = ~np.isfinite(points).all(axis=1)
         if not wrong.any():
             x, y, z = points.T[:, None]
-            pose = self.pose(x + 1j * y, z)
-            angle: Array = np.minimum(np.maximum(pose.angles[0], self.angle_min), self.angle_max)
-            wrong = pose.lost[0] | (np.abs(pose.angles[0] - angle) > FLAG_TOLERANCE).any(axis=1)
+            joints = self.solve(self.pose(x + 1j * y, z), np.zeros(1, dtype=np.complex128), np.zeros(1))
+            wrong = joints.unreachable[0]
             if not wrong.any():
-                return angle
+                return np.asarray(joints.angle[0])
         leg = int(np.argmax(wrong))
         raise ReachError(
             "the foot cannot get there", got=tuple(points[leg].tolist()), expected=self._reach_text(leg),

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexapod_cosim.controller import Gains, LegSolver
+from hexapod_cosim.controller.compliance import LARGEST_LOAD
 from hexapod_cosim.controller.design.closed import closed_loop, disturbed, rising, splay
 from hexapod_cosim.controller.design.laws import Laws, delay_steps
-from hexapod_cosim.controller.design.standing import LARGEST_LOAD, Places, weight_share
+from hexapod_cosim.controller.design.standing import Places, weight_share
 from hexapod_cosim.cosim.design import STANCES, level_fmu
 from hexapod_cosim.cosim.linearise import ANGLES, LATEST, Bench, linearise, rest
 from hexapod_cosim.models import LEG_NAMES, Robot

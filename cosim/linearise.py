@@ -162,7 +162,7 @@ def rest(plant: Fmu, robot: Robot, *, standing: Sequence[str], load: float) -> t
     """
     angle, total = lifted_stance(robot, standing), load * len(standing) * weight_share(robot)
     share, feet = shares(robot, angle, standing, total), LegSolver(robot).forward(angle) - np.array(robot.torso.com)
-    push = robot.total_mass * float(np.linalg.norm(robot.gravity)) - total
+    push = robot.weight - total
     inputs = np.zeros(3 * ANGLES + len(PUSH))
     inputs[:ANGLES] = angle.reshape(-1)
     inputs[2 * ANGLES : 3 * ANGLES] = -(LegSolver(robot).jacobian(angle)[:, 2] * share[:, None]).reshape(-1)

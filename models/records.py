@@ -168,6 +168,11 @@ class Robot:
         return self.torso.mass + sum(link.mass for leg in self.legs for link in leg.links)
 
     @property
+    def weight(self) -> float:
+        """N"""
+        return self.total_mass * float(np.linalg.norm(self.gravity))
+
+    @property
     def stance(self) -> Array:
         """(6, 3) joint angles of the standing pose [rad]."""
         return np.array([leg.stance for leg in self.legs])

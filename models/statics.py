@@ -93,7 +93,7 @@ def _start(robot: Robot) -> Array:
     normal = ground_normal(robot.terrain)
     x[1], x[2] = -np.arcsin(normal[1]), np.arctan2(normal[0], normal[2])
     x[6:] = robot.stance.ravel()
-    weight = robot.total_mass * float(np.linalg.norm(robot.gravity))
+    weight = robot.weight
     depth = (weight / LEGS / robot.contact.stiffness) ** (2.0 / 3.0)
     highest = min(foot.penetration for foot in foot_contacts(robot, _bodies(robot, x)))
     x[0] += (highest - depth) / normal[2]

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.variation import STANDARD
-from hexapod_cosim.models import FRICTION_LAWS, HexapodError, load_robot
+from hexapod_cosim.models import HexapodError, load_robot
 
 ROBOTS = DATA["judged"]["robots"]
 SAME_VALUE = 1e-6  # what differs by less is the same
@@ -139,9 +139,7 @@ def test_a_case_that_this_version_does_not_know_is_left_out_and_said(monkeypatch
     assert "| all parts | 2 → 2 of 2 | ≈ -50 ± 212 % |" in table
 
 
-def test_the_ground_that_sticks_is_walked_as_soon_as_there_is_one() -> None:
-    if "bristle" not in FRICTION_LAWS:
-        pytest.skip("no such friction law yet")
+def test_the_ground_that_sticks_is_one_that_the_plant_knows() -> None:
     for case in sticking():
         assert scenario_robot(case.plan("compliant", 0)).friction.law == "bristle"
 

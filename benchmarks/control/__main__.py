@@ -50,7 +50,7 @@ def tables(measured: Measured) -> dict[str, str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """All tables, in some ten minutes on two processors; --quick in a minute, into build/bench instead of docs and results."""
+    """All tables, in some five minutes on two processors; --quick in a minute, into build/bench instead of docs and results."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.control", description=main.__doc__)
     parser.add_argument("--quick", action="store_true", help="few cases and seeds, short walks; docs and results stay as they are")
     parser.add_argument("--only", metavar="SECTION", help="one table: " + ", ".join(one.name for one in sections()))

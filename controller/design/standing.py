@@ -12,6 +12,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.controller.compliance import LARGEST_LOAD
 from hexapod_cosim.controller.gains import TRIPOD_LEGS
 from hexapod_cosim.controller.kinematics import LEGS, Array, LegSolver, Mask
 from hexapod_cosim.models import Robot
@@ -20,7 +21,6 @@ Places = NDArray[np.int_]
 
 JOINTS = 3
 ANGLES = FORCES = 3 * LEGS
-LARGEST_LOAD = 2.0  # 1    the answer to a force goes with the load up to this one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class StandingPlant:
 
 def weight_share(robot: Robot) -> float:
     """N    one leg's share of the weight while three legs stand"""
-    return robot.total_mass * float(np.linalg.norm(robot.gravity)) / TRIPOD_LEGS
+    return robot.weight / TRIPOD_LEGS
 
 
 def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
