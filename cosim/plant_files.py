@@ -11,7 +11,7 @@ from hexapod_cosim.models.errors import FmuError
 
 MODEL_IDENTIFIER = "hexapod"
 DISTRIBUTION = "hexapod-cosim"
-GENERATED_SOURCES = ("variables.c", "defaults.c")
+GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
 
 _HERE = Path(__file__).resolve().parent

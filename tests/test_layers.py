@@ -68,7 +68,7 @@ def c_files(*folders: str) -> list[Path]:
 
 
 def test_the_physics_includes_itself_its_header_and_the_c_library() -> None:
-    own = {path.name for path in c_files("src", "src/lanes")} | {"hexapod/hexapod.h"}
+    own = {path.name for path in c_files("src", "src/lanes")} | {f"hexapod/{path.name}" for path in c_files("include/hexapod")}
     files = c_files("src", "src/lanes", "include/hexapod")
     assert files
     for path in files:

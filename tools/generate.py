@@ -47,12 +47,21 @@ def render_all() -> dict[Path, str]:
     interface = load_interface(load_robot(DEFAULT_ROBOT))
     description = render_fmi2(interface)
     return {
+        GENERATED / "variables.h": render_structure(),
         GENERATED / "variables.c": render_variables(interface, description.guid),
         GENERATED / "defaults.c": render_defaults(interface),
         GENERATED / "modelDescription.xml": description.xml,
         GENERATED / "index.html": render_html(interface, description.guid),
         GENERATED / "start_values.txt": start_values(interface, description.guid),
     }
+
+
+def render_structure() -> str:
+    """What the variables are fields of, as C."""
+    lines = [_head("variables.h - what the FMU's variables are fields of."), "#ifndef HEXAPOD_GENERATED_VARIABLES_H"]
+    lines += ["#define HEXAPOD_GENERATED_VARIABLES_H", "", '#include "hexapod/hexapod.h"', "", "struct hxVariables {"]
+    lines += ["  hxDefinition definition; /* parameters */", "  hxInput input;", "  hxOutput output;", "};", "", "#endif", ""]
+    return "\n".join(lines)
 
 
 def render_variables(interface: Interface, guid: str) -> str:

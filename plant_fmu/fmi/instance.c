@@ -26,8 +26,7 @@ static void return_to_start(hxInstance *instance) {
   instance->state.model_stale = 1;
   instance->state.output_stale = 1;
   instance->state.stop_time = INFINITY;
-  instance->state.variables.definition = instance->start_definition;
-  instance->state.variables.input = instance->start_input;
+  instance->state.variables = instance->start;
 }
 
 /* an FMU without readable resources can only be the compiled-in robot's */
@@ -47,25 +46,24 @@ hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *re
     return HX_INVALID_ARGUMENT;
   }
   snprintf(instance->guid, sizeof instance->guid, "%s", guid);
-  hx_definition_default(&instance->start_definition);
-  hx_input_default(&instance->start_input);
+  hx_component_defaults(&instance->start);
   hxStatus status = hx_resources_read(instance, resources, &found);
   if (status == HX_OK && !found) status = check_default_guid(instance, resources);
   if (status != HX_OK) return status;
-  instance->plant = hx_plant_create();
-  if (!instance->plant) {
+  instance->component = hx_component_create();
+  if (!instance->component) {
     hx_log(instance, HX_LOG_ERROR, "instantiation: out of memory; free some and try again");
     return HX_OUT_OF_MEMORY;
   }
   return_to_start(instance);
-  hx_log(instance, HX_LOG_EVENT, "instantiated %s, plant %s, start values %s", guid, hx_version(),
+  hx_log(instance, HX_LOG_EVENT, "instantiated %s, version %s, start values %s", guid, hx_version(),
          found ? "from the resources" : "compiled in");
   return HX_OK;
 }
 
 void hx_instance_close(hxInstance *instance) {
-  if (instance->plant) hx_plant_destroy(instance->plant);
-  instance->plant = NULL;
+  if (instance->component) hx_component_destroy(instance->component);
+  instance->component = NULL;
 }
 
 /* ---------------------------------------------------------------------------------------------- values */
@@ -105,7 +103,7 @@ static hxStatus refresh_output(hxInstance *instance) {
     const hxStatus status = hx_instance_initialize(instance);
     if (status != HX_OK) return status;
   }
-  if (state->output_stale) hx_plant_output(instance->plant, &state->variables.input, &state->variables.output);
+  if (state->output_stale) hx_component_output(instance->component, &state->variables);
   state->output_stale = 0;
   return HX_OK;
 }
@@ -179,14 +177,14 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
 /* ---------------------------------------------------------------------------------------------- time */
 
 double hx_instance_time(const hxInstance *instance) {
-  return instance->state.model_stale ? instance->state.start_time : hx_plant_time(instance->plant);
+  return instance->state.model_stale ? instance->state.start_time : hx_component_time(instance->component);
 }
 
 hxStatus hx_instance_initialize(hxInstance *instance) {
-  const hxStatus status = hx_plant_reset(instance->plant, &instance->state.variables.definition, instance->state.start_time);
+  const hxStatus status = hx_component_reset(instance->component, &instance->state.variables, instance->state.start_time);
   if (status != HX_OK) {
     hx_log(instance, HX_LOG_ERROR, "parameters: %s; nothing was initialised, correct them and try again",
-           hx_plant_message(instance->plant));
+           hx_component_message(instance->component));
     return status;
   }
   instance->state.model_stale = 0;
@@ -203,7 +201,7 @@ static double clock_tolerance(double t, double h) {
   return fmax(last_bits, fmin(sums, 0.5 * h));
 }
 
-/* the plant goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up */
+/* the component goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up */
 hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
   const double now = hx_instance_time(instance);
   if (!(h > 0.0 && h <= longest_step)) {
@@ -235,25 +233,26 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
   }
   /* an extra step of rounding size may end before our own time: it is done */
   if (t + h <= now) return HX_OK;
-  const hxStatus status = hx_plant_step(instance->plant, &instance->state.variables.input, t + h);
+  const hxStatus status = hx_component_step(instance->component, &instance->state.variables, t + h);
   if (status == HX_INVALID_ARGUMENT) {
-    hx_log(instance, HX_LOG_ERROR, "step from %.17g s by %.17g s: %s; the state is unchanged", t, h, hx_plant_message(instance->plant));
+    hx_log(instance, HX_LOG_ERROR, "step from %.17g s by %.17g s: %s; the state is unchanged", t, h,
+           hx_component_message(instance->component));
     return status;
   }
   if (status != HX_OK) {
     hx_log(instance, HX_LOG_DISCARD, "step from %.17g s by %.17g s: %s; the state is unchanged, try a smaller step or a gentler input", t,
-           h, hx_plant_message(instance->plant));
+           h, hx_component_message(instance->component));
     return status;
   }
   instance->state.output_stale = 1;
   return HX_OK;
 }
 
-/* the plant goes back as well, so that saved states of a reset instance and of a new one are the same bytes */
+/* the component goes back as well, so that saved states of a reset instance and of a new one are the same bytes */
 void hx_instance_reset(hxInstance *instance) {
-  hxDefinition definition;
+  struct hxVariables defaults;
   return_to_start(instance);
-  hx_definition_default(&definition);
-  hx_plant_reset(instance->plant, &definition, 0.0);
+  hx_component_defaults(&defaults);
+  hx_component_reset(instance->component, &defaults, 0.0);
   hx_log(instance, HX_LOG_EVENT, "reset");
 }

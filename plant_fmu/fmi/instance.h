@@ -5,7 +5,7 @@
 #ifndef HEXAPOD_FMI_INSTANCE_H
 #define HEXAPOD_FMI_INSTANCE_H
 
-#include "fmi/variables.h"
+#include "fmi/component.h"
 
 /* Modes are bits so that a set of them is a mask. */
 typedef enum hxMode { HX_MODE_INSTANTIATED = 1, HX_MODE_INITIALIZATION = 2, HX_MODE_STEP = 4, HX_MODE_TERMINATED = 8 } hxMode;
@@ -22,10 +22,10 @@ typedef struct hxInstance hxInstance;
 /* Passes a finished message on to the importer. */
 typedef void hxLogSink(hxInstance *instance, hxLogCategory category, const char *text);
 
-/* What a saved state holds besides the plant's bytes. */
+/* What a saved state holds besides the component's bytes. */
 typedef struct hxInstanceState {
   int mode;         /* hxMode */
-  int model_stale;  /* parameters were set since the plant was reset */
+  int model_stale;  /* parameters were set since the component was reset */
   int output_stale; /* variables.output is not that of the present time and input */
   double start_time;
   double stop_time; /* no step goes past it; infinite when the importer names none */
@@ -34,9 +34,8 @@ typedef struct hxInstanceState {
 
 struct hxInstance {
   hxInstanceState state;
-  hxPlant *plant;
-  hxDefinition start_definition; /* what a reset returns to: compiled in, or from the resources */
-  hxInput start_input;
+  hxComponent *component;
+  struct hxVariables start; /* what a reset returns to: definition and input, compiled in or from the resources */
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
   unsigned logged; /* bit k: category k is passed on */
@@ -51,7 +50,7 @@ void hx_instance_close(hxInstance *instance);
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value);
 hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value);
 
-hxStatus hx_instance_initialize(hxInstance *instance); /* the plant takes the parameters */
+hxStatus hx_instance_initialize(hxInstance *instance); /* the component takes the parameters */
 hxStatus hx_instance_step(hxInstance *instance, double t, double h);
 void hx_instance_reset(hxInstance *instance);
 double hx_instance_time(const hxInstance *instance);
@@ -65,7 +64,7 @@ hxStatus hx_instance_check(hxInstance *instance, const void *block, size_t n);
 
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);
 
-/* Reads start_values.txt of the resources into start_definition and start_input; *found says whether there is one. */
+/* Reads start_values.txt of the resources into start; *found says whether there is one. */
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found);
 
 /* The row of a reference, or NULL; and a value's fitness for it (NaN and infinities fit nowhere). */

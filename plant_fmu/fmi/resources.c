@@ -1,4 +1,4 @@
-/* resources.c - start values of the robot in the FMU's resources.
+/* resources.c - start values in the FMU's resources.
  *
  * start_values.txt: the GUID; then, for every input and parameter in the order of their references, a line
  * "reference value name"; then "checksum" and, in 16 hexadecimal digits, hx_checksum over the lines above without their ends,
@@ -227,9 +227,9 @@ static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
 }
 
 /* whether there can be such a robot */
-static hxStatus check_robot(hxInstance *instance, const hxDefinition *definition) {
+static hxStatus check_start(hxInstance *instance, const struct hxVariables *variables) {
   char message[HX_MESSAGE_SIZE];
-  const hxStatus status = hx_definition_check(definition, message);
+  const hxStatus status = hx_component_check(variables, message);
   if (status != HX_OK) hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU anew", file_name, message);
   return status;
 }
@@ -244,14 +244,12 @@ static hxStatus read_file(hxInstance *instance, FILE *file) {
            instance->guid, guid);
     return HX_INVALID_ARGUMENT;
   }
-  variables.definition = instance->start_definition;
-  variables.input = instance->start_input;
+  variables = instance->start;
   hxStatus status = read_variables(instance, &reader, &variables);
   if (status == HX_OK) status = read_checksum(instance, &reader);
-  if (status == HX_OK) status = check_robot(instance, &variables.definition);
+  if (status == HX_OK) status = check_start(instance, &variables);
   if (status != HX_OK) return status;
-  instance->start_definition = variables.definition;
-  instance->start_input = variables.input;
+  instance->start = variables;
   return HX_OK;
 }
 

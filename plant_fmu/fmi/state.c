@@ -1,4 +1,4 @@
-/* state.c - saved states: header, instance, plant, in one block without pointers. */
+/* state.c - saved states: header, instance, component, in one block without pointers. */
 #include "fmi/instance.h"
 
 #include <stdint.h>
@@ -11,7 +11,7 @@ static const char state_magic[8] = "hexapod";
 typedef struct hxStateHeader {
   char magic[8];
   uint32_t format;
-  uint32_t size;     /* of the block: another word size or plant makes another one */
+  uint32_t size;     /* of the block: another word size or component makes another one */
   uint64_t checksum; /* of what follows the header; written by hx_instance_seal */
   char guid[HX_GUID_SIZE];
 } hxStateHeader;
@@ -19,10 +19,10 @@ typedef struct hxStateHeader {
 typedef struct hxStateBlock {
   hxStateHeader header;
   hxInstanceState instance;
-  double plant[]; /* hx_plant_state_size bytes */
+  double component[]; /* hx_component_state_size bytes */
 } hxStateBlock;
 
-size_t hx_instance_state_size(void) { return sizeof(hxStateBlock) + hx_plant_state_size(); }
+size_t hx_instance_state_size(void) { return sizeof(hxStateBlock) + hx_component_state_size(); }
 
 void hx_instance_save(const hxInstance *instance, void *bytes) {
   hxStateBlock *block = bytes;
@@ -32,7 +32,7 @@ void hx_instance_save(const hxInstance *instance, void *bytes) {
   block->header.format = STATE_FORMAT;
   block->header.size = (uint32_t)hx_instance_state_size();
   memcpy(&block->instance, &instance->state, sizeof instance->state);
-  hx_plant_get_state(instance->plant, block->plant);
+  hx_component_get_state(instance->component, block->component);
 }
 
 /* bytes may be unaligned */
@@ -73,7 +73,7 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   const hxStateBlock *block = bytes;
   const char *what = fault(instance, &block->header);
   if (what) return refuse(instance, what);
-  if (hx_plant_set_state(instance->plant, block->plant, hx_plant_state_size()) != HX_OK) return refuse(instance, "a damaged plant");
+  if (hx_component_set_state(instance->component, block->component) != HX_OK) return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);
   return HX_OK;
 }

@@ -1,15 +1,8 @@
-/* variables.h - the table of variables that generated/variables.c fills in. */
+/* variables.h - the table of variables that generated/variables.c fills in; their structure is in generated/variables.h. */
 #ifndef HEXAPOD_FMI_VARIABLES_H
 #define HEXAPOD_FMI_VARIABLES_H
 
-#include "hexapod/hexapod.h"
-
-/* What the variables are fields of. */
-struct hxVariables {
-  hxDefinition definition; /* parameters */
-  hxInput input;
-  hxOutput output;
-};
+#include "generated/variables.h"
 
 typedef enum hxType { HX_REAL, HX_INTEGER, HX_BOOLEAN } hxType; /* double, int, int; an enumeration is an HX_INTEGER */
 

@@ -794,7 +794,7 @@ const char *const hx_log_category_names[] = {
     "logAll",
 };
 
-const char hx_default_guid[] = "{3c61b690-3b1a-4175-96fc-4685385a2699}";
+const char hx_default_guid[] = "{4dbefa99-1249-4e32-9de8-74e7922c488a}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -1,4 +1,4 @@
-#include "hexapod/hexapod.h"
+#include "hexapod/status.h"
 
 /* FNV-1a over little-endian words, the last one filled up with zeros, and a shift that brings high bits down: a product alone
  * never does, and changes of sign bits would cancel. Every step is one to one in the hash and in the word. */

@@ -1,4 +1,4 @@
-#include "hexapod/hexapod.h"
+#include "hexapod/status.h"
 
 const char *hx_status_name(hxStatus status) {
   static const char *const names[] = {

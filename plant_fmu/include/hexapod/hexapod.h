@@ -9,19 +9,10 @@
 #ifndef HEXAPOD_H
 #define HEXAPOD_H
 
-#include <stddef.h>
-#include <stdint.h>
+#include "hexapod/status.h"
 
 #ifdef __cplusplus
 extern "C" {
-#endif
-
-#if defined(HX_SHARED) && !defined(_WIN32)
-#define HX_API __attribute__((visibility("default")))
-#elif defined(HX_SHARED)
-#define HX_API __declspec(dllexport)
-#else
-#define HX_API
 #endif
 
 enum {
@@ -29,20 +20,8 @@ enum {
   HX_JOINTS = 3,                         /* per leg */
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS,   /* 19 */
   HX_BODY_STATE = 13,                    /* r[3] p[4] v[3] w[3] */
-  HX_MULTIPLIERS = 5,                    /* per joint */
-  HX_MESSAGE_SIZE = 512
+  HX_MULTIPLIERS = 5                     /* per joint */
 };
-
-/* What a call came to. The list is closed; the message says got, expected, fix. */
-typedef enum hxStatus {
-  HX_OK = 0,
-  HX_INVALID_ARGUMENT,  /* a value outside its range, or not finite; nothing changed */
-  HX_INVALID_MODEL,     /* a definition no robot can have; nothing changed */
-  HX_STEP_TOO_SMALL,    /* the error control asks for a step below its floor */
-  HX_NOT_FINITE,        /* the motion has left the numbers */
-  HX_OUT_OF_MEMORY,
-  HX_BAD_STATE          /* a saved state that is damaged or of another version; nothing changed */
-} hxStatus;
 
 typedef enum hxContactLaw {
   HX_CONTACT_EXACT_RESTITUTION = 1,
@@ -206,9 +185,6 @@ typedef struct hxOutput {
 
 typedef struct hxPlant hxPlant;
 
-HX_API const char *hx_version(void);
-HX_API const char *hx_status_name(hxStatus status);
-
 HX_API void hx_definition_default(hxDefinition *definition);
 HX_API void hx_input_default(hxInput *input); /* the ATHENA-like robot's standing pose */
 
@@ -248,9 +224,6 @@ HX_API const char *hx_plant_message(const hxPlant *plant); /* of the last failur
 HX_API size_t hx_plant_state_size(void);
 HX_API void hx_plant_get_state(const hxPlant *plant, void *bytes);
 HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size);
-
-/* A number that tells damaged bytes from intact ones, on every machine the same; seed: of what came before, or 0. */
-HX_API uint64_t hx_checksum(uint64_t seed, const void *bytes, size_t n);
 
 /* For multibody researchers: the bodies' states, drifted joints allowed, and eq. 1 solved for them. */
 HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);

@@ -1,0 +1,42 @@
+/* plant.c - the plant as an FMU's component */
+#include "fmi/component.h"
+
+static hxPlant *plant_of(hxComponent *component) { return (hxPlant *)component; }
+static const hxPlant *const_plant(const hxComponent *component) { return (const hxPlant *)component; }
+
+hxComponent *hx_component_create(void) { return (hxComponent *)hx_plant_create(); }
+
+void hx_component_destroy(hxComponent *component) { hx_plant_destroy(plant_of(component)); }
+
+void hx_component_defaults(struct hxVariables *variables) {
+  hx_definition_default(&variables->definition);
+  hx_input_default(&variables->input);
+}
+
+hxStatus hx_component_check(const struct hxVariables *variables, char *message) {
+  return hx_definition_check(&variables->definition, message);
+}
+
+hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *variables, double t) {
+  return hx_plant_reset(plant_of(component), &variables->definition, t);
+}
+
+hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, double t_end) {
+  return hx_plant_step(plant_of(component), &variables->input, t_end);
+}
+
+void hx_component_output(hxComponent *component, struct hxVariables *variables) {
+  hx_plant_output(plant_of(component), &variables->input, &variables->output);
+}
+
+double hx_component_time(const hxComponent *component) { return hx_plant_time(const_plant(component)); }
+
+const char *hx_component_message(const hxComponent *component) { return hx_plant_message(const_plant(component)); }
+
+size_t hx_component_state_size(void) { return hx_plant_state_size(); }
+
+void hx_component_get_state(const hxComponent *component, void *bytes) { hx_plant_get_state(const_plant(component), bytes); }
+
+hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
+  return hx_plant_set_state(plant_of(component), bytes, hx_plant_state_size());
+}
