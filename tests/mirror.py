@@ -61,6 +61,17 @@ HxInput = record(
     ("push_force", Vector3),
     ("push_torque", Vector3),
 )
+HxCoordinates = record(
+    "HxCoordinates",
+    ("position", Vector3),
+    ("quaternion", Vector4),
+    ("velocity", Vector3),
+    ("angular_velocity", Vector3),
+    ("angle", PerJoint),
+    ("speed", PerJoint),
+    *reals("actuator_work push_work dissipated"),
+    ("bristle", LegVectors),
+)
 HxOutput = record(
     "HxOutput",
     ("time", Real),

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from mirror import BODIES, BODY_STATE, JOINTS, LEGS, MULTIPLIERS, OK, Doubles, HxDefinition, HxInput, HxOutput, Real
+from mirror import BODIES, BODY_STATE, JOINTS, LEGS, MULTIPLIERS, OK, Doubles, HxCoordinates, HxDefinition, HxInput, HxOutput, Real
 
 from hexapod_cosim.models import (
     CONTACT_LAWS,
@@ -54,6 +54,12 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_plant_set_state": (status, [plant, ct.c_char_p, ct.c_size_t]),
         "hx_plant_get_bodies": (None, [plant, Doubles]),
         "hx_plant_set_bodies": (status, [plant, Doubles]),
+        "hx_plant_get_coordinates": (None, [plant, ct.POINTER(HxCoordinates)]),
+        "hx_plant_set_coordinates": (status, [plant, Real, ct.POINTER(HxCoordinates)]),
+        "hx_plant_rates": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxCoordinates)]),
+        "hx_plant_penetration": (None, [plant, Doubles]),
+        "hx_plant_update_contacts": (ct.c_int, [plant]),
+        "hx_plant_tangent": (status, [plant, *[ct.POINTER(kind) for kind in (HxInput, HxInput, HxCoordinates, HxCoordinates, HxOutput)]]),
         "hx_plant_accelerations": (None, [plant, ct.POINTER(HxInput), Doubles, Doubles, Doubles]),
     }
     for name, (result, arguments) in signatures.items():
@@ -98,6 +104,11 @@ def put(target: Any, values: Any) -> None:
             put(target[index], value)
         else:
             target[index] = value
+
+
+def flat(record: Any) -> Array:
+    """The doubles of a structure that has nothing else (copied)."""
+    return np.frombuffer(bytes(record))
 
 
 def seen(value: Any) -> Any:
@@ -232,6 +243,30 @@ class Plant:
     @bodies.setter
     def bodies(self, body: Array) -> None:
         self._check(self.core.hx_plant_set_bodies(self.handle, pointer(np.ascontiguousarray(body))))
+
+    @property
+    def coordinates(self) -> Array:
+        """(70,) torso, angles, speeds, work, bristles."""
+        x = HxCoordinates()
+        self.core.hx_plant_get_coordinates(self.handle, x)
+        return flat(x)
+
+    @coordinates.setter
+    def coordinates(self, x: Array) -> None:
+        self._check(self.core.hx_plant_set_coordinates(self.handle, self.time, HxCoordinates.from_buffer_copy(x.tobytes())))
+
+    def rates(self, command: Command | None = None) -> Array:
+        """(70,) d/dt of the coordinates under a command."""
+        dx = HxCoordinates()
+        self.core.hx_plant_rates(self.handle, inputs(command or self.hold()), dx)
+        return flat(dx)
+
+    def tangent(self, command: Command, d_input: Array, dx: Array) -> tuple[Array, Any]:
+        """What a change of the input (60,) and of the coordinates (70,) makes of the rates (70,) and of the HxOutput."""
+        change, d_rate, d_output = HxInput.from_buffer_copy(d_input.tobytes()), HxCoordinates(), HxOutput()
+        moved = HxCoordinates.from_buffer_copy(dx.tobytes())
+        self._check(self.core.hx_plant_tangent(self.handle, inputs(command), change, moved, d_rate, d_output))
+        return flat(d_rate), d_output
 
     def accelerations(self, command: Command | None = None) -> Accelerations:
         """Eq. 1 solved at the present state; the gear torque, which the plant does not tell, is left at 0."""

@@ -794,7 +794,7 @@ const char *const hx_log_category_names[] = {
     "logAll",
 };
 
-const char hx_default_guid[] = "{4dbefa99-1249-4e32-9de8-74e7922c488a}";
+const char hx_default_guid[] = "{4c3a4c7c-ffd0-496a-8ed7-248bc3222c2b}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -21,6 +21,13 @@ typedef struct hxKernel {
   /* dy/dt, with or without the multipliers on the way. */
   void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate);
 
+  /* A motion on its joints at coordinates; coordinates of a motion and their rates, either of which may be NULL. */
+  void (*place)(const hxModel *model, const hxCoordinates *x, hxMotion *motion);
+  void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command, hxCoordinates *x, hxCoordinates *rate);
+
+  /* All feet: penetration, approach speed; m, m/s. */
+  void (*feet)(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]);
+
   void (*output)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output);
 
   void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],

@@ -1,5 +1,6 @@
 /* kernel_functions.h - a kernel's functions from the physics on lanes: included once in each kernel's file, at its width */
 #include "kernel.h"
+#include "lanes/coordinates.h"
 #include "lanes/dynamics.h"
 #include "lanes/integrator.h"
 #include "lanes/output.h"
@@ -27,6 +28,22 @@ static void kernel_derivative(const hxModel *model, const hxState *state, const 
   *rate = all.motion;
 }
 
+static void kernel_coordinates(const hxModel *model, const hxState *state, const hxCommand *command, hxCoordinates *x,
+                               hxCoordinates *rate) {
+  hxRate all;
+  hxWork work;
+  memset(all.motion.bristle, 0, sizeof all.motion.bristle);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 0, &work, &all);
+  if (x) hx_coordinates_of(&state->motion, &work, x);
+  if (rate) hx_coordinates_rate(&all.motion, &work, rate);
+}
+
+static void kernel_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
+  const hxFeet feet = feet_of(model, motion);
+  memcpy(delta, feet.delta, sizeof feet.delta);
+  memcpy(ddelta, feet.ddelta, sizeof feet.ddelta);
+}
+
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output) {
   hxRate rate;
   hxWork work;
@@ -48,5 +65,8 @@ static void kernel_accelerations(const hxModel *model, const hxState *state, con
    .start = kernel_start,                                                                                                                  \
    .integrate = hx_integrate,                                                                                                              \
    .derivative = kernel_derivative,                                                                                                        \
+   .place = hx_motion_from_coordinates,                                                                                                    \
+   .coordinates = kernel_coordinates,                                                                                                      \
+   .feet = kernel_feet,                                                                                                                    \
    .output = kernel_output,                                                                                                                \
    .accelerations = kernel_accelerations}

@@ -6,8 +6,10 @@
 #include <string.h>
 
 #include "check.h"
+#include "contact_law.h"
 #include "kernel.h"
 #include "robot.h"
+#include "tangent.h"
 
 /* A saved state: the plant's model and state behind what it takes to recognise them. */
 typedef struct {
@@ -97,6 +99,80 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;
+}
+
+static const hxCommand no_command;
+
+void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x) {
+  hx_kernel()->coordinates(&plant->model, &plant->state, &no_command, x, NULL);
+}
+
+/* whether a state is one: finite, with an attitude */
+static int are_coordinates(const hxCoordinates *x) {
+  const double *entry = (const double *)x, *p = x->quaternion;
+  double sum = 0.0;
+  for (int i = 0; i < HX_COORDINATES; ++i) sum += 0.0 * entry[i];
+  return sum == 0.0 && p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] > 1e-6;
+}
+
+hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x) {
+  if (!isfinite(t) || !are_coordinates(x))
+    return refuse(plant, HX_INVALID_ARGUMENT,
+                  "coordinates: got a number that is not finite, or a quaternion near 0; expected a state of the robot");
+  hx_kernel()->place(&plant->model, x, &plant->state.motion);
+  plant->state.time = t;
+  return HX_OK;
+}
+
+void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
+  hxCommand command;
+  hx_command_from_input(&command, input, plant->state.time);
+  hx_kernel()->coordinates(&plant->model, &plant->state, &command, NULL, rate);
+}
+
+void hx_plant_penetration(const hxPlant *plant, double penetration[HX_LEGS]) {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
+  memcpy(penetration, delta, HX_LEGS * sizeof(double));
+}
+
+int hx_plant_update_contacts(hxPlant *plant) {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  const hxMotion before = plant->state.motion;
+  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
+  plant->state.touchdowns += hx_contact_switch(&plant->model, delta, ddelta, &plant->state.contact);
+  if (plant->model.friction_law == HX_FRICTION_BRISTLE) hx_contact_slacken(&plant->state.contact, &plant->state.motion);
+  return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
+}
+
+/* the largest size among numbers that begin at first; not finite when one is not */
+static double largest(double so_far, const void *first, size_t n) {
+  const double *entry = first;
+  for (size_t i = 0; first && i < n; ++i)
+    if (!(fabs(entry[i]) <= so_far)) so_far = fabs(entry[i]);
+  return so_far;
+}
+
+hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx, hxCoordinates *d_rate,
+                          hxOutput *d_output) {
+  static const hxInput no_input;
+  static const hxCoordinates no_change;
+  hxTangentPoint point;
+  const double scale = largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
+  if (!isfinite(scale)) return refuse(plant, HX_INVALID_ARGUMENT, "derivatives: got a direction that is not finite, expected numbers");
+  hx_command_from_input(&point.command, input, plant->state.time);
+  hx_command_from_input(&point.d_command, d_input ? d_input : &no_input, 0.0);
+  hx_plant_get_coordinates(plant, &point.x);
+  point.dx = dx ? *dx : no_change;
+  point.model = plant->model;
+  point.state = plant->state;
+  point.scale = scale > 0.0 ? scale : 1.0;
+#if HX_HAS_TANGENT
+  hx_tangent(&point, d_rate, d_output);
+  return HX_OK;
+#else
+  return refuse(plant, HX_INVALID_ARGUMENT, "derivatives: this binary's compiler has no complex numbers; use another");
+#endif
 }
 
 void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]) {

@@ -183,6 +183,22 @@ typedef struct hxOutput {
   } solver;
 } hxOutput;
 
+/* The least numbers that tell where everything is: the torso as it is, joints by angle and speed. Of doubles alone, in this order the
+ * continuous states of model exchange. The same structure holds their rates, and changes of either. */
+typedef struct hxCoordinates {
+  double position[3], quaternion[4];  /* m, 1      torso's centre of mass and attitude; the quaternion need not have unit length */
+  double velocity[3];                 /* m/s */
+  double angular_velocity[3];         /* rad/s     world axes */
+  double angle[HX_LEGS][HX_JOINTS];   /* rad */
+  double speed[HX_LEGS][HX_JOINTS];   /* rad/s */
+  double actuator_work;               /* J */
+  double push_work;                   /* J */
+  double dissipated;                  /* J */
+  double bristle[HX_LEGS][3];         /* m         world axes; 0 and at rest but with the bristle law */
+} hxCoordinates;
+
+enum { HX_COORDINATES = sizeof(hxCoordinates) / sizeof(double) };
+
 typedef struct hxPlant hxPlant;
 
 HX_API void hx_definition_default(hxDefinition *definition);
@@ -224,6 +240,20 @@ HX_API const char *hx_plant_message(const hxPlant *plant); /* of the last failur
 HX_API size_t hx_plant_state_size(void);
 HX_API void hx_plant_get_state(const hxPlant *plant, void *bytes);
 HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size);
+
+/* For solvers of others: y' = f(t, y, u) in coordinates, between touch-downs and lift-offs. The importer looks for sign changes of the feet's
+ * penetration and then has the contacts updated. */
+HX_API void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x);
+HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x); /* contacts stay as they are */
+HX_API void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate);
+HX_API void hx_plant_penetration(const hxPlant *plant, double penetration[HX_LEGS]); /* m  < 0: clearance */
+HX_API int hx_plant_update_contacts(hxPlant *plant); /* touch-downs and lift-offs that are due; whether coordinates changed (bristles) */
+
+/* What small changes of input and coordinates make of rates and outputs: derivatives along that direction, exact to rounding (complex
+ * arithmetic, lanes/tangent.h), contacts held; contact and the solver's counts have none. Either change may be NULL, for none, and so
+ * may either result. HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
+HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx,
+                                 hxCoordinates *d_rate, hxOutput *d_output);
 
 /* For multibody researchers: the bodies' states, drifted joints allowed, and eq. 1 solved for them. */
 HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);

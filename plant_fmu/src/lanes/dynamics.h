@@ -345,7 +345,7 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
 /* ---- the torso -------------------------------------------------------------------------------------------------------------- */
 
 static inline void torso_pass(const hxModel *model, const hxMotion *motion, hxWork *work) {
-  const double *J = model->torso_inertia;
+  const hxNumber *J = model->torso_inertia;
   const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]), hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};
   work->torso = hx_torso_body(motion);
   work->torso_J = hx_rotate_sym3(work->torso.axes, body);
@@ -410,7 +410,7 @@ static inline void store_link_rate(const hxModel *model, const hxMotion *motion,
   hxMotion6 nu = link_velocity(motion, joint, slot);
   if (implicit) nu = hx_motion_add_scaled(nu, hx_splat(implicit->z), dv);
   if (implicit && implicit->change) nu = hx_motion_add(nu, link_velocity(&implicit->change->motion, joint, slot));
-  double (*to)[HX_SLOTS] = rate->motion.link[joint];
+  hxNumber(*to)[HX_SLOTS] = rate->motion.link[joint];
   hx_store_vec3(&to[HX_R], slot, nu.lin);
   hx_store_quat(&to[HX_P], slot, hx_quaternion_rate(hx_link_quat(motion, joint, slot), nu.ang));
   hx_store_vec3(&to[HX_V], slot, dv.lin);

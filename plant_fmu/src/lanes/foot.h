@@ -70,7 +70,7 @@ static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
  * damping can have: w never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages scatter. */
 static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const double per_length = 1.0 / model->presliding;
+  const hxNumber per_length = 1.0 / model->presliding;
   const hxVec3 u = hx_scale(hx_splat(per_length), b);
   const hxReal size = hx_sqrt(hx_dot(u, u)), within = hx_min(size, one);
   const hxReal s = hx_clip((size - break_away) * (1.0 / (1.0 - break_away)), zero, one);

@@ -17,6 +17,9 @@
 
 #include "../state.h"
 
+#ifndef HX_TANGENT
+typedef double hxNumber; /* what the structures of state.h and hexapod.h are made of */
+
 #ifndef HX_LANES
 #if !defined(__GNUC__)
 #define HX_LANES 1
@@ -28,8 +31,6 @@
 #define HX_LANES 2
 #endif
 #endif
-
-enum { HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES }; /* a pack is HX_LANES legs */
 
 #if HX_LANES == 1
 typedef double hxReal;
@@ -98,27 +99,6 @@ static inline hxReal hx_max(hxReal a, hxReal b) { return hx_select(hx_less(a, b)
 static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) { return hx_min(hx_max(x, low), high); }
 static inline hxReal hx_abs(hxReal x) { return hx_from_bits(hx_bits(x) & INT64_MAX); }
 
-/* The sum over the legs, in every lane, in one order whatever the width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */
-#if HX_LANES == 2
-static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
-  const hxReal x = (pack[0] + pack[2]) + pack[1];
-  return x + HX_SHUFFLE(x, 1, 0);
-}
-#elif HX_LANES == 4
-static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
-  const hxMask legs = {-1, -1, 0, 0};
-  const hxReal x = pack[0] + hx_select(legs, pack[1], hx_splat(-0.0)); /* adding -0 changes nothing, not even -0 */
-  const hxReal halves = x + HX_SHUFFLE(x, 2, 3, 0, 1);
-  return halves + HX_SHUFFLE(halves, 1, 0, 3, 2);
-}
-#else
-static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
-  double x[HX_SLOTS];
-  for (int p = 0; p < HX_PACKS; ++p) hx_store(&x[p * HX_LANES], pack[p]);
-  return hx_splat(((x[0] + x[4]) + x[2]) + ((x[1] + x[5]) + x[3]));
-}
-#endif
-
 /* e^x - 1 for |x| <= 40: x = k ln 2 + r, Taylor to r^13 (remainder 4e-18), then 2^k (e^r - 1) + (2^k - 1) */
 static inline hxReal hx_expm1(hxReal x) {
   const double round = 6755399441055744.0; /* 1.5 * 2^52: adding and taking it away rounds to an integer */
@@ -163,5 +143,50 @@ static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   const hxReal high = (-0.05036270404445784 + z * 0.037993873512197886) - z2 * 0.017835677876676313;
   return 8.0 * (t + t * z * (low + z4 * (mid + z4 * high)));
 }
+
+/* The angle of (x, y) in (-pi, pi], and the one in [-pi/2, pi/2] whose sine is x; of single numbers. */
+static inline double hx_atan2(double y, double x) { return atan2(y, x); }
+static inline double hx_asin(double x) { return asin(fmin(1.0, fmax(-1.0, x))); }
+
+static inline hxReal hx_cos(hxReal x) {
+  double lane[HX_LANES];
+  hx_store(lane, x);
+  for (int i = 0; i < HX_LANES; ++i) lane[i] = cos(lane[i]);
+  return hx_load(lane);
+}
+
+static inline hxReal hx_sin(hxReal x) {
+  double lane[HX_LANES];
+  hx_store(lane, x);
+  for (int i = 0; i < HX_LANES; ++i) lane[i] = sin(lane[i]);
+  return hx_load(lane);
+}
+
+#else
+#include "tangent.h"
+#endif
+
+enum { HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES }; /* a pack is HX_LANES legs */
+
+/* The sum over the legs, in every lane, in one order whatever the width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */
+#if HX_LANES == 2
+static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
+  const hxReal x = (pack[0] + pack[2]) + pack[1];
+  return x + HX_SHUFFLE(x, 1, 0);
+}
+#elif HX_LANES == 4
+static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
+  const hxMask legs = {-1, -1, 0, 0};
+  const hxReal x = pack[0] + hx_select(legs, pack[1], hx_splat(-0.0)); /* adding -0 changes nothing, not even -0 */
+  const hxReal halves = x + HX_SHUFFLE(x, 2, 3, 0, 1);
+  return halves + HX_SHUFFLE(halves, 1, 0, 3, 2);
+}
+#else
+static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
+  hxNumber x[HX_SLOTS];
+  for (int p = 0; p < HX_PACKS; ++p) hx_store(&x[p * HX_LANES], pack[p]);
+  return hx_splat(((x[0] + x[4]) + x[2]) + ((x[1] + x[5]) + x[3]));
+}
+#endif
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "dynamics.h"
 
-static void get3(hxVec3 a, int lane, double out[3]) {
+static void get3(hxVec3 a, int lane, hxNumber out[3]) {
   out[0] = hx_lane(a.x, lane);
   out[1] = hx_lane(a.y, lane);
   out[2] = hx_lane(a.z, lane);
@@ -19,7 +19,7 @@ static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
 static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) { return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w))); }
 
 /* of bodies and rotors */
-static double hx_kinetic_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
   const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J, hx_torso_vec3(motion, HX_V), work->torso.w);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -36,7 +36,7 @@ static double hx_kinetic_energy(const hxModel *model, const hxMotion *motion, co
 }
 
 /* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
-static double hx_potential_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -76,9 +76,9 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
 }
 
 static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) {
-  const double *m = motion->torso;
+  const hxNumber *m = motion->torso;
   const hxMat3 R = work->torso.axes;
-  double x[3], y[3], z[3]; /* columns of R */
+  hxNumber x[3], y[3], z[3]; /* columns of R */
   get3(R.x, 0, x), get3(R.y, 0, y), get3(R.z, 0, z);
   for (int i = 0; i < 3; ++i) {
     o->torso.position[i] = m[HX_R + i];
@@ -86,9 +86,9 @@ static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) 
     o->torso.angular_velocity[i] = m[HX_W + i];
   }
   for (int i = 0; i < 4; ++i) o->torso.quaternion[i] = m[HX_P + i];
-  o->torso.roll = atan2(y[2], z[2]);
-  o->torso.pitch = asin(fmin(1.0, fmax(-1.0, -x[2])));
-  o->torso.yaw = atan2(x[1], x[0]);
+  o->torso.roll = hx_atan2(y[2], z[2]);
+  o->torso.pitch = hx_asin(-x[2]);
+  o->torso.yaw = hx_atan2(x[1], x[0]);
   get3(hx_tmul(R, work->torso_acceleration.lin), 0, o->imu.specific_force);
   get3(hx_tmul(R, work->torso.w), 0, o->imu.angular_velocity);
 }
@@ -104,8 +104,8 @@ static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutp
       velocity[pack] += hx_dot(c.dphi_lin, c.dphi_lin) + c.dphi[0] * c.dphi[0] + c.dphi[1] * c.dphi[1];
     }
   }
-  o->constraint.position_error = sqrt(hx_lane(hx_sum_legs(position), 0));
-  o->constraint.velocity_error = sqrt(hx_lane(hx_sum_legs(velocity), 0));
+  o->constraint.position_error = hx_lane(hx_sqrt(hx_sum_legs(position)), 0);
+  o->constraint.velocity_error = hx_lane(hx_sqrt(hx_sum_legs(velocity)), 0);
 }
 
 static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
@@ -137,8 +137,8 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
 }
 
 /* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's bodies */
-static void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, double acceleration[HX_BODIES][6],
-                                  double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
+static inline void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, hxNumber acceleration[HX_BODIES][6],
+                                         hxNumber multiplier[HX_BODIES - 1][HX_MULTIPLIERS], hxNumber drive_torque[HX_BODIES - 1]) {
   for (int i = 0; i < 6; ++i) acceleration[0][i] = rate->torso[HX_V + i];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;

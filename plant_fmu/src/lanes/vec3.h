@@ -18,35 +18,35 @@ typedef struct {
 } hxSym3;
 
 /* [component][slot] in memory */
-static inline hxVec3 hx_load_vec3(const double (*m)[HX_SLOTS], int slot) {
+static inline hxVec3 hx_load_vec3(const hxNumber (*m)[HX_SLOTS], int slot) {
   return (hxVec3){hx_load(&m[0][slot]), hx_load(&m[1][slot]), hx_load(&m[2][slot])};
 }
 
-static inline void hx_store_vec3(double (*m)[HX_SLOTS], int slot, hxVec3 a) {
+static inline void hx_store_vec3(hxNumber (*m)[HX_SLOTS], int slot, hxVec3 a) {
   hx_store(&m[0][slot], a.x);
   hx_store(&m[1][slot], a.y);
   hx_store(&m[2][slot], a.z);
 }
 
-static inline hxQuat hx_load_quat(const double (*m)[HX_SLOTS], int slot) {
+static inline hxQuat hx_load_quat(const hxNumber (*m)[HX_SLOTS], int slot) {
   return (hxQuat){hx_load(&m[0][slot]), hx_load(&m[1][slot]), hx_load(&m[2][slot]), hx_load(&m[3][slot])};
 }
 
-static inline void hx_store_quat(double (*m)[HX_SLOTS], int slot, hxQuat p) {
+static inline void hx_store_quat(hxNumber (*m)[HX_SLOTS], int slot, hxQuat p) {
   hx_store(&m[0][slot], p.w);
   hx_store(&m[1][slot], p.x);
   hx_store(&m[2][slot], p.y);
   hx_store(&m[3][slot], p.z);
 }
 
-static inline hxSym3 hx_load_sym3(const double (*m)[HX_SLOTS], int slot) {
+static inline hxSym3 hx_load_sym3(const hxNumber (*m)[HX_SLOTS], int slot) {
   return (hxSym3){hx_load(&m[0][slot]), hx_load(&m[1][slot]), hx_load(&m[2][slot]),
                   hx_load(&m[3][slot]), hx_load(&m[4][slot]), hx_load(&m[5][slot])};
 }
 
 /* the same in all lanes */
-static inline hxVec3 hx_splat_vec3(const double a[3]) { return (hxVec3){hx_splat(a[0]), hx_splat(a[1]), hx_splat(a[2])}; }
-static inline hxQuat hx_splat_quat(const double p[4]) { return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])}; }
+static inline hxVec3 hx_splat_vec3(const hxNumber a[3]) { return (hxVec3){hx_splat(a[0]), hx_splat(a[1]), hx_splat(a[2])}; }
+static inline hxQuat hx_splat_quat(const hxNumber p[4]) { return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])}; }
 
 static inline hxVec3 hx_zero3(void) { return (hxVec3){hx_splat(0.0), hx_splat(0.0), hx_splat(0.0)}; }
 static inline hxVec3 hx_add(hxVec3 a, hxVec3 b) { return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z}; }

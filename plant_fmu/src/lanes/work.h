@@ -56,10 +56,10 @@ enum { HX_TURN_SIZE = 8 + HX_JOINTS * 3 * HX_SLOTS };
 
 /* dy/dt, and the angular velocities that its quaternion rates stand for. The same doubles as a vector for the integrator. */
 typedef union {
-  double y[HX_TURN_SIZE + HX_MOTION_SIZE];
+  hxNumber y[HX_TURN_SIZE + HX_MOTION_SIZE];
   struct {
-    double torso_turn[8]; /* the last five are padding */
-    double link_turn[HX_JOINTS][3][HX_SLOTS];
+    hxNumber torso_turn[8]; /* the last five are padding */
+    hxNumber link_turn[HX_JOINTS][3][HX_SLOTS];
     hxMotion motion;
   };
 } hxRate;

@@ -1,0 +1,73 @@
+/* tangent.h - one leg at a time, its derivative along: hxReal is the complex number x + i step x', which takes the place of lanes.h's.
+ *
+ * Arithmetic on complex numbers differentiates itself: (a + i h a')(b + i h b') = ab + i h (a b' + a' b) but for h^2 a' b', which is
+ * nothing where h is 1e-170. Derivatives come out exact to rounding; there is no difference of values in them. What chooses, by order or by
+ * sign, looks at the real part; at a kink that is the side that the values are computed on.
+ */
+#ifndef HX_LANES_TANGENT_H
+#define HX_LANES_TANGENT_H
+
+static const double hx_tangent_step = 1e-170;
+
+typedef hxComplex hxReal, hxNumber;
+typedef int64_t hxMask;
+
+static inline double hx_re(hxComplex x) { return __real__ x; }
+static inline double hx_im(hxComplex x) { return __imag__ x; }
+
+static inline hxComplex hx_complex(double re, double im) {
+  hxComplex x;
+  __real__ x = re;
+  __imag__ x = im;
+  return x;
+}
+
+static inline hxReal hx_load(const hxNumber *slots) { return slots[0]; }
+static inline void hx_store(hxNumber *slots, hxReal x) { slots[0] = x; }
+static inline hxReal hx_splat(hxNumber x) { return x; }
+static inline hxNumber hx_lane(hxReal x, int lane) {
+  (void)lane;
+  return x;
+}
+
+static inline hxMask hx_less(hxReal a, hxReal b) { return hx_re(a) < hx_re(b) ? -1 : 0; }
+static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return mask ? a : b; }
+static inline hxReal hx_min(hxReal a, hxReal b) { return hx_select(hx_less(b, a), b, a); }
+static inline hxReal hx_max(hxReal a, hxReal b) { return hx_select(hx_less(a, b), b, a); }
+static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) { return hx_min(hx_max(x, low), high); }
+static inline hxReal hx_abs(hxReal x) { return hx_re(x) < 0.0 ? -x : x; }
+
+/* f(x) from its value and its slope there */
+static inline hxReal hx_chain(hxReal x, double value, double slope) { return hx_complex(value, slope * hx_im(x)); }
+
+/* the slope at 0 counts as 0: what is under a root here is a square */
+static inline hxReal hx_sqrt(hxReal x) {
+  const double root = sqrt(fmax(hx_re(x), 0.0));
+  return hx_chain(x, root, root > 0.0 ? 0.5 / root : 0.0);
+}
+
+static inline hxReal hx_tanh(hxReal x) {
+  const double t = tanh(hx_re(x));
+  return hx_chain(x, t, 1.0 - t * t);
+}
+
+static inline hxReal hx_tanh_ratio(hxReal x) { return hx_tanh(x) / x; }
+static inline hxReal hx_cos(hxReal x) { return hx_chain(x, cos(hx_re(x)), -sin(hx_re(x))); }
+static inline hxReal hx_sin(hxReal x) { return hx_chain(x, sin(hx_re(x)), cos(hx_re(x))); }
+
+static inline hxNumber hx_atan2(hxNumber y, hxNumber x) {
+  const double a = hx_re(x), b = hx_re(y), square = a * a + b * b;
+  return hx_complex(atan2(b, a), (a * hx_im(y) - b * hx_im(x)) / square);
+}
+
+static inline hxNumber hx_asin(hxNumber x) {
+  const double s = fmin(1.0, fmax(-1.0, hx_re(x))), cosine = sqrt(1.0 - s * s);
+  return hx_chain(x, asin(s), cosine > 0.0 ? 1.0 / cosine : 0.0);
+}
+
+static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
+  const hxReal sign = hx_re(x) < 0.0 ? -1.0 : 1.0;
+  return 2.0 * hx_atan2(sign * y, sign * x);
+}
+
+#endif

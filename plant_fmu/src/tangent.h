@@ -1,0 +1,25 @@
+/* tangent.h - derivatives of rates and outputs along a direction, from the physics on complex numbers (lanes/tangent.h) */
+#ifndef HX_TANGENT_H
+#define HX_TANGENT_H
+
+#include "state.h"
+
+#if defined(__GNUC__)
+#define HX_HAS_TANGENT 1
+#else
+#define HX_HAS_TANGENT 0 /* MSVC has no arithmetic on complex numbers */
+#endif
+
+/* Where, and which way. */
+typedef struct hxTangentPoint {
+  hxCommand command, d_command;
+  hxCoordinates x, dx;
+  hxState state; /* contacts and time; the motion is that of x */
+  double scale;  /* > 0: sizes of d_command and dx */
+  hxModel model;
+} hxTangentPoint;
+
+/* Either result may be NULL. In d_output, contact is 0. */
+void hx_tangent(const hxTangentPoint *point, hxCoordinates *d_rate, hxOutput *d_output);
+
+#endif
