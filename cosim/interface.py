@@ -17,11 +17,11 @@ from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
 from hexapod_cosim.models.statics import settled
 
-Causality = Literal["input", "output", "parameter"]
+Causality = Literal["input", "output", "parameter", "local"]
 Type = Literal["Real", "Boolean", "Enumeration"]
 
-CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter")
-DEFAULT_VARIABILITY = {"input": "continuous", "output": "continuous", "parameter": "fixed"}
+CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter", "local")
+DEFAULT_VARIABILITY = {"input": "continuous", "output": "continuous", "parameter": "fixed", "local": "continuous"}
 POSE_DECIMALS = 10  # of the settled pose (m, rad): far below what matters, far above what differs between machines
 
 
@@ -70,7 +70,18 @@ class Variable:
     start: float | int | None  # None for outputs
     enumeration: str | None
     field: str  # lvalue in struct hxVariables
+    depends: tuple[str, ...] | None  # of an output or local: the states and inputs it is a direct function of; None: all
+    initial: tuple[str, ...] | None  # the parameters it comes from at the start, besides those of its states; None: all
     description: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """A continuous state of model exchange, its derivative and the parameters it starts from, by the names of their variables."""
+
+    name: str
+    derivative: str
+    initial: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,6 +101,8 @@ class Interface:
     robot: Robot
     version: str
     variables: tuple[Variable, ...]
+    states: tuple[State, ...]  # in the order in which importers exchange them
+    event_indicators: int
     patterns: tuple[Pattern, ...]
     units: tuple[Unit, ...]
     enumerations: Mapping[str, Enumeration]
@@ -102,6 +115,30 @@ class Interface:
     def by_name(self) -> Mapping[str, Variable]:
         """Variables by name."""
         return {variable.name: variable for variable in self.variables}
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """Places of variables in the model description, from 1, by name."""
+        return {variable.name: place for place, variable in enumerate(self.variables, start=1)}
+
+    @cached_property
+    def derivative_of(self) -> Mapping[str, int]:
+        """By the names of derivatives, places of the states that they are derivatives of."""
+        return {state.derivative: self.index[state.name] for state in self.states}
+
+    def depends(self, name: str) -> tuple[str, ...] | None:
+        """States and inputs that an output or a derivative is a direct function of; None: all."""
+        return self.variable(name).depends
+
+    def depends_initially(self, name: str) -> tuple[str, ...] | None:
+        """Parameters and inputs that it comes from at the start; None: all."""
+        variable, start = self.variable(name), {state.name: state.initial for state in self.states}
+        if name in start:
+            return start[name]
+        if variable.depends is None or variable.initial is None:
+            return None
+        through = [known for state in variable.depends for known in start.get(state, (state,))]
+        return tuple(dict.fromkeys([*through, *variable.initial]))
 
     def variable(self, name: str) -> Variable:
         """A variable by name. Raises HexapodError naming the nearest one."""
@@ -123,10 +160,13 @@ def load_interface(robot: Robot) -> Interface:
     """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit its variable."""
     table = _table()
     enumerations = {name: _enumeration(name, entry) for name, entry in table["enumeration"].items()}
+    variables = tuple(_expand_all(table, enumerations, _roots(robot)))
     return Interface(
         robot=robot,
         version=package_version(),
-        variables=tuple(_expand_all(table, enumerations, _roots(robot))),
+        variables=variables,
+        states=tuple(_states(table)),
+        event_indicators=table["event"]["indicators"],
         patterns=tuple(_pattern(entry, causality) for causality in CAUSALITIES for entry in table[causality]),
         units=tuple(_unit(name, entry) for name, entry in table["unit"].items()),
         enumerations=enumerations,
@@ -173,7 +213,7 @@ def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration
     for causality in CAUSALITIES:
         places = itertools.chain.from_iterable(_places(entry, table["axis"]) for entry in table[causality])
         for reference, (entry, place) in enumerate(places, start=table["first_reference"][causality]):
-            yield _variable(entry, place, reference, causality, enumerations, roots)
+            yield _variable(entry, place, reference, causality, enumerations, roots, table["axis"])
 
 
 def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable[tuple[Mapping[str, Any], dict[str, tuple[int, str]]]]:
@@ -186,13 +226,13 @@ def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable
 
 def _variable(
     entry: Mapping[str, Any], place: Mapping[str, tuple[int, str]], reference: int, causality: Causality,
-    enumerations: Mapping[str, Enumeration], roots: SimpleNamespace,
+    enumerations: Mapping[str, Enumeration], roots: SimpleNamespace, axes: Mapping[str, list[str]],
 ) -> Variable:  # fmt: skip
     labels = {axis: label for axis, (_, label) in place.items()}
     enumeration = enumerations.get(entry.get("type", ""))
     kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
     variable = Variable(
-        name=entry["name"].replace("[i]", f"[{labels.get('i')}]").format(**labels),
+        name=_labelled(entry["name"], labels),
         reference=reference,
         type=kind,
         causality=causality,
@@ -205,9 +245,44 @@ def _variable(
         enumeration=enumeration.name if enumeration else None,
         field=re.sub(r"\[(\w+)\]", lambda match: f"[{place[match[1]][0]}]", entry["field"]),
         description=entry["description"].format(**labels),
+        depends=_names(entry.get("depends"), labels, axes),
+        initial=_names(entry.get("initial"), labels, axes),
     )
     _check_start(variable)
     return variable
+
+
+def _labelled(pattern: str, labels: Mapping[str, str]) -> str:
+    return pattern.replace("[i]", f"[{labels.get('i')}]").format(**labels)
+
+
+def _states(table: Mapping[str, Any]) -> Iterable[State]:
+    for entry in table["state"]:
+        for _, place in _places(entry, table["axis"]):
+            labels = {axis: label for axis, (_, label) in place.items()}
+            name, derivative = (_labelled(entry[key], labels) for key in ("name", "derivative"))
+            yield State(name=name, derivative=derivative, initial=_names(entry["initial"], labels, table["axis"]) or ())
+
+
+def _names(patterns: Iterable[str] | None, labels: Mapping[str, str], axes: Mapping[str, list[str]]) -> tuple[str, ...] | None:
+    """Names by patterns: @ begins a group, {axis} is one's own label, * every leg, joint or index (of three, or of a quaternion's four)."""
+    if patterns is None:
+        return None
+    found: list[str] = []
+    for pattern in patterns:
+        group = _table()["group"][pattern[1:]] if pattern.startswith("@") else None
+        found += _every(_labelled(pattern, labels), axes) if group is None else _names(group, labels, axes) or ()
+    return tuple(found)
+
+
+def _every(pattern: str, axes: Mapping[str, list[str]]) -> list[str]:
+    """A name for every label of its stars: a leg at the beginning, a joint inside, an index in brackets (a quaternion has four)."""
+    indices = [f"[{i + 1}]" for i in range(4 if "quaternion" in pattern else 3)]
+    joints, legs = ([f".{joint}." for joint in axes["joint"]], [f"{leg}." for leg in axes["leg"]])
+    names = [pattern]
+    for star, labels in (("[*]", indices), (".*.", joints), ("*.", legs)):
+        names = [name.replace(star, label, 1) for name in names for label in (labels if star in name else [star])]
+    return names
 
 
 def _start(

@@ -12,18 +12,21 @@ from xml.etree.ElementTree import Element, SubElement
 from hexapod_cosim.cosim.interface import Enumeration, Interface, Unit, Variable
 from hexapod_cosim.cosim.plant_files import DISTRIBUTION, MODEL_IDENTIFIER, source_files
 
-# what the binary can do; tests/test_fmi.py holds each of these to its word
-CAPABILITIES = {
-    "canHandleVariableCommunicationStepSize": "true",
-    "canInterpolateInputs": "false",
-    "maxOutputDerivativeOrder": "0",
-    "canRunAsynchronuously": "false",
+# what the binary can do; tests/test_fmi.py and tests/test_fmi_exchange.py hold each of these to its word
+BOTH = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
-    "providesDirectionalDerivative": "false",
 }
+MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "true"} | BOTH
+# canInterpolateInputs: derivatives of inputs are taken whenever they are given, but some masters that connect sources without any
+# refuse an FMU that declares it, and none refuses one that does not
+CO_SIMULATION = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "canRunAsynchronuously": "false",
+} | BOTH
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,9 @@ def _document(interface: Interface) -> Element:
         "fmiVersion": "2.0", "modelName": robot.name, "guid": "", "version": interface.version,
         "description": f"Hexapod robot of {1 + joints} rigid bodies and {joints} servo joints, walking on compliant ground",
         "license": "MIT", "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
+        "numberOfEventIndicators": str(interface.event_indicators),
     })  # fmt: skip
-    _add_co_simulation(root)
+    _add_interfaces(root, interface)
     _add_units(root, interface.units)
     _add_types(root, interface.enumerations.values())
     categories = SubElement(root, "LogCategories")
@@ -63,13 +67,25 @@ def _document(interface: Interface) -> Element:
     _add_provenance(root, interface)
     variables = SubElement(root, "ModelVariables")
     for variable in interface.variables:
-        _add_variable(variables, variable, interface.units)
-    _add_structure(root, interface.variables)
+        _add_variable(variables, variable, interface)
+    _add_structure(root, interface)
     return root
 
 
-def _add_co_simulation(root: Element) -> None:
-    element = SubElement(root, "CoSimulation", {"modelIdentifier": MODEL_IDENTIFIER} | CAPABILITIES)
+def _add_interfaces(root: Element, interface: Interface) -> None:
+    """Model exchange for components with continuous states, whose derivatives are exact; co-simulation."""
+    differentiable = {"providesDirectionalDerivative": _flag(bool(interface.states))}
+    order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
+    if interface.states:
+        _add_sources(SubElement(root, "ModelExchange", {"modelIdentifier": MODEL_IDENTIFIER} | MODEL_EXCHANGE | differentiable))
+    _add_sources(SubElement(root, "CoSimulation", {"modelIdentifier": MODEL_IDENTIFIER} | CO_SIMULATION | order | differentiable))
+
+
+def _flag(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _add_sources(element: Element) -> None:
     files = SubElement(element, "SourceFiles")
     for name in source_files():
         if name.endswith(".c"):
@@ -99,15 +115,15 @@ def _add_provenance(root: Element, interface: Interface) -> None:
     SubElement(tool, "Robot", name=interface.robot.name, hash=interface.robot.hash)
 
 
-def _add_variable(parent: Element, variable: Variable, units: Iterable[Unit]) -> None:
+def _add_variable(parent: Element, variable: Variable, interface: Interface) -> None:
     element = SubElement(parent, "ScalarVariable", {
         "name": variable.name, "valueReference": str(variable.reference), "causality": variable.causality,
-        "variability": variable.variability, "initial": "calculated" if variable.causality == "output" else "exact",
+        "variability": variable.variability, "initial": "exact" if variable.causality == "parameter" else "calculated",
         "description": variable.description,
     })  # fmt: skip
     if variable.causality == "input":
         del element.attrib["initial"]  # the standard forbids to state it
-    displays = {unit.name: unit.display[0] for unit in units if unit.display}
+    displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
     attributes = {
         "declaredType": variable.enumeration,
         "unit": variable.unit,
@@ -116,6 +132,7 @@ def _add_variable(parent: Element, variable: Variable, units: Iterable[Unit]) ->
         "max": variable.maximum,
         "nominal": variable.nominal,
         "start": variable.start,
+        "derivative": interface.derivative_of.get(variable.name),
     }
     SubElement(element, variable.type, {name: _text(value) for name, value in attributes.items() if value is not None})
 
@@ -124,11 +141,25 @@ def _text(value: float | int | str) -> str:
     return value if isinstance(value, str) else repr(value)
 
 
-def _add_structure(root: Element, variables: Iterable[Variable]) -> None:
-    """All outputs, each depending on everything: no dependencies stated."""
-    indices = [index for index, variable in enumerate(variables, start=1) if variable.causality == "output"]
+def _add_structure(root: Element, interface: Interface) -> None:
+    """Outputs and derivatives with what they depend on now; the same and the states with what they depend on at the start."""
     structure = SubElement(root, "ModelStructure")
-    for name in ("Outputs", "InitialUnknowns"):
-        parent = SubElement(structure, name)
-        for index in indices:
-            SubElement(parent, "Unknown", index=str(index))
+    outputs = [variable.name for variable in interface.of_causality("output")]
+    derivatives = [state.derivative for state in interface.states]
+    initial = sorted({*outputs, *derivatives, *(state.name for state in interface.states)}, key=interface.index.__getitem__)
+    for title, names, depends in (
+        ("Outputs", outputs, interface.depends),
+        ("Derivatives", derivatives, interface.depends),
+        ("InitialUnknowns", initial, interface.depends_initially),
+    ):
+        parent = SubElement(structure, title) if names else None
+        for name in names if parent is not None else ():
+            _add_unknown(parent, interface, name, depends(name))
+
+
+def _add_unknown(parent: Element, interface: Interface, name: str, depends: Iterable[str] | None) -> None:
+    """Without dependencies an unknown depends on all knowns."""
+    attributes = {"index": str(interface.index[name])}
+    if depends is not None:
+        attributes["dependencies"] = " ".join(map(str, sorted(interface.index[known] for known in depends)))
+    SubElement(parent, "Unknown", attributes)

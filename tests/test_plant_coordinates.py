@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import ctypes as ct
 import itertools
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from mirror import HxCoordinates, HxInput, HxOutput
-from plant import Plant, PlantError, flat, inputs
-from states import changed, landing, lopsided, random_command, random_pose
+from plant import Plant, flat, inputs
+from states import changed, lopsided, random_command, random_pose
 
-from hexapod_cosim.models import Robot, load_robot
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array

@@ -60,7 +60,8 @@ def render_structure() -> str:
     """What the variables are fields of, as C."""
     lines = [_head("variables.h - what the FMU's variables are fields of."), "#ifndef HEXAPOD_GENERATED_VARIABLES_H"]
     lines += ["#define HEXAPOD_GENERATED_VARIABLES_H", "", '#include "hexapod/hexapod.h"', "", "struct hxVariables {"]
-    lines += ["  hxDefinition definition; /* parameters */", "  hxInput input;", "  hxOutput output;", "};", "", "#endif", ""]
+    lines += ["  hxDefinition definition; /* parameters */", "  hxInput input;", "  hxOutput output;"]
+    lines += ["  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */", "};", "", "#endif", ""]
     return "\n".join(lines)
 
 
@@ -76,8 +77,20 @@ def render_variables(interface: Interface, guid: str) -> str:
         lines += [f"    [HX_{causality.upper()}] = {{{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s}},"]
     lines += ["};", "", "const char *const hx_log_category_names[] = {"]
     lines += [f'    "{name}",' for name in interface.log_categories]
-    lines += ["};", "", f'const char hx_default_guid[] = "{guid}";', "", *_enumeration_checks(interface), ""]
+    lines += ["};", "", *_states(interface)]
+    lines += [f'const char hx_default_guid[] = "{guid}";', "", *_enumeration_checks(interface), ""]
     return "\n".join(lines)
+
+
+def _states(interface: Interface) -> list[str]:
+    """The continuous states as rows, in the order of struct hxVariables' state."""
+    rows = [
+        f"    {{{interface.variable(state.name).reference}, {interface.variable(state.name).nominal!r}}}," for state in interface.states
+    ]
+    lines = ["static const hxStateRow states[] = {", *rows, "};", "const hxStateRow *const hx_states = states;"]
+    lines += ["const size_t hx_state_count = sizeof states / sizeof states[0];", ""]
+    lines += ['_Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");', ""]
+    return lines
 
 
 def _row(variable: Variable) -> str:

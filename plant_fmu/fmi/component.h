@@ -1,6 +1,6 @@
 /* component.h - what is inside an FMU: the layer of fmi/ drives it through these functions, which each component defines for itself.
  *
- * Its variables are struct hxVariables of its own generated/variables.h: at least a definition (parameters), an input and an output.
+ * Its variables are struct hxVariables of its own generated/variables.h: at least a definition (parameters), an hxInput input and an output.
  * A component has no pointers and no hidden state: what get_state copies out is all there is.
  */
 #ifndef HEXAPOD_FMI_COMPONENT_H
@@ -22,8 +22,8 @@ hxStatus hx_component_check(const struct hxVariables *variables, char *message);
 /* To the start at time t, by the definition; on failure unchanged but for the message. */
 hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *variables, double t);
 
-/* To t_end exactly, under the input; on failure as before but for the message. */
-hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, double t_end);
+/* To t_end exactly, under the input, which changes at a rate (NULL: is held); on failure as before but for the message. */
+hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, const hxInput *rate, double t_end);
 
 /* The output at the present time under the input: nothing else changes. */
 void hx_component_output(hxComponent *component, struct hxVariables *variables);
@@ -34,5 +34,25 @@ const char *hx_component_message(const hxComponent *component); /* of the last f
 size_t hx_component_state_size(void);
 void hx_component_get_state(const hxComponent *component, void *bytes);
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes); /* HX_BAD_STATE leaves it as it was */
+
+/* What a component with continuous states has besides. */
+typedef struct hxContinuous {
+  size_t state, rate; /* offsets in struct hxVariables of hx_state_count doubles each */
+  size_t indicators;  /* events are where one of these changes its sign */
+
+  /* Reads the state into the variables; puts the component there at time t. */
+  void (*get)(const hxComponent *component, struct hxVariables *variables);
+  hxStatus (*set)(hxComponent *component, const struct hxVariables *variables, double t);
+
+  void (*rates)(hxComponent *component, struct hxVariables *variables); /* at the present time under the input */
+  void (*indicate)(const hxComponent *component, double indicator[]);
+  int (*update)(hxComponent *component); /* what an event brings about; whether the state changed */
+
+  /* Derivatives of output and rate along a change of input and state: rows of the same structure. */
+  hxStatus (*tangent)(hxComponent *component, const struct hxVariables *variables, const struct hxVariables *change,
+                      struct hxVariables *result);
+} hxContinuous;
+
+extern const hxContinuous *const hx_continuous; /* NULL for a component without */
 
 #endif

@@ -1,4 +1,4 @@
-/* fmi2.c - FMI 2.0 for co-simulation: every function of the standard, in its order. No physics. */
+/* fmi2.c - FMI 2.0, co-simulation and model exchange: every function of the standard, in its order. No physics. */
 #include "fmi/instance.h"
 
 #include <math.h>
@@ -19,8 +19,11 @@ _Static_assert(sizeof(fmi2Real) == sizeof(double) && sizeof(fmi2Boolean) == size
 /* ---------------------------------------------------------------------------------------------- legal order */
 
 enum {
-  ANY_MODE = HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION | HX_MODE_STEP | HX_MODE_TERMINATED,
-  BEFORE_END = HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION | HX_MODE_STEP
+  EXCHANGING = HX_MODE_EVENT | HX_MODE_CONTINUOUS,
+  BEFORE_END = HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION | HX_MODE_STEP | EXCHANGING,
+  ANY_MODE = BEFORE_END | HX_MODE_TERMINATED,
+  INITIALIZED = HX_MODE_INITIALIZATION | HX_MODE_STEP | EXCHANGING | HX_MODE_TERMINATED,
+  EITHER = HX_CO_SIMULATION | HX_MODEL_EXCHANGE
 };
 
 typedef enum fmi2Call {
@@ -49,53 +52,82 @@ typedef enum fmi2Call {
   DO_STEP,
   CANCEL_STEP,
   GET_STATUS,
-  UNSUPPORTED
+  DIRECTIONAL_DERIVATIVE,
+  ENTER_EVENT_MODE,
+  NEW_DISCRETE_STATES,
+  ENTER_CONTINUOUS_TIME_MODE,
+  COMPLETED_INTEGRATOR_STEP,
+  SET_TIME,
+  SET_CONTINUOUS_STATES,
+  GET_DERIVATIVES,
+  GET_EVENT_INDICATORS,
+  GET_CONTINUOUS_STATES,
+  GET_NOMINALS
 } fmi2Call;
 
-/* The standard's table of allowed calls (section 4.2.4), but for two liberties that importers take and that harm nothing:
- * values are read before initialisation, and a terminated instance is terminated again. */
+/* The standard's tables of allowed calls (sections 3.2.3 and 4.2.4), but for liberties that importers take and that harm nothing: values are
+ * read before initialisation, states and their rates in it, and a terminated instance is terminated again. */
 static const struct {
   const char *name;
-  int modes;
+  int modes, interfaces;
 } calls[] = {
-    [SET_DEBUG_LOGGING] = {"fmi2SetDebugLogging", ANY_MODE},
-    [SETUP_EXPERIMENT] = {"fmi2SetupExperiment", HX_MODE_INSTANTIATED},
-    [ENTER_INITIALIZATION_MODE] = {"fmi2EnterInitializationMode", HX_MODE_INSTANTIATED},
-    [EXIT_INITIALIZATION_MODE] = {"fmi2ExitInitializationMode", HX_MODE_INITIALIZATION},
-    [TERMINATE] = {"fmi2Terminate", HX_MODE_STEP | HX_MODE_TERMINATED},
-    [RESET] = {"fmi2Reset", ANY_MODE},
-    [GET_REAL] = {"fmi2GetReal", ANY_MODE},
-    [GET_INTEGER] = {"fmi2GetInteger", ANY_MODE},
-    [GET_BOOLEAN] = {"fmi2GetBoolean", ANY_MODE},
-    [GET_STRING] = {"fmi2GetString", ANY_MODE},
-    [SET_REAL] = {"fmi2SetReal", BEFORE_END},
-    [SET_INTEGER] = {"fmi2SetInteger", BEFORE_END},
-    [SET_BOOLEAN] = {"fmi2SetBoolean", BEFORE_END},
-    [SET_STRING] = {"fmi2SetString", BEFORE_END},
-    [GET_STATE] = {"fmi2GetFMUstate", ANY_MODE},
-    [SET_STATE] = {"fmi2SetFMUstate", ANY_MODE},
-    [FREE_STATE] = {"fmi2FreeFMUstate", ANY_MODE},
-    [SERIALIZED_SIZE] = {"fmi2SerializedFMUstateSize", ANY_MODE},
-    [SERIALIZE] = {"fmi2SerializeFMUstate", ANY_MODE},
-    [DESERIALIZE] = {"fmi2DeSerializeFMUstate", ANY_MODE},
-    [SET_INPUT_DERIVATIVES] = {"fmi2SetRealInputDerivatives", BEFORE_END},
-    [GET_OUTPUT_DERIVATIVES] = {"fmi2GetRealOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED},
-    [DO_STEP] = {"fmi2DoStep", HX_MODE_STEP},
-    [CANCEL_STEP] = {"fmi2CancelStep", HX_MODE_STEP},
-    [GET_STATUS] = {"fmi2GetXXXStatus", ANY_MODE},
-    [UNSUPPORTED] = {"a function of another interface", ANY_MODE},
+    [SET_DEBUG_LOGGING] = {"fmi2SetDebugLogging", ANY_MODE, EITHER},
+    [SETUP_EXPERIMENT] = {"fmi2SetupExperiment", HX_MODE_INSTANTIATED, EITHER},
+    [ENTER_INITIALIZATION_MODE] = {"fmi2EnterInitializationMode", HX_MODE_INSTANTIATED, EITHER},
+    [EXIT_INITIALIZATION_MODE] = {"fmi2ExitInitializationMode", HX_MODE_INITIALIZATION, EITHER},
+    [TERMINATE] = {"fmi2Terminate", HX_MODE_STEP | EXCHANGING | HX_MODE_TERMINATED, EITHER},
+    [RESET] = {"fmi2Reset", ANY_MODE, EITHER},
+    [GET_REAL] = {"fmi2GetReal", ANY_MODE, EITHER},
+    [GET_INTEGER] = {"fmi2GetInteger", ANY_MODE, EITHER},
+    [GET_BOOLEAN] = {"fmi2GetBoolean", ANY_MODE, EITHER},
+    [GET_STRING] = {"fmi2GetString", ANY_MODE, EITHER},
+    [SET_REAL] = {"fmi2SetReal", BEFORE_END, EITHER},
+    [SET_INTEGER] = {"fmi2SetInteger", BEFORE_END, EITHER},
+    [SET_BOOLEAN] = {"fmi2SetBoolean", BEFORE_END, EITHER},
+    [SET_STRING] = {"fmi2SetString", BEFORE_END, EITHER},
+    [GET_STATE] = {"fmi2GetFMUstate", ANY_MODE, EITHER},
+    [SET_STATE] = {"fmi2SetFMUstate", ANY_MODE, EITHER},
+    [FREE_STATE] = {"fmi2FreeFMUstate", ANY_MODE, EITHER},
+    [SERIALIZED_SIZE] = {"fmi2SerializedFMUstateSize", ANY_MODE, EITHER},
+    [SERIALIZE] = {"fmi2SerializeFMUstate", ANY_MODE, EITHER},
+    [DESERIALIZE] = {"fmi2DeSerializeFMUstate", ANY_MODE, EITHER},
+    [SET_INPUT_DERIVATIVES] = {"fmi2SetRealInputDerivatives", BEFORE_END, HX_CO_SIMULATION},
+    [GET_OUTPUT_DERIVATIVES] = {"fmi2GetRealOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED, HX_CO_SIMULATION},
+    [DO_STEP] = {"fmi2DoStep", HX_MODE_STEP, HX_CO_SIMULATION},
+    [CANCEL_STEP] = {"fmi2CancelStep", HX_MODE_STEP, HX_CO_SIMULATION},
+    [GET_STATUS] = {"fmi2GetXXXStatus", ANY_MODE, HX_CO_SIMULATION},
+    [DIRECTIONAL_DERIVATIVE] = {"fmi2GetDirectionalDerivative", INITIALIZED, EITHER},
+    [ENTER_EVENT_MODE] = {"fmi2EnterEventMode", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
+    [NEW_DISCRETE_STATES] = {"fmi2NewDiscreteStates", HX_MODE_EVENT, HX_MODEL_EXCHANGE},
+    [ENTER_CONTINUOUS_TIME_MODE] = {"fmi2EnterContinuousTimeMode", HX_MODE_EVENT, HX_MODEL_EXCHANGE},
+    [COMPLETED_INTEGRATOR_STEP] = {"fmi2CompletedIntegratorStep", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
+    [SET_TIME] = {"fmi2SetTime", EXCHANGING, HX_MODEL_EXCHANGE},
+    [SET_CONTINUOUS_STATES] = {"fmi2SetContinuousStates", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
+    [GET_DERIVATIVES] = {"fmi2GetDerivatives", INITIALIZED, HX_MODEL_EXCHANGE},
+    [GET_EVENT_INDICATORS] = {"fmi2GetEventIndicators", INITIALIZED, HX_MODEL_EXCHANGE},
+    [GET_CONTINUOUS_STATES] = {"fmi2GetContinuousStates", INITIALIZED, HX_MODEL_EXCHANGE},
+    [GET_NOMINALS] = {"fmi2GetNominalsOfContinuousStates", ANY_MODE, HX_MODEL_EXCHANGE},
 };
 
 static const char *mode_name(int mode) {
   if (mode == HX_MODE_INSTANTIATED) return "before fmi2EnterInitializationMode";
   if (mode == HX_MODE_INITIALIZATION) return "in initialization mode";
+  if (mode == HX_MODE_EVENT) return "in event mode";
+  if (mode == HX_MODE_CONTINUOUS) return "in continuous-time mode";
   return mode == HX_MODE_STEP ? "between steps" : "after fmi2Terminate";
 }
+
+static const char *interface_name(int interface) { return interface == HX_MODEL_EXCHANGE ? "model exchange" : "co-simulation"; }
 
 /* the instance of a call that is legal now; NULL, with a message, otherwise */
 static fmi2Instance *enter(fmi2Component component, fmi2Call call) {
   fmi2Instance *instance = component;
   if (!instance) return NULL;
+  if (!(calls[call].interfaces & instance->base.state.interface)) {
+    hx_log(&instance->base, HX_LOG_ERROR, "%s: got a call of %s, expected one of %s, which was instantiated; nothing was changed",
+           calls[call].name, interface_name(calls[call].interfaces), interface_name(instance->base.state.interface));
+    return NULL;
+  }
   if (!(calls[call].modes & instance->base.state.mode)) {
     hx_log(&instance->base, HX_LOG_ERROR, "%s: got a call %s, where the standard does not allow it; nothing was changed", calls[call].name,
            mode_name(instance->base.state.mode));
@@ -176,11 +208,13 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   instance->base.sink = log_sink;
   instance->base.logged = loggingOn ? ~0u : always_logged;
   if (instanceName) snprintf(instance->base.name, sizeof instance->base.name, "%s", instanceName);
+  instance->base.state.interface = fmuType == fmi2CoSimulation ? HX_CO_SIMULATION : HX_MODEL_EXCHANGE;
   hxStatus status = HX_INVALID_ARGUMENT;
-  if (fmuType == fmi2CoSimulation)
+  if (fmuType == fmi2CoSimulation || (fmuType == fmi2ModelExchange && hx_continuous))
     status = hx_instance_open(&instance->base, fmuGUID, fmuResourceLocation);
   else
-    hx_log(&instance->base, HX_LOG_ERROR, "fmi2Instantiate: got model exchange, expected co-simulation; nothing was instantiated");
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "fmi2Instantiate: got interface type %d, expected one of the model description's; nothing was instantiated", (int)fmuType);
   if (status == HX_OK) return instance;
   fmi2FreeInstance(instance);
   return NULL;
@@ -230,7 +264,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
   fmi2Instance *instance = enter(c, EXIT_INITIALIZATION_MODE);
   if (!instance || hx_instance_initialize(&instance->base) != HX_OK) return fmi2Error;
-  instance->base.state.mode = HX_MODE_STEP;
+  instance->base.state.mode = instance->base.state.interface == HX_MODEL_EXCHANGE ? HX_MODE_EVENT : HX_MODE_STEP;
   hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s", hx_instance_time(&instance->base));
   return fmi2OK;
 }
@@ -238,7 +272,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 fmi2Status fmi2Terminate(fmi2Component c) {
   fmi2Instance *instance = enter(c, TERMINATE);
   if (!instance) return fmi2Error;
-  if (instance->base.state.mode == HX_MODE_STEP)
+  if (instance->base.state.mode != HX_MODE_TERMINATED)
     hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s", hx_instance_time(&instance->base));
   instance->base.state.mode = HX_MODE_TERMINATED;
   return fmi2OK;
@@ -387,26 +421,32 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
   return fmi2Error;
 }
 
-/* inputs are held over a step and outputs are not differentiated: canInterpolateInputs and maxOutputDerivativeOrder say so */
-static fmi2Status no_derivatives(fmi2Component c, fmi2Call call, size_t nvr) {
-  fmi2Instance *instance = enter(c, call);
-  if (instance && nvr == 0) return fmi2OK;
-  if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR, "%s: got %zu derivatives, expected none, as the model description declares", calls[call].name,
-           nvr);
-  return fmi2Error;
+/* derivatives are of order 1; complains about others */
+static int are_first(fmi2Instance *instance, fmi2Call call, size_t n, const fmi2Integer order[]) {
+  for (size_t i = 0; i < n; i++)
+    if (order[i] != 1) {
+      hx_log(&instance->base, HX_LOG_ERROR, "%s: got order %d, expected 1; nothing was done", calls[call].name, (int)order[i]);
+      return 0;
+    }
+  return 1;
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
                                        const fmi2Real value[]) {
-  (void)vr, (void)order, (void)value;
-  return no_derivatives(c, SET_INPUT_DERIVATIVES, nvr);
+  fmi2Instance *instance = enter(c, SET_INPUT_DERIVATIVES);
+  if (!instance || !given(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) || !given(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
+    return fmi2Error;
+  if (!are_first(instance, SET_INPUT_DERIVATIVES, nvr, order)) return fmi2Error;
+  return status_of(hx_instance_set_input_rates(&instance->base, vr, nvr, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
                                         fmi2Real value[]) {
-  (void)vr, (void)order, (void)value;
-  return no_derivatives(c, GET_OUTPUT_DERIVATIVES, nvr);
+  fmi2Instance *instance = enter(c, GET_OUTPUT_DERIVATIVES);
+  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+    return fmi2Error;
+  if (!are_first(instance, GET_OUTPUT_DERIVATIVES, nvr, order)) return fmi2Error;
+  return status_of(hx_instance_get_output_rates(&instance->base, vr, nvr, value));
 }
 
 /* a kind of status that the type asked for does not have */
@@ -449,63 +489,84 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
   return no_status(enter(c, GET_STATUS), s);
 }
 
-/* ---------------------------------------------------------------------------------------------- not supported */
-
-/* importers bind every function of the standard, so all are here */
-static fmi2Status not_supported(fmi2Component c, const char *name) {
-  fmi2Instance *instance = enter(c, UNSUPPORTED);
-  if (instance) hx_log(&instance->base, HX_LOG_ERROR, "%s: got a call, expected none, as the model description does not offer it", name);
-  return fmi2Error;
-}
+/* ---------------------------------------------------------------------------------------------- derivatives */
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-  (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-  return not_supported(c, "fmi2GetDirectionalDerivative");
+  fmi2Instance *instance = enter(c, DIRECTIONAL_DERIVATIVE);
+  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknown, vUnknown_ref, dvUnknown)) return fmi2Error;
+  if (!given(instance, DIRECTIONAL_DERIVATIVE, nKnown, vKnown_ref, dvKnown)) return fmi2Error;
+  return status_of(hx_instance_directional(&instance->base, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
 }
 
-fmi2Status fmi2EnterEventMode(fmi2Component c) { return not_supported(c, "fmi2EnterEventMode"); }
+/* ---------------------------------------------------------------------------------------------- model exchange */
 
+fmi2Status fmi2EnterEventMode(fmi2Component c) {
+  fmi2Instance *instance = enter(c, ENTER_EVENT_MODE);
+  if (!instance) return fmi2Error;
+  instance->base.state.mode = HX_MODE_EVENT;
+  return fmi2OK;
+}
+
+/* touch-downs and lift-offs; nothing follows from them at once, and no time event is ever known beforehand */
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
-  (void)eventInfo;
-  return not_supported(c, "fmi2NewDiscreteStates");
+  fmi2Instance *instance = enter(c, NEW_DISCRETE_STATES);
+  int changed;
+  if (!instance || !given(instance, NEW_DISCRETE_STATES, 1, eventInfo, eventInfo)) return fmi2Error;
+  const hxStatus status = hx_instance_update(&instance->base, &changed);
+  *eventInfo = (fmi2EventInfo){.valuesOfContinuousStatesChanged = changed};
+  return status_of(status);
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return not_supported(c, "fmi2EnterContinuousTimeMode"); }
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+  fmi2Instance *instance = enter(c, ENTER_CONTINUOUS_TIME_MODE);
+  if (!instance) return fmi2Error;
+  instance->base.state.mode = HX_MODE_CONTINUOUS;
+  return fmi2OK;
+}
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint, fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
-  (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-  return not_supported(c, "fmi2CompletedIntegratorStep");
+  fmi2Instance *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
+  (void)noSetFMUStatePriorToCurrentPoint;
+  if (!instance || !given(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation)) return fmi2Error;
+  *enterEventMode = *terminateSimulation = fmi2False;
+  return fmi2OK;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-  (void)time;
-  return not_supported(c, "fmi2SetTime");
+  fmi2Instance *instance = enter(c, SET_TIME);
+  return instance ? status_of(hx_instance_set_time(&instance->base, time)) : fmi2Error;
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-  (void)x, (void)nx;
-  return not_supported(c, "fmi2SetContinuousStates");
+  fmi2Instance *instance = enter(c, SET_CONTINUOUS_STATES);
+  if (!instance || !given(instance, SET_CONTINUOUS_STATES, nx, x, x)) return fmi2Error;
+  return status_of(hx_instance_set_states(&instance->base, x, nx));
+}
+
+/* a getter of doubles, as many as there are */
+typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
+
+static fmi2Status get_array(fmi2Component c, fmi2Call call, Getter *getter, fmi2Real value[], size_t n) {
+  fmi2Instance *instance = enter(c, call);
+  if (!instance || !given(instance, call, n, value, value)) return fmi2Error;
+  return status_of(getter(&instance->base, value, n));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-  (void)derivatives, (void)nx;
-  return not_supported(c, "fmi2GetDerivatives");
+  return get_array(c, GET_DERIVATIVES, hx_instance_get_rates, derivatives, nx);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-  (void)eventIndicators, (void)ni;
-  return not_supported(c, "fmi2GetEventIndicators");
+  return get_array(c, GET_EVENT_INDICATORS, hx_instance_get_indicators, eventIndicators, ni);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-  (void)x, (void)nx;
-  return not_supported(c, "fmi2GetContinuousStates");
+  return get_array(c, GET_CONTINUOUS_STATES, hx_instance_get_states, x, nx);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-  (void)x_nominal, (void)nx;
-  return not_supported(c, "fmi2GetNominalsOfContinuousStates");
+  return get_array(c, GET_NOMINALS, hx_instance_get_nominals, x_nominal, nx);
 }

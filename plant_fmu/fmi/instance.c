@@ -21,10 +21,12 @@ void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ..
 /* ---------------------------------------------------------------------------------------------- opening */
 
 static void return_to_start(hxInstance *instance) {
+  const int interface = instance->state.interface;
   memset(&instance->state, 0, sizeof instance->state);
+  instance->state.interface = interface;
   instance->state.mode = HX_MODE_INSTANTIATED;
   instance->state.model_stale = 1;
-  instance->state.output_stale = 1;
+  instance->state.output_stale = instance->state.rate_stale = 1;
   instance->state.stop_time = INFINITY;
   instance->state.variables = instance->start;
 }
@@ -83,8 +85,7 @@ int hx_variable_takes(const hxVariable *variable, double value) { return value >
 
 static const char *const type_names[] = {[HX_REAL] = "Real", [HX_INTEGER] = "Integer or Enumeration", [HX_BOOLEAN] = "Boolean"};
 
-/* the row of a reference if it is of the type asked for; complains otherwise */
-static const hxVariable *find_typed(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality) {
+const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality) {
   const hxVariable *variable = hx_variable_find(reference, causality);
   if (!variable)
     hx_log(instance, HX_LOG_ERROR, "value reference: got %u, expected one of modelDescription.xml; nothing was done", reference);
@@ -96,28 +97,34 @@ static const hxVariable *find_typed(hxInstance *instance, hxType type, unsigned 
   return variable;
 }
 
-/* brings variables.output to the present time, input and, before the first step, parameters */
-static hxStatus refresh_output(hxInstance *instance) {
+hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate) {
   hxInstanceState *state = &instance->state;
   if (state->model_stale) {
     const hxStatus status = hx_instance_initialize(instance);
     if (status != HX_OK) return status;
   }
-  if (state->output_stale) hx_component_output(instance->component, &state->variables);
-  state->output_stale = 0;
+  if (output && state->output_stale) {
+    hx_component_output(instance->component, &state->variables);
+    state->output_stale = 0;
+  }
+  if (rate && state->rate_stale) {
+    hx_continuous->rates(instance->component, &state->variables);
+    state->rate_stale = 0;
+  }
   return HX_OK;
 }
 
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
   const char *variables = (const char *)&instance->state.variables;
   hxCausality causality;
-  int needs_output = 0;
+  int needs_output = 0, needs_rate = 0;
   for (size_t i = 0; i < n; i++) {
-    if (!find_typed(instance, type, reference[i], &causality)) return HX_INVALID_ARGUMENT;
+    if (!hx_instance_find(instance, type, reference[i], &causality)) return HX_INVALID_ARGUMENT;
     needs_output |= causality == HX_OUTPUT;
+    needs_rate |= causality == HX_LOCAL;
   }
-  if (needs_output) {
-    const hxStatus status = refresh_output(instance);
+  if (needs_output || needs_rate) {
+    const hxStatus status = hx_instance_refresh(instance, needs_output, needs_rate);
     if (status != HX_OK) return status;
   }
   for (size_t i = 0; i < n; i++) {
@@ -136,8 +143,9 @@ static double value_at(hxType type, const void *value, size_t i) {
 
 /* whether one value may be set now */
 static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCausality causality, double value) {
-  if (causality == HX_OUTPUT) {
-    hx_log(instance, HX_LOG_ERROR, "%s: got a value for an output, expected an input or a parameter; nothing was set", variable->name);
+  if (causality == HX_OUTPUT || causality == HX_LOCAL) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got a value for what is calculated, expected an input or a parameter; nothing was set",
+           variable->name);
     return HX_INVALID_ARGUMENT;
   }
   if (causality == HX_PARAMETER && !(instance->state.mode & (HX_MODE_INSTANTIATED | HX_MODE_INITIALIZATION))) {
@@ -157,7 +165,7 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
   char *variables = (char *)&instance->state.variables;
   hxCausality causality;
   for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = find_typed(instance, type, reference[i], &causality);
+    const hxVariable *variable = hx_instance_find(instance, type, reference[i], &causality);
     if (!variable) return HX_INVALID_ARGUMENT;
     const hxStatus status = check_set(instance, variable, causality, value_at(type, value, i));
     if (status != HX_OK) return status;
@@ -169,7 +177,7 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
     else
       memcpy(variables + variable->offset, (const int *)value + i, sizeof(int));
     instance->state.model_stale |= causality == HX_PARAMETER;
-    instance->state.output_stale = 1;
+    hx_stale(instance);
   }
   return HX_OK;
 }
@@ -188,7 +196,8 @@ hxStatus hx_instance_initialize(hxInstance *instance) {
     return status;
   }
   instance->state.model_stale = 0;
-  instance->state.output_stale = 1;
+  if (hx_continuous) hx_continuous->get(instance->component, &instance->state.variables);
+  hx_stale(instance);
   return HX_OK;
 }
 
@@ -233,7 +242,11 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
   }
   /* an extra step of rounding size may end before our own time: it is done */
   if (t + h <= now) return HX_OK;
-  const hxStatus status = hx_component_step(instance->component, &instance->state.variables, t + h);
+  hxInput end;
+  hxStatus status = hx_instance_ramp_end(instance, h, &end);
+  if (status != HX_OK) return status;
+  status = hx_component_step(instance->component, &instance->state.variables, instance->state.ramped ? &instance->state.input_rate : NULL,
+                             t + h);
   if (status == HX_INVALID_ARGUMENT) {
     hx_log(instance, HX_LOG_ERROR, "step from %.17g s by %.17g s: %s; the state is unchanged", t, h,
            hx_component_message(instance->component));
@@ -244,7 +257,10 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
            h, hx_component_message(instance->component));
     return status;
   }
-  instance->state.output_stale = 1;
+  instance->state.variables.input = end;
+  if (!instance->state.ramped) memset(&instance->state.input_rate, 0, sizeof instance->state.input_rate);
+  instance->state.ramped = 0;
+  hx_stale(instance);
   return HX_OK;
 }
 

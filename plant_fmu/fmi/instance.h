@@ -8,7 +8,16 @@
 #include "fmi/component.h"
 
 /* Modes are bits so that a set of them is a mask. */
-typedef enum hxMode { HX_MODE_INSTANTIATED = 1, HX_MODE_INITIALIZATION = 2, HX_MODE_STEP = 4, HX_MODE_TERMINATED = 8 } hxMode;
+typedef enum hxMode {
+  HX_MODE_INSTANTIATED = 1,
+  HX_MODE_INITIALIZATION = 2,
+  HX_MODE_STEP = 4, /* co-simulation */
+  HX_MODE_TERMINATED = 8,
+  HX_MODE_EVENT = 16,
+  HX_MODE_CONTINUOUS = 32 /* model exchange */
+} hxMode;
+
+typedef enum hxInterface { HX_CO_SIMULATION = 1, HX_MODEL_EXCHANGE = 2 } hxInterface;
 
 typedef enum hxLogCategory { HX_LOG_ERROR, HX_LOG_DISCARD, HX_LOG_WARNING, HX_LOG_EVENT, HX_LOG_ALL, HX_LOG_CATEGORIES } hxLogCategory;
 
@@ -27,8 +36,12 @@ typedef struct hxInstanceState {
   int mode;         /* hxMode */
   int model_stale;  /* parameters were set since the component was reset */
   int output_stale; /* variables.output is not that of the present time and input */
+  int rate_stale;   /* nor are the rates of the states */
+  int interface;    /* hxInterface */
+  int ramped;       /* input_rate is of the next step; else of the last one */
   double start_time;
   double stop_time; /* no step goes past it; infinite when the importer names none */
+  hxInput input_rate; /* 1/s */
   struct hxVariables variables;
 } hxInstanceState;
 
@@ -42,7 +55,7 @@ struct hxInstance {
   hxLogSink *sink;
 };
 
-/* Opens an instance that is zero but for its name, log and sink; resources is a URI, a path or NULL. On failure it is to be closed all the same. */
+/* Opens an instance that is zero but for its name, log, sink and interface; resources is a URI, a path or NULL. On failure it is to be closed all the same. */
 hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources);
 void hx_instance_close(hxInstance *instance);
 
@@ -55,6 +68,22 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h);
 void hx_instance_reset(hxInstance *instance);
 double hx_instance_time(const hxInstance *instance);
 
+/* Model exchange (exchange.c): continuous states and their rates, in the order of hx_states; event indicators; what an event brings about. */
+hxStatus hx_instance_set_time(hxInstance *instance, double t);
+hxStatus hx_instance_get_states(hxInstance *instance, double x[], size_t n);
+hxStatus hx_instance_set_states(hxInstance *instance, const double x[], size_t n);
+hxStatus hx_instance_get_rates(hxInstance *instance, double rate[], size_t n);
+hxStatus hx_instance_get_nominals(hxInstance *instance, double nominal[], size_t n);
+hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], size_t n);
+hxStatus hx_instance_update(hxInstance *instance, int *states_changed);
+
+/* Derivatives by reference (exchange.c): of unknowns (outputs, rates) along a change of knowns (inputs, continuous states), exact; rates of
+ * inputs for the next steps; rates of outputs now. All or nothing. */
+hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,
+                                 const double change[], double result[]);
+hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n, const double rate[]);
+hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n, double rate[]);
+
 /* Saved states: one block without pointers. check finds out whether n bytes are an intact one of this FMU. */
 size_t hx_instance_state_size(void);
 void hx_instance_save(const hxInstance *instance, void *block);
@@ -66,6 +95,17 @@ void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ..
 
 /* Reads start_values.txt of the resources into start; *found says whether there is one. */
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found);
+
+/* The input at the end of the next step, if it is ramped and that is in range; complains if not. */
+hxStatus hx_instance_ramp_end(hxInstance *instance, double h, hxInput *end);
+
+/* Output and rates are to be found anew. */
+static inline void hx_stale(hxInstance *instance) { instance->state.output_stale = instance->state.rate_stale = 1; }
+
+/* Brings output or rates to the present time and input, and the component to the parameters before that; the row of a reference if it is
+ * of the type asked for. */
+hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate);
+const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality);
 
 /* The row of a reference, or NULL; and a value's fitness for it (NaN and infinities fit nowhere). */
 const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality);

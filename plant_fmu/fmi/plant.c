@@ -21,8 +21,8 @@ hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *va
   return hx_plant_reset(plant_of(component), &variables->definition, t);
 }
 
-hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, double t_end) {
-  return hx_plant_step(plant_of(component), &variables->input, t_end);
+hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, const hxInput *rate, double t_end) {
+  return hx_plant_step_ramp(plant_of(component), &variables->input, rate, t_end);
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables) {
@@ -40,3 +40,40 @@ void hx_component_get_state(const hxComponent *component, void *bytes) { hx_plan
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
   return hx_plant_set_state(plant_of(component), bytes, hx_plant_state_size());
 }
+
+/* ---------------------------------------------------------------------------------------------- model exchange */
+
+static void get_state(const hxComponent *component, struct hxVariables *variables) {
+  hx_plant_get_coordinates(const_plant(component), &variables->state);
+}
+
+static hxStatus set_state(hxComponent *component, const struct hxVariables *variables, double t) {
+  return hx_plant_set_coordinates(plant_of(component), t, &variables->state);
+}
+
+static void rates(hxComponent *component, struct hxVariables *variables) {
+  hx_plant_rates(plant_of(component), &variables->input, &variables->rate);
+}
+
+static void indicate(const hxComponent *component, double indicator[]) { hx_plant_penetration(const_plant(component), indicator); }
+
+static int update(hxComponent *component) { return hx_plant_update_contacts(plant_of(component)); }
+
+static hxStatus tangent(hxComponent *component, const struct hxVariables *variables, const struct hxVariables *change,
+                        struct hxVariables *result) {
+  return hx_plant_tangent(plant_of(component), &variables->input, &change->input, &change->state, &result->rate, &result->output);
+}
+
+static const hxContinuous continuous = {
+    .state = offsetof(struct hxVariables, state),
+    .rate = offsetof(struct hxVariables, rate),
+    .indicators = HX_LEGS,
+    .get = get_state,
+    .set = set_state,
+    .rates = rates,
+    .indicate = indicate,
+    .update = update,
+    .tangent = tangent,
+};
+
+const hxContinuous *const hx_continuous = &continuous;

@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { STATE_FORMAT = 2 };
+enum { STATE_FORMAT = 3 };
 
 static const char state_magic[8] = "hexapod";
 
@@ -73,6 +73,7 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   const hxStateBlock *block = bytes;
   const char *what = fault(instance, &block->header);
   if (what) return refuse(instance, what);
+  if (block->instance.interface != instance->state.interface) return refuse(instance, "one of the other interface");
   if (hx_component_set_state(instance->component, block->component) != HX_OK) return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);
   return HX_OK;

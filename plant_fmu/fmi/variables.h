@@ -6,7 +6,7 @@
 
 typedef enum hxType { HX_REAL, HX_INTEGER, HX_BOOLEAN } hxType; /* double, int, int; an enumeration is an HX_INTEGER */
 
-typedef enum hxCausality { HX_INPUT, HX_OUTPUT, HX_PARAMETER, HX_CAUSALITIES } hxCausality;
+typedef enum hxCausality { HX_INPUT, HX_OUTPUT, HX_PARAMETER, HX_LOCAL, HX_CAUSALITIES } hxCausality; /* local: rates of states */
 
 typedef struct hxVariable {
   const char *name;
@@ -24,6 +24,16 @@ typedef struct hxSection {
 } hxSection;
 
 extern const hxSection hx_sections[HX_CAUSALITIES];
+
+/* A continuous state of model exchange: the variable that shows it, and its usual size. */
+typedef struct hxStateRow {
+  unsigned reference;
+  double nominal;
+} hxStateRow;
+
+/* In the order of the state in struct hxVariables; none without model exchange. */
+extern const hxStateRow *const hx_states;
+extern const size_t hx_state_count;
 
 /* Names of the log categories, in the order of hxLogCategory. */
 extern const char *const hx_log_category_names[];

@@ -9,6 +9,7 @@ struct hxVariables {
   hxDefinition definition; /* parameters */
   hxInput input;
   hxOutput output;
+  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */
 };
 
 #endif

@@ -15,8 +15,8 @@ typedef struct hxKernel {
   /* Sets contacts, energy, counters and time of a motion that starts here and now. */
   void (*start)(const hxModel *model, double t, hxState *state);
 
-  /* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
-  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message);
+  /* Advances the state to t_end exactly; the command changes by the ramp per second, or is held (NULL). On failure the state is somewhere on the way and the message says why. */
+  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state, char *message);
 
   /* dy/dt, with or without the multipliers on the way. */
   void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate);

@@ -58,9 +58,31 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   return HX_OK;
 }
 
-hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
+/* the largest size among numbers that begin at first; not finite when one is not */
+static double largest(double so_far, const void *first, size_t n) {
+  const double *entry = first;
+  for (size_t i = 0; first && i < n; ++i)
+    if (!(fabs(entry[i]) <= so_far)) so_far = fabs(entry[i]);
+  return so_far;
+}
+
+hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) { return hx_plant_step_ramp(plant, input, NULL, t_end); }
+
+/* a rate as a command, unless it is none; *finite says whether it is one of numbers */
+static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *finite) {
+  const double size = largest(0.0, rate, sizeof *rate / sizeof(double));
+  *finite = isfinite(size);
+  if (!rate || size == 0.0) return NULL;
+  hx_command_from_input(command, rate, 0.0);
+  return command;
+}
+
+hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end) {
   const hxState before = plant->state;
-  hxCommand command;
+  hxCommand command, change;
+  int finite;
+  const hxCommand *ramp = ramp_of(rate, &change, &finite);
+  if (!finite) return refuse(plant, HX_INVALID_ARGUMENT, "rates of inputs: got a number that is not finite, expected units per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
     snprintf(plant->message, HX_MESSAGE_SIZE, "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
              plant->state.time);
@@ -69,7 +91,7 @@ hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
   hx_command_from_input(&command, input, plant->state.time);
-  status = hx_kernel()->integrate(&plant->model, &command, t_end, &plant->state, plant->message);
+  status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, &plant->state, plant->message);
   if (status != HX_OK) plant->state = before;
   return status;
 }
@@ -136,21 +158,19 @@ void hx_plant_penetration(const hxPlant *plant, double penetration[HX_LEGS]) {
   memcpy(penetration, delta, HX_LEGS * sizeof(double));
 }
 
+/* m  solvers that find one foot's sign change lose another's that comes within their rounding: a foot so near the ground counts as having
+ * gone on where it is going */
+static const double near_ground = 1e-9;
+
 int hx_plant_update_contacts(hxPlant *plant) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
   const hxMotion before = plant->state.motion;
   hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
+  for (int slot = 0; slot < HX_SLOTS; ++slot)
+    if (fabs(delta[slot]) < near_ground) delta[slot] = ddelta[slot];
   plant->state.touchdowns += hx_contact_switch(&plant->model, delta, ddelta, &plant->state.contact);
   if (plant->model.friction_law == HX_FRICTION_BRISTLE) hx_contact_slacken(&plant->state.contact, &plant->state.motion);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
-}
-
-/* the largest size among numbers that begin at first; not finite when one is not */
-static double largest(double so_far, const void *first, size_t n) {
-  const double *entry = first;
-  for (size_t i = 0; first && i < n; ++i)
-    if (!(fabs(entry[i]) <= so_far)) so_far = fabs(entry[i]);
-  return so_far;
 }
 
 hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx, hxCoordinates *d_rate,

@@ -230,6 +230,10 @@ HX_API hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, d
 /* Integrates to t_end >= time, exactly. On failure the plant is as it was before the call, but for its message. */
 HX_API hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end);
 
+/* The same under an input that changes at a rate, per second; NULL: it is held. In kinematic mode a rate of angle_ref takes the place of
+ * what speed_ref moves the drives by. */
+HX_API hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end);
+
 /* Everything there is to see at the present time under this input. */
 HX_API void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output);
 

@@ -20,7 +20,7 @@ static const double bristle_scale = 10.0; /* preslidings: at the default toleran
 /* Where a step starts. */
 typedef struct {
   const hxModel *model;
-  const hxCommand *command;
+  const hxCommand *command, *ramp; /* what is asked for at command->time, and its change per second; ramp NULL: none */
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
@@ -126,6 +126,18 @@ static void normalise_quaternions(hxMotion *m) {
     }
 }
 
+/* The command at a time. A drive whose angle_ref moves by itself is not moved by speed_ref as well. */
+static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
+  enum { SIZE = sizeof(hxCommand) / sizeof(double), ANGLES = HX_JOINTS * HX_SLOTS, TIME = offsetof(hxCommand, time) / sizeof(double) };
+  const double *from = (const double *)start->command, *rate = (const double *)start->ramp;
+  double *to = (double *)now, moves = 0.0;
+  if (!start->ramp) return start->command;
+  for (int i = 0; i < SIZE; ++i) to[i] = i == TIME ? start->command->time : from[i] + (t - start->command->time) * rate[i];
+  for (int i = 0; i < ANGLES; ++i) moves += fabs(rate[i]);
+  if (moves > 0.0) now->time = t;
+  return now;
+}
+
 /* One step of the method from a start, kept or not. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
@@ -134,14 +146,16 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxRate k[HX_STAGES], change;
   hxMotion y;
   hxWork work;
+  hxCommand now;
   for (int i = 0; i < m->stages; ++i) {
+    const double t = start->t + m->c[i] * h;
     if (i > 0) {
       combine(model, y.y, start->y->y, h, m->a[i], k, i, HX_TURN_SIZE);
       if (m->gamma > 0.0) combine(model, change.y, NULL, h, m->g[i], k, i, 0);
       implicit.change = &change;
     }
-    hx_dynamics_evaluate(model, start->contact, start->command, start->t + m->c[i] * h, i > 0 ? &y : start->y,
-                         m->gamma > 0.0 ? &implicit : NULL, 0, &work, &k[i]);
+    hx_dynamics_evaluate(model, start->contact, command_at(start, t, &now), t, i > 0 ? &y : start->y, m->gamma > 0.0 ? &implicit : NULL, 0,
+                         &work, &k[i]);
     state->evaluations += 1.0;
   }
   memcpy(trial->y.bristle, start->y->bristle, sizeof trial->y.bristle);
@@ -288,8 +302,13 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
 }
 
 /* From state->time to t_end; the last step lands on it exactly. */
-static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
-  hxStart start = {.model = model, .command = command, .contact = &state->contact, .method = hx_method(model->method), .y = &state->motion};
+static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state, char *message) {
+  hxStart start = {.model = model,
+                   .command = command,
+                   .ramp = ramp,
+                   .contact = &state->contact,
+                   .method = hx_method(model->method),
+                   .y = &state->motion};
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step, state->next_step), *next_step = &first; /* new inputs: a larger error than the last step's */
@@ -306,7 +325,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, double t_
   return HX_OK;
 }
 
-static hxStatus run_fixed(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
+static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state,
+                          char *message) {
   const double t_start = state->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
   if (count > steps_allowed(t_end - t_start)) {
@@ -318,15 +338,16 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, double
   }
   for (double i = 1.0; i <= count; i += 1.0) {
     const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
-    const hxStatus status = run_to(model, command, t, state, message);
+    const hxStatus status = run_to(model, command, ramp, t, state, message);
     if (status != HX_OK) return status;
   }
   return HX_OK;
 }
 
 /* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
-static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, double t_end, hxState *state, char *message) {
-  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, t_end, state, message);
+static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state,
+                             char *message) {
+  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end, state, message);
   fill_motion_slots(&state->motion);
   return status;
 }
