@@ -58,11 +58,11 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   return HX_OK;
 }
 
-/* the largest size among numbers that begin at first; not finite when one is not */
+/* the largest size among numbers that begin at first; once not finite, always */
 static double largest(double so_far, const void *first, size_t n) {
   const double *entry = first;
   for (size_t i = 0; first && i < n; ++i)
-    if (!(fabs(entry[i]) <= so_far)) so_far = fabs(entry[i]);
+    if (!isnan(so_far) && !(fabs(entry[i]) <= so_far)) so_far = fabs(entry[i]);
   return so_far;
 }
 

@@ -1,0 +1,380 @@
+"""Model exchange, derivatives and dependencies: the FMU for solvers and tools of others."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmi_plant import ATHENA, ERROR, MODEL_EXCHANGE, OK, Plant
+from fmpy import simulate_fmu
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STATES = [state.name for state in ATHENA.states]
+INPUTS = [variable.name for variable in ATHENA.of_causality("input")]
+UNKNOWNS = [variable.name for variable in ATHENA.of_causality("output", "local") if variable.type == "Real"]
+DISCRETE = [name for name in UNKNOWNS if ATHENA.variable(name).variability == "discrete"]
+LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
+ROUNDING = 1e-12  # 1    of the largest number of its kind
+
+
+class EventInfo(ctypes.Structure):
+    """fmi2EventInfo."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in ("needed", "terminate", "nominals", "states", "time_defined")),
+        ("time", ctypes.c_double),
+    )
+
+
+@pytest.fixture
+def solved(plant_library: Path) -> Iterator[Plant]:
+    """An instance for model exchange, initialised: in event mode."""
+    with Plant(plant_library, kind=MODEL_EXCHANGE) as instance:
+        yield instance.initialize()
+
+
+def doubles(values: Sequence[float] | Array) -> ctypes.Array[ctypes.c_double]:
+    return (ctypes.c_double * len(values))(*values)
+
+
+def fetched(plant: Plant, function: str, n: int) -> Array:
+    place = doubles(np.full(n, np.nan))
+    assert plant.call(function, place, ctypes.c_size_t(n)) == OK, plant.last_message
+    return np.array(place)
+
+
+def put_states(plant: Plant, x: Array) -> int:
+    return plant.call("fmi2SetContinuousStates", doubles(x), ctypes.c_size_t(len(x)))
+
+
+def directional(plant: Plant, unknowns: Sequence[str], knowns: Sequence[str], change: Sequence[float]) -> tuple[int, Array]:
+    """Status and derivatives of the unknowns."""
+    wanted, given = ATHENA.references(unknowns), ATHENA.references(knowns)
+    result = doubles(np.full(len(wanted), np.nan))
+    status = plant.call(
+        "fmi2GetDirectionalDerivative", (ctypes.c_uint * len(wanted))(*wanted), ctypes.c_size_t(len(wanted)),
+        (ctypes.c_uint * len(given))(*given), ctypes.c_size_t(len(given)), doubles(change), result,
+    )  # fmt: skip
+    return status, np.array(result)
+
+
+def set_rates(plant: Plant, rates: dict[str, float], *, order: int = 1) -> int:
+    references = ATHENA.references(rates)
+    n = len(references)
+    orders = (ctypes.c_int * n)(*[order] * n)
+    return plant.call(
+        "fmi2SetRealInputDerivatives", (ctypes.c_uint * n)(*references), ctypes.c_size_t(n), orders, doubles(list(rates.values()))
+    )
+
+
+def output_rates(plant: Plant, names: Sequence[str]) -> Array:
+    references, n = ATHENA.references(names), len(names)
+    result = doubles(np.zeros(n))
+    orders = (ctypes.c_int * n)(*[1] * n)
+    assert plant.call("fmi2GetRealOutputDerivatives", (ctypes.c_uint * n)(*references), ctypes.c_size_t(n), orders, result) == OK
+    return np.array(result)
+
+
+# ---- a solver of others ------------------------------------------------------------------------------------------------------
+
+THROWN = {"initial.position[3]": 0.15, "initial.velocity[1]": 0.2, "initial.angular_velocity[2]": 0.5}
+CONVERGED = 2e-9  # m, rad    both solvers at 1e-9; twelve touch-downs multiply what they leave
+
+
+@pytest.mark.parametrize("law", ["tanh", "bristle"])
+def test_a_solver_of_others_finds_the_same_motion(athena_fmu: Path, law: str) -> None:
+    names = [*STATES[:7], *(f"{leg}.{joint}.angle" for leg in LEGS for joint in ("coxa", "femur", "tibia")), "solver.touchdowns"]
+    start = THROWN | {"solver.tolerance": 1e-10, "friction.law": {"tanh": 1, "bristle": 3}[law]}
+    asked = {"start_values": start, "stop_time": 0.12, "output_interval": 0.01, "output": names}
+    ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **asked)
+    theirs = simulate_fmu(str(athena_fmu), fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-10, record_events=False, **asked)
+    assert ours["solver.touchdowns"][-1] == theirs["solver.touchdowns"][-1] >= 8
+    for name in names[:-1]:
+        np.testing.assert_allclose(theirs[name], ours[name], atol=CONVERGED, err_msg=name)
+
+
+def test_a_walk_s_commands_lead_a_solver_of_others_the_same_way(athena_fmu: Path) -> None:
+    t = np.linspace(0.0, 0.2, 201)
+    columns = {"time": t, "LF.femur.angle_ref": 0.4 + 0.5 * t, "RM.coxa.angle_ref": 0.3 * t, "torso.push_force[2]": 20.0 * t}
+    signals = np.rec.fromarrays(list(columns.values()), names=list(columns))
+    asked = {"input": signals, "stop_time": 0.2, "output_interval": 0.02, "output": STATES[:7], "start_values": {"solver.tolerance": 1e-9}}
+    theirs = simulate_fmu(str(athena_fmu), fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-7, record_events=False, **asked)
+    ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **(asked | {"output_interval": 0.0005}))
+    late = 0.5 * 0.0005 * 0.5  # m    a command held for half a millisecond lags half of that, at half a radian a second and half a metre
+    for name in STATES[:7]:
+        np.testing.assert_allclose(theirs[name], np.interp(theirs["time"], ours["time"], ours[name]), atol=late, err_msg=name)
+
+
+# ---- states and events -------------------------------------------------------------------------------------------------------
+
+
+def test_the_states_are_the_variables_that_show_them(solved: Plant) -> None:
+    x = fetched(solved, "fmi2GetContinuousStates", len(STATES))
+    np.testing.assert_allclose(solved.reals(STATES), x, atol=ROUNDING)
+    rates = fetched(solved, "fmi2GetDerivatives", len(STATES))
+    np.testing.assert_allclose(solved.reals([state.derivative for state in ATHENA.states]), rates, atol=ROUNDING * np.abs(rates).max())
+
+
+def test_states_that_are_set_are_shown(solved: Plant) -> None:
+    assert solved.call("fmi2EnterContinuousTimeMode") == OK
+    x = fetched(solved, "fmi2GetContinuousStates", len(STATES)) + np.random.default_rng(1).normal(0.0, 0.01, len(STATES))
+    assert solved.call("fmi2SetTime", 0.5) == OK
+    assert put_states(solved, x) == OK
+    assert (fetched(solved, "fmi2GetContinuousStates", len(STATES)) == x).all()
+    np.testing.assert_allclose(solved.reals(STATES), x, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_states_that_are_none_are_refused_and_change_nothing(solved: Plant, bad: float) -> None:
+    assert solved.call("fmi2EnterContinuousTimeMode") == OK
+    x, seen = fetched(solved, "fmi2GetContinuousStates", len(STATES)), solved.everything()
+    for place, value in ((20, bad), (slice(3, 7), 0.0)):
+        wrong = x.copy()
+        wrong[place] = value
+        assert put_states(solved, wrong) == ERROR
+        assert "expected" in solved.last_message
+    assert put_states(solved, x[:-1]) == ERROR
+    assert "got 69 places, expected 70" in solved.last_message
+    assert solved.call("fmi2SetTime", float(bad)) == ERROR
+    assert solved.everything() == seen
+
+
+def test_indicators_are_the_feet_s_penetrations_and_an_event_closes_a_foot(solved: Plant) -> None:
+    depths = [f"{leg}.foot.penetration" for leg in LEGS]
+    assert fetched(solved, "fmi2GetEventIndicators", len(LEGS)).tolist() == solved.reals(depths)
+    assert solved.call("fmi2EnterContinuousTimeMode") == OK
+    x = fetched(solved, "fmi2GetContinuousStates", len(STATES))
+    height, closed = STATES.index("torso.position[3]"), ATHENA.references([f"{leg}.foot.contact" for leg in LEGS])
+    for z, contact in ((0.05, 1.0), (0.0, 0.0)):  # up: the feet still count as closed until the event, then they are open
+        moved = x.copy()
+        moved[height] += z
+        assert put_states(solved, moved) == OK
+        assert solved.get_references("fmi2GetBoolean", closed) == (OK, [contact] * 6)
+        info = EventInfo()
+        assert solved.call("fmi2EnterEventMode") == OK
+        assert solved.call("fmi2NewDiscreteStates", ctypes.byref(info)) == OK
+        assert not any((info.needed, info.terminate, info.nominals, info.states, info.time_defined))
+        assert solved.get_references("fmi2GetBoolean", closed) == (OK, [1.0 - contact] * 6)
+        assert solved.call("fmi2EnterContinuousTimeMode") == OK
+
+
+def test_nominals_are_those_of_the_description(solved: Plant) -> None:
+    assert fetched(solved, "fmi2GetNominalsOfContinuousStates", len(STATES)).tolist() == [ATHENA.variable(n).nominal for n in STATES]
+
+
+def test_a_saved_state_holds_the_contacts_and_the_solver_s_state(solved: Plant) -> None:
+    assert solved.call("fmi2EnterContinuousTimeMode") == OK
+    saved, seen = solved.save(), solved.everything()
+    x = fetched(solved, "fmi2GetContinuousStates", len(STATES))
+    assert put_states(solved, x + 0.01) == OK
+    assert solved.call("fmi2EnterEventMode") == OK
+    assert solved.call("fmi2NewDiscreteStates", ctypes.byref(EventInfo())) == OK
+    assert solved.call("fmi2SetFMUstate", saved) == OK
+    assert solved.everything() == seen
+    assert (fetched(solved, "fmi2GetContinuousStates", len(STATES)) == x).all()
+    solved.free(saved)
+
+
+def test_a_state_of_the_other_interface_is_refused(solved: Plant, running: Plant) -> None:
+    saved = solved.save()
+    status, copied = running.deserialize(solved.serialize(saved))
+    assert status == OK
+    assert running.call("fmi2SetFMUstate", copied) == ERROR
+    assert "one of the other interface" in running.last_message
+    running.free(copied)
+    solved.free(saved)
+
+
+def test_calls_of_the_other_interface_are_refused_by_name(solved: Plant, running: Plant) -> None:
+    assert solved.step(0.0, 0.01) == ERROR
+    assert "fmi2DoStep: got a call of co-simulation, expected one of model exchange" in solved.last_message
+    assert running.call("fmi2EnterEventMode") == ERROR
+    assert "got a call of model exchange, expected one of co-simulation" in running.last_message
+
+
+@pytest.mark.parametrize("function", ["fmi2EnterEventMode", "fmi2CompletedIntegratorStep", "fmi2SetContinuousStates"])
+def test_continuous_time_calls_need_continuous_time_mode(solved: Plant, function: str) -> None:
+    assert solved.call(function) == ERROR
+    assert "in event mode" in solved.last_message
+
+
+def test_no_integrator_step_needs_an_event(solved: Plant) -> None:
+    event, end = ctypes.c_int(7), ctypes.c_int(7)
+    assert solved.call("fmi2EnterContinuousTimeMode") == OK
+    assert solved.call("fmi2CompletedIntegratorStep", 1, ctypes.byref(event), ctypes.byref(end)) == OK
+    assert (event.value, end.value) == (0, 0)
+
+
+# ---- directional derivatives -------------------------------------------------------------------------------------------------
+
+
+def test_derivatives_of_many_knowns_are_the_sum_of_each_one_s(running: Plant) -> None:
+    running.step(0.0, 0.01)
+    rng = np.random.default_rng(3)
+    knowns, change = [*STATES, *INPUTS], rng.normal(0.0, 1.0, len(STATES) + len(INPUTS))
+    together = directional(running, UNKNOWNS, knowns, change)[1]
+    single = sum(weight * directional(running, UNKNOWNS, [known], [1.0])[1] for known, weight in zip(knowns, change, strict=True))
+    np.testing.assert_allclose(together, single, atol=1e-11 * np.abs(together).max())  # of 130 terms
+
+
+def test_derivatives_do_not_depend_on_the_size_of_the_change(running: Plant) -> None:
+    known = ["torso.position[3]"]
+    unit = directional(running, UNKNOWNS, known, [1.0])[1]
+    for size in (1e-100, 1e-8, 1e100):
+        np.testing.assert_allclose(directional(running, UNKNOWNS, known, [size])[1] / size, unit, rtol=ROUNDING)
+
+
+def test_a_servo_s_torque_falls_with_its_angle_by_its_stiffness(running: Plant) -> None:
+    status, value = directional(running, ["LF.femur.torque"], ["LF.femur.angle"], [1.0])
+    assert (status, value[0]) == (OK, pytest.approx(-running.real("servo.kp"), rel=ROUNDING))
+
+
+@pytest.mark.parametrize(
+    ("unknown", "known", "message"),
+    [("torso.roll", "servo.kp", "got the known servo.kp, expected an input or a continuous state"),
+     ("torso.roll", "torso.roll", "got the known torso.roll"),
+     ("servo.kp", "torso.velocity[1]", "got the unknown servo.kp, expected an output or a derivative")],
+)  # fmt: skip
+def test_derivatives_of_or_by_others_are_refused(running: Plant, unknown: str, known: str, message: str) -> None:
+    status, value = directional(running, [unknown], [known], [1.0])
+    assert status == ERROR
+    assert message in running.last_message
+    assert np.isnan(value).all()
+
+
+def test_a_direction_that_is_not_finite_is_refused(running: Plant) -> None:
+    assert directional(running, ["torso.roll"], ["torso.velocity[1]"], [np.nan])[0] == ERROR
+    assert "not finite" in running.last_message
+
+
+# ---- derivatives of inputs and outputs ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", [1, 3])
+def test_an_input_that_moves_is_the_limit_of_one_that_is_set_often(plant_library: Path, mode: int) -> None:
+    rates = {"LF.femur.angle_ref": 0.5, "RM.coxa.angle_ref": -0.3, "torso.push_force[2]": 100.0}
+    ends = []
+    for pieces in (1, 200, 400):
+        with Plant(plant_library) as plant:
+            assert plant.set_reals({"solver.tolerance": 1e-8}) == OK
+            assert plant.set_references("fmi2SetInteger", ATHENA.references(["servo.mode"]), [mode]) == OK
+            plant.initialize()
+            value = dict(zip(rates, plant.reals(rates), strict=True))
+            for i in range(pieces):
+                t, h = 0.02 * i / pieces, 0.02 / pieces
+                assert plant.set_reals({name: value[name] + rate * (t + (pieces > 1) * 0.5 * h) for name, rate in rates.items()}) == OK
+                assert pieces > 1 or set_rates(plant, rates) == OK
+                assert plant.step(t, h) == OK, plant.last_message
+            ends.append(np.array(plant.reals(STATES)))
+    moving, coarse, fine = ends
+    assert np.abs(moving - fine).max() < 0.35 * np.abs(moving - coarse).max() + 1e-7  # order 2: a quarter; 1e-7: the solver's
+
+
+def test_a_moving_input_ends_where_it_has_moved_to_and_then_stays(running: Plant) -> None:
+    assert set_rates(running, {"torso.push_force[1]": 100.0}) == OK
+    assert running.step(0.0, 0.01) == OK
+    assert running.real("torso.push_force[1]") == pytest.approx(1.0)
+    assert running.step(0.01, 0.01) == OK
+    assert running.real("torso.push_force[1]") == pytest.approx(1.0)
+
+
+def test_rates_of_inputs_that_cannot_be_are_refused_whole(running: Plant) -> None:
+    before = running.everything()
+    assert set_rates(running, {"torso.push_force[1]": 1.0, "torso.push_force[2]": np.nan}) == ERROR
+    assert "derivative of torso.push_force[2]: got nan" in running.last_message
+    assert set_rates(running, {"torso.roll": 1.0}) == ERROR
+    assert set_rates(running, {"torso.push_force[1]": 1.0}, order=2) == ERROR
+    assert "got order 2, expected 1" in running.last_message
+    assert running.step(0.0, 0.01) == OK
+    assert running.real("torso.push_force[1]") == 0.0
+    assert set_rates(running, {"LF.femur.angle_ref": 1e4}) == OK
+    assert running.step(0.01, 0.01) == ERROR
+    assert "expected one that leaves it in" in running.last_message
+    assert len(before) == len(running.everything())
+
+
+def test_rates_of_outputs_are_their_slopes_over_time(running: Plant) -> None:
+    names = [name for name in UNKNOWNS if name not in DISCRETE and ATHENA.variable(name).causality == "output"]
+    names = [name for name in names if not name.startswith("constraint.")]
+    h, t, samples = 1e-4, 0.005, []
+    assert running.call("fmi2SetRealInputDerivatives", None, ctypes.c_size_t(0), None, None) == OK
+    assert running.set_reals({"LF.femur.angle_ref": running.real("LF.femur.angle_ref") + 0.01}) == OK
+    assert running.step(0.0, t) == OK
+    for k in range(5):
+        if k == 2:
+            slopes = output_rates(running, names)
+        samples.append(np.array(running.reals(names)))
+        assert running.step(t + k * h, h) == OK
+    central = (samples[0] - 8.0 * samples[1] + 8.0 * samples[3] - samples[4]) / (12.0 * h)
+    scale = np.maximum(np.abs(central), [float(ATHENA.variable(name).nominal or 1.0) for name in names])
+    np.testing.assert_array_less(np.abs(slopes - central) / scale, 0.02)  # five points of a solution to 1e-6, 0.1 ms apart
+
+
+# ---- dependencies ------------------------------------------------------------------------------------------------------------
+
+VARIANTS: tuple[dict[str, float], ...] = (
+    {},
+    {"friction.law": 3, "terrain.kind": 2, "terrain.incline": 0.1, "terrain.heading": 0.5},
+    {"servo.mode": 3, "terrain.kind": 2, "terrain.incline": 0.1},
+)
+
+
+def moved(library: Path, variant: dict[str, float], *, initialize: bool = True) -> Plant:
+    """An instance in a skew posture, moving, with all feet deep in soft ground."""
+    plant, rng = Plant(library), np.random.default_rng(5)
+    soft = {"contact.law": 5, "contact.damping_factor": 0.1, "contact.stiffness": 1e3, "friction.presliding": 1e-5, "friction.mu": 0.1}
+    for name, value in (soft | variant).items():
+        kind = "fmi2SetReal" if ATHENA.variable(name).type == "Real" else "fmi2SetInteger"
+        assert plant.set_references(kind, ATHENA.references([name]), [value]) == OK
+    names = [n.name for n in ATHENA.of_causality("parameter") if n.name.startswith("initial.")]
+    assert plant.set_reals({name: plant.real(name) + rng.normal(0.0, 0.05) for name in names}) == OK
+    assert plant.set_reals({"initial.position[3]": plant.real("initial.position[3]") - 0.1}) == OK
+    assert plant.set_reals({f"torso.push_{kind}[{i}]": 1.0 for kind in ("force", "torque") for i in (1, 2, 3)}) == OK
+    return plant.initialize() if initialize else plant
+
+
+def test_what_unknowns_depend_on_is_what_the_description_says(plant_library: Path) -> None:
+    knowns = [*STATES, *INPUTS]
+    seen = np.zeros((len(UNKNOWNS), len(knowns)), dtype=bool)
+    for variant in VARIANTS:
+        with moved(plant_library, variant) as plant:
+            for start, end in itertools.pairwise((0.0, 0.0005, 0.001, 0.002, 0.005, 0.01)):  # some feet slide, some hold
+                assert plant.step(start, end - start) == OK, plant.last_message
+                jacobian = np.array([directional(plant, UNKNOWNS, [known], [1.0])[1] for known in knowns]).T
+                seen |= np.abs(jacobian) > 1e-9 * np.abs(jacobian).max(axis=0)  # less is rounding
+    for name, row in zip(UNKNOWNS, seen, strict=True):
+        found, stated = {known for known, does in zip(knowns, row, strict=True) if does}, ATHENA.depends(name)
+        assert stated is None or found <= set(stated), f"{name} depends on {found - set(stated or ())} too"
+        assert stated is None or kinds(stated) == kinds(found), f"{name} depends on {kinds(found)} alone, whatever the index"
+
+
+def kinds(names: Iterable[str]) -> set[str]:
+    """Names without their index."""
+    return {name.partition("[")[0] for name in names}
+
+
+def test_what_unknowns_depend_on_at_the_start_is_what_the_description_says(plant_library: Path) -> None:
+    """Each parameter is changed by itself; a kink may hide one direction of a change, so both are tried."""
+    names = [*(variable.name for variable in ATHENA.of_causality("parameter") if variable.type == "Real"), *INPUTS]
+    seen = {name: set[str]() for name in UNKNOWNS}
+    for variant in VARIANTS:
+        with moved(plant_library, variant, initialize=False) as plant:
+            before, value = np.array(plant.reals(UNKNOWNS)), dict(zip(names, plant.reals(names), strict=True))
+            for name, sign in itertools.product(names, (1.0, -1.0)):
+                if plant.set_reals({name: value[name] * (1.0 + sign * 0.01) + sign * 1e-3 * (value[name] == 0.0)}) != OK:
+                    continue
+                status, values = plant.get_references("fmi2GetReal", ATHENA.references(UNKNOWNS))
+                for unknown in (
+                    np.array(UNKNOWNS)[np.abs(np.array(values) - before) > 1e-9 * np.abs(before) + ROUNDING] if status == OK else ()
+                ):
+                    seen[unknown].add(name)
+                assert plant.set_reals({name: value[name]}) == OK
+    for name, found in seen.items():
+        stated = ATHENA.depends_initially(name)
+        assert stated is None or found <= set(stated), f"{name} depends on {found - set(stated or ())} too"
