@@ -19,7 +19,7 @@ td, th {{ text-align: left; vertical-align: top; padding: 0.2em 0.8em 0.2em 0; b
 </head>
 <body>
 <h1>{name}: hexapod plant</h1>
-<p>A six-legged robot of {bodies} rigid bodies and {joints} servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation, version
+<p>A six-legged robot of {bodies} rigid bodies and {joints} servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation and model exchange, version
 {version}, GUID {guid}.</p>
 <h2>First run</h2>
 <p>Without any input the robot stands in its pose, settled on the ground, and stays there. Drive it by the joint commands
@@ -38,7 +38,10 @@ came in nothing is set.</li>
 <li>Accuracy is the parameter <code>solver.tolerance</code> (or <code>solver.step</code>); the experiment's tolerance does not change it,
 so results do not depend on the importer's settings.</li>
 <li>A step that the plant cannot take is discarded and leaves the state as it was. The state can be saved, restored and serialised.</li>
-<li>Not provided: model exchange, directional derivatives, derivatives of inputs and outputs, asynchronous steps.</li>
+<li>Model exchange: {states} continuous states (torso, joint angles and speeds, works, bristles); events are touch-downs and lift-offs.</li>
+<li>Directional derivatives of outputs and state derivatives by inputs and states are exact. Derivatives of inputs and outputs are of order 1; a
+derivative of an input holds for the next step.</li>
+<li>Not provided: asynchronous steps.</li>
 </ul>
 <h2>Variables</h2>
 <p>{{leg}} and {{joint}} stand for the names above, [i] for 1, 2, 3 (quaternions: to 4).</p>
@@ -73,6 +76,7 @@ def render_html(interface: Interface, guid: str) -> str:
         version=interface.version,
         guid=guid,
         step=interface.step,
+        states=len(interface.states),
         rows="\n".join(rows),
         sources="\n".join(sources) or "<li>not stated</li>",
     )

@@ -152,9 +152,10 @@ def _add_structure(root: Element, interface: Interface) -> None:
         ("Derivatives", derivatives, interface.depends),
         ("InitialUnknowns", initial, interface.depends_initially),
     ):
-        parent = SubElement(structure, title) if names else None
-        for name in names if parent is not None else ():
-            _add_unknown(parent, interface, name, depends(name))
+        if names:
+            parent = SubElement(structure, title)
+            for name in names:
+                _add_unknown(parent, interface, name, depends(name))
 
 
 def _add_unknown(parent: Element, interface: Interface, name: str, depends: Iterable[str] | None) -> None:

@@ -53,7 +53,7 @@ def put_states(plant: Plant, x: Array) -> int:
     return plant.call("fmi2SetContinuousStates", doubles(x), ctypes.c_size_t(len(x)))
 
 
-def directional(plant: Plant, unknowns: Sequence[str], knowns: Sequence[str], change: Sequence[float]) -> tuple[int, Array]:
+def directional(plant: Plant, unknowns: Sequence[str], knowns: Sequence[str], change: Sequence[float] | Array) -> tuple[int, Array]:
     """Status and derivatives of the unknowns."""
     wanted, given = ATHENA.references(unknowns), ATHENA.references(knowns)
     result = doubles(np.full(len(wanted), np.nan))
@@ -102,7 +102,7 @@ def test_a_solver_of_others_finds_the_same_motion(athena_fmu: Path, law: str) ->
 def test_a_walk_s_commands_lead_a_solver_of_others_the_same_way(athena_fmu: Path) -> None:
     t = np.linspace(0.0, 0.2, 201)
     columns = {"time": t, "LF.femur.angle_ref": 0.4 + 0.5 * t, "RM.coxa.angle_ref": 0.3 * t, "torso.push_force[2]": 20.0 * t}
-    signals = np.rec.fromarrays(list(columns.values()), names=list(columns))
+    signals = np.rec.fromarrays(list(columns.values()), names=",".join(columns))
     asked = {"input": signals, "stop_time": 0.2, "output_interval": 0.02, "output": STATES[:7], "start_values": {"solver.tolerance": 1e-9}}
     theirs = simulate_fmu(str(athena_fmu), fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-7, record_events=False, **asked)
     ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **(asked | {"output_interval": 0.0005}))
