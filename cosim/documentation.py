@@ -19,8 +19,8 @@ td, th {{ text-align: left; vertical-align: top; padding: 0.2em 0.8em 0.2em 0; b
 </head>
 <body>
 <h1>{name}: hexapod plant</h1>
-<p>A six-legged robot of {bodies} rigid bodies and {joints} servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation and model exchange, version
-{version}, GUID {guid}.</p>
+<p>A six-legged robot of {bodies} rigid bodies and {joints} servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation
+and model exchange, version {version}, GUID {guid}.</p>
 <h2>First run</h2>
 <p>Without any input the robot stands in its pose, settled on the ground, and stays there. Drive it by the joint commands
 <code>L.J.angle_ref</code>, <code>L.J.speed_ref</code> and <code>L.J.torque_ref</code>; push it by <code>torso.push_force</code>.
@@ -39,8 +39,8 @@ came in nothing is set.</li>
 so results do not depend on the importer's settings.</li>
 <li>A step that the plant cannot take is discarded and leaves the state as it was. The state can be saved, restored and serialised.</li>
 <li>Model exchange: {states} continuous states (torso, joint angles and speeds, works, bristles); events are touch-downs and lift-offs.</li>
-<li>Directional derivatives of outputs and state derivatives by inputs and states are exact. Derivatives of inputs and outputs are of order 1; a
-derivative of an input holds for the next step.</li>
+<li>Directional derivatives of outputs and state derivatives by inputs and states are exact. Derivatives of inputs and outputs are of order 1;
+a derivative of an input holds for the next step.</li>
 <li>Not provided: asynchronous steps.</li>
 </ul>
 <h2>Variables</h2>

@@ -102,7 +102,9 @@ def test_a_solver_of_others_finds_the_same_motion(athena_fmu: Path, law: str) ->
 def test_a_walk_s_commands_lead_a_solver_of_others_the_same_way(athena_fmu: Path) -> None:
     t = np.linspace(0.0, 0.2, 201)
     columns = {"time": t, "LF.femur.angle_ref": 0.4 + 0.5 * t, "RM.coxa.angle_ref": 0.3 * t, "torso.push_force[2]": 20.0 * t}
-    signals = np.rec.fromarrays(list(columns.values()), names=",".join(columns))
+    signals = np.zeros(len(t), dtype=[(name, np.float64) for name in columns])
+    for name, values in columns.items():
+        signals[name] = values
     asked = {"input": signals, "stop_time": 0.2, "output_interval": 0.02, "output": STATES[:7], "start_values": {"solver.tolerance": 1e-9}}
     theirs = simulate_fmu(str(athena_fmu), fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-7, record_events=False, **asked)
     ours = simulate_fmu(str(athena_fmu), fmi_type="CoSimulation", **(asked | {"output_interval": 0.0005}))
