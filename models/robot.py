@@ -3,7 +3,8 @@
 A robot file shares link data between the legs in [links.coxa], [links.femur], [links.tibia]; any leg may override any of
 those keys in [legs.LF.femur] and so on, so legs need not be equal. Three figures may be left out and are then computed:
 torso.inertia (the homogeneous box of torso.size), contact.stiffness (Hertz, from the foot's radius and material) and friction.presliding
-(Mindlin, from the same and the weight).
+(Mindlin, from the same and the weight). A URDF is a robot file too, and a robot file may name one, [urdf] file = "my.urdf", with what
+is put over it (urdf/).
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ from hexapod_cosim.models.records import (
     Vector6,
 )
 from hexapod_cosim.models.schema import Number, Vector, expect_table, read_given, refuse_unknown_keys, require
+from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
 
 __all__ = [
@@ -51,10 +53,6 @@ __all__ = [
     "mindlin_presliding", "robot_from_table",
 ]  # fmt: skip
 
-SECTIONS: dict[str, type[Any]] = {
-    "torso": Torso, "foot": Foot, "contact": Contact, "friction": Friction, "servo": Servo, "baumgarte": Baumgarte,
-    "solver": Solver, "terrain": Terrain, "gait": Gait,
-}  # fmt: skip
 LEAST_PRESLIDING = 1e-6  # m  where there is no load or no friction to take it from
 STANCE = Number("rad", at_least=-math.pi, at_most=math.pi)
 
@@ -67,6 +65,8 @@ def list_robots() -> list[str]:
 def load_robot(path_or_name: str | Path) -> Robot:
     """Reads and checks a robot file, or one of `list_robots()` by name. Raises RobotError."""
     path = _robot_path(path_or_name)
+    if path.suffix.lower() == ".urdf":
+        return _robot_from_urdf(urdf_table(path), str(path))
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -76,7 +76,16 @@ def load_robot(path_or_name: str | Path) -> Robot:
         raise RobotError(
             "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
         ) from error
+    if "urdf" in table:
+        return _robot_from_urdf(side_table(table, path.parent, str(path)), str(path))
     return robot_from_table(table, where=str(path))
+
+
+def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
+    try:
+        return robot_from_table(table, where=where)
+    except RobotError as error:
+        raise element_named(error, table) from error
 
 
 def _robot_path(path_or_name: str | Path) -> Path:

@@ -13,25 +13,34 @@ from hexapod_cosim.controller import Gains, save_gains
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
+from hexapod_cosim.cosim.robot_files import chosen_format, export_description
 from hexapod_cosim.cosim.validation import find_problems
-from hexapod_cosim.models import FmuError, HexapodError, load_robot
+from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
 
-RobotName = Annotated[str, typer.Option("--robot", metavar="FILE", help="A robot file, or a name of `hexapod list robots`.")]
+RobotName = Annotated[str, typer.Option("--robot", metavar="FILE", help="A robot file, a URDF, or a name of `hexapod list robots`.")]
 DEFAULT_PERIOD = 0.005  # s, the default macro-step
 
 
 def export(
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE.fmu", help="The file to write; default ROBOT.fmu.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="The file to write; default ROBOT.fmu, ROBOT.urdf or ROBOT.xml.")
+    ] = None,
     robot: RobotName = "athena",
     fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard.")] = 2,
     platforms: Annotated[
         str | None,
         typer.Option("--platforms", help="Platforms, separated by commas; default: this machine's; all: every one that is installed."),
     ] = None,
+    urdf: Annotated[bool, typer.Option("--urdf", help="Write the robot as a URDF instead; so does -o FILE.urdf.")] = False,
+    mjcf: Annotated[bool, typer.Option("--mjcf", help="Write it as a MuJoCo model instead; so does -o FILE.xml.")] = False,
     json: Json = False,
 ) -> None:
-    """Pack the plant FMU of a robot."""
-    made = load_robot(robot)
+    """Pack the plant FMU of a robot, or write the robot for other tools."""
+    form, made = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
+    if form is not None:
+        written = export_description(made, output or Path(f"{made.name}{form.suffix}"), form)
+        _show_written(written, made, form.suffix[1:], json=json)
+        return
     path = output or Path(f"{made.name}.fmu")
     if path.is_dir():
         raise HexapodError("not an FMU's name", got=str(path), expected="a file, not a folder", fix=f"write -o {path / made.name}.fmu")
@@ -41,10 +50,15 @@ def export(
         )
     chosen = [name.strip() for name in platforms.split(",")] if platforms else None
     export_fmu(made, path, fmi=fmi, platforms=chosen)
+    _show_written(path, made, "fmu", json=json)
+
+
+def _show_written(path: Path, robot: Robot, kind: str, *, json: bool) -> None:
     if json:
-        show_json({"fmu": str(path), "robot": made.name, "hash": made.hash})
+        show_json({kind: str(path), "robot": robot.name, "hash": robot.hash})
         return
     show_files([path])
+    print("".join(f"{text}\n" for key, text in robot.source.items() if key.startswith("URDF, ")), end="")
 
 
 def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")], json: Json = False) -> None:

@@ -1,0 +1,158 @@
+"""Which of a URDF's chains is which leg, and its links in this project's frames (docs/architecture.md).
+
+Legs are known by where their hips are, not by names. Every link's frame becomes parallel to the hip's at angle 0. The hip's yaw is chosen
+so that the joints turn about +z, -y and +y where their axes allow that, as the controller wants it; joints whose axis points the other way
+are then counted the other way round.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.kinematics import axis_rotation, cross
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array
+from hexapod_cosim.models.urdf.bodies import Body, Branch
+
+Z = np.array([0.0, 0.0, 1.0])
+PATTERN = (Z, np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]))  # the controller's joint axes
+PATTERN_TOLERANCE = 1e-4  # rad    figures printed with four digits
+SAME_YAW = 1e-9  # rad    then the printed one is taken
+SHORT = 1e-6  # m    no direction can be taken from a way as short
+
+
+@dataclass(frozen=True, eq=False)
+class FoundLeg:
+    """A leg's table as a robot file has it, and where it comes from."""
+
+    name: str
+    table: dict[str, Any]
+    joints: tuple[str, str, str]
+    reversed: tuple[str, ...]  # joints counted the other way round
+    radius: float | None  # m    of the foot, where the URDF says it
+    servo: tuple[Branch, Branch, Branch]
+
+
+def find_legs(torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str) -> list[FoundLeg]:
+    """The six legs in our order; `origin` (3,) and `axes` (3, 3) are the torso's frame in the root link's. Raises RobotError."""
+    chains = [_chain(branch, where) for branch in torso.branches]
+    if len(chains) != len(LEG_NAMES):
+        got = f"{len(chains)} moving joints on {torso.name!r}: {', '.join(chain[0].joint.name for chain in chains)}"
+        raise RobotError("not six legs", got=got, expected="six", fix="make joints that are no legs' fixed", where=where)
+    hips = np.array([axes.T @ (chain[0].position - origin) for chain in chains])
+    order = _order(hips, [chain[0].joint.name for chain in chains], where)
+    middle = hips.mean(axis=0)
+    return [
+        _leg(name, chains[k], hips[k], hips[k] - middle, axes, keep_frames=keep_frames, where=where)
+        for name, k in zip(LEG_NAMES, order, strict=True)
+    ]
+
+
+def _chain(branch: Branch, where: str) -> tuple[Branch, Branch, Branch]:
+    chain = [branch]
+    while chain[-1].body.branches:
+        body = chain[-1].body
+        if len(body.branches) > 1 or len(chain) == len(JOINT_NAMES):
+            got = f"{', '.join(item.joint.name for item in body.branches)} on link {body.name!r}, joint {len(chain) + 1} of the leg"
+            fix = "make the others fixed"
+            raise RobotError("a leg that is no chain of three joints", got=got, expected="one after the other", fix=fix, where=where)
+        chain.append(body.branches[0])
+    if len(chain) != len(JOINT_NAMES):
+        names, fix = [item.joint.name for item in chain], "make it fixed if it is no leg"
+        raise RobotError("a leg that is no chain of three joints", got=names, expected="three moving joints", fix=fix, where=where)
+    return (chain[0], chain[1], chain[2])
+
+
+def _order(hips: Array, names: list[str], where: str) -> list[int]:
+    """Indices of LF LM LR RF RM RR: x forward, y left."""
+    sides = [sorted((k for k in range(len(hips)) if sign * hips[k, 1] > 0.0), key=lambda k: -hips[k, 0]) for sign in (1.0, -1.0)]
+    if [len(side) for side in sides] != [3, 3]:
+        got = ", ".join(f"{name} at ({x:.3g}, {y:.3g})" for name, (x, y, _) in zip(names, hips, strict=True))
+        fix = 'say which way is forward: `forward = "y"` under [urdf] of a robot file with file = "..."'
+        raise RobotError("not three hips left and three right", got=got, expected="x forward, y left", fix=fix, where=where)
+    return [*sides[0], *sides[1]]
+
+
+def _leg(
+    name: str, chain: tuple[Branch, Branch, Branch], hip: Array, outwards: Array, axes: Array, *, keep_frames: bool, where: str
+) -> FoundLeg:
+    turns = [axes.T @ chain[0].rotation]  # links' axes to the torso's at angle 0
+    for branch in chain[1:]:
+        turns.append(turns[-1] @ branch.rotation)
+    wanted = None if keep_frames else _pattern_yaw(turns, chain, outwards)
+    yaw, R_HC = _yaw(chain[0], turns[0], wanted, plain=bool((axes == np.eye(3)).all()))
+    turns = [R_HC, R_HC @ chain[1].rotation, R_HC @ chain[1].rotation @ chain[2].rotation]
+    foot, radius = _foot(chain[2].body, where)
+    tips = [turns[0] @ chain[1].position, turns[1] @ chain[2].position, turns[2] @ foot]
+    table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
+    other_way = []
+    for joint, pattern, branch, R, tip in zip(JOINT_NAMES, PATTERN, chain, turns, tips, strict=True):
+        axis, sign = _axis(R @ branch.joint.axis, pattern if wanted is not None else None)
+        other_way += [branch.joint.name] if sign < 0.0 else []
+        table[joint] = _link(branch, R, tip, axis, sign, where)
+    names = (chain[0].joint.name, chain[1].joint.name, chain[2].joint.name)
+    return FoundLeg(name, table, names, tuple(other_way), radius, chain)
+
+
+def _pattern_yaw(turns: list[Array], chain: tuple[Branch, Branch, Branch], outwards: Array) -> float | None:
+    """The hip's yaw [rad] in which the axes are up to sign the controller's; None where there is none."""
+    coxa, femur, tibia = (R @ branch.joint.axis for R, branch in zip(turns, chain, strict=True))
+    if np.hypot(*coxa[:2]) > PATTERN_TOLERANCE or abs(femur[2]) > PATTERN_TOLERANCE:
+        return None
+    if np.linalg.norm(cross(femur, tibia)) > PATTERN_TOLERANCE:
+        return None
+    x = cross(femur, Z)
+    way = (turns[0] @ chain[1].position) @ x
+    way = way if abs(way) > SHORT else outwards @ x
+    x = -x if way < 0.0 else x
+    return math.atan2(x[1], x[0])
+
+
+def _yaw(coxa: Branch, R_TC: Array, wanted: float | None, *, plain: bool) -> tuple[float, Array]:
+    """The hip's yaw [rad] and the coxa's axes in the hip's frame; exact where the URDF gives the yaw itself."""
+    printed = coxa.joint.yaw if coxa.direct and plain else None
+    if printed is not None and abs(printed) <= math.pi:
+        turn = 0.0 if wanted is None else math.remainder(wanted - printed, 2.0 * math.pi)
+        if abs(turn) <= SAME_YAW:
+            return printed, np.eye(3)
+    yaw = math.atan2(R_TC[1, 0], R_TC[0, 0]) if wanted is None else wanted
+    return yaw, axis_rotation(Z, -yaw) @ R_TC
+
+
+def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
+    if pattern is None:
+        return axis + 0.0, 1.0
+    return pattern, 1.0 if axis @ pattern > 0.0 else -1.0
+
+
+def _foot(tibia: Body, where: str) -> tuple[Array, float | None]:
+    """Centre of the foot [m] in the tibia's frame, and its radius: the outermost collision sphere, else the outermost fixed link."""
+    spheres = tibia.spheres
+    if spheres:
+        outermost = max(spheres, key=lambda sphere: float(np.linalg.norm(sphere.centre)))
+        return outermost.centre, outermost.radius
+    tip = max((member.position for member in tibia.members), key=lambda place: float(np.linalg.norm(place)))
+    if np.linalg.norm(tip) <= SHORT:
+        fix = "give it a collision sphere where it touches the ground, or a fixed link there"
+        raise RobotError("a leg without a foot", expected="a foot", fix=fix, where=f"{where}: link {tibia.name!r}")
+    return tip, None
+
+
+def _link(branch: Branch, R: Array, tip: Array, axis: Array, sign: float, where: str) -> dict[str, Any]:
+    """A link's table, in hip axes."""
+    inertial, joint = branch.body.inertial(where), branch.joint
+    limits = (joint.lower, joint.upper) if sign > 0.0 else (-joint.upper, -joint.lower)
+    return {
+        "mass": inertial.mass, "length": float(tip[0]), "offset_y": float(tip[1]), "offset_z": float(tip[2]),
+        "com": (R @ inertial.com).tolist(), "inertia": inertia_entries(R @ inertial.inertia @ R.T),
+        "axis": axis.tolist(), "angle_min": limits[0], "angle_max": limits[1],
+    }  # fmt: skip
+
+
+def inertia_entries(inertia: Array) -> list[float]:
+    """xx yy zz xy xz yz of a symmetric matrix."""
+    return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]

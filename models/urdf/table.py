@@ -1,0 +1,262 @@
+"""A URDF as the tables of a robot file, with what it does not say taken, in this order, from a side file, from the URDF's own
+<hexapod> element, or assumed.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.models.errors import RobotError, unknown_name
+from hexapod_cosim.models.kinematics import axis_rotation
+from hexapod_cosim.models.records import (
+    JOINT_NAMES,
+    LEG_NAMES,
+    Array,
+    Baumgarte,
+    Contact,
+    Foot,
+    Friction,
+    Gait,
+    Leg,
+    Link,
+    Servo,
+    Solver,
+    Terrain,
+    Torso,
+)
+from hexapod_cosim.models.schema import Number, Vector, expect_table, read_given, refuse_unknown_keys, specs
+from hexapod_cosim.models.urdf.assumed import assume_gait, assume_servo, assume_stances, equivalent_box
+from hexapod_cosim.models.urdf.bodies import Body, root_body
+from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, describe, parse_urdf
+from hexapod_cosim.models.urdf.extension import extension_tables
+from hexapod_cosim.models.urdf.legs import FoundLeg, find_legs, inertia_entries
+
+Table = dict[str, Any]
+
+JOINTS = "read: joints "  # a leg's, in source
+
+FORWARD = {"x": 0.0, "y": 0.5 * np.pi, "-x": np.pi, "-y": -0.5 * np.pi}  # the torso's yaw in the root link
+SIZES = {"torque_max": "effort", "speed_max": "velocity", "coulomb_friction": "friction"}  # servo's, and a joint's in the URDF
+WHOLE = ("contact", "friction", "baumgarte", "solver", "terrain")  # sections a URDF says nothing of
+SECTIONS: dict[str, type[Any]] = {
+    "torso": Torso, "foot": Foot, "contact": Contact, "friction": Friction, "servo": Servo, "baumgarte": Baumgarte,
+    "solver": Solver, "terrain": Terrain, "gait": Gait,
+}  # fmt: skip
+EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
+    **{name: dict(specs(record)) for name, record in SECTIONS.items()},
+    "world": {"gravity": Vector("m/s2", 3)},
+    **{name: {"stance": Vector("rad", 3)} for name in LEG_NAMES},
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """The [urdf] table of a side file."""
+
+    forward: str = "x"
+    ignore: tuple[str, ...] = ()
+    keep_frames: bool = False
+
+    @classmethod
+    def read(cls, table: Mapping[str, Any], where: str) -> Options:
+        """Checked. Raises RobotError."""
+        refuse_unknown_keys(table, ["file", "forward", "ignore", "keep_frames"], where)
+        forward, ignore, keep = table.get("forward", "x"), table.get("ignore", []), table.get("keep_frames", False)
+        if forward not in FORWARD:
+            raise unknown_name("direction", str(forward), FORWARD, where=f"{where}.forward", error=RobotError)
+        if not isinstance(ignore, list) or any(name != DAMPING for name in ignore):
+            raise RobotError("cannot be ignored", got=ignore, expected=f'["{DAMPING}"]', fix="correct it", where=f"{where}.ignore")
+        if not isinstance(keep, bool):
+            raise RobotError("wrong type", got=keep, expected="true or false", fix="correct it", where=f"{where}.keep_frames")
+        return cls(forward, tuple(ignore), keep)
+
+
+def side_table(side: Mapping[str, Any], folder: Path, where: str) -> Table:
+    """The whole table of a robot file that names a URDF under [urdf], relative to its folder. Raises RobotError."""
+    given = expect_table(side["urdf"], f"{where}: urdf")
+    file = given.get("file")
+    if not isinstance(file, str) or not file:
+        raise RobotError("no URDF named", got=file, expected="a path", fix='write file = "my.urdf"', where=f"{where}: urdf.file")
+    rest = {key: value for key, value in side.items() if key != "urdf"}
+    return urdf_table(folder / file, side=rest, options=Options.read(given, f"{where}: urdf"), where=where)
+
+
+def urdf_table(path: Path, *, side: Mapping[str, Any] | None = None, options: Options | None = None, where: str | None = None) -> Table:
+    """The tables of a robot file, from a URDF and what is put over it; `where` names the side file. Raises RobotError."""
+    options, side = options or Options(), {} if side is None else side
+    urdf = parse_urdf(_read(path), where=str(path), ignore=options.ignore)
+    own = extension_tables(urdf, EXTENSION_FIELDS)
+    keep = options.keep_frames or (urdf.extension is not None and urdf.extension.get("frames") == "ours")
+    torso, legs = _found(urdf, options.forward, keep_frames=keep)
+    table = _merged(_assumed(), _measured(urdf, torso, legs))
+    table = _merged(table, _shaped(own))
+    table = _merged(table, _spread(side, where or str(path)))
+    assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(table, legs, urdf)
+    table["source"] = _source(urdf, legs, assumed) | dict(side.get("source", {}))
+    return table
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RobotError("cannot read the URDF", got=error.strerror, fix="give the path of a URDF", where=str(path)) from error
+
+
+def _assumed() -> Table:
+    return tomllib.loads((Path(__file__).parent / "assumed.toml").read_text(encoding="utf-8"))
+
+
+def _found(urdf: Urdf, forward: str, *, keep_frames: bool) -> tuple[Table, list[FoundLeg]]:
+    """The torso's table and the legs. The torso's frame is its heaviest link's place, in the root link's axes turned forward."""
+    root = root_body(urdf)
+    inertial = root.inertial(urdf.where)
+    heaviest = max(root.members, key=lambda member: member.link.inertial.mass if member.link.inertial else 0.0)
+    origin, axes = heaviest.position, np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0
+    torso = {
+        "mass": inertial.mass,
+        "com": (axes.T @ (inertial.com - origin) + 0.0).tolist(),
+        "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
+    }
+    torso["size"] = _box(root, axes) or equivalent_box(torso["mass"], torso["inertia"])
+    return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
+
+
+def _box(root: Body, axes: Array) -> list[float] | None:
+    """Extents [m] of the torso's largest box."""
+    boxes = [np.abs(axes.T @ member.rotation) @ member.link.box for member in root.members if member.link.box is not None]
+    return [float(edge) for edge in max(boxes, key=lambda size: float(np.prod(size)))] if boxes else None
+
+
+def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
+    """What the URDF says."""
+    table: Table = {"name": urdf.name, "torso": torso, "legs": {leg.name: leg.table for leg in legs}, "servo": {}, "foot": {}}
+    if all(leg.radius is not None for leg in legs):
+        table["foot"]["radius"] = [leg.radius for leg in legs]
+    for key, name in SIZES.items():
+        table["servo"][key] = [getattr(branch.joint, name) for leg in legs for branch in leg.servo]
+    return table
+
+
+def _shaped(own: Table) -> Table:
+    """The tables of the <hexapod> element as a robot file has them."""
+    table = {key: value for key, value in own.items() if key not in ("world", *LEG_NAMES)} | own.get("world", {})
+    for name in LEG_NAMES:
+        if "stance" in own.get(name, {}):
+            stance = {joint: {"stance": angle} for joint, angle in zip(JOINT_NAMES, own[name]["stance"], strict=True)}
+            table.setdefault("legs", {})[name] = stance
+    return table
+
+
+def _spread(side: Mapping[str, Any], where: str) -> Table:
+    """A side file's tables, with [links.*] put into every leg: they stand above the URDF's too."""
+    _check_side(side, where)
+    table = deepcopy(dict(side))
+    links, legs = table.pop("links", {}), table.get("legs", {})
+    table["legs"] = {name: _merged(links, legs.get(name, {})) for name in LEG_NAMES}
+    return table
+
+
+def _check_side(side: Mapping[str, Any], where: str) -> None:
+    """Raises RobotError for keys and types that a robot file may not have."""
+    refuse_unknown_keys(side, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
+    for name, record in SECTIONS.items():
+        read_given(record, expect_table(side.get(name, {}), f"{where}: {name}"), f"{where}: {name}")
+    legs = expect_table(side.get("legs", {}), f"{where}: legs")
+    refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")
+    for name, leg in legs.items():
+        read_given(Leg, expect_table(leg, f"{where}: legs.{name}"), f"{where}: legs.{name}", extra=JOINT_NAMES)
+        _check_links({key: value for key, value in leg.items() if key in JOINT_NAMES}, f"{where}: legs.{name}")
+    _check_links(expect_table(side.get("links", {}), f"{where}: links"), f"{where}: links")
+    expect_table(side.get("source", {}), f"{where}: source")
+
+
+def _check_links(links: Mapping[str, Any], where: str) -> None:
+    refuse_unknown_keys(links, list(JOINT_NAMES), where)
+    for joint, link in links.items():
+        read_given(Link, expect_table(link, f"{where}.{joint}"), f"{where}.{joint}", extra=("stance",))
+        Number("rad").read(link.get("stance", 0.0), f"{where}.{joint}.stance")
+
+
+def _merged(low: Mapping[str, Any], high: Mapping[str, Any]) -> Table:
+    """The tables of both; where both have a value, the higher one's."""
+    both = {key: _merged(low[key], high[key]) for key in low if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)}
+    return deepcopy(dict(low) | dict(high) | both)
+
+
+def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
+    """Fills in what is missing, in place; returns the names of what was assumed."""
+    _unify(table, legs, urdf)
+    assumed = ["foot.radius"] if any(leg.radius is None for leg in legs) else []
+    assumed += [f"servo.{key}" for key in assume_servo(table["servo"])]
+    stances = assume_stances(table["legs"])
+    assumed += ["stance"] if stances else []
+    return assumed + [f"gait.{key}" for key in assume_gait(table["gait"], _height(table))]
+
+
+def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:
+    """Every joint has the same servo, every foot the same radius: one number for a list of them."""
+    names = [name for leg in legs for name in leg.joints]
+    for section, keys, owners in (("servo", SIZES, names), ("foot", {"radius": "radius"}, [leg.joints[2] for leg in legs])):
+        for key, name in keys.items():
+            values = table[section].get(key)
+            if isinstance(values, list) and len(values) == len(owners):
+                table[section][key] = _same(values, owners, f"{section}.{key}", name, urdf.where)
+
+
+def _same(values: list[float | None], owners: list[str], key: str, name: str, where: str) -> float:
+    first = values[0]
+    odd = next((k for k, value in enumerate(values) if value is None or value != first), None)
+    if odd is None and first is not None:
+        return first
+    odd = odd or 0
+    at, fix = f"{where}: joint {owners[odd]!r}", f"give {key} for all in a robot file with [urdf] file"
+    if values[odd] is None:
+        raise RobotError(f"no {name}", expected=f"what {key} is", fix=fix, where=at)
+    expected = f"{first!r} as at {owners[0]!r}: all joints have the same servo, all feet the same radius"
+    raise RobotError(f"another {name}", got=values[odd], expected=expected, fix=fix, where=at)
+
+
+def _height(table: Table) -> float:
+    """Of the hips above the feet [m], roughly: all joints of the pattern."""
+    legs = table["legs"].values()
+    return float(np.mean([_drop(leg) for leg in legs]))
+
+
+def _drop(leg: Table) -> float:
+    R, z = np.eye(3), 0.0
+    for joint in JOINT_NAMES:
+        link = leg[joint]
+        R = R @ axis_rotation(np.array(link["axis"]), link["stance"])
+        z -= float((R @ np.array([link["length"], link["offset_y"], link["offset_z"]]))[2])
+    return max(z, 1e-3)
+
+
+def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str]) -> Table:
+    source = {"robot": f"read from the URDF of {urdf.name!r}"}
+    source |= {f"leg {leg.name}": f"{JOINTS}{', '.join(leg.joints)}" for leg in legs}
+    other_way = [name for leg in legs for name in leg.reversed]
+    if other_way:
+        source["URDF, angles"] = f"counted against the URDF's axes: {', '.join(other_way)}"
+    if assumed:
+        source["URDF, assumed"] = f"the URDF does not say, so assumed: {', '.join(assumed)}"
+    ignored = describe(urdf.ignored)
+    return source | ({"URDF, ignored": f"in the URDF, without effect here: {ignored}"} if ignored else {})
+
+
+def element_named(error: RobotError, table: Mapping[str, Any]) -> RobotError:
+    """The same error, with the URDF's names where it speaks of a leg or of one of its links."""
+    where = error.where or ""
+    leg = next((name for name in LEG_NAMES if f"legs.{name}" in where), None)
+    joints = table["source"].get(f"leg {leg}", "").removeprefix(JOINTS).split(", ")
+    link = next((k for k, joint in enumerate(JOINT_NAMES) if f".{joint}" in where), None)
+    named = [joint for k, joint in enumerate(joints) if joint and link in (None, k)]
+    at = f"{where} (joint {', '.join(named)})" if named else where
+    return RobotError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=at)

@@ -1,0 +1,111 @@
+"""What stands in a URDF's attributes: numbers, turns, places; and the file as a whole. Raises RobotError, naming the element."""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ET
+
+import numpy as np
+
+from hexapod_cosim.models.errors import RobotError
+from hexapod_cosim.models.records import Array
+
+DECIMALS = re.compile(r"[+-]?\d*\.(\d{2,})")
+
+
+class _Builder(ET.TreeBuilder):
+    """Refuses document types, and with them entities, external or expanding."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise RobotError("a document type in a URDF", got=f"<!DOCTYPE {name}>", expected="plain XML without entities", fix="remove it")
+
+
+def read_root(text: str | bytes, where: str) -> ET.Element:
+    """The <robot> element of a file."""
+    try:
+        root = ET.fromstring(text, parser=ET.XMLParser(target=_Builder()))
+    except (ET.ParseError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
+        raise RobotError("not XML", got=str(error), expected="a URDF", fix="correct that place", where=where) from error
+    except RobotError as error:
+        raise RobotError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
+    if any("xacro" in element.tag for element in root.iter()):
+        raise RobotError("xacro macros", expected="a URDF", fix="expand them first: xacro my.urdf.xacro > my.urdf", where=where)
+    if root.tag != "robot":
+        raise RobotError("no URDF", got=f"<{root.tag}>", expected="<robot>", fix="give a URDF of a six-legged robot", where=where)
+    return root
+
+
+def name_of(element: ET.Element, where: str) -> str:
+    """The element's name, which it must have."""
+    name = element.get("name")
+    if not name:
+        raise RobotError(f"a {element.tag} without a name", expected="name=...", fix="name it", where=where)
+    return name
+
+
+def numbers(element: ET.Element | None, key: str, default: tuple[float, ...] | None, where: str, count: int = 3) -> Array:
+    """(count,) finite numbers of an attribute; the default, if there is one, where the attribute or the element is missing."""
+    text = None if element is None else element.get(key)
+    if text is None and default is not None:
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in (text or "").split()])
+    except ValueError:
+        values = np.full(1, math.nan)
+    if len(values) != count or not np.isfinite(values).all():
+        expected = "a finite number" if count == 1 else f"{count} finite numbers"
+        at = f"{where}: {element.tag}" if element is not None else where
+        raise RobotError(f"no good {key}", got=text, expected=expected, fix=f"correct {key}", where=at)
+    return values
+
+
+def number(element: ET.Element | None, key: str, default: float | None, where: str) -> float:
+    """The same for a single one."""
+    return float(numbers(element, key, None if default is None else (default,), where, 1)[0])
+
+
+def rpy_matrix(roll: float, pitch: float, yaw: float) -> Array:
+    """(3, 3) Rz(yaw) Ry(pitch) Rx(roll); exact for whole quarter turns."""
+    (cr, sr), (cp, sp), (cy, sy) = _cos_sin(roll), _cos_sin(pitch), _cos_sin(yaw)
+    matrix = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    return matrix + 0.0  # no negative zeros
+
+
+def _cos_sin(angle: float) -> tuple[float, float]:
+    quarters = round(angle / (0.5 * math.pi))
+    if angle == quarters * 0.5 * math.pi:
+        return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarters % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def _angles(element: ET.Element | None, where: str) -> list[float]:
+    """Roll, pitch, yaw; a number that is a quarter turn to all its printed digits (1.57, 3.1416) is one."""
+    values = numbers(element, "rpy", (0.0, 0.0, 0.0), where)
+    words = (element.get("rpy", "0 0 0") if element is not None else "0 0 0").split()
+    return [_quarter_turn(value, word) for value, word in zip(values.tolist(), words, strict=True)]
+
+
+def _quarter_turn(value: float, word: str) -> float:
+    digits, quarters = DECIMALS.fullmatch(word), round(value / (0.5 * math.pi))
+    exact = quarters * 0.5 * math.pi
+    if digits is None or quarters == 0:
+        return value
+    scale = 10 ** min(len(digits[1]), 15)
+    printed = (round(exact * scale), math.trunc(exact * scale))
+    return exact if round(value * scale) in printed else value
+
+
+def origin(element: ET.Element, where: str) -> tuple[Array, Array, list[float]]:
+    """Rotation (3, 3), place (3,) [m] and roll, pitch, yaw [rad] of the element's frame."""
+    origin = element.find("origin")
+    if origin is not None and origin.get("quat_xyzw"):
+        raise RobotError("a quaternion as origin", expected="rpy", fix="write it as roll, pitch and yaw", where=where)
+    angles = _angles(origin, where)
+    return rpy_matrix(*angles), numbers(origin, "xyz", (0.0, 0.0, 0.0), where), angles

@@ -1,0 +1,125 @@
+"""A robot as a URDF: what is read back from it is the same robot, to the last bit.
+
+Links and joints in this project's frames; every number in full. What URDF has no words for stands in one element of ours, <hexapod>, which
+other readers skip; <mujoco> keeps MuJoCo from welding the torso, and its mass, to the world.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from typing import Any
+
+from hexapod_cosim.models.records import JOINT_NAMES, Leg, Link, Robot, Vector3
+from hexapod_cosim.models.schema import specs
+from hexapod_cosim.models.urdf.elements import EXTENSION
+
+RECORDS = ("foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "gait")
+THICKNESS = 0.7  # 1    radius of a drawn link, of the foot's
+COLOURS = {"body": "0.30 0.33 0.38 1", "limb": "0.72 0.74 0.78 1", "rubber": "0.85 0.45 0.15 1"}
+
+
+def robot_to_urdf(robot: Robot) -> str:
+    """The text of a URDF."""
+    root = ET.Element("robot", name=robot.name)
+    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", fusestatic="false", discardvisual="false")
+    compiler.set("inertiafromgeom", "false")  # the feet's spheres weigh nothing
+    for name, colour in COLOURS.items():
+        ET.SubElement(ET.SubElement(root, "material", name=name), "color", rgba=colour)
+    _torso(root, robot)
+    for leg in robot.legs:
+        _leg(root, leg, robot)
+    _extension(root, robot)
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers in full, between blanks."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _torso(root: ET.Element, robot: Robot) -> None:
+    torso = ET.SubElement(root, "link", name="torso")
+    _inertial(torso, robot.torso.mass, robot.torso.com, robot.torso.inertia)
+    visual = _shape(torso, "visual", robot.torso.com, "body")
+    ET.SubElement(visual, "box", size=numbers(robot.torso.size))
+
+
+def _leg(root: ET.Element, leg: Leg, robot: Robot) -> None:
+    parent, place, yaw = "torso", leg.hip_position, leg.hip_yaw
+    for name, link in zip(JOINT_NAMES, leg.links, strict=True):
+        child = f"{leg.name}_{name}"
+        _limb(root, child, link, THICKNESS * robot.foot.radius)
+        joint = _joint(root, f"{child}_joint", "revolute", parent, child)
+        ET.SubElement(joint, "origin", xyz=numbers(place), rpy=numbers((0.0, 0.0, yaw)))
+        ET.SubElement(joint, "axis", xyz=numbers(link.axis))
+        limit = ET.SubElement(joint, "limit", lower=repr(link.angle_min), upper=repr(link.angle_max))
+        limit.attrib |= {"effort": repr(robot.servo.torque_max), "velocity": repr(robot.servo.speed_max)}
+        ET.SubElement(joint, "dynamics", damping="0.0", friction=repr(robot.servo.coulomb_friction))
+        parent, place, yaw = child, link.tip, 0.0
+    _foot(root, f"{leg.name}_foot", parent, place, robot.foot.radius)
+
+
+def _joint(root: ET.Element, name: str, kind: str, parent: str, child: str) -> ET.Element:
+    joint = ET.SubElement(root, "joint", name=name, type=kind)
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
+    return joint
+
+
+def _limb(root: ET.Element, name: str, link: Link, radius: float) -> None:
+    element = ET.SubElement(root, "link", name=name)
+    _inertial(element, link.mass, link.com, link.inertia)
+    middle = tuple(0.5 * value for value in link.tip)
+    visual = _shape(element, "visual", middle, "limb", rpy=direction_rpy(link.tip))
+    ET.SubElement(visual, "cylinder", radius=repr(radius), length=repr(math.hypot(*link.tip)))
+
+
+def _foot(root: ET.Element, name: str, parent: str, place: Vector3, radius: float) -> None:
+    """A link of its own without mass, so that others find the foot's centre as a frame."""
+    link = ET.SubElement(root, "link", name=name)
+    for tag in ("visual", "collision"):
+        shape = _shape(link, tag, (0.0, 0.0, 0.0), "rubber" if tag == "visual" else None)
+        ET.SubElement(shape, "sphere", radius=repr(radius))
+    joint = _joint(root, f"{name}_joint", "fixed", parent, name)
+    ET.SubElement(joint, "origin", xyz=numbers(place), rpy="0 0 0")
+
+
+def direction_rpy(way: Vector3) -> Vector3:
+    """Roll, pitch and yaw that turn z along a way."""
+    x, y, z = way
+    return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
+
+
+def _shape(link: ET.Element, tag: str, place: Iterable[float], material: str | None, rpy: Vector3 = (0.0, 0.0, 0.0)) -> ET.Element:
+    shape = ET.SubElement(link, tag)
+    ET.SubElement(shape, "origin", xyz=numbers(place), rpy=numbers(rpy))
+    geometry = ET.SubElement(shape, "geometry")
+    if material is not None:
+        ET.SubElement(shape, "material", name=material)
+    return geometry
+
+
+def _inertial(link: ET.Element, mass: float, com: Vector3, inertia: tuple[float, ...]) -> None:
+    element = ET.SubElement(link, "inertial")
+    ET.SubElement(element, "origin", xyz=numbers(com), rpy="0 0 0")
+    ET.SubElement(element, "mass", value=repr(mass))
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    ET.SubElement(element, "inertia", {name: repr(value) for name, value in zip(names, inertia, strict=True)})
+
+
+def _extension(root: ET.Element, robot: Robot) -> None:
+    own = ET.SubElement(root, EXTENSION, frames="ours")
+    ET.SubElement(own, "world", gravity=numbers(robot.gravity))
+    ET.SubElement(own, "torso", size=numbers(robot.torso.size))
+    for name in RECORDS:
+        record = getattr(robot, name)
+        ET.SubElement(own, name, {key: _text(getattr(record, key)) for key in specs(type(record))})
+    for leg in robot.legs:
+        ET.SubElement(own, leg.name, stance=numbers(leg.stance))
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else repr(float(value))
