@@ -16,12 +16,13 @@ from hexapod_cosim.models.urdf.writer import robot_to_urdf
 class Format:
     """A way to describe a robot."""
 
+    name: str
     title: str
     suffix: str
     write: Callable[[Robot], str]
 
 
-FORMATS = {"urdf": Format("a URDF", ".urdf", robot_to_urdf), "mjcf": Format("an MJCF file", ".xml", robot_to_mjcf)}
+FORMATS = {"urdf": Format("urdf", "a URDF", ".urdf", robot_to_urdf), "mjcf": Format("mjcf", "an MJCF file", ".xml", robot_to_mjcf)}
 
 
 def chosen_format(path: Path | None, *, urdf: bool, mjcf: bool) -> Format | None:

@@ -39,7 +39,7 @@ def export(
     form, made = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
     if form is not None:
         written = export_description(made, output or Path(f"{made.name}{form.suffix}"), form)
-        _show_written(written, made, form.suffix[1:], json=json)
+        _show_written(written, made, form.name, json=json)
         return
     path = output or Path(f"{made.name}.fmu")
     if path.is_dir():

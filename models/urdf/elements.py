@@ -21,7 +21,7 @@ from hexapod_cosim.models.validation import check_inertia
 EXTENSION = "hexapod"  # an element of ours: what URDF has no words for
 MOVING = ("revolute", "continuous")
 KINDS = (*MOVING, "fixed", "floating", "prismatic", "planar")
-WITHOUT_EFFECT = ("transmission", "gazebo", "material", "ros2_control", "mujoco", "sensor", "drake", "version")
+SILENT = ("link", "joint", EXTENSION, "material", "mujoco")  # all others are told to have no effect
 AXIS_TOLERANCE = 1e-6  # an axis this near to unit length is taken as printed
 DAMPING = "damping"  # what a side file may have ignored
 
@@ -84,7 +84,7 @@ def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -
     ignored: Counter[str] = Counter()
     links = [_link(element, f"{where}: link {name_of(element, where)!r}", ignored) for element in root.findall("link")]
     joints = [_joint(element, f"{where}: joint {name_of(element, where)!r}", ignore, ignored) for element in root.findall("joint")]
-    ignored.update(element.tag for element in root if element.tag not in ("link", "joint", EXTENSION))
+    ignored.update(element.tag for element in root if element.tag not in SILENT)
     _refuse_twins([link.name for link in links], "link", where)
     _refuse_twins([joint.name for joint in joints], "joint", where)
     return Urdf(root.get("name") or "robot", where, {link.name: link for link in links}, tuple(joints), root.find(EXTENSION), ignored)

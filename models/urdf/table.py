@@ -188,7 +188,8 @@ def _check_links(links: Mapping[str, Any], where: str) -> None:
 def _merged(low: Mapping[str, Any], high: Mapping[str, Any]) -> Table:
     """The tables of both; where both have a value, the higher one's."""
     both = {key: _merged(low[key], high[key]) for key in low if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)}
-    return deepcopy(dict(low) | dict(high) | both)
+    merged: Table = deepcopy({**low, **high, **both})
+    return merged
 
 
 def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:

@@ -1,0 +1,60 @@
+"""A robot written as a URDF and read again is the same robot; a URDF in other words too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from disguised_urdf import differences, disguised, random_robot, stances
+from foreign_urdf import SIDE, spider, spider_urdf
+
+from hexapod_cosim.models import check_robot, list_robots, load_robot
+from hexapod_cosim.models.urdf.writer import robot_to_urdf
+
+ROUNDING = 1e-12  # kg, m, kg m2, rad: some 1e4 times the rounding of what is turned, shifted and added up
+SEEDS = range(8)
+
+
+def written(text: str, folder: Path, name: str = "robot.urdf") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", list_robots())
+def test_a_bundled_robot_comes_back_to_the_last_bit(name: str, tmp_path: Path) -> None:
+    robot = load_robot(name)
+    again = load_robot(written(robot_to_urdf(robot), tmp_path))
+    assert again == robot
+    assert again.hash == robot.hash
+
+
+@pytest.mark.parametrize("pattern", [True, False], ids=["controller's axes", "any axes"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_random_robot_comes_back_to_the_last_bit(seed: int, pattern: bool, tmp_path: Path) -> None:
+    robot = random_robot(seed, pattern=pattern)
+    check_robot(robot)
+    assert load_robot(written(robot_to_urdf(robot), tmp_path)) == robot
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_robot_in_other_frames_names_and_parts_is_the_same_robot(seed: int, tmp_path: Path) -> None:
+    robot = random_robot(seed, pattern=True)
+    again = load_robot(written(disguised(robot, seed, stances(robot)), tmp_path))
+    apart = {name: difference for name, difference in differences(again, robot).items() if difference > ROUNDING}
+    assert apart == {}
+    assert (again.servo, again.foot.radius) == (replace(robot.servo, torque_continuous=0.2 * robot.servo.torque_max), robot.foot.radius)
+
+
+def test_a_urdf_by_hand_is_the_robot_it_describes(tmp_path: Path) -> None:
+    written(spider_urdf(), tmp_path, "spider.urdf")
+    robot = load_robot(written(SIDE, tmp_path, "spider.toml"))
+    apart = {name: difference for name, difference in differences(robot, spider()).items() if difference > ROUNDING}
+    assert apart == {}
+    assert robot.foot == spider().foot
+    assert robot.servo.torque_max == 5.5
+    assert robot.servo.kp == pytest.approx(spider().servo.kp, rel=ROUNDING)
+    assert robot.source["leg LF"] == "read: joints j_c3, j_f3, j_t3"
+    assert robot.source["URDF, angles"] == "counted against the URDF's axes: j_c6, j_f6, j_t6, j_c1, j_f1, j_t1, j_c4, j_f4, j_t4"
+    assert robot.source["URDF, ignored"] == "in the URDF, without effect here: 1 gazebo, 6 mesh, 6 transmission"
