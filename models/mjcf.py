@@ -14,22 +14,31 @@ from collections.abc import Iterable
 import numpy as np
 
 from hexapod_cosim.models.dynamics import mass_matrix
-from hexapod_cosim.models.kinematics import BODIES, JOINTS, LEGS, axis_quaternion, body_states, quaternion_product, rotation_matrix
+from hexapod_cosim.models.kinematics import (
+    BODIES,
+    JOINTS,
+    LEGS,
+    axis_quaternion,
+    body_states,
+    foot_positions,
+    quaternion_product,
+    rotation_matrix,
+)
 from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, Vector3
-from hexapod_cosim.models.statics import settled
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
 TIME_STEP = 0.001  # s
 IMPEDANCE = 0.9  # 1    of MuJoCo's constraints, its default: the share of a constraint's acceleration it may take
 DRAWN = {"contype": "0", "conaffinity": "0", "group": "1", "mass": "0"}  # geometry that neither touches nor weighs
 UNKNOWNS = 6 + LEGS * JOINTS
+Z = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 ZERO = np.zeros((LEGS, JOINTS))  # rad, rad/s
 GROUND = "5 5 0.1"  # m    half sizes of the drawn plane and its grid
 
 
 def robot_to_mjcf(robot: Robot) -> str:
-    """The text of an MJCF file, with a keyframe "stance": settled on the ground. Raises RobotError for a robot that cannot stand."""
+    """The text of an MJCF file, with a keyframe "stance" on the ground."""
     root = ET.Element("mujoco", model=robot.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
     option = ET.SubElement(root, "option", timestep=repr(TIME_STEP), gravity=numbers(robot.gravity))
@@ -56,14 +65,9 @@ def _assets(root: ET.Element) -> None:
 
 
 def _ground(world: ET.Element, robot: Robot) -> None:
-    terrain = robot.terrain
-    slope = terrain.kind == "slope"
-    turn = axis_quaternion(np.array([0.0, 0.0, 1.0]), terrain.heading if slope else 0.0)
-    # the slope rises along its heading: its normal leans back
-    tilt = axis_quaternion(np.array([0.0, 1.0, 0.0]), -terrain.incline if slope else 0.0)
     ET.SubElement(
-        world, "geom", name="ground", type="plane", size=GROUND, material="ground", pos=numbers((0.0, 0.0, terrain.height)),
-        quat=numbers(quaternion_product(turn, tilt)), friction=_friction(robot), solref=_solref(robot), solimp=_solimp(), priority="1",
+        world, "geom", name="ground", type="plane", size=GROUND, material="ground", pos=numbers((0.0, 0.0, robot.terrain.height)),
+        quat=numbers(_ground_quaternion(robot)), friction=_friction(robot), solref=_solref(robot), solimp=_solimp(), priority="1",
     )  # fmt: skip
 
 
@@ -120,7 +124,7 @@ def _torso(world: ET.Element, robot: Robot) -> None:
 
 def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
     body, place = torso, leg.hip_position
-    quaternion = axis_quaternion(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
+    quaternion = axis_quaternion(Z, leg.hip_yaw)
     for name, link in zip(JOINT_NAMES, leg.links, strict=True):
         body = ET.SubElement(body, "body", name=f"{leg.name}_{name}", pos=numbers(place), quat=numbers(quaternion))
         _inertial(body, link.mass, link.com, link.inertia)
@@ -151,8 +155,21 @@ def _servos(root: ET.Element, robot: Robot) -> None:
 
 
 def _stance(root: ET.Element, robot: Robot) -> None:
-    position, quaternion, angle = settled(robot)
-    origin = position - rotation_matrix(quaternion) @ np.array(robot.torso.com)  # MuJoCo moves the frame, not the centre of mass
+    """The standing pose with the lowest feet just on the ground, the torso as steep as it; in a moment the robot settles."""
+    tilt = _ground_quaternion(robot)
+    heading = robot.terrain.heading if robot.terrain.kind == "slope" else 0.0
+    quaternion = quaternion_product(tilt, axis_quaternion(Z, -heading))
+    feet = foot_positions(robot, robot.stance)
+    height = robot.foot.radius - float(np.min(feet[:, 2]))  # of the torso's frame above the plane
+    place = np.array([0.0, 0.0, robot.terrain.height]) + height * rotation_matrix(tilt)[:, 2]
     key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="stance")
-    key.set("qpos", numbers([*origin, *quaternion, *angle.ravel()]))
+    key.set("qpos", numbers([*place, *quaternion, *robot.stance.ravel()]))
     key.set("ctrl", numbers(robot.stance.ravel()))
+
+
+def _ground_quaternion(robot: Robot) -> Array:
+    """(4,) turns z to the ground's normal: a slope rises along its heading, so the normal leans back."""
+    terrain = robot.terrain
+    slope = terrain.kind == "slope"
+    turn = axis_quaternion(Z, terrain.heading if slope else 0.0)
+    return quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), -terrain.incline if slope else 0.0))
