@@ -24,11 +24,16 @@ def random_robot(seed: int, *, pattern: bool) -> Robot:
             leg,
             hip_position=_triple(np.array(leg.hip_position) + rng.normal(0.0, 0.003, 3)),
             hip_yaw=leg.hip_yaw + float(rng.normal(0.0, 0.1)),
-            links=tuple(_random_link(link, rng, pattern=pattern) for link in leg.links),
+            links=_random_links(leg.links, rng, pattern=pattern),
         )
         for leg in robot.legs
     ]
     return replace(robot, name=f"random{seed}", torso=replace(robot.torso, mass=mass, com=com, inertia=inertia), legs=tuple(legs))
+
+
+def _random_links(links: tuple[Link, Link, Link], rng: np.random.Generator, *, pattern: bool) -> tuple[Link, Link, Link]:
+    coxa, femur, tibia = (_random_link(link, rng, pattern=pattern) for link in links)
+    return coxa, femur, tibia
 
 
 def _random_link(link: Link, rng: np.random.Generator, *, pattern: bool) -> Link:

@@ -49,7 +49,7 @@ def bodies(robot: Robot, place: Array, quaternion: Array, angle: Array, velocity
 
 
 def our_mass_matrix(robot: Robot, place: Array, quaternion: Array, angle: Array, *, local_velocity: bool) -> Array:
-    """(24, 24) of the torso frame's velocity (torso or world axes), its spin in torso axes and the joints' speeds; from all bodies' masses."""
+    """(24, 24) of the torso frame's velocity (torso or world axes), its spin in torso axes and the joints' speeds."""
     R, columns = rotation_matrix(quaternion), []
     for unit in np.eye(UNKNOWNS):
         velocity = R @ unit[:3] if local_velocity else unit[:3]

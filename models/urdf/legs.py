@@ -39,10 +39,10 @@ class FoundLeg:
 
 def find_legs(torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str) -> list[FoundLeg]:
     """The six legs in our order; `origin` (3,) and `axes` (3, 3) are the torso's frame in the root link's. Raises RobotError."""
-    chains = [_chain(branch, where) for branch in torso.branches]
-    if len(chains) != len(LEG_NAMES):
-        got = f"{len(chains)} moving joints on {torso.name!r}: {', '.join(chain[0].joint.name for chain in chains)}"
+    if len(torso.branches) != len(LEG_NAMES):
+        got = f"{len(torso.branches)} moving joints on {torso.name!r}: {', '.join(branch.joint.name for branch in torso.branches)}"
         raise RobotError("not six legs", got=got, expected="six", fix="make joints that are no legs' fixed", where=where)
+    chains = [_chain(branch, where) for branch in torso.branches]
     hips = np.array([axes.T @ (chain[0].position - origin) for chain in chains])
     order = _order(hips, [chain[0].joint.name for chain in chains], where)
     middle = hips.mean(axis=0)

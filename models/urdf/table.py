@@ -147,7 +147,7 @@ def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
 
 def _shaped(own: Table) -> Table:
     """The tables of the <hexapod> element as a robot file has them."""
-    table = {key: value for key, value in own.items() if key not in ("world", *LEG_NAMES)} | own.get("world", {})
+    table: Table = {key: value for key, value in own.items() if key not in ("world", *LEG_NAMES)} | own.get("world", {})
     for name in LEG_NAMES:
         if "stance" in own.get(name, {}):
             stance = {joint: {"stance": angle} for joint, angle in zip(JOINT_NAMES, own[name]["stance"], strict=True)}
