@@ -108,6 +108,10 @@ def _spider_leg(name: str) -> str:
 
 
 def spider() -> Robot:
+    return robot_from_table(spider_table(), where="spider.toml")
+
+
+def spider_table() -> dict[str, Any]:
     """The same robot as a file of ours would have it, put together by the parallel-axis theorem by hand."""
     table = athena_table()
     for name in ("links", "legs", "source"):
@@ -123,7 +127,7 @@ def spider() -> Robot:
     table["foot"]["radius"] = 0.012
     table["servo"] |= {"torque_max": 5.5, "speed_max": 6.0, "coulomb_friction": 0.04, "kp": 5.5 / 0.15, "kd": 0.02 * 5.5 / 0.15}
     table["servo"] |= {"rotor_inertia": 0.01 / 40.0 * 5.5 / 0.15, "torque_continuous": 0.2 * 5.5}
-    return robot_from_table(table | {"name": "spider"}, where="spider.toml")
+    return table | {"name": "spider"}
 
 
 def _spider_links() -> dict[str, dict[str, Any]]:
