@@ -64,7 +64,7 @@ class _Plane:
     """A leg of the controller's pattern in its own plane (controller/kinematics.py has the equations)."""
 
     def __init__(self, leg: Table) -> None:
-        tips = [complex(leg[joint]["length"], leg[joint]["offset_z"]) for joint in JOINT_NAMES]
+        tips = [complex(leg[joint]["length"], leg[joint].get("offset_z", 0.0)) for joint in JOINT_NAMES]
         self.base = leg["hip_position"][2] + tips[0].imag
         self.size = [abs(tip) for tip in tips[1:]]
         self.tilt = [math.atan2(tip.imag, tip.real) for tip in tips[1:]]

@@ -56,6 +56,12 @@ class Body:
             raise RobotError("a moving body without mass", expected="<inertial>", fix=fix, where=f"{where}: link {self.name!r}")
         return parts[0] if len(parts) == 1 else _together(parts)
 
+    @property
+    def problem(self) -> RobotError | None:
+        """Why its inertia is none of a possible body."""
+        found = (member.link.inertial.problem for member in self.members if member.link.inertial is not None)
+        return next((problem for problem in found if problem is not None), None)
+
 
 def _moved(member: Member) -> Inertial:
     inertial, R = member.link.inertial, member.rotation

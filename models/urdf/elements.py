@@ -33,6 +33,7 @@ class Inertial:
     mass: float
     com: Array  # (3,)
     inertia: Array  # (3, 3)
+    problem: RobotError | None = None  # why no body can be so; to be raised unless someone else gives the inertia
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +124,19 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
     moments = tuple(
         number(table, key, None if key in ("ixx", "iyy", "izz") else 0.0, at) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
-    if mass > 0.0 and any(moments):  # none at all: a point mass
-        check_inertia(mass, moments, math.inf, at)
-    return Inertial(mass, p, R @ inertia_matrix(moments) @ R.T + 0.0) if mass > 0.0 else None
+    if mass == 0.0:
+        return None
+    return Inertial(
+        mass, p, R @ inertia_matrix(moments) @ R.T + 0.0, _problem(mass, moments, at) if any(moments) else None
+    )  # none: a point mass
+
+
+def _problem(mass: float, moments: tuple[float, ...], where: str) -> RobotError | None:
+    try:
+        check_inertia(mass, moments, math.inf, where)
+    except RobotError as error:
+        return error
+    return None
 
 
 def _joint(element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]) -> UrdfJoint:

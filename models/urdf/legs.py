@@ -20,7 +20,7 @@ from hexapod_cosim.models.urdf.bodies import Body, Branch
 
 Z = np.array([0.0, 0.0, 1.0])
 PATTERN = (Z, np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0]))  # the controller's joint axes
-PATTERN_TOLERANCE = 1e-4  # rad    figures printed with four digits
+PATTERN_TOLERANCE = 1e-3  # rad    URDFs have 1.5704 for a quarter turn; it moves a foot by a tenth of a millimetre
 SAME_YAW = 1e-9  # rad    then the printed one is taken
 SHORT = 1e-6  # m    no direction can be taken from a way as short
 
@@ -34,6 +34,7 @@ class FoundLeg:
     joints: tuple[str, str, str]
     reversed: tuple[str, ...]  # joints counted the other way round
     radius: float | None  # m    of the foot, where the URDF says it
+    footless: RobotError | None  # nothing says where the foot is; to be raised unless someone else does
     servo: tuple[Branch, Branch, Branch]
 
 
@@ -86,8 +87,8 @@ def _leg(
     wanted = None if keep_frames else _pattern_yaw(turns, chain, outwards)
     yaw, R_HC = _yaw(chain[0], turns[0], wanted, plain=bool((axes == np.eye(3)).all()))
     turns = [R_HC, R_HC @ chain[1].rotation, R_HC @ chain[1].rotation @ chain[2].rotation]
-    foot, radius = _foot(chain[2].body, where)
-    tips = [turns[0] @ chain[1].position, turns[1] @ chain[2].position, turns[2] @ foot]
+    foot, radius = _foot(chain[2].body)
+    tips = [turns[0] @ chain[1].position, turns[1] @ chain[2].position, None if foot is None else turns[2] @ foot]
     table: dict[str, Any] = {"hip_position": hip.tolist(), "hip_yaw": yaw}
     other_way = []
     for joint, pattern, branch, R, tip in zip(JOINT_NAMES, PATTERN, chain, turns, tips, strict=True):
@@ -95,7 +96,7 @@ def _leg(
         other_way += [branch.joint.name] if sign < 0.0 else []
         table[joint] = _link(branch, R, tip, axis, sign, where)
     names = (chain[0].joint.name, chain[1].joint.name, chain[2].joint.name)
-    return FoundLeg(name, table, names, tuple(other_way), radius, chain)
+    return FoundLeg(name, table, names, tuple(other_way), radius, _footless(chain[2].body, where) if foot is None else None, chain)
 
 
 def _pattern_yaw(turns: list[Array], chain: tuple[Branch, Branch, Branch], outwards: Array) -> float | None:
@@ -129,26 +130,28 @@ def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
     return pattern, 1.0 if axis @ pattern > 0.0 else -1.0
 
 
-def _foot(tibia: Body, where: str) -> tuple[Array, float | None]:
+def _foot(tibia: Body) -> tuple[Array | None, float | None]:
     """Centre of the foot [m] in the tibia's frame, and its radius: the outermost collision sphere, else the outermost fixed link."""
     spheres = tibia.spheres
     if spheres:
         outermost = max(spheres, key=lambda sphere: float(np.linalg.norm(sphere.centre)))
         return outermost.centre, outermost.radius
     tip = max((member.position for member in tibia.members), key=lambda place: float(np.linalg.norm(place)))
-    if np.linalg.norm(tip) <= SHORT:
-        fix = "give it a collision sphere where it touches the ground, or a fixed link there"
-        raise RobotError("a leg without a foot", expected="a foot", fix=fix, where=f"{where}: link {tibia.name!r}")
-    return tip, None
+    return (tip, None) if np.linalg.norm(tip) > SHORT else (None, None)
 
 
-def _link(branch: Branch, R: Array, tip: Array, axis: Array, sign: float, where: str) -> dict[str, Any]:
+def _footless(tibia: Body, where: str) -> RobotError:
+    fix = "give it a collision sphere where it touches the ground, or a fixed link there; or give length and offsets under [links.tibia]"
+    return RobotError("a leg without a foot", expected="a foot", fix=fix, where=f"{where}: link {tibia.name!r}")
+
+
+def _link(branch: Branch, R: Array, tip: Array | None, axis: Array, sign: float, where: str) -> dict[str, Any]:
     """A link's table, in hip axes."""
     inertial, joint = branch.body.inertial(where), branch.joint
+    place = {} if tip is None else {"length": float(tip[0]), "offset_y": float(tip[1]), "offset_z": float(tip[2])}
     limits = (joint.lower, joint.upper) if sign > 0.0 else (-joint.upper, -joint.lower)
     return {
-        "mass": inertial.mass, "length": float(tip[0]), "offset_y": float(tip[1]), "offset_z": float(tip[2]),
-        "com": (R @ inertial.com).tolist(), "inertia": inertia_entries(R @ inertial.inertia @ R.T),
+        "mass": inertial.mass, **place, "com": (R @ inertial.com).tolist(), "inertia": inertia_entries(R @ inertial.inertia @ R.T),
         "axis": axis.tolist(), "angle_min": limits[0], "angle_max": limits[1],
     }  # fmt: skip
 

@@ -94,10 +94,12 @@ def urdf_table(path: Path, *, side: Mapping[str, Any] | None = None, options: Op
     urdf = parse_urdf(_read(path), where=str(path), ignore=options.ignore)
     own = extension_tables(urdf, EXTENSION_FIELDS)
     keep = options.keep_frames or (urdf.extension is not None and urdf.extension.get("frames") == "ours")
-    torso, legs = _found(urdf, options.forward, keep_frames=keep)
-    table = _merged(_assumed(), _measured(urdf, torso, legs))
-    table = _merged(table, _shaped(own))
-    table = _merged(table, _spread(side, where or str(path)))
+    root = root_body(urdf)
+    torso, legs = _found(root, urdf, options.forward, keep_frames=keep)
+    above = _merged(_shaped(own), _spread(side, where or str(path)))
+    _refuse_impossible(root, legs, above)
+    _refuse_footless(legs, above)
+    table = _merged(_merged(_assumed(), _measured(urdf, torso, legs)), above)
     assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(table, legs, urdf)
     table["source"] = _source(urdf, legs, assumed) | dict(side.get("source", {}))
     return table
@@ -114,9 +116,8 @@ def _assumed() -> Table:
     return tomllib.loads((Path(__file__).parent / "assumed.toml").read_text(encoding="utf-8"))
 
 
-def _found(urdf: Urdf, forward: str, *, keep_frames: bool) -> tuple[Table, list[FoundLeg]]:
+def _found(root: Body, urdf: Urdf, forward: str, *, keep_frames: bool) -> tuple[Table, list[FoundLeg]]:
     """The torso's table and the legs. The torso's frame is its heaviest link's place, in the root link's axes turned forward."""
-    root = root_body(urdf)
     inertial = root.inertial(urdf.where)
     heaviest = max(root.members, key=lambda member: member.link.inertial.mass if member.link.inertial else 0.0)
     origin, axes = heaviest.position, np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0
@@ -125,14 +126,35 @@ def _found(urdf: Urdf, forward: str, *, keep_frames: bool) -> tuple[Table, list[
         "com": (axes.T @ (inertial.com - origin) + 0.0).tolist(),
         "inertia": inertia_entries(axes.T @ inertial.inertia @ axes + 0.0),
     }
-    torso["size"] = _box(root, axes) or equivalent_box(torso["mass"], torso["inertia"])
+    torso["size"] = _box(root, axes, torso) or equivalent_box(torso["mass"], torso["inertia"])
     return torso, find_legs(root, origin, axes, keep_frames=keep_frames, where=urdf.where)
 
 
-def _box(root: Body, axes: Array) -> list[float] | None:
-    """Extents [m] of the torso's largest box."""
+def _refuse_impossible(torso: Body, legs: list[FoundLeg], above: Table) -> None:
+    """Raises RobotError for the first body whose inertia is impossible and is not given by someone else."""
+    bodies = [("[torso]", torso, above.get("torso", {}))]
+    for leg in legs:
+        given = above.get("legs", {}).get(leg.name, {})
+        bodies += [(f"[links.{joint}]", branch.body, given.get(joint, {})) for joint, branch in zip(JOINT_NAMES, leg.servo, strict=True)]
+    for section, body, given in bodies:
+        problem = None if "inertia" in given else body.problem
+        if problem is not None:
+            fix = f"{problem.fix}; or give the right one, `inertia = [...]` under {section} of a robot file with [urdf] file"
+            raise RobotError(problem.what, got=problem.got, expected=problem.expected, fix=fix, where=problem.where)
+
+
+def _refuse_footless(legs: list[FoundLeg], above: Table) -> None:
+    for leg in legs:
+        if leg.footless is not None and "length" not in above.get("legs", {}).get(leg.name, {}).get("tibia", {}):
+            raise leg.footless
+
+
+def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
+    """Extents [m] of the torso's largest box, if it can hold its matter."""
     boxes = [np.abs(axes.T @ member.rotation) @ member.link.box for member in root.members if member.link.box is not None]
-    return [float(edge) for edge in max(boxes, key=lambda size: float(np.prod(size)))] if boxes else None
+    largest = max(boxes, key=lambda size: float(np.prod(size)), default=np.zeros(3))
+    gyration = np.sqrt(sum(torso["inertia"][:3]) / (2.0 * torso["mass"]))
+    return [float(edge) for edge in largest] if np.linalg.norm(largest) > gyration else None
 
 
 def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
@@ -236,7 +258,7 @@ def _drop(leg: Table) -> float:
     for joint in JOINT_NAMES:
         link = leg[joint]
         R = R @ axis_rotation(np.array(link["axis"]), link["stance"])
-        z -= float((R @ np.array([link["length"], link["offset_y"], link["offset_z"]]))[2])
+        z -= float((R @ np.array([link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)]))[2])
     return max(z, 1e-3)
 
 
