@@ -172,10 +172,12 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
   }
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = hx_variable_find(reference[i], &causality);
+    const int number = type == HX_REAL ? 0 : ((const int *)value)[i],
+              stored = type == HX_BOOLEAN ? number != 0 : number; /* true may be -1 */
     if (type == HX_REAL)
       memcpy(variables + variable->offset, (const double *)value + i, sizeof(double));
     else
-      memcpy(variables + variable->offset, (const int *)value + i, sizeof(int));
+      memcpy(variables + variable->offset, &stored, sizeof(int));
     instance->state.model_stale |= causality == HX_PARAMETER;
     hx_stale(instance);
   }
@@ -204,10 +206,13 @@ hxStatus hx_instance_initialize(hxInstance *instance) {
 static const double longest_step = 100.0; /* s */
 
 /* How far an importer's clock may be from ours: rounding of sums of some thousand steps (ours follows the importer's, so that longer ones
- * do not pile up), and never so much that a step would be a different one, but for the last bits. */
-static double clock_tolerance(double t, double h) {
-  const double sums = 1e-9 + 1e4 * DBL_EPSILON * fabs(t), last_bits = 4.0 * DBL_EPSILON * fmax(1.0, fabs(t));
-  return fmax(last_bits, fmin(sums, 0.5 * h));
+ * do not pile up); and from the stop time, which it may reach by a sum of all its steps, some ten million. */
+static const double few_steps = 1e4 * DBL_EPSILON, all_steps = 1e-9; /* 1  relative */
+
+/* never so much that a step would be a different one, but for the last bits */
+static double clock_tolerance(double t, double h, double sums) {
+  const double last_bits = 4.0 * DBL_EPSILON * fmax(1.0, fabs(t));
+  return fmax(last_bits, fmin(1e-9 + sums * fabs(t), 0.5 * h));
 }
 
 /* the component goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up */
@@ -219,20 +224,14 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
            longest_step);
     return HX_INVALID_ARGUMENT;
   }
-  if (!(fabs(t - now) <= clock_tolerance(now, h))) {
+  if (!(fabs(t - now) <= clock_tolerance(now, h, few_steps))) {
     hx_log(instance, HX_LOG_ERROR,
            "communication point: got %.17g s, expected %.17g, where the last step ended; the state is unchanged, "
            "restore a saved state to go back",
            t, now);
     return HX_INVALID_ARGUMENT;
   }
-  if (!(t + h > t)) {
-    hx_log(instance, HX_LOG_ERROR,
-           "communication step size: got %.17g s, expected one that moves the clock at %.17g s; the state is unchanged, make it longer", h,
-           t);
-    return HX_INVALID_ARGUMENT;
-  }
-  if (t + h > instance->state.stop_time + clock_tolerance(now, h)) {
+  if (t + h > instance->state.stop_time + clock_tolerance(now, h, all_steps)) {
     hx_log(
         instance, HX_LOG_ERROR,
         "communication step size: got %.17g s at %.17g s, expected a step that ends by the experiment's stop time, %.17g s; the state is "
@@ -240,7 +239,7 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
         h, t, instance->state.stop_time);
     return HX_INVALID_ARGUMENT;
   }
-  /* an extra step of rounding size may end before our own time: it is done */
+  /* an extra step of rounding size may end where it began or before our own time: it is done */
   if (t + h <= now) return HX_OK;
   hxInput end;
   hxStatus status = hx_instance_ramp_end(instance, h, &end);
