@@ -64,6 +64,7 @@ format: setup
 
 generate: setup
 	$(BIN)/python tools/generate.py
+	$(BIN)/python tools/generate_extras.py
 
 fmu: setup
 	$(BIN)/hexapod export --robot athena -o out/athena.fmu

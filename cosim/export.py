@@ -6,12 +6,14 @@ import zipfile
 from collections.abc import Iterable
 from functools import reduce
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from hexapod_cosim.cosim.documentation import render_html
+from hexapod_cosim.cosim.extras import extra_members
 from hexapod_cosim.cosim.files import atomic_path, not_writable
 from hexapod_cosim.cosim.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
 from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, binary, fmi2_platform, installed_platforms, source_files
+from hexapod_cosim.cosim.reference import reference_members
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.records import Robot
 
@@ -51,13 +53,21 @@ def _members(interface: Interface, platforms: Iterable[str]) -> dict[str, bytes]
     description = render_fmi2(interface)
     members = {
         "modelDescription.xml": description.xml.encode(),
-        "documentation/index.html": render_html(interface, description.guid).encode(),
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
     for platform in platforms:
         library = binary(platform)
         members[f"binaries/{platform}/{MODEL_IDENTIFIER}{library.suffix}"] = library.read_bytes()
-    return members | {f"sources/{name}": path.read_bytes() for name, path in source_files().items()}
+    members |= {f"sources/{name}": path.read_bytes() for name, path in source_files().items()}
+    return members | extra_members(interface, description.guid) | _reference(interface, members)
+
+
+def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:
+    """Reference results where this machine can run the FMU: none for one that is packed for other platforms alone."""
+    if not any(name.startswith(f"binaries/{fmi2_platform()}/") for name in members):
+        return {}
+    with TemporaryDirectory(prefix="hexapod-export-") as folder:
+        return reference_members(interface, _write_atomically(Path(folder) / "trial.fmu", members))
 
 
 def start_values(interface: Interface, guid: str) -> str:

@@ -32,6 +32,7 @@ class Unit:
     name: str
     exponents: Mapping[str, int] | None
     display: tuple[str, float] | None  # name, and display value = factor * value
+    type: str | None = None  # the type that variables of this unit declare
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,7 +203,8 @@ def _unit(name: str, entry: Any) -> Unit:
     if isinstance(entry, str):
         return Unit(name=name, exponents=None, display=None)
     display = (entry["display"]["name"], float(entry["display"]["factor"])) if "display" in entry else None
-    return Unit(name=name, exponents={key: value for key, value in entry.items() if key != "display"}, display=display)
+    exponents = {key: value for key, value in entry.items() if key not in ("display", "type")}
+    return Unit(name=name, exponents=exponents, display=display, type=entry.get("type"))
 
 
 def _pattern(entry: Mapping[str, Any], causality: Causality) -> Pattern:

@@ -59,7 +59,7 @@ def _document(interface: Interface) -> Element:
     })  # fmt: skip
     _add_interfaces(root, interface)
     _add_units(root, interface.units)
-    _add_types(root, interface.enumerations.values())
+    _add_types(root, interface.enumerations.values(), interface.units)
     categories = SubElement(root, "LogCategories")
     for name, text in interface.log_categories.items():
         SubElement(categories, "Category", name=name, description=text)
@@ -102,12 +102,20 @@ def _add_units(root: Element, units: Iterable[Unit]) -> None:
             SubElement(element, "DisplayUnit", name=unit.display[0], factor=repr(unit.display[1]))
 
 
-def _add_types(root: Element, enumerations: Iterable[Enumeration]) -> None:
+def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
     parent = SubElement(root, "TypeDefinitions")
+    for unit in units:
+        _add_real_type(parent, unit)
     for enumeration in enumerations:
         element = SubElement(SubElement(parent, "SimpleType", name=enumeration.name), "Enumeration")
         for number, (name, text) in enumerate(enumeration.items, start=1):
             SubElement(element, "Item", name=name, value=str(number), description=text)
+
+
+def _add_real_type(parent: Element, unit: Unit) -> None:
+    if unit.type is not None:
+        display = {"displayUnit": unit.display[0]} if unit.display else {}
+        SubElement(SubElement(parent, "SimpleType", name=unit.type), "Real", {"quantity": unit.type, "unit": unit.name} | display)
 
 
 def _add_provenance(root: Element, interface: Interface) -> None:
@@ -124,8 +132,9 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
     if variable.causality == "input":
         del element.attrib["initial"]  # the standard forbids to state it
     displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
+    types = {unit.name: unit.type for unit in interface.units}
     attributes = {
-        "declaredType": variable.enumeration,
+        "declaredType": variable.enumeration or types.get(variable.unit or ""),
         "unit": variable.unit,
         "displayUnit": displays.get(variable.unit or ""),
         "min": variable.minimum,

@@ -47,6 +47,11 @@ def source_files() -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
+def licence_file() -> Path:
+    """The licence's text."""
+    return _TREE.parent / "LICENSE" if in_source_tree() else _INSTALLED / "LICENSE"
+
+
 def fmi2_platform() -> str:
     """The folder of an FMI 2 archive that holds this machine's binary, as importers look for it."""
     system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")

@@ -16,6 +16,7 @@ from hexapod_cosim.cosim.documentation import render_html
 from hexapod_cosim.cosim.export import start_values
 from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
+from hexapod_cosim.cosim.terminals import render_terminals
 from hexapod_cosim.models.robot import load_robot
 
 GENERATED = Path(__file__).resolve().parents[1] / "plant_fmu" / "generated"
@@ -52,6 +53,7 @@ def render_all() -> dict[Path, str]:
         GENERATED / "defaults.c": render_defaults(interface),
         GENERATED / "modelDescription.xml": description.xml,
         GENERATED / "index.html": render_html(interface, description.guid),
+        GENERATED / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
         GENERATED / "start_values.txt": start_values(interface, description.guid),
     }
 

@@ -1,0 +1,29 @@
+"""What an FMU holds besides what runs: page, picture, icon, terminals, licence. The same for every version of the standard."""
+
+from __future__ import annotations
+
+from hexapod_cosim.cosim.documentation import render_html
+from hexapod_cosim.cosim.interface import Interface
+from hexapod_cosim.cosim.plant_files import licence_file
+from hexapod_cosim.cosim.portrait import draw_robot
+from hexapod_cosim.cosim.terminals import FOLDER, ICON, render_terminals
+
+PICTURE = "model.png"
+LICENCE = "documentation/licenses/license.txt"
+PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
+
+
+def extra_members(interface: Interface, guid: str) -> dict[str, bytes]:
+    """Contents by path in the archive."""
+    return {
+        "documentation/index.html": render_html(interface, guid).encode(),
+        LICENCE: licence_file().read_bytes(),
+        f"{FOLDER}/terminalsAndIcons.xml": render_terminals(list(interface.by_name)).encode(),
+        **pictures(interface),
+    }
+
+
+def pictures(interface: Interface) -> dict[str, bytes]:
+    """The robot's picture and icon by path in the archive."""
+    sizes = {PICTURE: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
+    return {path: draw_robot(interface.robot, width=width, height=height) for path, (width, height) in sizes.items()}

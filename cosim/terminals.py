@@ -1,0 +1,60 @@
+"""terminalsAndIcons.xml: the FMU's variables bundled as a user connects them, and its icon.
+
+Defined by FMI 3.0 (section 2.4.9), in the same folder and form since FMI 2.0.4. Legs have a terminal each: command (what a controller
+gives), state (what joint sensors measure) and foot (the contact); the torso has push, motion and imu. Terminals match by their members'
+names (rule "plug"), so that a controller's terminal of the same members connects in one go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
+
+FOLDER = "terminalsAndIcons"
+ICON = "icon.png"
+COMMANDS, STATES = ("angle_ref", "speed_ref", "torque_ref"), ("angle", "speed", "torque")
+TORSO = (
+    ("push", "disturbing force and torque", ("torso.push_force", "torso.push_torque")),
+    ("motion", "position, attitude and their rates", ("torso.position", "torso.quaternion", "torso.velocity", "torso.angular_velocity")),
+    ("imu", "an ideal inertial sensor", ("imu.specific_force", "imu.angular_velocity")),
+)
+HALF_SIZE = 100.0  # of the icon's coordinates, which run from - to +
+MILLIMETRES = 0.1  # of a diagram, per unit of these coordinates
+
+
+def render_terminals(names: Sequence[str]) -> str:
+    """The document for an FMU whose variables have these names; arrays are spelt out, as FMI 2.0 has them."""
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    corners = {"x1": repr(-HALF_SIZE), "y1": repr(-HALF_SIZE), "x2": repr(HALF_SIZE), "y2": repr(HALF_SIZE)}
+    picture = SubElement(root, "GraphicalRepresentation")
+    SubElement(picture, "CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": repr(MILLIMETRES)})
+    SubElement(picture, "Icon", corners)
+    terminals = SubElement(root, "Terminals")
+    for leg in LEG_NAMES:
+        _add_leg(terminals, leg, names)
+    torso = _add(terminals, "torso", "what happens to the torso")
+    for name, text, starts in TORSO:
+        _add(torso, name, text, [(variable, variable.partition(".")[2]) for variable in names if variable.partition("[")[0] in starts])
+    ElementTree.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
+
+
+def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
+    terminal = _add(parent, leg, f"leg {leg}")
+    for name, text, quantities in (("command", "joint commands", COMMANDS), ("state", "joint states", STATES)):
+        members = [f"{joint}.{quantity}" for joint in JOINT_NAMES for quantity in quantities]
+        _add(terminal, name, text, [(f"{leg}.{member}", member) for member in members])
+    start = f"{leg}.foot."
+    foot = [(variable, variable.removeprefix(start)) for variable in names if variable.startswith(start)]
+    _add(terminal, "foot", "contact of the foot with the ground", foot)
+
+
+def _add(parent: Element, name: str, text: str, members: Iterable[tuple[str, str]] = ()) -> Element:
+    """A terminal of (variable, member) pairs."""
+    terminal = SubElement(parent, "Terminal", name=name, matchingRule="plug", description=text)
+    for variable, member in members:
+        SubElement(terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind="signal")
+    return terminal
