@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 import zipfile
+from contextlib import chdir
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from fmpy import extract
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
 from fmpy.validation import validate_fmu
 
+from hexapod_cosim.cosim.archive_check import archive_problems
 from hexapod_cosim.cosim.fmu import Fmu, read_description
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.models import HexapodError
@@ -16,6 +21,7 @@ from hexapod_cosim.models import HexapodError
 START_VALUES = "resources/start_values.txt"
 CHECKSUM = "checksum "
 TRIAL_STEP = 0.001  # s
+FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
 
 
 def find_problems(path: Path) -> list[str]:
@@ -26,16 +32,10 @@ def find_problems(path: Path) -> list[str]:
 
 def find_own_problems(path: Path) -> list[str]:
     """The same without fmpy's checks. Raises FmuError when it is no FMU at all."""
-    description, problems = read_description(path), []
+    description, problems = read_description(path), archive_problems(path)
     with zipfile.ZipFile(path) as archive:
         problems += _start_value_problems(archive, description)
-        problems += _archive_problems(archive)
-    return problems + _run_problems(path)
-
-
-def _archive_problems(archive: zipfile.ZipFile) -> list[str]:
-    damaged = archive.testzip()
-    return [f"{damaged} is damaged: its checksum is wrong"] if damaged else []
+    return problems + _run_problems(path) + _guid_problems(path, description)
 
 
 def _start_value_problems(archive: zipfile.ZipFile, description: Any) -> list[str]:
@@ -89,3 +89,23 @@ def _run_problems(path: Path) -> list[str]:
     except HexapodError as error:
         return [str(error)]
     return []
+
+
+def _guid_problems(path: Path, description: Any) -> list[str]:
+    """A binary that takes any GUID would run with another model's description."""
+    callbacks = fmi2CallbackFunctions()
+    with TemporaryDirectory(prefix="hexapod-validate-") as folder:
+        extract(path, folder)
+        identifier = description.coSimulation.modelIdentifier
+        try:
+            with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
+                slave = FMU2Slave(guid=FOREIGN_GUID, modelIdentifier=identifier, unzipDirectory=folder, instanceName="validate")
+        except Exception:  # fmpy's errors have no common type; that it does not load is told elsewhere
+            return []
+        try:
+            slave.instantiate(callbacks=callbacks)
+        except Exception:  # as it should
+            slave.freeLibrary()
+            return []
+        slave.freeInstance()
+    return [f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of modelDescription.xml alone"]
