@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import reduce
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,13 +12,13 @@ from hexapod_cosim.cosim.extras import extra_members
 from hexapod_cosim.cosim.files import atomic_path, not_writable
 from hexapod_cosim.cosim.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
-from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, binary, fmi2_platform, installed_platforms, source_files
+from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, binary, fmi2_platform, source_files
+from hexapod_cosim.cosim.platforms import build_binaries, choose_platforms, plant_library
 from hexapod_cosim.cosim.reference import reference_members
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.records import Robot
 
 FMI_VERSIONS = (2,)
-ALL_PLATFORMS = "all"
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
 
@@ -30,35 +30,32 @@ def export_fmu(robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Itera
         robot: what the FMU's start values are.
         path: the file to write; it appears complete or not at all. Its folder is made if need be.
         fmi: version of the standard.
-        platforms: folders such as linux64; by default this machine's. "all": every one whose binary is installed.
+        platforms: folders such as linux64, or "all", each cross-compiled; "sources": no binary at all. By default this machine's binary
+            as it was installed.
 
-    Raises FmuError: no binary, a version that is not offered; HexapodError: a path that cannot be written.
+    Raises FmuError: no binary, no cross compiler, a version or platform that is not offered; HexapodError: a path that cannot be written.
     """
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
         raise FmuError("no such FMI version", got=fmi, expected=offered, fix="export with one of these")
-    members = _members(load_interface(robot), _platforms(platforms))
-    return _write_atomically(Path(path), members)
+    binaries = installed_binary() if platforms is None else build_binaries(plant_library(), choose_platforms(platforms, fmi=fmi), fmi=fmi)
+    return _write_atomically(Path(path), _members(load_interface(robot), binaries))
 
 
-def _platforms(platforms: Iterable[str] | None) -> list[str]:
-    if platforms is None:
-        return [fmi2_platform()]
-    chosen = [platforms] if isinstance(platforms, str) else list(platforms)
-    return (installed_platforms() or [fmi2_platform()]) if ALL_PLATFORMS in chosen else chosen
+def installed_binary() -> dict[str, bytes]:
+    """This machine's binary as it was built when this package was installed, by its path in the FMU."""
+    library = binary(fmi2_platform())
+    return {f"binaries/{fmi2_platform()}/{MODEL_IDENTIFIER}{library.suffix}": library.read_bytes()}
 
 
-def _members(interface: Interface, platforms: Iterable[str]) -> dict[str, bytes]:
+def _members(interface: Interface, binaries: Mapping[str, bytes]) -> dict[str, bytes]:
     """Contents of the archive by path."""
     description = render_fmi2(interface)
     members = {
         "modelDescription.xml": description.xml.encode(),
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
-    for platform in platforms:
-        library = binary(platform)
-        members[f"binaries/{platform}/{MODEL_IDENTIFIER}{library.suffix}"] = library.read_bytes()
-    members |= {f"sources/{name}": path.read_bytes() for name, path in source_files().items()}
+    members |= dict(binaries) | {f"sources/{name}": path.read_bytes() for name, path in source_files().items()}
     return members | extra_members(interface, description.guid) | _reference(interface, members)
 
 

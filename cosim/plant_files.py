@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
-from importlib import metadata
+from importlib import metadata, util
 from pathlib import Path
 
 from hexapod_cosim.models.errors import FmuError
@@ -50,6 +50,14 @@ def source_files() -> dict[str, Path]:
 def licence_file() -> Path:
     """The licence's text."""
     return _TREE.parent / "LICENSE" if in_source_tree() else _INSTALLED / "LICENSE"
+
+
+def fmi_headers() -> Path:
+    """Folder of the standard's C headers: the installed fmpy's."""
+    spec = util.find_spec("fmpy")
+    if spec is None or spec.origin is None:
+        raise FmuError("no FMI headers", got="no package fmpy", expected="fmpy", fix="pip install fmpy")
+    return Path(spec.origin).parent / "c-code"
 
 
 def fmi2_platform() -> str:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.controller import Gains, save_gains
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
 from hexapod_cosim.cosim.robot_files import chosen_format, export_description
@@ -29,7 +29,11 @@ def export(
     fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard.")] = 2,
     platforms: Annotated[
         str | None,
-        typer.Option("--platforms", help="Platforms, separated by commas; default: this machine's; all: every one that is installed."),
+        typer.Option(
+            "--platforms",
+            help="Cross-compile for these, separated by commas (linux64, win64, darwin64, aarch64-linux) or all; sources: no binary. "
+            "Default: this machine's installed one.",
+        ),
     ] = None,
     urdf: Annotated[bool, typer.Option("--urdf", help="Write the robot as a URDF instead; so does -o FILE.urdf.")] = False,
     mjcf: Annotated[bool, typer.Option("--mjcf", help="Write it as a MuJoCo model instead; so does -o FILE.xml.")] = False,
@@ -48,8 +52,9 @@ def export(
         raise HexapodError(
             "not an FMU's name", got=path.name, expected="a name that ends in .fmu", fix=f"write -o {path.with_suffix('.fmu')}"
         )
-    chosen = [name.strip() for name in platforms.split(",")] if platforms else None
-    export_fmu(made, path, fmi=fmi, platforms=chosen)
+    chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
+    with waiting("compiling" if chosen else None):
+        export_fmu(made, path, fmi=fmi, platforms=chosen)
     _show_written(path, made, "fmu", json=json)
 
 

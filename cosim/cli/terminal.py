@@ -50,6 +50,16 @@ def warn(text: str) -> None:
     print(f"warning: {text}", file=sys.stderr)
 
 
+@contextmanager
+def waiting(label: str | None) -> Iterator[None]:
+    """Says what takes a while, as long as it does, on a terminal."""
+    if label is None or not sys.stderr.isatty():
+        yield
+        return
+    with Console(stderr=True).status(label):
+        yield
+
+
 class _Speed(ProgressColumn):
     """Simulated over wall time."""
 

@@ -8,6 +8,8 @@
 
 #include "fmi/variables.h"
 
+HX_HIDDEN_BEGIN
+
 typedef struct hxComponent hxComponent;
 
 hxComponent *hx_component_create(void); /* holding its defaults; NULL when out of memory */
@@ -54,5 +56,7 @@ typedef struct hxContinuous {
 } hxContinuous;
 
 extern const hxContinuous *const hx_continuous; /* NULL for a component without */
+
+HX_HIDDEN_END
 
 #endif

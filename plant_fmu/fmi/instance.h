@@ -7,6 +7,8 @@
 
 #include "fmi/component.h"
 
+HX_HIDDEN_BEGIN
+
 /* Modes are bits so that a set of them is a mask. */
 typedef enum hxMode {
   HX_MODE_INSTANTIATED = 1,
@@ -110,5 +112,7 @@ const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned r
 /* The row of a reference, or NULL; and a value's fitness for it (NaN and infinities fit nowhere). */
 const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality);
 int hx_variable_takes(const hxVariable *variable, double value);
+
+HX_HIDDEN_END
 
 #endif

@@ -51,12 +51,28 @@ static const char *skip_scheme(const char *uri) {
   for (size_t i = 0; i < sizeof scheme - 1; i++)
     if (uri[i] != scheme[i] && uri[i] != scheme[i] - 'a' + 'A') return NULL;
   uri += sizeof scheme - 1;
+#ifndef _WIN32
   if (uri[0] == '/' && uri[1] == '/') {
     const char *path = strchr(uri + 2, '/');
     return path ? path : uri + 2;
   }
+#endif
   return uri;
 }
+
+#ifdef _WIN32
+/* /C:/x, //C:/x, ///C:/x, //localhost/C:/x -> C:/x; ////server/share -> //server/share; in place */
+static void to_windows_path(char *path) {
+  static const char this_machine[] = "//localhost/";
+  const size_t host = strncmp(path, this_machine, sizeof this_machine - 1) == 0 ? sizeof this_machine - 2 : 0;
+  const size_t slashes = strspn(path + host, "/");
+  const char *name = path + host + slashes;
+  const int drive = name[0] && (name[1] == ':' || name[1] == '|');
+  const char *from = drive ? name : slashes >= 4 ? name - 2 : path + host;
+  memmove(path, from, strlen(from) + 1);
+  if (drive) path[1] = ':';
+}
+#endif
 
 /* path of start_values.txt below the resources, decoded or as it is given, to be freed; NULL when out of memory */
 static char *start_values_path(const char *resources, int decode) {
@@ -66,11 +82,7 @@ static char *start_values_path(const char *resources, int decode) {
   strcpy(path, after_scheme ? after_scheme : resources);
   if (after_scheme && decode) percent_decode(path);
 #ifdef _WIN32
-  /* /C:/x -> C:/x */
-  if (path[0] == '/' && path[1] && (path[2] == ':' || path[2] == '|')) {
-    memmove(path, path + 1, strlen(path));
-    path[1] = ':';
-  }
+  to_windows_path(path);
 #endif
   size_t length = strlen(path);
   if (length > 0 && path[length - 1] != '/') path[length++] = '/';

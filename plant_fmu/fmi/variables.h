@@ -3,6 +3,9 @@
 #define HEXAPOD_FMI_VARIABLES_H
 
 #include "generated/variables.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 typedef enum hxType { HX_REAL, HX_INTEGER, HX_BOOLEAN } hxType; /* double, int, int; an enumeration is an HX_INTEGER */
 
@@ -40,5 +43,7 @@ extern const char *const hx_log_category_names[];
 
 /* GUID of the model description with the compiled-in robot. */
 extern const char hx_default_guid[];
+
+HX_HIDDEN_END
 
 #endif

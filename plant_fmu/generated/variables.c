@@ -924,7 +924,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{2cf8b152-3570-40d3-a692-28770b0fef80}";
+const char hx_default_guid[] = "{dbafb213-b1ef-453b-9327-ddd6a64244e7}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -3,8 +3,13 @@
 #define HX_CHECK_H
 
 #include "hexapod/hexapod.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 /* message: HX_MESSAGE_SIZE bytes, written on failure only; may be NULL */
 hxStatus hx_input_check(const hxInput *input, char *message);
+
+HX_HIDDEN_END
 
 #endif

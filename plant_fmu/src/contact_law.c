@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "elementary.h"
+
 double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
   /* g(chi) = ln(1 + chi) - ln(1 - chi e) - chi (1 + e) falls from 0, then rises to infinity at 1/e: one root in between */
@@ -9,7 +11,7 @@ double hx_exact_restitution_chi(double e) {
   for (int i = 0; i < 200; ++i) {
     const double chi = 0.5 * (low + high);
     if (chi <= low || chi >= high) break;
-    if (log1p(chi) - log1p(-chi * e) - chi * (1.0 + e) < 0.0)
+    if (hx_log1p(chi) - hx_log1p(-chi * e) - chi * (1.0 + e) < 0.0)
       low = chi;
     else
       high = chi;

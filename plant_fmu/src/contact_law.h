@@ -4,6 +4,8 @@
 
 #include "state.h"
 
+HX_HIDDEN_BEGIN
+
 /* One row per hxContactLaw; the only place a law is chosen. */
 typedef struct {
   double (*scale)(const hxDefinition *definition);              /* the law's constant, compiled into the model */
@@ -23,5 +25,7 @@ void hx_contact_slacken(const hxContactState *contact, hxMotion *motion);
 
 /* Touch-down of open feet in the ground, lift-off of closed ones out of it; returns the number of touch-downs. */
 int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact);
+
+HX_HIDDEN_END
 
 #endif

@@ -8,6 +8,8 @@
 
 #include "state.h"
 
+HX_HIDDEN_BEGIN
+
 typedef struct hxKernel {
   const char *name;
   int (*runs_here)(void); /* whether this processor has its instructions */
@@ -39,5 +41,7 @@ extern const hxKernel *const hx_kernels[];
 
 /* The fastest kernel that this processor runs. */
 const hxKernel *hx_kernel(void);
+
+HX_HIDDEN_END
 
 #endif

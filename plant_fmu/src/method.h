@@ -2,6 +2,10 @@
 #ifndef HX_METHOD_H
 #define HX_METHOD_H
 
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
+
 enum { HX_STAGES = 7 };
 
 /*   y_i = y_0 + sum_{j<i} a_ij k_j
@@ -20,5 +24,7 @@ typedef struct hxMethodRow {
 } hxMethodRow;
 
 const hxMethodRow *hx_method(int method); /* NULL when there is no such method */
+
+HX_HIDDEN_END
 
 #endif

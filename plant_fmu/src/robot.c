@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "contact_law.h"
+#include "elementary.h"
 
 static void cross(const double a[3], const double b[3], double out[3]) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -65,7 +66,8 @@ static void joint_on_parent(const hxDefinition *d, int leg, int joint, double sP
 /* The turn from the parent's axes to the child's at angle 0: the hip's yaw for the coxa, none for the others. */
 static void zero_turn(const hxDefinition *d, int leg, int joint, double p[4]) {
   const double half = joint == 0 ? 0.5 * d->leg[leg].hip_yaw : 0.0;
-  p[0] = cos(half), p[1] = 0.0, p[2] = 0.0, p[3] = sin(half);
+  hx_sin_cos(half, &p[3], &p[0]);
+  p[1] = p[2] = 0.0;
 }
 
 /* The quaternion of a right-handed frame given by its axes, by the largest of its components (Shepperd). */
@@ -142,9 +144,12 @@ static void compile_ground(hxModel *model, const hxDefinition *d) {
   const double incline = d->terrain.kind == HX_TERRAIN_SLOPE ? d->terrain.incline : 0.0;
   model->ground_point[0] = model->ground_point[1] = 0.0;
   model->ground_point[2] = d->terrain.height;
-  model->ground_normal[0] = -sin(incline) * cos(d->terrain.heading);
-  model->ground_normal[1] = -sin(incline) * sin(d->terrain.heading);
-  model->ground_normal[2] = cos(incline);
+  double rise, level, sideways, ahead;
+  hx_sin_cos(incline, &rise, &level);
+  hx_sin_cos(d->terrain.heading, &sideways, &ahead);
+  model->ground_normal[0] = -rise * ahead;
+  model->ground_normal[1] = -rise * sideways;
+  model->ground_normal[2] = level;
 }
 
 static void compile_settings(hxModel *model, const hxDefinition *d) {
@@ -189,9 +194,10 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
 static void place_child(const hxDefinition *d, int leg, int joint, const double parent[HX_BODY_STATE], double child[HX_BODY_STATE]) {
   const hxLink *link = &d->leg[leg].link[joint];
   const double half = 0.5 * d->initial.angle[leg][joint], speed = d->initial.speed[leg][joint];
-  double axis[3], zero[4], turned[4], p[4], s[3], sP_i[3], sP_j[3], com[3], arm[3], w_arm[3];
+  double axis[3], zero[4], turned[4], p[4], s[3], sP_i[3], sP_j[3], com[3], arm[3], w_arm[3], sine, cosine;
   normalise(link->axis, 3, axis);
-  const double turn[4] = {cos(half), sin(half) * axis[0], sin(half) * axis[1], sin(half) * axis[2]};
+  hx_sin_cos(half, &sine, &cosine);
+  const double turn[4] = {cosine, sine * axis[0], sine * axis[1], sine * axis[2]};
   zero_turn(d, leg, joint, zero);
   quat_mul(parent + HX_P, zero, turned);
   quat_mul(turned, turn, p);

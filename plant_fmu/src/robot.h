@@ -4,6 +4,8 @@
 
 #include "state.h"
 
+HX_HIDDEN_BEGIN
+
 /* Two unit normals to a unit axis: a = axis x (the coordinate direction it is least along, the first on ties), b = axis x a. */
 void hx_axis_normals(const double axis[3], double a[3], double b[3]);
 
@@ -17,5 +19,7 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
 void hx_bodies_from_motion(const hxModel *model, const hxMotion *motion, double body[HX_BODIES][HX_BODY_STATE]);
 
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time);
+
+HX_HIDDEN_END
 
 #endif

@@ -6,13 +6,7 @@
 #define HX_STATE_H
 
 #include "hexapod/hexapod.h"
-
-/* a*b + c rounds twice on every machine, whatever an importer's compiler call says about fused arithmetic */
-#if defined(__clang__)
-#pragma clang fp contract(off)
-#elif defined(__GNUC__)
-#pragma GCC optimize("fp-contract=off")
-#endif
+#include "hexapod/inside.h"
 
 enum {
   HX_SLOTS = 8, /* legs in memory, padded: slots past the last leg mirror leg 0 */

@@ -4,6 +4,8 @@
 
 #include "state.h"
 
+HX_HIDDEN_BEGIN
+
 #if defined(__GNUC__)
 #define HX_HAS_TANGENT 1
 #else
@@ -21,5 +23,7 @@ typedef struct hxTangentPoint {
 
 /* Either result may be NULL. In d_output, contact is 0. */
 void hx_tangent(const hxTangentPoint *point, hxCoordinates *d_rate, hxOutput *d_output);
+
+HX_HIDDEN_END
 
 #endif

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "contact_law.h"
+#include "elementary.h"
 #include "hexapod/hexapod.h"
 #include "kernel.h"
 #include "lanes/dynamics.h"
@@ -153,6 +154,15 @@ HX_API void hx_probe_expm1(const double *x, double *out, int n) {
 HX_API void hx_probe_angle_from_half(const double *y, const double *x, double *out, int n) {
   for (int i = 0; i < n; i += HX_LANES) hx_store(out + i, hx_angle_from_half(hx_load(y + i), hx_load(x + i)));
 }
+
+HX_API void hx_probe_elementary(const double *x, double *sine, double *cosine, double *logarithm, int n) {
+  for (int i = 0; i < n; i++) {
+    hx_sin_cos(x[i], &sine[i], &cosine[i]);
+    logarithm[i] = x[i] > -1.0 ? hx_log1p(x[i]) : 0.0;
+  }
+}
+
+HX_API double hx_probe_atan2(double y, double x) { return hx_atan2(y, x); }
 
 HX_API void hx_probe_select(const double *a, const double *b, double out[3][HX_SLOTS]) {
   for (int i = 0; i < HX_SLOTS; i += HX_LANES) {

@@ -9,10 +9,13 @@
 extern "C" {
 #endif
 
+/* HX_SHARED: the plant is a shared library of its own, here and where it is used. */
 #if defined(HX_SHARED) && !defined(_WIN32)
 #define HX_API __attribute__((visibility("default")))
 #elif defined(HX_SHARED)
 #define HX_API __declspec(dllexport)
+#elif defined(__GNUC__) && !defined(_WIN32)
+#define HX_API __attribute__((visibility("hidden"))) /* compiled into something else: not among that one's symbols */
 #else
 #define HX_API
 #endif

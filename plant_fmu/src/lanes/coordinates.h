@@ -17,9 +17,11 @@ static inline void scatter_joint(hxReal x, int joint, int slot, hxNumber (*table
 /* p_j = p_i zero turn(q), about the child's z; w_j = w_i + qd s; r and v as the joint's point has them on both sides */
 static inline void place_link(const hxModel *model, int joint, int slot, hxReal angle, hxReal speed, hxMotion *motion) {
   const hxJointModel *m = &model->joint[joint];
-  const hxReal half = 0.5 * angle, zero = hx_splat(0.0);
+  const hxReal zero = hx_splat(0.0);
+  hxReal sine, cosine;
+  hx_lanes_sin_cos(0.5 * angle, &sine, &cosine);
   const hxQuat from = hx_quat_mul(hx_parent_quat(motion, joint, slot), hx_load_quat(m->zero, slot));
-  hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(from, (hxQuat){hx_cos(half), zero, zero, hx_sin(half)}));
+  hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(from, (hxQuat){cosine, zero, zero, sine}));
   const hxBody i = hx_parent_body(motion, joint, slot);
   const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot)), w_j = hx_add_scaled(i.w, speed, s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);

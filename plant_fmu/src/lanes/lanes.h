@@ -15,6 +15,7 @@
 #include <immintrin.h>
 #endif
 
+#include "../elementary.h"
 #include "../state.h"
 
 #ifndef HX_TANGENT
@@ -144,22 +145,22 @@ static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   return 8.0 * (t + t * z * (low + z4 * (mid + z4 * high)));
 }
 
-/* The angle of (x, y) in (-pi, pi], and the one in [-pi/2, pi/2] whose sine is x; of single numbers. */
-static inline double hx_atan2(double y, double x) { return atan2(y, x); }
-static inline double hx_asin(double x) { return asin(fmin(1.0, fmax(-1.0, x))); }
-
-static inline hxReal hx_cos(hxReal x) {
-  double lane[HX_LANES];
-  hx_store(lane, x);
-  for (int i = 0; i < HX_LANES; ++i) lane[i] = cos(lane[i]);
-  return hx_load(lane);
+/* atan2(y, x), 0 at the origin: half the angle has the sine y and the cosine x + r, or r - x and |y| where x + r cancels */
+static inline double hx_atan2(double y, double x) {
+  const double r = sqrt(x * x + y * y);
+  if (r == 0.0) return 0.0;
+  const double sine = x < 0.0 ? copysign(r - x, y) : y, cosine = x < 0.0 ? fabs(y) : x + r;
+  return hx_lane(hx_angle_from_half(hx_splat(sine), hx_splat(cosine)), 0);
 }
 
-static inline hxReal hx_sin(hxReal x) {
-  double lane[HX_LANES];
-  hx_store(lane, x);
-  for (int i = 0; i < HX_LANES; ++i) lane[i] = sin(lane[i]);
-  return hx_load(lane);
+/* the angle in [-pi/2, pi/2] whose sine is x */
+static inline double hx_asin(double x) { return hx_atan2(x, sqrt(fmax(0.0, (1.0 - x) * (1.0 + x)))); }
+
+static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
+  double s[HX_LANES], c[HX_LANES];
+  hx_store(s, x);
+  for (int i = 0; i < HX_LANES; ++i) hx_sin_cos(s[i], &s[i], &c[i]);
+  *sine = hx_load(s), *cosine = hx_load(c);
 }
 
 #else

@@ -52,8 +52,12 @@ static inline hxReal hx_tanh(hxReal x) {
 }
 
 static inline hxReal hx_tanh_ratio(hxReal x) { return hx_tanh(x) / x; }
-static inline hxReal hx_cos(hxReal x) { return hx_chain(x, cos(hx_re(x)), -sin(hx_re(x))); }
-static inline hxReal hx_sin(hxReal x) { return hx_chain(x, sin(hx_re(x)), cos(hx_re(x))); }
+
+static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
+  double s, c;
+  hx_sin_cos(hx_re(x), &s, &c);
+  *sine = hx_chain(x, s, c), *cosine = hx_chain(x, c, -s);
+}
 
 static inline hxNumber hx_atan2(hxNumber y, hxNumber x) {
   const double a = hx_re(x), b = hx_re(y), square = a * a + b * b;

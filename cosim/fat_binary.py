@@ -1,0 +1,45 @@
+"""The universal Mach-O file: libraries for several processors in one, as Apple's lipo joins them."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+
+from hexapod_cosim.models.errors import FmuError
+
+FAT_MAGIC, MACH_O_64 = 0xCAFEBABE, 0xFEEDFACF
+PAGE_BITS = 14  # slices begin at multiples of 16 KiB, the larger of the processors' pages
+_HEADER, _SLICE, _MACH_HEADER = struct.Struct(">II"), struct.Struct(">5I"), struct.Struct("<3I")
+
+
+def join_mach_o(slices: Sequence[bytes]) -> bytes:
+    """One universal file of 64-bit Mach-O files, one a processor.
+
+    Layout (mach-o/fat.h, all big-endian): magic and number of slices; for each its processor, subtype, offset, size, alignment; the slices.
+    Raises FmuError when one is not such a file, or two are for the same processor.
+    """
+    processors = [_processor(data) for data in slices]
+    if len(set(processors)) < len(processors):
+        raise FmuError("universal binary", got=f"processors {processors}", expected="each once", fix="join one file a processor")
+    out = bytearray(_HEADER.pack(FAT_MAGIC, len(slices)))
+    offset = _aligned(_HEADER.size + _SLICE.size * len(slices))
+    for processor, data in zip(processors, slices, strict=True):
+        out += _SLICE.pack(*processor, offset, len(data), PAGE_BITS)
+        offset = _aligned(offset + len(data))
+    for data in slices:
+        out += bytes(_aligned(len(out)) - len(out)) + data
+    return bytes(out)
+
+
+def _processor(data: bytes) -> tuple[int, int]:
+    """Type and subtype of the processor that a Mach-O file is for."""
+    magic, kind, subtype = _MACH_HEADER.unpack(data[: _MACH_HEADER.size].ljust(_MACH_HEADER.size, b"\0"))
+    if magic != MACH_O_64:
+        raise FmuError(
+            "universal binary", got=f"a file that begins with {data[:4].hex()}", expected="64-bit Mach-O", fix="build it for macOS"
+        )
+    return kind, subtype
+
+
+def _aligned(offset: int) -> int:
+    return -(-offset >> PAGE_BITS) << PAGE_BITS

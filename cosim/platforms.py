@@ -1,0 +1,89 @@
+"""Which platforms an FMU can hold binaries for, under the names each version of the standard gives them, and their binaries.
+
+All of them come from one compiler (cosim/cross_build.py), this machine's too: then the same package makes the same bytes wherever it runs,
+and a binary asks for no newer C library than any importer has. Without a choice an FMU gets the binary that was installed with this
+package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
+from hexapod_cosim.cosim.cross_build import TARGETS, Library, build_library, find_compiler
+from hexapod_cosim.cosim.fat_binary import join_mach_o
+from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, fmi_headers, source_files
+from hexapod_cosim.models.errors import FmuError
+
+ALL, SOURCES = "all", "sources"
+
+# FMI 2 names 64-bit x86 in its own way and takes FMI 3's names for everything else (2.0.5, section 2.3). darwin64 is for both processors of
+# Macs: importers on either look there.
+_FMI2 = {
+    "linux64": ("x86_64-linux",),
+    "win64": ("x86_64-windows",),
+    "darwin64": ("x86_64-darwin", "aarch64-darwin"),
+    "aarch64-linux": ("aarch64-linux",),
+}
+_FMI3 = {name: (name,) for name in TARGETS}
+
+
+def platform_targets(fmi: int) -> Mapping[str, tuple[str, ...]]:
+    """Folders below binaries in an FMU of a version of the standard, and the targets of the compiler that go into each."""
+    return _FMI2 if fmi == 2 else _FMI3
+
+
+def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
+    """The folders that names stand for: "all", "sources" for none, or folders. Raises FmuError for a name that is none of these."""
+    chosen, known = [names] if isinstance(names, str) else list(names), platform_targets(fmi)
+    for name in chosen:
+        if name not in known and name not in (ALL, SOURCES):
+            expected = ", ".join((*known, ALL, f"{SOURCES} for no binary at all"))
+            raise FmuError(f"no such platform of FMI {fmi}", got=name, expected=expected, fix="name some of these, separated by commas")
+    if SOURCES in chosen and len(chosen) > 1:
+        raise FmuError("contradicting platforms", got=", ".join(chosen), expected=f"{SOURCES} alone", fix=f"leave out {SOURCES}")
+    return [name for name in known if name in chosen or ALL in chosen]
+
+
+def plant_library() -> Library:
+    """The plant FMU's library."""
+    return Library(MODEL_IDENTIFIER, source_files(), (fmi_headers(),))
+
+
+def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> dict[str, bytes]:
+    """Shared libraries by their path in an FMU (binaries/linux64/hexapod.so), built at once, or taken from the cache.
+
+    Args:
+        library: what to build.
+        platforms: folders, as `choose_platforms` returns them.
+        fmi: version of the standard.
+
+    Raises FmuError: no cross compiler, or sources it does not compile.
+    """
+    wanted = {name: platform_targets(fmi)[name] for name in platforms}
+    targets = list(dict.fromkeys(target for parts in wanted.values() for target in parts))
+    if not targets:
+        return {}
+    compiler = find_compiler()
+    with _workers(len(targets)) as pool:
+        built = dict(zip(targets, pool.map(lambda target: build_library(library, target, compiler=compiler), targets), strict=True))
+    return {_member(library, name, parts): _joined([built[part] for part in parts]) for name, parts in wanted.items()}
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Threads that each wait for a compiler. What has not begun is dropped when one fails or the user interrupts."""
+    pool = ThreadPoolExecutor(count)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _member(library: Library, folder: str, targets: tuple[str, ...]) -> str:
+    return f"binaries/{folder}/{library.name}{TARGETS[targets[0]].suffix}"
+
+
+def _joined(parts: list[bytes]) -> bytes:
+    return parts[0] if len(parts) == 1 else join_mach_o(parts)
