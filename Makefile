@@ -7,14 +7,15 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 
-.PHONY: help setup demo test check bench bench-quick control format generate fmu typing clean
+.PHONY: help setup demo test test-importers check bench bench-quick control format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
 	@echo "make demo      the paper's comparison; says where its report is"
 	@echo "make test      every test"
+	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (10 min)"
@@ -40,11 +41,14 @@ demo: setup
 test: setup typing
 	$(BIN)/python -m pytest
 
+test-importers: setup
+	$(BIN)/python -m tools.importers.compare
+
 check: setup typing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py
+	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 

@@ -1,0 +1,1 @@
+"""The plant FMU through importers that no one here wrote."""
