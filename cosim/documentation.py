@@ -39,8 +39,8 @@ came in nothing is set.</li>
 so results do not depend on the importer's settings.</li>
 <li>A step that the plant cannot take is discarded and leaves the state as it was. The state can be saved, restored and serialised.</li>
 <li>Model exchange: {states} continuous states (torso, joint angles and speeds, works, bristles); events are touch-downs and lift-offs.</li>
-<li>Directional derivatives of outputs and state derivatives by inputs and states are exact. Derivatives of inputs and outputs are of order 1;
-a derivative of an input holds for the next step.</li>
+<li>Directional derivatives of outputs and state derivatives by inputs and states are exact. Derivatives of inputs and outputs are of
+order 1; a derivative of an input holds for the next step.</li>
 <li>Not provided: asynchronous steps.</li>
 </ul>
 <h2>Variables</h2>
