@@ -427,24 +427,24 @@ static const hxVariable parameters[] = {
     {"RR.coxa.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.leg[5].link[0].mass), HX_REAL},
     {"RR.femur.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.leg[5].link[1].mass), HX_REAL},
     {"RR.tibia.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.leg[5].link[2].mass), HX_REAL},
-    {"LF.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[0].link[0].length), HX_REAL},
-    {"LF.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[0].link[1].length), HX_REAL},
-    {"LF.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[0].link[2].length), HX_REAL},
-    {"LM.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[1].link[0].length), HX_REAL},
-    {"LM.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[1].link[1].length), HX_REAL},
-    {"LM.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[1].link[2].length), HX_REAL},
-    {"LR.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[2].link[0].length), HX_REAL},
-    {"LR.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[2].link[1].length), HX_REAL},
-    {"LR.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[2].link[2].length), HX_REAL},
-    {"RF.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[3].link[0].length), HX_REAL},
-    {"RF.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[3].link[1].length), HX_REAL},
-    {"RF.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[3].link[2].length), HX_REAL},
-    {"RM.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[4].link[0].length), HX_REAL},
-    {"RM.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[4].link[1].length), HX_REAL},
-    {"RM.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[4].link[2].length), HX_REAL},
-    {"RR.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[5].link[0].length), HX_REAL},
-    {"RR.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[5].link[1].length), HX_REAL},
-    {"RR.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[5].link[2].length), HX_REAL},
+    {"LF.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[0].length), HX_REAL},
+    {"LF.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[1].length), HX_REAL},
+    {"LF.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[2].length), HX_REAL},
+    {"LM.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[1].link[0].length), HX_REAL},
+    {"LM.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[1].link[1].length), HX_REAL},
+    {"LM.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[1].link[2].length), HX_REAL},
+    {"LR.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[2].link[0].length), HX_REAL},
+    {"LR.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[2].link[1].length), HX_REAL},
+    {"LR.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[2].link[2].length), HX_REAL},
+    {"RF.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[3].link[0].length), HX_REAL},
+    {"RF.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[3].link[1].length), HX_REAL},
+    {"RF.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[3].link[2].length), HX_REAL},
+    {"RM.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[4].link[0].length), HX_REAL},
+    {"RM.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[4].link[1].length), HX_REAL},
+    {"RM.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[4].link[2].length), HX_REAL},
+    {"RR.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[5].link[0].length), HX_REAL},
+    {"RR.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[5].link[1].length), HX_REAL},
+    {"RR.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[5].link[2].length), HX_REAL},
     {"LF.coxa.offset_y", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[0].offset_y), HX_REAL},
     {"LF.femur.offset_y", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[1].offset_y), HX_REAL},
     {"LF.tibia.offset_y", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[2].offset_y), HX_REAL},
@@ -924,7 +924,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{dbafb213-b1ef-453b-9327-ddd6a64244e7}";
+const char hx_default_guid[] = "{6b2bd6f6-4142-4609-85c5-a27c68123d7a}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -69,10 +69,14 @@ static void legs(hxChecker *c, const hxDefinition *d) {
   char name[32];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxLink *link = &d->leg[leg].link[joint];
+      const double tip[3] = {link->length, link->offset_y, link->offset_z};
       snprintf(name, sizeof name, "%s.%s.inertia_xx", leg_names[leg], joint_names[joint]);
-      body(c, name, d->leg[leg].link[joint].inertia);
+      body(c, name, link->inertia);
       snprintf(name, sizeof name, "%s.%s.axis", leg_names[leg], joint_names[joint]);
-      length_not_zero(c, name, d->leg[leg].link[joint].axis, 3, "a direction: not all zero");
+      length_not_zero(c, name, link->axis, 3, "a direction: not all zero");
+      snprintf(name, sizeof name, "%s.%s.length", leg_names[leg], joint_names[joint]);
+      length_not_zero(c, name, tip, 3, "a tip away from the joint: length and offsets not all zero");
     }
   }
 }
