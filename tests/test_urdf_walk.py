@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
 
 import fmpy
@@ -10,10 +12,10 @@ import numpy as np
 import pytest
 from command import Call, assert_refused
 from disguised_urdf import disguised, stances
-from foreign_urdf import SIDE, spider_table, spider_urdf
+from foreign_urdf import SIDE, athena_table, spider_table, spider_urdf
 
 from hexapod_cosim.cosim.toml_text import to_toml
-from hexapod_cosim.models import LEG_NAMES, list_robots, load_robot
+from hexapod_cosim.models import LEG_NAMES, RobotError, list_robots, load_robot
 
 SAME_WALK = 1e-9  # m    the robots differ in the last bits of some inertias; what contact makes of that in seconds
 SAME_COURSE = 0.1  # m    the walk is as long as commanded, less the ramps
@@ -35,7 +37,7 @@ def walked(call: Call, robot: Path, folder: Path, duration: float) -> dict[str, 
     code, _, err = call("simulate", "walk_flat", "-o", folder, *(word for text in settings for word in ("--set", text)))
     assert code == 0, err
     table = np.genfromtxt(folder / "results.csv", delimiter=",", names=True, deletechars="")
-    return {name: table[name] for name in table.dtype.names}
+    return {name: table[name] for name in table.dtype.names or ()}
 
 
 def column(result: dict[str, np.ndarray], start: str) -> np.ndarray:
@@ -48,6 +50,24 @@ def test_a_urdf_robot_walks_as_the_same_robot_in_a_file_of_ours(call: Call, file
         name = f"torso.position[{axis}]"
         assert column(theirs, name) == pytest.approx(column(ours, name), abs=SAME_WALK)
     assert column(ours, "torso.position[1]")[-1] > SAME_COURSE
+
+
+def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Path) -> None:
+    """Tibias that hang straight down at angle 0, as most URDFs draw them: length 0, all in the offset."""
+    table = athena_table()
+    (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
+    tibia, quarter = table["links"]["tibia"], 0.5 * math.pi
+    tibia |= {
+        "length": 0.0,
+        "offset_z": -tibia["length"],
+        "com": [0.0, 0.0, -tibia["com"][0]],
+        "inertia": [*tibia["inertia"][2::-1], 0.0, 0.0, 0.0],
+    }
+    tibia |= {key: tibia[key] - quarter for key in ("angle_min", "angle_max", "stance")}
+    (tmp_path / "hanging.toml").write_text(to_toml(table), encoding="utf-8")
+    ours, hanging = (walked(call, tmp_path / f"{name}.toml", tmp_path / name, 2.0) for name in ("ours", "hanging"))
+    assert column(hanging, "torso.position[1]") == pytest.approx(column(ours, "torso.position[1]"), abs=SAME_WALK)
+    assert column(hanging, "LF.tibia.angle") + quarter == pytest.approx(column(ours, "LF.tibia.angle"), abs=SAME_WALK)
 
 
 def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> None:
@@ -145,3 +165,22 @@ def test_a_side_file_stands_above_the_urdf(tmp_path: Path) -> None:
     assert robot.torso.mass == 3.0
     assert [leg.links[2].mass for leg in robot.legs] == [0.12, 0.12, 0.12, 0.12, 0.2, 0.12]
     assert "6 damping" in robot.source["URDF, ignored"]
+
+
+def test_what_a_urdf_has_wrong_or_lacks_a_side_file_may_give(tmp_path: Path) -> None:
+    """As in published URDFs: a quarter turn as 1.5704, an inertia in other units, feet that are meshes only."""
+    text = spider_urdf().replace('rpy="1.5708 0 0"', 'rpy="1.5704 0 0"').replace('ixx="5e-5"', 'ixx="0.1"')
+    text = re.sub("<joint name=.toe_joint.*?</joint>|<link name=.toe_.*?</link>", "", text, flags=re.DOTALL)
+    (tmp_path / "spider.urdf").write_text(text, encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text('[urdf]\nfile = "spider.urdf"\n', encoding="utf-8")
+    with pytest.raises(RobotError, match=r"link 'femur_3'.* no possible body.* under \[links\.femur\]"):
+        load_robot(path)
+    path.write_text(f"{path.read_text()}[links.femur]\ninertia = [5e-5, 1.7e-4, 1.8e-4, 0, 0, 0]\n", encoding="utf-8")
+    with pytest.raises(RobotError, match=r"link 'tibia_3'.* without a foot.* under \[links\.tibia\]"):
+        load_robot(path)
+    path.write_text(f"{path.read_text()}[links.tibia]\nlength = 0.15\n", encoding="utf-8")
+    robot = load_robot(path)
+    assert [link.axis for link in robot.legs[0].links] == [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)]
+    assert robot.legs[0].links[2].tip == (0.15, 0.0, 0.0)
+    assert "foot.radius" in robot.source["URDF, assumed"]
