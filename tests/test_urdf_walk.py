@@ -184,3 +184,12 @@ def test_what_a_urdf_has_wrong_or_lacks_a_side_file_may_give(tmp_path: Path) -> 
     assert [link.axis for link in robot.legs[0].links] == [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)]
     assert robot.legs[0].links[2].tip == (0.15, 0.0, 0.0)
     assert "foot.radius" in robot.source["URDF, assumed"]
+
+
+def test_the_side_file_of_the_documentation_works(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[1] / "docs" / "howto" / "my-robot.md").read_text(encoding="utf-8")
+    side = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)[0]
+    (tmp_path / "my.urdf").write_text(spider_urdf(), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(side.replace('forward = "y"', 'forward = "x"'), encoding="utf-8")
+    robot = load_robot(tmp_path / "mine.toml")
+    assert (robot.name, robot.servo.kp, robot.legs[0].links[0].inertia[0]) == ("mine", 25.0, 2.2e-5)
