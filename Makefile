@@ -6,8 +6,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 
 .PHONY: help setup demo test test-importers check bench bench-quick control format generate fmu typing clean
 
@@ -20,7 +20,7 @@ help:
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (10 min)"
 	@echo "make format    formats C and Python"
-	@echo "make generate  plant_fmu/generated/ from plant_fmu/interface.toml"
+	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
 	@echo "make clean     removes what these made"
 

@@ -8,12 +8,13 @@ from functools import reduce
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from hexapod_cosim.cosim.components import PLANT, Component
 from hexapod_cosim.cosim.extras import extra_members
 from hexapod_cosim.cosim.files import atomic_path, not_writable
 from hexapod_cosim.cosim.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
-from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, binary, fmi2_platform, source_files
-from hexapod_cosim.cosim.platforms import build_binaries, choose_platforms, plant_library
+from hexapod_cosim.cosim.plant_files import binary, fmi2_platform, source_files
+from hexapod_cosim.cosim.platforms import build_binaries, choose_platforms, component_library
 from hexapod_cosim.cosim.reference import reference_members
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.records import Robot
@@ -35,17 +36,26 @@ def export_fmu(robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Itera
 
     Raises FmuError: no binary, no cross compiler, a version or platform that is not offered; HexapodError: a path that cannot be written.
     """
+    return export_interface(load_interface(robot), path, fmi=fmi, platforms=platforms)
+
+
+def export_interface(interface: Interface, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
+    """Writes the FMU of a component with this interface, as `export_fmu` does."""
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
         raise FmuError("no such FMI version", got=fmi, expected=offered, fix="export with one of these")
-    binaries = installed_binary() if platforms is None else build_binaries(plant_library(), choose_platforms(platforms, fmi=fmi), fmi=fmi)
-    return _write_atomically(Path(path), _members(load_interface(robot), binaries))
+    component = interface.component
+    if platforms is None:
+        binaries = installed_binary(component)
+    else:
+        binaries = build_binaries(component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi)
+    return _write_atomically(Path(path), _members(interface, binaries))
 
 
-def installed_binary() -> dict[str, bytes]:
+def installed_binary(component: Component = PLANT) -> dict[str, bytes]:
     """This machine's binary as it was built when this package was installed, by its path in the FMU."""
-    library = binary(fmi2_platform())
-    return {f"binaries/{fmi2_platform()}/{MODEL_IDENTIFIER}{library.suffix}": library.read_bytes()}
+    library = binary(fmi2_platform(), component)
+    return {f"binaries/{fmi2_platform()}/{component.identifier}{library.suffix}": library.read_bytes()}
 
 
 def _members(interface: Interface, binaries: Mapping[str, bytes]) -> dict[str, bytes]:
@@ -55,13 +65,13 @@ def _members(interface: Interface, binaries: Mapping[str, bytes]) -> dict[str, b
         "modelDescription.xml": description.xml.encode(),
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
-    members |= dict(binaries) | {f"sources/{name}": path.read_bytes() for name, path in source_files().items()}
+    members |= dict(binaries) | {f"sources/{name}": path.read_bytes() for name, path in source_files(interface.component).items()}
     return members | extra_members(interface, description.guid) | _reference(interface, members)
 
 
 def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:
-    """Reference results where this machine can run the FMU: none for one that is packed for other platforms alone."""
-    if not any(name.startswith(f"binaries/{fmi2_platform()}/") for name in members):
+    """Reference results of the plant where this machine can run it: none for an FMU that is packed for other platforms alone."""
+    if interface.component is not PLANT or not any(name.startswith(f"binaries/{fmi2_platform()}/") for name in members):
         return {}
     with TemporaryDirectory(prefix="hexapod-export-") as folder:
         return reference_members(interface, _write_atomically(Path(folder) / "trial.fmu", members))
@@ -74,7 +84,7 @@ def start_values(interface: Interface, guid: str) -> str:
 
 
 def _start_line(variable: Variable) -> str:
-    value = float(variable.start or 0.0).hex() if variable.type == "Real" else str(variable.start)
+    value = float(variable.start or 0.0).hex() if variable.type == "Real" else str(int(variable.start or 0))
     return f"{variable.reference} {value} {variable.name}"
 
 

@@ -12,6 +12,7 @@ from functools import cache, cached_property, lru_cache
 from types import SimpleNamespace
 from typing import Any, Literal
 
+from hexapod_cosim.cosim.components import PLANT, Component
 from hexapod_cosim.cosim.plant_files import interface_file, package_version
 from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
@@ -99,6 +100,7 @@ class Pattern:
 class Interface:
     """Everything an importer sees of one robot's FMU."""
 
+    component: Component
     robot: Robot
     version: str
     variables: tuple[Variable, ...]
@@ -159,16 +161,22 @@ class Interface:
 @lru_cache(maxsize=16)
 def load_interface(robot: Robot) -> Interface:
     """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit its variable."""
-    table = _table()
+    return expand_interface(PLANT, robot, _roots(robot))
+
+
+def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace) -> Interface:
+    """A component's interface, with start values from the attributes of `roots`. Raises HexapodError when one does not fit its variable."""
+    table = _table(component)
     enumerations = {name: _enumeration(name, entry) for name, entry in table["enumeration"].items()}
-    variables = tuple(_expand_all(table, enumerations, _roots(robot)))
+    variables = tuple(_expand_all(table, enumerations, roots))
     return Interface(
+        component=component,
         robot=robot,
         version=package_version(),
         variables=variables,
         states=tuple(_states(table)),
-        event_indicators=table["event"]["indicators"],
-        patterns=tuple(_pattern(entry, causality) for causality in CAUSALITIES for entry in table[causality]),
+        event_indicators=table["event"]["indicators"] if "event" in table else 0,
+        patterns=tuple(_pattern(entry, causality) for causality in CAUSALITIES for entry in table.get(causality, [])),
         units=tuple(_unit(name, entry) for name, entry in table["unit"].items()),
         enumerations=enumerations,
         log_categories=table["log_category"],
@@ -179,8 +187,8 @@ def load_interface(robot: Robot) -> Interface:
 
 
 @cache
-def _table() -> dict[str, Any]:
-    return tomllib.loads(interface_file().read_text(encoding="utf-8"))
+def _table(component: Component) -> dict[str, Any]:
+    return tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
 
 
 def _roots(robot: Robot) -> SimpleNamespace:
@@ -213,9 +221,9 @@ def _pattern(entry: Mapping[str, Any], causality: Causality) -> Pattern:
 
 def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace) -> Iterable[Variable]:
     for causality in CAUSALITIES:
-        places = itertools.chain.from_iterable(_places(entry, table["axis"]) for entry in table[causality])
+        places = itertools.chain.from_iterable(_places(entry, table["axis"]) for entry in table.get(causality, []))
         for reference, (entry, place) in enumerate(places, start=table["first_reference"][causality]):
-            yield _variable(entry, place, reference, causality, enumerations, roots, table["axis"])
+            yield _variable(entry, place, reference, causality, enumerations, roots, table)
 
 
 def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable[tuple[Mapping[str, Any], dict[str, tuple[int, str]]]]:
@@ -228,7 +236,7 @@ def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable
 
 def _variable(
     entry: Mapping[str, Any], place: Mapping[str, tuple[int, str]], reference: int, causality: Causality,
-    enumerations: Mapping[str, Enumeration], roots: SimpleNamespace, axes: Mapping[str, list[str]],
+    enumerations: Mapping[str, Enumeration], roots: SimpleNamespace, table: Mapping[str, Any],
 ) -> Variable:  # fmt: skip
     labels = {axis: label for axis, (_, label) in place.items()}
     enumeration = enumerations.get(entry.get("type", ""))
@@ -247,8 +255,8 @@ def _variable(
         enumeration=enumeration.name if enumeration else None,
         field=re.sub(r"\[(\w+)\]", lambda match: f"[{place[match[1]][0]}]", entry["field"]),
         description=entry["description"].format(**labels),
-        depends=_names(entry.get("depends"), labels, axes),
-        initial=_names(entry.get("initial"), labels, axes),
+        depends=_names(entry.get("depends"), labels, table),
+        initial=_names(entry.get("initial"), labels, table),
     )
     _check_start(variable)
     return variable
@@ -259,21 +267,21 @@ def _labelled(pattern: str, labels: Mapping[str, str]) -> str:
 
 
 def _states(table: Mapping[str, Any]) -> Iterable[State]:
-    for entry in table["state"]:
+    for entry in table.get("state", []):
         for _, place in _places(entry, table["axis"]):
             labels = {axis: label for axis, (_, label) in place.items()}
             name, derivative = (_labelled(entry[key], labels) for key in ("name", "derivative"))
-            yield State(name=name, derivative=derivative, initial=_names(entry["initial"], labels, table["axis"]) or ())
+            yield State(name=name, derivative=derivative, initial=_names(entry["initial"], labels, table) or ())
 
 
-def _names(patterns: Iterable[str] | None, labels: Mapping[str, str], axes: Mapping[str, list[str]]) -> tuple[str, ...] | None:
+def _names(patterns: Iterable[str] | None, labels: Mapping[str, str], table: Mapping[str, Any]) -> tuple[str, ...] | None:
     """Names by patterns: @ begins a group, {axis} is one's own label, * every leg, joint or index (of three, or of a quaternion's four)."""
     if patterns is None:
         return None
     found: list[str] = []
     for pattern in patterns:
-        group = _table()["group"][pattern[1:]] if pattern.startswith("@") else None
-        found += _every(_labelled(pattern, labels), axes) if group is None else _names(group, labels, axes) or ()
+        group = table["group"][pattern[1:]] if pattern.startswith("@") else None
+        found += _every(_labelled(pattern, labels), table["axis"]) if group is None else _names(group, labels, table) or ()
     return tuple(found)
 
 
@@ -294,7 +302,9 @@ def _start(
         return given
     value: Any = roots
     for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
-        value = getattr(value, attribute) if attribute else value[place[axis][0]]
+        value = getattr(value, attribute) if attribute else value[place[axis][0] if axis in place else int(axis)]
+    if isinstance(value, bool):
+        return value
     return enumeration.number(value) if enumeration else float(value)
 
 

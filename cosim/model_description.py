@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from hexapod_cosim.cosim.components import Component
 from hexapod_cosim.cosim.interface import Enumeration, Interface, Unit, Variable
-from hexapod_cosim.cosim.plant_files import DISTRIBUTION, MODEL_IDENTIFIER, source_files
+from hexapod_cosim.cosim.plant_files import DISTRIBUTION, source_files
 
 # what the binary can do; tests/test_fmi.py and tests/test_fmi_exchange.py hold each of these to its word
 BOTH = {
@@ -52,8 +53,8 @@ def _document(interface: Interface) -> Element:
     robot = interface.robot
     joints = sum(len(leg.links) for leg in robot.legs)
     root = Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": robot.name, "guid": "", "version": interface.version,
-        "description": f"Hexapod robot of {1 + joints} rigid bodies and {joints} servo joints, walking on compliant ground",
+        "fmiVersion": "2.0", "modelName": robot.name + interface.component.suffix, "guid": "", "version": interface.version,
+        "description": interface.component.description.format(bodies=1 + joints, joints=joints),
         "license": "MIT", "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
         "numberOfEventIndicators": str(interface.event_indicators),
     })  # fmt: skip
@@ -76,18 +77,19 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
     """Model exchange for components with continuous states, whose derivatives are exact; co-simulation."""
     differentiable = {"providesDirectionalDerivative": _flag(bool(interface.states))}
     order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
+    identifier = {"modelIdentifier": interface.component.identifier}
     if interface.states:
-        _add_sources(SubElement(root, "ModelExchange", {"modelIdentifier": MODEL_IDENTIFIER} | MODEL_EXCHANGE | differentiable))
-    _add_sources(SubElement(root, "CoSimulation", {"modelIdentifier": MODEL_IDENTIFIER} | CO_SIMULATION | order | differentiable))
+        _add_sources(SubElement(root, "ModelExchange", identifier | MODEL_EXCHANGE | differentiable), interface.component)
+    _add_sources(SubElement(root, "CoSimulation", identifier | CO_SIMULATION | order | differentiable), interface.component)
 
 
 def _flag(value: bool) -> str:
     return "true" if value else "false"
 
 
-def _add_sources(element: Element) -> None:
+def _add_sources(element: Element, component: Component) -> None:
     files = SubElement(element, "SourceFiles")
-    for name in source_files():
+    for name in source_files(component):
         if name.endswith(".c"):
             SubElement(files, "File", name=name)
 
@@ -147,6 +149,8 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
 
 
 def _text(value: float | int | str) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     return value if isinstance(value, str) else repr(value)
 
 

@@ -1,4 +1,4 @@
-"""Where the plant's files are: the binaries, the sources and interface.toml, in a source tree or in an installed wheel."""
+"""Where a component's files are: the binaries, the sources and interface.toml, in a source tree or in an installed wheel."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import tomllib
 from importlib import metadata, util
 from pathlib import Path
 
+from hexapod_cosim.cosim.components import PLANT, Component
 from hexapod_cosim.models.errors import FmuError
 
-MODEL_IDENTIFIER = "hexapod"
 DISTRIBUTION = "hexapod-cosim"
 GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
+SHARED_SOURCES = ("status.c", "checksum.c")  # of the plant's, in every component
+SHARED_HEADERS = ("status.h", "legs.h")
+PLANT_ALONE = "plant.c"  # of the FMI layer: the plant as a component
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
 
 _HERE = Path(__file__).resolve().parent
@@ -24,9 +27,9 @@ def in_source_tree() -> bool:
     return (_TREE / "interface.toml").is_file()
 
 
-def interface_file() -> Path:
-    """interface.toml."""
-    return (_TREE if in_source_tree() else _INSTALLED) / "interface.toml"
+def interface_file(component: Component = PLANT) -> Path:
+    """A component's interface.toml."""
+    return _HERE.parent / (component.tree if in_source_tree() else component.installed) / "interface.toml"
 
 
 def package_version() -> str:
@@ -37,14 +40,26 @@ def package_version() -> str:
     return metadata.version(DISTRIBUTION)
 
 
-def source_files() -> dict[str, Path]:
-    """The plant's C sources and headers, by their path below an FMU's sources folder; includes resolve with -I sources."""
-    root = _TREE if in_source_tree() else _INSTALLED / "sources"
+def source_files(component: Component = PLANT) -> dict[str, Path]:
+    """A component's C sources and headers, by their path below an FMU's sources folder; includes resolve with -I sources."""
+    found = _own_sources(component)
+    if component is not PLANT:
+        found |= {name: path for name, path in _own_sources(PLANT).items() if _is_shared(name)}
+    return dict(sorted(found.items()))
+
+
+def _own_sources(component: Component) -> dict[str, Path]:
+    root = _HERE.parent / component.tree if in_source_tree() else _HERE.parent / component.installed / "sources"
     folders = {"src": root / "src", "fmi": root / "fmi"}
     folders["hexapod"] = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
     found = {f"{name}/{path.relative_to(folder).as_posix()}": path for name, folder in folders.items() for path in folder.rglob("*.[ch]")}
-    found |= {f"generated/{name}": root / "generated" / name for name in GENERATED_SOURCES}
-    return dict(sorted(found.items()))
+    return found | {f"generated/{name}": root / "generated" / name for name in GENERATED_SOURCES}
+
+
+def _is_shared(name: str) -> bool:
+    """Whether a source of the plant is part of every component: the FMI layer, statuses and checksums."""
+    folder, _, file = name.partition("/")
+    return {"src": file in SHARED_SOURCES, "hexapod": file in SHARED_HEADERS, "fmi": file != PLANT_ALONE}.get(folder, False)
 
 
 def licence_file() -> Path:
@@ -66,14 +81,14 @@ def fmi2_platform() -> str:
     return system + ("64" if sys.maxsize > 2**32 else "32")
 
 
-def binary(fmi_platform: str) -> Path:
+def binary(fmi_platform: str, component: Component = PLANT) -> Path:
     """The FMU's shared library for a platform such as linux64, the newest at hand. Raises FmuError when there is none or it is stale."""
-    found = [path for folder in _plant_folders() for path in (folder / "binaries" / fmi_platform).glob(f"{MODEL_IDENTIFIER}.*")]
+    found = [path for folder in _plant_folders() for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")]
     if not found:
-        expected = "one of: " + ", ".join(platforms) if (platforms := installed_platforms()) else "a built plant"
-        raise FmuError("no plant binary for this platform", got=fmi_platform, expected=expected, fix=BUILD)
+        expected = "one of: " + ", ".join(platforms) if (platforms := installed_platforms()) else "a built one"
+        raise FmuError(f"no {component.name} binary for this platform", got=fmi_platform, expected=expected, fix=BUILD)
     newest = max(found, key=lambda path: path.stat().st_mtime)
-    _refuse_stale(newest)
+    _refuse_stale(newest, component)
     return newest
 
 
@@ -87,12 +102,16 @@ def _built(path: Path) -> int:
     return int(path.stat().st_mtime)
 
 
-def _refuse_stale(path: Path) -> None:
+def _refuse_stale(path: Path, component: Component) -> None:
     """In a source tree the sources may have moved on since the binary was built."""
-    changed = [name for name, source in source_files().items() if _built(source) > _built(path)] if in_source_tree() else []
+    changed = [name for name, source in source_files(component).items() if _built(source) > _built(path)] if in_source_tree() else []
     if changed:
         raise FmuError(
-            "the plant binary is older than its sources", got=", ".join(changed), expected="none changed", fix=BUILD, where=str(path)
+            f"the {component.name} binary is older than its sources",
+            got=", ".join(changed),
+            expected="none changed",
+            fix=BUILD,
+            where=str(path),
         )
 
 

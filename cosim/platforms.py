@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
+from hexapod_cosim.cosim.components import PLANT, Component
 from hexapod_cosim.cosim.cross_build import TARGETS, Library, build_library, find_compiler
 from hexapod_cosim.cosim.fat_binary import join_mach_o
-from hexapod_cosim.cosim.plant_files import MODEL_IDENTIFIER, fmi_headers, source_files
+from hexapod_cosim.cosim.plant_files import fmi_headers, source_files
 from hexapod_cosim.models.errors import FmuError
 
 ALL, SOURCES = "all", "sources"
@@ -46,9 +47,9 @@ def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
     return [name for name in known if name in chosen or ALL in chosen]
 
 
-def plant_library() -> Library:
-    """The plant FMU's library."""
-    return Library(MODEL_IDENTIFIER, source_files(), (fmi_headers(),))
+def component_library(component: Component = PLANT) -> Library:
+    """The library of a component's FMU."""
+    return Library(component.identifier, source_files(component), (fmi_headers(),))
 
 
 def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> dict[str, bytes]:

@@ -16,9 +16,11 @@ from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 FOLDER = "terminalsAndIcons"
 ICON = "icon.png"
 COMMANDS, STATES = ("angle_ref", "speed_ref", "torque_ref"), ("angle", "speed", "torque")
+BODY = ("vx", "vy", "yaw_rate", "height", "roll", "pitch")  # of a controller
 TORSO = (
     ("push", "disturbing force and torque", ("torso.push_force", "torso.push_torque")),
     ("motion", "position, attitude and their rates", ("torso.position", "torso.quaternion", "torso.velocity", "torso.angular_velocity")),
+    ("command", "what the torso is told to do", tuple(f"command.{name}" for name in BODY)),
     ("imu", "an ideal inertial sensor", ("imu.specific_force", "imu.angular_velocity")),
 )
 HALF_SIZE = 100.0  # of the icon's coordinates, which run from - to +
@@ -37,7 +39,9 @@ def render_terminals(names: Sequence[str]) -> str:
         _add_leg(terminals, leg, names)
     torso = _add(terminals, "torso", "what happens to the torso")
     for name, text, starts in TORSO:
-        _add(torso, name, text, [(variable, variable.partition(".")[2]) for variable in names if variable.partition("[")[0] in starts])
+        members = [(variable, variable.partition(".")[2]) for variable in names if variable.partition("[")[0] in starts]
+        if members:
+            _add(torso, name, text, members)
     ElementTree.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
 
@@ -46,7 +50,7 @@ def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
     terminal = _add(parent, leg, f"leg {leg}")
     for name, text, quantities in (("command", "joint commands", COMMANDS), ("state", "joint states", STATES)):
         members = [f"{joint}.{quantity}" for joint in JOINT_NAMES for quantity in quantities]
-        _add(terminal, name, text, [(f"{leg}.{member}", member) for member in members])
+        _add(terminal, name, text, [(f"{leg}.{member}", member) for member in members if f"{leg}.{member}" in names])
     start = f"{leg}.foot."
     foot = [(variable, variable.removeprefix(start)) for variable in names if variable.startswith(start)]
     _add(terminal, "foot", "contact of the foot with the ground", foot)

@@ -62,6 +62,12 @@ def core(plant_build: Path) -> ctypes.CDLL:
     return ctypes.CDLL(str(next((plant_build / "plant_fmu").glob("libhexapod_c.[sd]*"))))
 
 
+@pytest.fixture(scope="session")
+def controller_core(plant_build: Path) -> ctypes.CDLL:
+    """controller.h as a shared library."""
+    return ctypes.CDLL(str(next((plant_build / "controller_fmu").glob("libhexapod_controller_c.[sd]*"))))
+
+
 @pytest.fixture
 def call(capsys: pytest.CaptureFixture[str], plant_build: Path) -> Call:
     """Runs the command in this process: exit code, stdout, stderr."""

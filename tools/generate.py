@@ -1,4 +1,4 @@
-"""Writes plant_fmu/generated/ from plant_fmu/interface.toml, models/athena.toml and pyproject.toml's version.
+"""Writes plant_fmu/generated/ and controller_fmu/generated/ from their interface.toml, models/athena.toml and pyproject.toml's version.
 
 usage: python tools/generate.py [--check]
 
@@ -12,6 +12,9 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from hexapod_cosim.controller import make_gait
+from hexapod_cosim.cosim.components import PLANT, Component
+from hexapod_cosim.cosim.controller_interface import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.documentation import render_html
 from hexapod_cosim.cosim.export import start_values
 from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Variable, load_interface
@@ -19,14 +22,15 @@ from hexapod_cosim.cosim.model_description import render_fmi2
 from hexapod_cosim.cosim.terminals import render_terminals
 from hexapod_cosim.models.robot import load_robot
 
-GENERATED = Path(__file__).resolve().parents[1] / "plant_fmu" / "generated"
+ROOT = Path(__file__).resolve().parents[1]
 DEFAULT_ROBOT = "athena"
+DEFAULT_PERIOD = 0.005  # s  of the controller
 TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"}
 
 
 def main() -> int:
     """Writes or checks; returns the exit code."""
-    parser = argparse.ArgumentParser(description="Generates plant_fmu/generated/.")
+    parser = argparse.ArgumentParser(description="Generates plant_fmu/generated/ and controller_fmu/generated/.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a file is stale")
     check = parser.parse_args().check
     stale = stale_files()
@@ -45,26 +49,36 @@ def stale_files() -> dict[Path, str]:
 
 def render_all() -> dict[Path, str]:
     """Every generated file's path and text."""
-    interface = load_interface(load_robot(DEFAULT_ROBOT))
-    description = render_fmi2(interface)
+    robot = load_robot(DEFAULT_ROBOT)
+    setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
+    return render_component(load_interface(robot)) | render_component(load_controller_interface(setup))
+
+
+def render_component(interface: Interface) -> dict[Path, str]:
+    """The generated files of one component."""
+    folder, description = ROOT / interface.component.tree / "generated", render_fmi2(interface)
     return {
-        GENERATED / "variables.h": render_structure(),
-        GENERATED / "variables.c": render_variables(interface, description.guid),
-        GENERATED / "defaults.c": render_defaults(interface),
-        GENERATED / "modelDescription.xml": description.xml,
-        GENERATED / "index.html": render_html(interface, description.guid),
-        GENERATED / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
-        GENERATED / "start_values.txt": start_values(interface, description.guid),
+        folder / "variables.h": render_structure(interface.component),
+        folder / "variables.c": render_variables(interface, description.guid),
+        folder / "defaults.c": render_defaults(interface),
+        folder / "modelDescription.xml": description.xml,
+        folder / "index.html": render_html(interface, description.guid),
+        folder / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
+        folder / "start_values.txt": start_values(interface, description.guid),
     }
 
 
-def render_structure() -> str:
+def render_structure(component: Component) -> str:
     """What the variables are fields of, as C."""
+    kind = component.structure
     lines = [_head("variables.h - what the FMU's variables are fields of."), "#ifndef HEXAPOD_GENERATED_VARIABLES_H"]
-    lines += ["#define HEXAPOD_GENERATED_VARIABLES_H", "", '#include "hexapod/hexapod.h"', "", "struct hxVariables {"]
-    lines += ["  hxDefinition definition; /* parameters */", "  hxInput input;", "  hxOutput output;"]
-    lines += ["  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */", "};", "", "#endif", ""]
-    return "\n".join(lines)
+    lines += ["#define HEXAPOD_GENERATED_VARIABLES_H", "", f'#include "{component.header}"', ""]
+    if kind:
+        lines += [f"typedef hx{kind}Input hxInput; /* what the FMI layer calls it */", ""]
+    lines += ["struct hxVariables {", f"  hx{kind}Definition definition; /* parameters */", "  hxInput input;", f"  hx{kind}Output output;"]
+    if component is PLANT:
+        lines += ["  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */"]
+    return "\n".join([*lines, "};", "", "#endif", ""])
 
 
 def render_variables(interface: Interface, guid: str) -> str:
@@ -72,11 +86,13 @@ def render_variables(interface: Interface, guid: str) -> str:
     lines = [_head("variables.c - every variable of the FMU: where it is and what it may be."), "#include <float.h>", ""]
     lines += ['#include "fmi/variables.h"', ""]
     for causality in CAUSALITIES:
-        lines += [f"static const hxVariable {causality}s[] = {{", *map(_row, interface.of_causality(causality)), "};", ""]
+        if rows := list(map(_row, interface.of_causality(causality))):
+            lines += [f"static const hxVariable {causality}s[] = {{", *rows, "};", ""]
     lines += ["const hxSection hx_sections[HX_CAUSALITIES] = {"]
     for causality in CAUSALITIES:
-        first = interface.first_reference[causality]
-        lines += [f"    [HX_{causality.upper()}] = {{{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s}},"]
+        first, any_there = interface.first_reference[causality], interface.of_causality(causality)
+        row = f"{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s" if any_there else f"{first}, 0, 0"
+        lines += [f"    [HX_{causality.upper()}] = {{{row}}},"]
     lines += ["};", "", "const char *const hx_log_category_names[] = {"]
     lines += [f'    "{name}",' for name in interface.log_categories]
     lines += ["};", "", *_states(interface)]
@@ -86,6 +102,8 @@ def render_variables(interface: Interface, guid: str) -> str:
 
 def _states(interface: Interface) -> list[str]:
     """The continuous states as rows, in the order of struct hxVariables' state."""
+    if not interface.states:
+        return ["const hxStateRow *const hx_states = 0;", "const size_t hx_state_count = 0;", ""]
     rows = [
         f"    {{{interface.variable(state.name).reference}, {interface.variable(state.name).nominal!r}}}," for state in interface.states
     ]
@@ -115,17 +133,30 @@ def _enumeration_checks(interface: Interface) -> Iterable[str]:
 
 def render_defaults(interface: Interface) -> str:
     """The default robot as C."""
-    lines = [_head(f"defaults.c - the robot {interface.robot.name} and the version."), '#include "hexapod/hexapod.h"', ""]
-    lines += ["static const hxDefinition default_definition = {", *_initialisers(interface, "definition"), "};", ""]
-    lines += ["static const hxInput default_input = {", *_initialisers(interface, "input"), "};", ""]
-    lines += ["void hx_definition_default(hxDefinition *definition) {", "  *definition = default_definition;", "}", ""]
-    lines += ["void hx_input_default(hxInput *input) {", "  *input = default_input;", "}", ""]
+    component = interface.component
+    lines = [
+        _head(f"defaults.c - the robot {interface.robot.name} and the version."),
+        "#include <float.h>",
+        "",
+        f'#include "{component.header}"',
+        "",
+    ]
+    for member in ("definition", "input"):
+        lines += _default(interface, member)
     lines += ["const char *hx_version(void) {", f'  return "{interface.version}";', "}", ""]
-    for member, structure in (("definition", "hxDefinition"), ("input", "hxInput")):
+    for member in ("definition", "input"):
+        structure = f"hx{component.structure}{member.capitalize()}"
         lines += [f"static const hxRange {member}_ranges[] = {{", *_ranges(interface, member, structure), "};", ""]
-        lines += [f"size_t hx_{member}_ranges(const hxRange **range) {{", f"  *range = {member}_ranges;"]
+        lines += [f"size_t hx_{component.prefix}{member}_ranges(const hxRange **range) {{", f"  *range = {member}_ranges;"]
         lines += [f"  return sizeof {member}_ranges / sizeof {member}_ranges[0];", "}", ""]
     return "\n".join(lines)
+
+
+def _default(interface: Interface, member: str) -> Iterable[str]:
+    """A structure's default values, and the function that hands them out."""
+    structure, function = f"hx{interface.component.structure}{member.capitalize()}", f"hx_{interface.component.prefix}{member}_default"
+    yield from (f"static const {structure} default_{member} = {{", *_initialisers(interface, member), "};", "")
+    yield from (f"void {function}({structure} *{member}) {{", f"  *{member} = default_{member};", "}", "")
 
 
 def _ranges(interface: Interface, member: str, structure: str) -> Iterable[str]:
@@ -147,7 +178,7 @@ def _initialisers(interface: Interface, member: str) -> Iterable[str]:
 def _constant(interface: Interface, variable: Variable) -> str:
     if variable.enumeration is not None:
         return interface.enumerations[variable.enumeration].constant(int(variable.start or 0))
-    return repr(variable.start)
+    return str(int(variable.start)) if isinstance(variable.start, bool) else repr(variable.start)
 
 
 def _head(purpose: str) -> str:

@@ -9,6 +9,7 @@
 #ifndef HEXAPOD_H
 #define HEXAPOD_H
 
+#include "hexapod/legs.h"
 #include "hexapod/status.h"
 
 #ifdef __cplusplus
@@ -16,8 +17,6 @@ extern "C" {
 #endif
 
 enum {
-  HX_LEGS = 6,
-  HX_JOINTS = 3,                         /* per leg */
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS,   /* 19 */
   HX_BODY_STATE = 13,                    /* r[3] p[4] v[3] w[3] */
   HX_MULTIPLIERS = 5                     /* per joint */
@@ -203,15 +202,6 @@ typedef struct hxPlant hxPlant;
 
 HX_API void hx_definition_default(hxDefinition *definition);
 HX_API void hx_input_default(hxInput *input); /* the ATHENA-like robot's standing pose */
-
-/* What one number of an hxDefinition or hxInput may be. */
-typedef struct hxRange {
-  const char *name;  /* as in the FMU */
-  const char *unit;  /* "" when it has none */
-  double min, max;   /* inclusive */
-  size_t offset;     /* into the structure */
-  int is_int;        /* an int there, otherwise a double */
-} hxRange;
 
 /* The ranges of every number in either structure; returns how many there are. */
 HX_API size_t hx_definition_ranges(const hxRange **range);

@@ -1,0 +1,10 @@
+/* check.h - what a controller may be told. */
+#ifndef HX_CONTROLLER_CHECK_H
+#define HX_CONTROLLER_CHECK_H
+
+#include "hexapod/controller.h"
+
+/* Every number of an input within its range; on failure message says what, got, expected. */
+hxStatus hx_controller_input_check(const hxControllerInput *input, char *message);
+
+#endif

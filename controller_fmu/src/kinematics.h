@@ -1,0 +1,53 @@
+/* kinematics.h - closed-form kinematics of three-joint legs, torso frame. Python: controller/kinematics.py. */
+#ifndef HX_LEG_KINEMATICS_H
+#define HX_LEG_KINEMATICS_H
+
+#include "hexapod/controller.h"
+#include "plane.h"
+
+/* Constants of one leg. */
+typedef struct hxLegModel {
+  double hip[3];                    /* m    torso frame */
+  double hip_yaw;                   /* rad */
+  hxPlane upright;                  /* 1    e^(-i hip_yaw) */
+  double coxa_length, coxa_height;  /* m */
+  double offset_y;                  /* m    Y, of all links */
+  double femur, tibia;              /* m    a, b */
+  double femur_tilt, tibia_tilt;    /* rad */
+  hxPlane femur_zero, tibia_zero;   /* 1    e^(-i tilt) */
+  double angle_min[HX_JOINTS], angle_max[HX_JOINTS];
+  double stance[HX_JOINTS];         /* rad */
+  double stance_pitch;              /* rad  q_3 - q_2 of the stance */
+  double speed_max;                 /* rad/s */
+  double radius;                    /* m    of the foot */
+} hxLegModel;
+
+/* A leg in its plane, torso frame. */
+typedef struct hxPose {
+  hxPlane point;           /* m    from the coxa axis to the foot, x + i y */
+  hxPlane heading;         /* 1    e^(i psi), the leg's outward direction */
+  hxPlane foot;            /* m    from the femur joint to the foot, u + i w */
+  hxPlane femur, tibia;    /* 1    e^(i A), e^(i B) */
+  double angle[HX_JOINTS]; /* rad  without joint limits */
+  int lost;                /* the foot is out of reach: these are the nearest angles */
+} hxPose;
+
+void hx_leg_compile(const hxControllerDefinition *definition, int leg, hxLegModel *model);
+
+/* The foot's centre at joint angles. */
+void hx_leg_forward(const hxLegModel *model, const double angle[HX_JOINTS], double foot[3]);
+
+/* m  how far the round foot has rolled outwards since the stance */
+double hx_leg_rolling(const hxLegModel *model, const double angle[HX_JOINTS]);
+
+/* Inverse kinematics without joint limits: whatever comes in, something comes out. */
+void hx_leg_pose(const hxLegModel *model, hxPlane plane, double height, hxPose *pose);
+
+/* rad/s  joint speeds of a foot that moves so, torso frame [m/s] */
+void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise, double speed[HX_JOINTS]);
+
+/* Angles within the joints' limits and speeds that servos reach. Returns whether the foot misses its target. */
+int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise, double angle[HX_JOINTS],
+                 double speed[HX_JOINTS]);
+
+#endif

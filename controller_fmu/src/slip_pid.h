@@ -1,0 +1,24 @@
+/* slip_pid.h - the law against slip: one discrete PID per foot and direction. Python: controller/slip_pid.py. */
+#ifndef HX_SLIP_PID_H
+#define HX_SLIP_PID_H
+
+#include "hexapod/controller.h"
+
+typedef struct hxSlipPid {
+  double h;                    /* s */
+  double kp, ki, kd;
+  double filter, derivative;   /* s  T_f, T_d */
+} hxSlipPid;
+
+/* What one PID remembers, of the last period. */
+typedef struct hxSlipState {
+  double force;     /* N   e */
+  double smooth;    /* N   e', filtered */
+  double integral;  /* N */
+  double slope;     /* N   filtered derivative */
+} hxSlipState;
+
+/* One period on under a force [N]; returns the answer [N]. */
+double hx_slip_pid_step(const hxSlipPid *pid, double force, hxSlipState *state);
+
+#endif

@@ -1,0 +1,96 @@
+#include "support.h"
+
+static const double ridge_share = 1e-9;    /* 1   of the mean square arm: feet on one line share no moment about it */
+static const double least_arm = 1e-12;     /* m2  keeps the equations of no standing foot at all solvable */
+static const double least_spread = 1e-4;   /* m2  of the feet about their centre: less takes no moment about the vertical */
+static const double least_load = 1e-6;     /* N   less is no load to share by */
+
+static double indentation(double load, double stiffness) {
+  const double root = cbrt(load / stiffness);
+  return root * root;
+}
+
+void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest, hxSupportModel *model) {
+  const hxGait *gait = &definition->gait;
+  const double handover = definition->gains.support.handover_time / gait->period;
+  model->duty = gait->duty;
+  model->handover = fmin(handover, fmin(gait->duty, 1.0 - gait->duty));
+  model->stiffness = definition->contact_stiffness;
+  model->rest_weight = rest->weight;
+  model->rest_moment = rest->moment;
+  model->rest_depth = indentation(rest->weight / HX_LEGS, model->stiffness);
+}
+
+/* from 0 to 1 over [0, 1] without a jump in rate or acceleration */
+static double smooth(double x) {
+  const double y = hx_clamp(x, 0.0, 1.0);
+  return y * y * y * (10.0 + y * (6.0 * y - 15.0));
+}
+
+double hx_support_activation(const hxSupportModel *model, double phase, int swinging, int walking) {
+  /* a leg that has nowhere to step stays */
+  if (!walking || (phase >= model->duty && !swinging)) return 1.0;
+  const double half = 0.5 * model->handover, since = fmod(phase + half, 1.0); /* cycles since the activation began to rise */
+  return fmin(smooth(since / model->handover), smooth((model->duty + 2.0 * half - since) / model->handover));
+}
+
+/* x of S x = b, S symmetric and positive definite: x = L^-T D^-1 L^-1 b */
+static void solve(const double S[6], const double b[3], double x[3]) { /* S: 00 01 02 11 12 22 */
+  const double d0 = S[0], l10 = S[1] / d0, l20 = S[2] / d0;
+  const double d1 = S[3] - l10 * S[1], l21 = (S[4] - l20 * S[1]) / d1;
+  const double d2 = S[5] - l20 * S[2] - l21 * l21 * d1;
+  const double y1 = b[1] - l10 * b[0], y2 = b[2] - l20 * b[0] - l21 * y1;
+  x[2] = y2 / d2;
+  x[1] = y1 / d1 - l21 * x[2];
+  x[0] = b[0] / d0 - l10 * x[1] - l20 * x[2];
+}
+
+/* f_n = a (alpha + beta x + gamma y), sum f_n = weight, sum p f_n = moment; never negative */
+static void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS], double weight, hxPlane moment,
+                         double normal[HX_LEGS]) {
+  const double needed[3] = {weight, moment.x, moment.y};
+  double S[6] = {0.0}, x[3];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const double a = activation[k], ax = a * feet[k].x, ay = a * feet[k].y;
+    S[0] += a;
+    S[1] += ax;
+    S[2] += ay;
+    S[3] += ax * feet[k].x;
+    S[4] += ax * feet[k].y;
+    S[5] += ay * feet[k].y;
+  }
+  const double ridge = ridge_share * (S[0] + S[3] + S[5]) + least_arm;
+  S[0] += ridge;
+  S[3] += ridge;
+  S[5] += ridge;
+  solve(S, needed, x);
+  for (int k = 0; k < HX_LEGS; ++k) {
+    const double share = activation[k] * (x[0] + x[1] * feet[k].x + x[2] * feet[k].y);
+    normal[k] = share < 0.0 ? 0.0 : share;
+  }
+}
+
+void hx_support_lowering(const hxSupportModel *model, const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
+                         double lowering[HX_LEGS]) {
+  double normal[HX_LEGS];
+  share_normal(feet, activation, model->rest_weight, model->rest_moment, normal);
+  for (int k = 0; k < HX_LEGS; ++k) lowering[k] = indentation(normal[k], model->stiffness) - model->rest_depth;
+}
+
+void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxShares *shares) {
+  double part[HX_LEGS], total = 0.0, spread = 0.0;
+  hxPlane arm[HX_LEGS], centre = {0.0, 0.0};
+  share_normal(feet, shares->activation, demand->weight, demand->moment, shares->normal);
+  for (int k = 0; k < HX_LEGS; ++k) total += shares->normal[k];
+  for (int k = 0; k < HX_LEGS; ++k) {
+    part[k] = shares->normal[k] / (total < least_load ? least_load : total);
+    centre = hx_add(centre, hx_scaled(feet[k], part[k]));
+  }
+  for (int k = 0; k < HX_LEGS; ++k) {
+    arm[k] = hx_sub(feet[k], centre);
+    spread += part[k] * hx_square(arm[k]);
+  }
+  /* f_h = (f_n / sum f_n) (F_h + i w (p - c)), w such that sum Im(p^* f_h) = twist */
+  const double w = spread < least_spread ? 0.0 : (demand->twist - hx_across(centre, demand->push)) / spread;
+  for (int k = 0; k < HX_LEGS; ++k) shares->push[k] = hx_scaled(hx_add(demand->push, hx_plane(-w * arm[k].y, w * arm[k].x)), part[k]);
+}

@@ -1,0 +1,14 @@
+/* suspension.h - the virtual suspension m z'' + b z' + k z = f per foot. Python: controller/suspension.py. */
+#ifndef HX_SUSPENSION_H
+#define HX_SUSPENSION_H
+
+#include "hexapod/controller.h"
+
+/* x(k+1) = a x(k) + b f(k) of x = (z, z'), exact under a force held over a period. */
+typedef struct hxSuspension {
+  double a[2][2], b[2];
+} hxSuspension;
+
+void hx_suspension_discretise(double mass, double damping, double stiffness, double period, hxSuspension *suspension);
+
+#endif
