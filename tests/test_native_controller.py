@@ -1,0 +1,343 @@
+"""The controller in C is the one in Python, to round-off: the same commands under the same measurements, over whole walks."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from gains import PERIOD, make_gains
+from native_controller import NativeController, NativeError, commands
+from scipy.linalg import expm
+
+from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, Parts, make_gait
+from hexapod_cosim.cosim.controller_interface import ControllerSetup
+from hexapod_cosim.models import load_robot
+
+ROBOTS = ("athena", "phantomx_mk4")
+ANGLE = 1e-12  # rad
+SPEED = 1e-12  # 1    of a servo's largest
+# 1    of a servo's largest: accelerations are second differences, which make of the paths' last bits 4e-16 m / h^2 = 2e-11 m/s2; times
+# the robot's mass and the legs' length that is some 1e-12 N m in either controller, of servos of 3 and 6 N m
+TORQUE = 3e-12
+STEPS = 2000  # a walk of 10 s
+Sense = Callable[[Controller, int, Measurement], None]
+
+
+def setup_of(
+    name: str = "athena", gait: str | Gait | None = None, *, compliant: bool = True, parts: Parts | None = None
+) -> ControllerSetup:
+    robot = load_robot(name)
+    timing = gait if isinstance(gait, Gait) else make_gait(robot, gait)
+    gains = make_gains(robot) if compliant else None
+    return ControllerSetup(robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or Parts())
+
+
+def program(t: float) -> BodyCommand:
+    """Straight on, all six at once half-way through a ramp and a swing, turning on the spot, and to a stop."""
+    if t < 3.0:
+        return BodyCommand(vx=0.04)
+    if t < 3.3:
+        return BodyCommand(0.02, -0.01, 0.05)
+    if t < 6.0:
+        return BodyCommand(0.02, 0.015, 0.08, 0.008, 0.04, -0.03)
+    return BodyCommand(yaw_rate=0.1) if t < 8.0 else BodyCommand()
+
+
+class Ground:
+    """Forces and angles as planned but for noise, so that every law has something to do; the same for the same seed."""
+
+    def __init__(self, *, noise: float = 0.1) -> None:
+        self.generator, self.noise = np.random.default_rng(3), noise
+
+    def __call__(self, controller: Controller, step: int, measurement: Measurement) -> None:
+        compliant, draw = controller.compliant, self.generator.normal
+        if compliant is None:
+            return
+        planned = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
+        measurement.foot_force[:] = planned * (1.0 + self.noise * draw(size=(6, 1))) + 3.0 * self.noise * draw(size=(6, 3)) * (
+            planned > 0.0
+        )
+        measurement.angle[:] = controller._out.angle_ref + 0.1 * self.noise * draw(size=(6, 3))
+        turn = np.array([1.0, *(0.1 * self.noise * draw(size=3))])
+        measurement.quaternion[:] = turn / np.linalg.norm(turn)
+
+
+def differences(core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
+    """Largest differences of angle, speed and torque over a walk, in units of ANGLE's rad and of the servo's largest; (steps, 6) fallback.
+
+    Diagnostics must be the same at every step.
+    """
+    reference, native = setup.build(), NativeController(core, setup)
+    measurement, worst, fallback = Measurement(angle=setup.robot.stance.copy()), np.zeros(3), []
+    shown, scale = reference.diagnostics, np.array([1.0, setup.robot.servo.speed_max, setup.robot.servo.torque_max])
+    for k in range(steps):
+        t = k * setup.period
+        expected = reference.step(t, program(t), measurement)
+        out = native.step(t, program(t), measurement)
+        gap = np.abs(commands(out) - [expected.angle_ref, expected.speed_ref, expected.torque_ref])
+        worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
+        for flag in ("swinging", "unreachable", "fallback"):
+            assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), f"{flag} at step {k}"
+        np.testing.assert_allclose(np.ctypeslib.as_array(out.shift), shown.shift.view(float).reshape(6, 2), atol=1e-12)
+        np.testing.assert_allclose(np.ctypeslib.as_array(out.lift), shown.lift, atol=1e-12)
+        fallback.append(shown.fallback.copy())
+        sense(reference, k, measurement)
+    return worst, np.array(fallback)
+
+
+WALKS = [
+    *((name, gait, True) for name in ROBOTS for gait in ("tripod", "ripple", "wave")), ("athena", "amble", True),
+    ("athena", "tripod", False), ("phantomx_mk4", "wave", False),
+]  # fmt: skip
+
+
+def close(worst: np.ndarray) -> bool:
+    print("largest differences of angle [rad], speed and torque [of the servo's largest]:", worst)
+    return bool((worst <= [ANGLE, SPEED, TORQUE]).all())
+
+
+@pytest.mark.parametrize(("name", "gait", "compliant"), WALKS)
+def test_a_walk_is_the_same(controller_core: ct.CDLL, name: str, gait: str, compliant: bool) -> None:
+    worst, fallback = differences(controller_core, setup_of(name, gait, compliant=compliant), sense=Ground())
+    assert close(worst)
+    assert not fallback.any()
+
+
+def dead_and_stuck(force: np.ndarray, step: int) -> None:
+    force[1] *= not 400 <= step < 900  # reads nothing
+    if 700 <= step < 1100:
+        force[3] = [1.0, -2.0, 15.0]  # and another one the same for ever
+    if 1300 <= step < 1500:
+        force[[0, 2, 4]] = 0.0
+
+
+def dragged(force: np.ndarray, step: int) -> None:
+    if 500 <= step < 560 or 900 <= step < 1000:
+        force[:, 0] += 0.8 * force[:, 2]  # the whole robot slides
+
+
+def uneven(force: np.ndarray, step: int) -> None:
+    if step % 200 < 30:
+        force[:, 2] += 5.0  # ground in mid-swing, not for long
+    if step % 170 < 12:
+        force[2] = 0.0  # and none under a leg that stands
+    if 600 <= step < 800:
+        force[:, 1] += [9.0, -9.0, 9.0, -9.0, 9.0, -9.0]  # squeezed beyond all limits
+
+
+@pytest.mark.parametrize("spoil", [dead_and_stuck, dragged, uneven])
+@pytest.mark.parametrize("name", ROBOTS)
+def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_same_step(
+    controller_core: ct.CDLL, name: str, spoil: Callable[[np.ndarray, int], None]
+) -> None:
+    ground = Ground()
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        spoil(measurement.foot_force, step)
+
+    worst, fallback = differences(controller_core, setup_of(name), sense=sense)
+    assert close(worst)
+    assert fallback.any() or spoil is uneven
+
+
+def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
+    setup = setup_of()
+    slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
+    worst, fallback = differences(controller_core, replace(setup, robot=slow, gains=make_gains(slow)), sense=Ground())
+    assert close(worst)
+    assert fallback.all(axis=1).any()
+
+
+@pytest.mark.parametrize("part", [item.name for item in fields(Parts)])
+def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> None:
+    ground = Ground()
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        uneven(measurement.foot_force, step)
+
+    assert close(differences(controller_core, setup_of(parts=replace(Parts(), **{part: False})), sense=sense, steps=900)[0])
+
+
+def test_another_period_gait_and_touch_down_speed_are_the_same_too(controller_core: ct.CDLL) -> None:
+    robot = load_robot("athena")
+    gait = Gait(name="ripple", period=1.3, duty=0.62, offsets=make_gait(robot, "ripple").offsets, step_height=0.03, touchdown_speed=0.05)
+    setup = ControllerSetup(robot=robot, gait=gait, period=0.008, gains=make_gains(robot, period=0.008))
+    worst, _ = differences(controller_core, setup, sense=Ground(), steps=1100)
+    assert close(worst)
+
+
+def test_legs_may_differ(controller_core: ct.CDLL) -> None:
+    robot = load_robot("athena")
+    legs = [
+        replace(
+            leg,
+            hip_yaw=leg.hip_yaw + 0.05 * k,
+            links=tuple(
+                replace(
+                    link,
+                    length=link.length * (1.0 + 0.01 * k),
+                    offset_y=0.002 * k,
+                    offset_z=-0.003 * k,
+                    com=(link.com[0], 0.001 * k, 0.002 * k),
+                )
+                for link in leg.links
+            ),
+        )  # fmt: skip
+        for k, leg in enumerate(robot.legs)
+    ]
+    crooked = replace(robot, legs=tuple(legs), torso=replace(robot.torso, com=(0.01, -0.02, 0.015)))
+    setup = ControllerSetup(robot=crooked, gait=make_gait(crooked), period=PERIOD, gains=make_gains(crooked))
+    assert close(differences(controller_core, setup, sense=Ground(), steps=1400)[0])
+
+
+# ------------------------------------------------------------------------------------------------ as an instance
+
+
+def stepped(native: NativeController, first: int, count: int) -> np.ndarray:
+    """(count, 3, 6, 3) commands of a walk with feet that are pressed and squeezed, from a step on."""
+    robot, found = load_robot("athena"), []
+    generator = np.random.default_rng(8)
+    draws = generator.normal(size=(first + count, 6, 3))
+    for k in range(first, first + count):
+        measurement = Measurement(angle=robot.stance + 0.01 * draws[k], foot_force=draws[k] + [0.0, 0.0, 8.0])
+        found.append(commands(native.step(k * PERIOD, program(k * PERIOD + 2.5), measurement)))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("compliant", [False, True])
+def test_a_restored_state_goes_on_bit_for_bit_and_reset_is_fresh(controller_core: ct.CDLL, compliant: bool) -> None:
+    setup = setup_of(compliant=compliant)
+    native, other = NativeController(controller_core, setup), NativeController(controller_core, setup)
+    fresh = native.save()
+    start = stepped(native, 0, 137)
+    saved = native.save()
+    rest = stepped(native, 137, 300)
+    other.restore(saved)
+    assert other.save() == saved
+    np.testing.assert_array_equal(stepped(other, 137, 300), rest)
+    assert other.save() == native.save()
+    native.reset()
+    assert native.save() == fresh
+    np.testing.assert_array_equal(stepped(native, 0, 137), start)
+
+
+def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
+    native = NativeController(controller_core, setup_of())
+    stepped(native, 0, 50)
+    saved = native.save()
+    first = commands(native.output())
+    native.input.command[0] = 0.3
+    native.input.foot_force[0][2] = 50.0
+    second = commands(native.output())
+    assert (first != second).any()  # outputs depend on inputs at once
+    assert native.save() == saved
+
+
+def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CDLL) -> None:
+    """Steps of two periods do both ticks under the same input; half a step holds the commands of the last tick."""
+    setup, force = setup_of(), np.tile([0.2, 0.0, 9.0], (6, 1))
+    fine, coarse, half = (NativeController(controller_core, setup, start=7.0) for _ in range(3))
+    measurement, command = Measurement(angle=setup.robot.stance.copy(), foot_force=force), BodyCommand(vx=0.05)
+    for native in (fine, coarse, half):
+        native.sense(command, measurement)
+    for k in range(300):
+        fine.go(7.0 + (2 * k + 1) * PERIOD)
+        fine.go(7.0 + (2 * k + 2) * PERIOD)
+        coarse.go(7.0 + (2 * k + 2) * PERIOD)
+        ticked = commands(half.output())
+        half.go(7.0 + (2 * k + 0.5) * PERIOD)
+        half.input.command[1] = 0.05  # comes between two ticks, and goes
+        np.testing.assert_array_equal(commands(half.output()), ticked)
+        half.input.command[1] = 0.0
+        half.go(7.0 + (2 * k + 2) * PERIOD)
+    np.testing.assert_array_equal(commands(fine.output()), commands(coarse.output()))
+    np.testing.assert_array_equal(commands(fine.output()), commands(half.output()))
+    assert fine.save() == coarse.save() == half.save()
+
+
+@pytest.mark.parametrize("slip", [-3e-6, 3e-6])
+def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(controller_core: ct.CDLL, slip: float) -> None:
+    exact, late = (NativeController(controller_core, setup_of(compliant=False)) for _ in range(2))
+    for native in (exact, late):
+        native.input.command[0] = 0.05
+    for k in range(1, 200):
+        exact.go(k * PERIOD)
+        late.go(k * PERIOD + slip)
+    np.testing.assert_array_equal(commands(exact.output()), commands(late.output()))
+
+
+# ------------------------------------------------------------------------------------------------ what is refused
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("torso.mass", 0.0, "torso.mass: got 0, expected 1e-09 to 1e+09 kg"), ("gait.duty", 1.0, "gait.duty: got 1"),
+        ("period", 0.6, "period: got 0.6, expected less than 0.5 s, the gait's shorter phase"), ("servo.kp", 0.0, "servo.kp: got 0"),
+        ("LM.femur.stance", 3.0, "LM.femur.stance: got 3, expected an angle between"), ("gains.slip.kp", np.nan, "gains.slip.kp: got"),
+        ("control", 3, "control: got 3, expected 1 to 2"), ("gait.pattern", 0, "gait.pattern: got 0, expected 1 to 5"),
+    ],
+)  # fmt: skip
+def test_an_impossible_definition_is_refused_and_changes_nothing(controller_core: ct.CDLL, name: str, value: float, expected: str) -> None:
+    native = NativeController(controller_core, setup_of())
+    stepped(native, 0, 5)
+    saved = native.save()
+    native.definition[name] = value
+    with pytest.raises(NativeError, match=expected.replace("+", "[+]")):
+        native.reset()
+    assert native.save() == saved
+
+
+def test_steps_back_and_inputs_that_are_no_numbers_are_refused(controller_core: ct.CDLL) -> None:
+    native = NativeController(controller_core, setup_of())
+    stepped(native, 0, 5)
+    saved = native.save()
+    for t in (0.0, np.nan, np.inf):
+        with pytest.raises(NativeError, match="end of step: got"):
+            native.go(t)
+    native.input.foot_force[2][1] = np.nan
+    with pytest.raises(NativeError, match=r"LR.foot.force\[2\]: got -?nan, expected -1e[+]09 to 1e[+]09 N"):
+        native.go(1.0)
+    assert native.save() == saved
+
+
+def test_a_saved_state_that_is_damaged_is_refused(controller_core: ct.CDLL) -> None:
+    native = NativeController(controller_core, setup_of())
+    saved = native.save()
+    damaged = bytearray(saved)
+    damaged[len(saved) // 2] ^= 1
+    for bad, reason in ((bytes(damaged), "damaged"), (saved[:-8], "size"), (b"x" * len(saved), "version")):
+        with pytest.raises(NativeError, match=reason):
+            native.restore(bad)
+    assert native.save() == saved
+
+
+def test_absurd_commands_end_in_finite_joint_commands(controller_core: ct.CDLL) -> None:
+    native = NativeController(controller_core, setup_of())
+    native.input.command[:] = [10.0, -10.0, 10.0, 10.0, 1.5, -1.5]
+    native.input.foot_force[0][2] = 1e9
+    for k in range(1, 400):
+        native.go(k * PERIOD)
+        assert np.isfinite(commands(native.output())).all()
+    assert any(native.out.unreachable)
+
+
+# ------------------------------------------------------------------------------------------------ pieces
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.999999, 1.0, 1.000001, 3.0, 1e4])
+def test_the_suspension_is_the_matrix_exponential_whatever_its_damping(controller_core: ct.CDLL, ratio: float) -> None:
+    mass, stiffness, period = 1.7, 4100.0, 0.005
+    damping, system = 2.0 * ratio * np.sqrt(stiffness * mass), np.zeros((3, 3))
+    system[0, 1], system[1] = 1.0, np.array([-stiffness, -damping, 1.0]) / mass
+    found = (ct.c_double * 6)()
+    controller_core.hx_probe_suspension(*(ct.c_double(value) for value in (mass, damping, stiffness, period)), found)
+    expected = expm(system * period)
+    scale = np.array([[1.0, period], [1.0 / period, 1.0]])
+    np.testing.assert_allclose(np.array(found[:4]).reshape(2, 2) / scale, expected[:2, :2] / scale, atol=1e-12)
+    np.testing.assert_allclose(found[4:], expected[:2, 2], rtol=1e-9)
