@@ -141,16 +141,18 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
 
 
 def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) -> None:
-    """The compiler keeps what it makes of the systems' libraries; what it makes of our sources goes with the folder."""
-    environment = os.environ | {
-        "ZIG_LOCAL_CACHE_DIR": str(root / "zig"),
-        "ZIG_GLOBAL_CACHE_DIR": str(_writable(cache_folder / "zig", root)),
-    }
+    environment = compiler_environment(root, cache_folder)
     process = subprocess.run(command, cwd=root / "in", env=environment, capture_output=True, text=True, errors="replace", check=False)
     if process.returncode != 0:
         complaint = "\n".join(process.stderr.splitlines()[:SHOWN_LINES]) or f"exit code {process.returncode}"
         fix = "correct the sources, or install the compiler anew if it is damaged"
         raise FmuError(f"cannot build for {target}", got=complaint, expected="sources that compile", fix=fix)
+
+
+def compiler_environment(scratch: Path, cache_folder: Path) -> dict[str, str]:
+    """Environment of the compiler: what it makes of the systems' libraries is kept in the cache, the rest goes to a scratch folder."""
+    folders = {"ZIG_LOCAL_CACHE_DIR": scratch / "zig", "ZIG_GLOBAL_CACHE_DIR": _writable(cache_folder / "zig", scratch)}
+    return os.environ | {name: str(folder) for name, folder in folders.items()}
 
 
 def _writable(folder: Path, otherwise: Path) -> Path:
