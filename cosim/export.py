@@ -49,7 +49,7 @@ def export_interface(interface: Interface, path: str | Path, *, fmi: int = 2, pl
         binaries = installed_binary(component)
     else:
         binaries = build_binaries(component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi)
-    return _write_atomically(Path(path), _members(interface, binaries))
+    return write_archive(Path(path), _members(interface, binaries))
 
 
 def installed_binary(component: Component = PLANT) -> dict[str, bytes]:
@@ -74,7 +74,7 @@ def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, byt
     if interface.component is not PLANT or not any(name.startswith(f"binaries/{fmi2_platform()}/") for name in members):
         return {}
     with TemporaryDirectory(prefix="hexapod-export-") as folder:
-        return reference_members(interface, _write_atomically(Path(folder) / "trial.fmu", members))
+        return reference_members(interface, write_archive(Path(folder) / "trial.fmu", members))
 
 
 def start_values(interface: Interface, guid: str) -> str:
@@ -97,7 +97,8 @@ def checksum(seed: int, data: bytes) -> int:
     return (value ^ len(data)) * FNV_PRIME & MASK
 
 
-def _write_atomically(path: Path, members: dict[str, bytes]) -> Path:
+def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
+    """A ZIP archive, whole or not at all, the same bytes for the same members. Raises HexapodError when it cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

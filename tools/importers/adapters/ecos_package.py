@@ -1,0 +1,34 @@
+"""A package through Ecos: usage: ecos_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS.
+
+NAMES: component.variable, one a line. Ecos reads the package as it is; step and parameter set it has to be told.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from columns import write_columns
+from ecos_walk import EcosLib, EcosSimulation, read
+
+STEP = 0.005  # s
+PARAMETER_SET = "start"
+
+
+def main() -> None:
+    """Walks."""
+    package, wanted, outputs, steps = sys.argv[1:]
+    EcosLib.set_log_level("err")
+    names = Path(wanted).read_text(encoding="utf-8").split("\n")
+    seen = []
+    with EcosSimulation(step_size=STEP, ssp_path=package) as simulation:
+        simulation.init(parameter_set=PARAMETER_SET)
+        for _ in range(int(steps)):
+            simulation.step()
+            seen.append([simulation.get_time(), *(read(simulation, name.replace(".", "::", 1)) for name in names)])
+        simulation.terminate()
+    write_columns(outputs, ["time", *names], seen)
+
+
+if __name__ == "__main__":
+    main()
