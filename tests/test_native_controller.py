@@ -187,7 +187,7 @@ def test_legs_may_differ(controller_core: ct.CDLL) -> None:
                 )
                 for link in leg.links
             ),
-        )  # fmt: skip
+        )
         for k, leg in enumerate(robot.legs)
     ]
     crooked = replace(robot, legs=tuple(legs), torso=replace(robot.torso, com=(0.01, -0.02, 0.015)))
