@@ -17,7 +17,7 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
     even = decay * cosh(x);
     odd = decay * (x > 0.0 ? sinh(x) / mu : period);
   } else { /* of a strong damper: neither exponential may overflow */
-    const double slow = exp((mu - sigma) * period), fast = exp(-(mu + sigma) * period);
+    const double slow = exp(-omega2 / (sigma + mu) * period), fast = exp(-(mu + sigma) * period);
     even = 0.5 * (slow + fast);
     odd = 0.5 * (slow - fast) / mu;
   }
