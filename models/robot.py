@@ -204,4 +204,4 @@ def mindlin_presliding(foot: Foot, stiffness: float, mu: float, load: float) -> 
     """
     shear_modulus = foot.youngs_modulus / (2.0 * (1.0 + foot.poisson))
     per_root_depth = 16.0 / 3.0 * shear_modulus * math.sqrt(foot.radius) / (2.0 - foot.poisson)
-    return max(mu * math.cbrt(load**2 * stiffness) / per_root_depth, LEAST_PRESLIDING)
+    return max(mu * math.cbrt(load * load * stiffness) / per_root_depth, LEAST_PRESLIDING)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import random
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -163,3 +165,43 @@ def test_limits_beyond_half_a_turn_are_those_of_half_a_turn(tmp_path: Path) -> N
     robot = load_robot(path)
     assert (robot.legs[4].links[0].angle_min, robot.legs[4].links[0].angle_max) == (-math.pi, math.pi)
     assert "3 limits beyond half a turn" in robot.source["URDF, ignored"]
+
+
+ODD = (
+    "0",
+    "-1",
+    "1e300",
+    "nan",
+    "inf",
+    "",
+    "1e-300",
+    "0 0 0",
+    "1 2",
+    "1e200 1e200 1e200",
+    "body",
+    "femur_1",
+    "fixed",
+    "floating",
+    "é",
+    "&lt;",
+)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_damaged_urdfs_are_read_or_refused_and_never_crash(tmp_path: Path, seed: int) -> None:
+    rng, path = random.Random(seed), tmp_path / "spider.urdf"
+    refused = 0
+    for _ in range(40):
+        text = spider_urdf()
+        for _ in range(rng.choice((1, 2, 3))):
+            places = [match.span(1) for match in re.finditer(r'="([^"]*)"', text)] + [
+                match.span() for match in re.finditer(r"<[^<>]*/>", text)
+            ]
+            begin, end = rng.choice(places)
+            text = text[:begin] + (rng.choice(ODD) if text[begin] != "<" else "") + text[end:]
+        path.write_text(text, encoding="utf-8")
+        try:
+            load_robot(path)
+        except RobotError as error:
+            refused += str(path) in str(error)
+    assert refused > 20
