@@ -9,13 +9,14 @@ TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 
-.PHONY: help setup demo test test-importers check bench bench-quick control format generate fmu typing clean
+.PHONY: help setup demo test test-importers check bench bench-quick control format generate fmu typing clean test-platforms
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
 	@echo "make demo      the paper's comparison; says where its report is"
 	@echo "make test      every test"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
+	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (10 min)"
@@ -43,6 +44,10 @@ test: setup typing
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
+
+test-platforms: setup
+	$(PYTHON) tools/install_emulators.py
+	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/test_platforms.py tests/test_platform_walks.py tests/test_cross_build.py
 
 check: setup typing
 	$(BIN)/ruff check .

@@ -88,7 +88,7 @@ def number(word: str) -> float:
 def build_walker(target: str, folder: Path) -> Path:
     """The driving program for a target."""
     program = folder / ("walker.exe" if "windows" in target else "walker")
-    command = [*find_compiler().command, "-target", TARGETS[target].triple, "-std=c11", "-O1", "-isystem", str(fmi_headers()), str(WALKER)]
+    command = [*find_compiler().command, "-target", TARGETS[target].triple, "-std=c11", "-O3", "-isystem", str(fmi_headers()), str(WALKER)]
     libraries = [] if "windows" in target else ["-ldl"]
     environment = compiler_environment(folder, user_cache())
     subprocess.run([*command, *libraries, "-o", str(program)], check=True, capture_output=True, env=environment, timeout=TIMEOUT)
