@@ -245,9 +245,8 @@ def test_what_is_not_offered_is_refused_by_name(plant_build: Path, tmp_path: Pat
 
 
 def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(exported: Path, tmp_path: Path) -> None:
-    unzipped = Path(
-        fmpy.extract(str(export_fmu(load_robot("athena"), tmp_path / "sources.fmu", platforms="sources")), str(tmp_path / "fmu"))
-    )
+    bare = export_fmu(load_robot("athena"), tmp_path / "sources.fmu", platforms="sources")
+    unzipped = Path(fmpy.extract(str(bare), str(tmp_path / "fmu")))
     assert not (unzipped / "binaries").exists()
     fmpy.build.build_platform_binary(unzipped)
     names = ["torso.position[1]", "torso.position[3]", "RR.tibia.torque"]
