@@ -10,6 +10,11 @@ SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 
 .PHONY: help setup demo test test-importers check bench bench-quick control format generate fmu typing clean test-platforms
+SANITIZED := tests/test_fmi.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_importers.py tests/test_plant_misuse.py tests/test_endurance.py
+SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp)
+
+.PHONY: help setup demo test test-endurance test-sanitize check bench bench-quick control format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -17,11 +22,14 @@ help:
 	@echo "make test      every test"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
+	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
+	@echo "make test-sanitize   the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (10 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml"
+	@echo "make generate  plant_fmu/generated/ from plant_fmu/interface.toml, pictures and reference results from the robot"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
 	@echo "make clean     removes what these made"
 
@@ -49,6 +57,17 @@ test-platforms: setup
 	$(PYTHON) tools/install_emulators.py
 	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/test_platforms.py tests/test_platform_walks.py tests/test_cross_build.py
 
+test-endurance: test-library
+	$(BIN)/python tests/endurance.py build/test/plant_fmu/hexapod.so
+
+test-library: setup
+	$(BIN)/python -m pytest -q tests/test_endurance.py
+
+# leaks are test_endurance.py's: Python's own would drown them
+test-sanitize: setup
+	HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1 LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) \
+	$(BIN)/python -m pytest -q $(SANITIZED)
+
 check: setup typing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -73,6 +92,7 @@ format: setup
 
 generate: setup
 	$(BIN)/python tools/generate.py
+	@$(MAKE) --no-print-directory setup
 	$(BIN)/python tools/generate_extras.py
 
 fmu: setup

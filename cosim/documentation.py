@@ -2,81 +2,107 @@
 
 from __future__ import annotations
 
-from html import escape
+import re
+from collections.abc import Iterable, Sequence
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
-from hexapod_cosim.cosim.interface import Interface
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>{name}: hexapod plant</title>
-<style>
-body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; }}
-table {{ border-collapse: collapse; }}
-td, th {{ text-align: left; vertical-align: top; padding: 0.2em 0.8em 0.2em 0; border-bottom: 1px solid #8884; }}
-</style>
-</head>
-<body>
-<h1>{name}: hexapod plant</h1>
-<p>A six-legged robot of {bodies} rigid bodies and {joints} servo joints ({mass:.3f} kg) on compliant ground: FMI 2.0 co-simulation
-and model exchange, version {version}, GUID {guid}.</p>
-<h2>First run</h2>
-<p>Without any input the robot stands in its pose, settled on the ground, and stays there. Drive it by the joint commands
-<code>L.J.angle_ref</code>, <code>L.J.speed_ref</code> and <code>L.J.torque_ref</code>; push it by <code>torso.push_force</code>.
-Inputs are held over a communication step ({step} s suits walking).</p>
-<h2>Conventions</h2>
-<ul>
-<li>SI units, radians. World z points up; vectors are in world axes unless their description says otherwise.</li>
-<li>Legs LF LM LR RF RM RR (left and right, front, middle and rear; left is +y), joints coxa, femur, tibia.</li>
-<li>Quaternions are w x y z, body to world. Inertias are about the centre of mass.</li>
-</ul>
-<h2>Setting and stepping</h2>
-<ul>
-<li>Parameters are fixed: set them before initialisation ends. Values out of range, infinite or NaN are refused, and of the batch they
-came in nothing is set.</li>
-<li>Accuracy is the parameter <code>solver.tolerance</code> (or <code>solver.step</code>); the experiment's tolerance does not change it,
-so results do not depend on the importer's settings.</li>
-<li>A step that the plant cannot take is discarded and leaves the state as it was. The state can be saved, restored and serialised.</li>
-<li>Model exchange: {states} continuous states (torso, joint angles and speeds, works, bristles); events are touch-downs and lift-offs.</li>
-<li>Directional derivatives of outputs and state derivatives by inputs and states are exact. Derivatives of inputs and outputs are of
-order 1; a derivative of an input holds for the next step.</li>
-<li>Not provided: asynchronous steps.</li>
-</ul>
-<h2>Variables</h2>
-<p>{{leg}} and {{joint}} stand for the names above, [i] for 1, 2, 3 (quaternions: to 4).</p>
-<table>
-<tr><th>name</th><th>causality</th><th>unit or type</th><th>meaning</th></tr>
-{rows}
-</table>
-<h2>Where the robot's numbers come from</h2>
-<ul>
-{sources}
-</ul>
-<p>MIT licence.</p>
-</body>
-</html>
-"""
+from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
+
+INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
+# what a user asks of a tool's compatibility list, by the flag of modelDescription.xml
+CAPABILITIES = {
+    "canHandleVariableCommunicationStepSize": "steps of any size, from rounding error to 100 s",
+    "canGetAndSetFMUstate": "state saved and restored, bit for bit",
+    "canSerializeFMUstate": "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused",
+    "providesDirectionalDerivative": "directional derivatives",
+    "canInterpolateInputs": "derivatives of inputs over a step; without them inputs are held",
+    "maxOutputDerivativeOrder": "derivatives of outputs, highest order",
+    "canBeInstantiatedOnlyOncePerProcess": "one instance a process only",
+    "canRunAsynchronuously": "steps that return before they are done",
+    "completedIntegratorStepNotNeeded": "model exchange without a call after every step of the solver",
+    "canNotUseMemoryManagementFunctions": "needs no memory functions of the importer",
+}
+AXES = {"leg": LEG_NAMES, "joint": JOINT_NAMES}
+
+Row = dict[str, str]
 
 
-def render_html(interface: Interface, guid: str) -> str:
-    """The page for one robot's FMU."""
-    rows = [
-        f"<tr><td><code>{escape(pattern.name)}</code></td><td>{pattern.causality}</td>"
-        f"<td>{escape(pattern.kind)}</td><td>{escape(pattern.description)}</td></tr>"
-        for pattern in interface.patterns
-    ]
-    sources = [f"<li>{escape(key)}: {escape(text)}</li>" for key, text in sorted(interface.robot.source.items())]
-    joints = sum(len(leg.links) for leg in interface.robot.legs)
-    return PAGE.format(
-        name=escape(interface.robot.name),
-        bodies=1 + joints,
-        joints=joints,
-        mass=interface.robot.total_mass,
-        version=interface.version,
-        guid=guid,
-        step=interface.step,
-        states=len(interface.states),
-        rows="\n".join(rows),
-        sources="\n".join(sources) or "<li>not stated</li>",
+def render_html(interface: Interface, description: str) -> str:
+    """The page for one robot's FMU, whose modelDescription.xml is given. What is the plant's own is in pages/plant.html.jinja."""
+    root = ElementTree.fromstring(description.encode())
+    environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "pages"), autoescape=True, undefined=StrictUndefined)
+    robot = interface.robot
+    return environment.get_template("plant.html.jinja").render(
+        robot=robot,
+        interface=interface,
+        joints=sum(len(leg.links) for leg in robot.legs),
+        fmi=root.get("fmiVersion"),
+        token=root.get("guid", root.get("instantiationToken")),
+        kinds=[name for tag, name in INTERFACES.items() if root.find(tag) is not None],
+        capabilities=_capabilities(root),
+        groups={causality: _rows(interface, causality) for causality in CAUSALITIES},
+        weight=robot.total_mass * max(map(abs, robot.gravity)),
     )
+
+
+def _capabilities(root: Element) -> list[Row]:
+    """Every flag that the model description declares, of every interface that it offers."""
+    found = {tag: root.find(tag) for tag in INTERFACES}
+    offered = {tag: element for tag, element in found.items() if element is not None}
+    return [
+        {"flag": flag, "meaning": meaning, "values": ", ".join(dict.fromkeys(_words(element.get(flag)) for element in offered.values()))}
+        for flag, meaning in CAPABILITIES.items()
+        if any(element.get(flag) is not None for element in offered.values())
+    ]
+
+
+def _words(value: str | None) -> str:
+    return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
+
+
+def _rows(interface: Interface, causality: str) -> list[Row]:
+    variables = [variable for variable in interface.variables if variable.causality == causality]
+    return [_row(pattern, _matching(pattern, variables), interface) for pattern in interface.patterns if pattern.causality == causality]
+
+
+def _row(pattern: Pattern, variables: Sequence[Variable], interface: Interface) -> Row:
+    first = variables[0]
+    display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(first.unit or "", "")
+    choices = interface.enumerations[first.enumeration].items if first.enumeration else ()
+    return {
+        "name": pattern.name,
+        "unit": first.unit or first.enumeration or first.type,
+        "display": display,
+        "count": str(len(variables)),
+        "range": "" if choices else _range(first),
+        "start": _starts(variables, [name for name, _ in choices]),
+        "meaning": pattern.description,
+        "choices": "; ".join(f"{number} {name}: {text}" for number, (name, text) in enumerate(choices, start=1)),
+    }
+
+
+def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]:
+    """The variables that a pattern stands for."""
+    expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d\]")
+    expression = re.sub(r"\\\{(\w+)\\\}", lambda match: f"(?:{'|'.join(AXES.get(match[1], (r'[xyz]{2}',)))})", expression)
+    return [variable for variable in variables if re.fullmatch(expression, variable.name)]
+
+
+def _range(variable: Variable) -> str:
+    if variable.minimum is None and variable.maximum is None:
+        return ""
+    low, high = ("" if bound is None else f"{bound:.4g}" for bound in (variable.minimum, variable.maximum))
+    return f"{low} to {high}" if low and high else f"from {low}" if low else f"to {high}"
+
+
+def _starts(variables: Sequence[Variable], choices: Sequence[str]) -> str:
+    """The start values, in short: one if all are the same."""
+    values = list(dict.fromkeys(variable.start for variable in variables if variable.start is not None))
+    if choices and values:
+        return f"{values[0]} ({choices[int(values[0]) - 1]})"
+    shown = list(dict.fromkeys(f"{value:.4g}" for value in values))
+    return ", ".join(shown) if len(shown) <= 4 else f"{min(values):.4g} to {max(values):.4g}"

@@ -66,7 +66,7 @@ def _members(interface: Interface, binaries: Mapping[str, bytes]) -> dict[str, b
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
     members |= dict(binaries) | {f"sources/{name}": path.read_bytes() for name, path in source_files(interface.component).items()}
-    return members | extra_members(interface, description.guid) | _reference(interface, members)
+    return members | extra_members(interface, description.xml) | _reference(interface, members)
 
 
 def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:

@@ -13,10 +13,10 @@ LICENCE = "documentation/licenses/license.txt"
 PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
 
 
-def extra_members(interface: Interface, guid: str) -> dict[str, bytes]:
-    """Contents by path in the archive."""
+def extra_members(interface: Interface, description: str) -> dict[str, bytes]:
+    """Contents by path in the archive, for an FMU whose modelDescription.xml is given."""
     return {
-        "documentation/index.html": render_html(interface, guid).encode(),
+        "documentation/index.html": render_html(interface, description).encode(),
         LICENCE: licence_file().read_bytes(),
         f"{FOLDER}/terminalsAndIcons.xml": render_terminals(list(interface.by_name)).encode(),
         **pictures(interface),

@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,9 @@ from fmi_plant import Plant
 from hexapod_cosim.cosim.cli import main
 
 ROOT = Path(__file__).resolve().parents[1]
-BUILD = ROOT / "build" / "test"
+PRESET = os.environ.get("HEXAPOD_PRESET", "test")  # `make test-sanitize` has another
+BUILD = ROOT / "build" / PRESET
+PACKED = ROOT / "build" / "plant" if PRESET == "test" else BUILD / "plant"
 
 
 @pytest.fixture(scope="session")
@@ -26,8 +28,8 @@ def plant_build() -> Path:
     if _configure().returncode != 0:
         shutil.rmtree(BUILD, ignore_errors=True)  # configured by a CMake, Python or generator that is gone
         _succeed(_configure())
-    _succeed(_cmake("--build", "--preset", "test"))
-    _succeed(_cmake("--install", str(BUILD), "--prefix", str(ROOT / "build" / "plant")))
+    _succeed(_cmake("--build", "--preset", PRESET))
+    _succeed(_cmake("--install", str(BUILD), "--prefix", str(PACKED)))
     return BUILD
 
 
@@ -69,6 +71,21 @@ def controller_core(plant_build: Path) -> ctypes.CDLL:
 
 
 @pytest.fixture
+def read_only() -> Iterator[Callable[[Path], None]]:
+    """Takes the right to write away from a folder and all in it; gives it back in the end."""
+    changed: list[Path] = []
+
+    def protect(folder: Path) -> None:
+        for path in [folder, *folder.rglob("*")]:
+            changed.append(path)
+            path.chmod(path.stat().st_mode & ~0o222)
+
+    yield protect
+    for path in changed:
+        path.chmod(path.stat().st_mode | 0o200)
+
+
+@pytest.fixture
 def call(capsys: pytest.CaptureFixture[str], plant_build: Path) -> Call:
     """Runs the command in this process: exit code, stdout, stderr."""
 
@@ -84,14 +101,14 @@ def call(capsys: pytest.CaptureFixture[str], plant_build: Path) -> Call:
 def _configure() -> subprocess.CompletedProcess[str]:
     fresh = not (BUILD / "CMakeCache.txt").exists()
     generator = ["-G", "Ninja"] if fresh and shutil.which("ninja", path=_search_path()) else []
-    return _cmake("--preset", "test", f"-DPython_EXECUTABLE={sys.executable}", *generator)
+    return _cmake("--preset", PRESET, f"-DPython_EXECUTABLE={sys.executable}", *generator)
 
 
 def _cmake(*arguments: str) -> subprocess.CompletedProcess[str]:
     cmake = shutil.which("cmake", path=_search_path())
     if cmake is None:
         pytest.fail("no cmake: run `pip install -e .[test]`")
-    environment = os.environ | {"PATH": _search_path()}
+    environment = os.environ | {"PATH": _search_path(), "LD_PRELOAD": ""}  # sanitizers are for the tests, not for the build
     return subprocess.run([cmake, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
 
 

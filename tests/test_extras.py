@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import html
 import io
+import posixpath
+import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import fmpy
@@ -16,6 +20,7 @@ import pytest
 from fmi_plant import ATHENA
 from PIL import Image
 
+from hexapod_cosim.cosim.documentation import CAPABILITIES
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.extras import ICON_SIZE, PICTURE_SIZE, pictures
 from hexapod_cosim.cosim.interface import load_interface
@@ -108,3 +113,43 @@ def test_types_carry_units_and_angles_are_shown_in_degrees(exported: Path) -> No
     assert (angle.declaredType.name, angle.declaredType.unit, angle.displayUnit) == ("Angle", "rad", "deg")
     assert (speed.declaredType.name, speed.declaredType.unit, speed.displayUnit) == ("AngularVelocity", "rad/s", "deg/s")
     assert variables["contact.law"].declaredType.name == "ContactLaw"
+
+
+@pytest.mark.parametrize("robot", list_robots())
+def test_the_page_s_quick_start_runs_as_it_stands(
+    plant_build: Path, tmp_path: Path, robot: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = export_fmu(load_robot(robot), tmp_path / f"{robot}.fmu")
+    with zipfile.ZipFile(fmu) as archive:
+        page = archive.read("documentation/index.html").decode()
+    snippet = re.search(r"<pre><code>(.*?)</code></pre>", page, re.DOTALL)
+    assert snippet
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(html.unescape(snippet[1]), names)
+    assert np.abs(names["result"]["torso.position[2]"]).max() > 1e-4  # m: the push pushed
+    assert capsys.readouterr().out.endswith("]\n")
+
+
+def test_the_page_names_every_variable_s_pattern_unit_choice_and_flag(exported: Path) -> None:
+    with zipfile.ZipFile(exported) as archive:
+        page, description = (archive.read(name).decode() for name in ("documentation/index.html", "modelDescription.xml"))
+    for pattern in ATHENA.patterns:
+        assert f"<code>{pattern.name}</code>" in page
+    for enumeration in ATHENA.enumerations.values():
+        assert all(f"{number} {name}:" in page for number, (name, _) in enumerate(enumeration.items, start=1))
+    for element in map(ElementTree.fromstring(description).find, ("CoSimulation", "ModelExchange")):
+        flags = {} if element is None else dict(element.attrib)
+        assert {flag for flag in flags if flag.startswith(("can", "provides", "max"))} <= set(CAPABILITIES)
+    counts = [int(number) for number in re.findall(r'</code></td><td class="value">(\d+)</td>\n', page)]
+    assert sum(counts) == len(ATHENA.variables)
+
+
+def test_the_page_s_links_lead_somewhere(exported: Path) -> None:
+    with zipfile.ZipFile(exported) as archive:
+        page, present = archive.read("documentation/index.html").decode(), set(archive.namelist())
+    anchors, targets = set(re.findall(r'id="([^"]+)"', page)), re.findall(r'(?:href|src)="([^"]+)"', page)
+    assert targets
+    for target in targets:
+        name = target[1:] if target.startswith("#") else posixpath.normpath(f"documentation/{target}")
+        assert name in (anchors if target.startswith("#") else present), target

@@ -62,7 +62,7 @@ def render_component(interface: Interface) -> dict[Path, str]:
         folder / "variables.c": render_variables(interface, description.guid),
         folder / "defaults.c": render_defaults(interface),
         folder / "modelDescription.xml": description.xml,
-        folder / "index.html": render_html(interface, description.guid),
+        folder / "index.html": render_html(interface, description.xml),
         folder / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
         folder / "start_values.txt": start_values(interface, description.guid),
     }

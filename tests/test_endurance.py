@@ -1,0 +1,34 @@
+"""What must hold however often, in short: each trial of endurance.py in a process of its own, so that a crash is a failure of its test."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SHORT = {"instances": 500, "libraries": 200, "threads": 20, "states": 500, "clock": 5000}
+SCRIPTS = Path(__file__).parent
+TIMEOUT = 600  # s: far beyond any of them on any machine; a call that hangs ends here
+
+
+def outcome(script: str, *arguments: str) -> str:
+    """What a script prints; fails with its last words unless it ends well."""
+    command = [sys.executable, str(SCRIPTS / script), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT)
+    assert done.returncode == 0, f"exit code {done.returncode}\n{done.stdout[-1000:]}{done.stderr[-3000:]}"
+    return done.stdout
+
+
+@pytest.mark.parametrize(("trial", "count"), SHORT.items())
+def test_it_holds_however_often(plant_library: Path, trial: str, count: int) -> None:
+    assert outcome("endurance.py", str(plant_library), trial, str(count)).startswith(trial)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_calls_keep_to_the_standard_s_state_machine(plant_library: Path, seed: int) -> None:
+    """Nothing crashes, a refused call changes nothing and says why, a reset instance is a new one, byte for byte."""
+    counts = outcome("fuzz.py", str(plant_library), str(seed), "1500")
+    assert "0:" in counts  # some were legal
+    assert "3:" in counts  # some were not
