@@ -14,7 +14,7 @@ SANITIZED := tests/test_fmi.py tests/test_fmi_state.py tests/test_fmi_values.py 
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp)
 
-.PHONY: help setup demo test test-endurance test-sanitize check bench bench-quick control format generate fmu typing clean
+.PHONY: help setup demo test test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -63,10 +63,10 @@ test-endurance: test-library
 test-library: setup
 	$(BIN)/python -m pytest -q tests/test_endurance.py
 
-# leaks are test_endurance.py's: Python's own would drown them
+# memory is measured without sanitizers, which keep what was freed
 test-sanitize: setup
 	HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1 LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) \
-	$(BIN)/python -m pytest -q $(SANITIZED)
+	$(BIN)/python -m pytest -q $(SANITIZED) -k "not states and not libraries and not instances-500"
 
 check: setup typing
 	$(BIN)/ruff check .
@@ -78,6 +78,9 @@ check: setup typing
 
 bench: setup
 	$(BIN)/python -m benchmarks.run
+
+bench-opening: setup
+	$(BIN)/python -m benchmarks.opening
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick

@@ -156,7 +156,7 @@ def fuzz(library: Path, count: int) -> Figures:
 TRIALS: dict[str, tuple[Callable[[Path, int], Figures], int]] = {
     "instances": (instances, 10_000),
     "libraries": (libraries, 5_000),
-    "threads": (threads, 400),
+    "threads": (threads, 100),
     "states": (states, 20_000),
     "clock": (clock, 1_000_000),
     "fuzz": (fuzz, 200_000),

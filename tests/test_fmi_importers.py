@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote
 
+import fmpy
 import pytest
 from fmi_plant import ATHENA, ERROR, GUID, LAST_SUCCESSFUL_TIME, OK, WARNING, Callbacks, Plant
 from memory import resident
@@ -253,3 +254,43 @@ def test_states_taken_at_every_step_and_never_freed_cost_their_own_bytes_alone(r
     assert running.step(H / 10.0, H / 10.0) == OK
     for state in states:
         running.free(state)
+
+
+def test_a_state_may_be_freed_twice_or_not_be_there(running: Plant) -> None:
+    state = running.save()
+    running.free(state)
+    running.free(state)
+    assert running.call("fmi2FreeFMUstate", None) == OK
+
+
+@pytest.mark.parametrize("name", ["with space", "größe", "100%", "%41%20", "a#b?c", "日本語", "x" * 200])
+def test_fmpy_runs_an_fmu_unpacked_anywhere(athena_fmu: Path, tmp_path: Path, name: str, read_only: Callable[[Path], None]) -> None:
+    copy = tmp_path / name / f"{name}.fmu"
+    copy.parent.mkdir()
+    shutil.copy2(athena_fmu, copy)
+    unpacked = Path(fmpy.extract(str(copy), str(tmp_path / name / "unpacked")))
+    read_only(copy.parent)
+    result = fmpy.simulate_fmu(str(unpacked), stop_time=0.02, output=["torso.position[3]"])
+    assert result["torso.position[3]"][-1] == pytest.approx(ATHENA.variable("initial.position[3]").start, abs=1e-6)
+
+
+def test_a_walk_goes_on_after_every_kind_of_refusal(running: Plant, plant_library: Path) -> None:
+    """An importer that carries on regardless gets what one without mistakes gets."""
+    mistakes: list[Callable[[], int]] = [
+        lambda: running.step(math.nan, H),
+        lambda: running.step(0.0, -H),
+        lambda: running.set_reals({"torso.push_force[1]": math.nan}),
+        lambda: running.set_reals({"torso.mass": 1.0}),
+        lambda: running.set_references("fmi2SetReal", [4_000_000], [0.0]),
+        lambda: running.get_references("fmi2GetReal", [4_000_000])[0],
+        lambda: running.deserialize(b"nonsense")[0],
+        lambda: running.call("fmi2EnterInitializationMode"),
+        lambda: running.call("fmi2SetFMUstate", None),
+    ]
+    with Plant(plant_library) as other:
+        other.initialize()
+        for k in range(20):
+            assert mistakes[k % len(mistakes)]() == ERROR
+            assert "got" in running.last_message
+            assert running.step(k * H, H) == other.step(k * H, H) == OK
+        assert running.everything() == other.everything()
