@@ -32,11 +32,11 @@ Row = dict[str, str]
 
 
 def render_html(interface: Interface, description: str) -> str:
-    """The page for one robot's FMU, whose modelDescription.xml is given. What is the plant's own is in pages/plant.html.jinja."""
+    """The page for one robot's FMU, whose modelDescription.xml is given. What is a component's own is in pages/."""
     root = ElementTree.fromstring(description.encode())
     environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "pages"), autoescape=True, undefined=StrictUndefined)
     robot = interface.robot
-    return environment.get_template("plant.html.jinja").render(
+    return environment.get_template(f"{interface.component.name}.html.jinja").render(
         robot=robot,
         interface=interface,
         joints=sum(len(leg.links) for leg in robot.legs),

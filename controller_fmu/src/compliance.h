@@ -5,8 +5,11 @@
 
 #include "contact_detection.h"
 #include "foot_law.h"
+#include "hexapod/inside.h"
 #include "support.h"
 #include "touchdown.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxComplianceModel {
   hxParts parts;
@@ -65,5 +68,7 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand, 
 
 /* One period on. force: ground on foot in the walking frame [N]; changed where a sensor is not believed. */
 void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws);
+
+HX_HIDDEN_END
 
 #endif

@@ -3,8 +3,11 @@
 #define HX_COMPLIANT_H
 
 #include "compliance.h"
+#include "hexapod/inside.h"
 #include "hold.h"
 #include "trajectory.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxCompliantModel {
   double per_second; /* 1/s   one over the period */
@@ -52,5 +55,7 @@ hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *
 /* The joint commands of this step, corrected in place. */
 void hx_compliant_step(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS], const hxStance *stance, const hxControllerInput *input,
                        hxCompliant *compliant, hxControllerOutput *output);
+
+HX_HIDDEN_END
 
 #endif

@@ -3,6 +3,9 @@
 #define HX_CONTACT_DETECTION_H
 
 #include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 /* Touch-down and lift-off with hysteresis, all feet. weight [N] of the robot. */
 void hx_contact_detect(double weight, const double normal[HX_LEGS], int touching[HX_LEGS]);
@@ -32,5 +35,7 @@ int hx_watch_busy(const hxWatch *watch);
 
 /* After another period: touching and the sum of all forces [N] are what is reported. */
 void hx_watch_look(const hxWatchModel *model, const int touching[HX_LEGS], double total, const hxExpected *expected, hxWatch *watch);
+
+HX_HIDDEN_END
 
 #endif

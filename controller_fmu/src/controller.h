@@ -8,7 +8,10 @@
 #ifndef HX_CONTROLLER_TICK_H
 #define HX_CONTROLLER_TICK_H
 
+#include "hexapod/inside.h"
 #include "state.h"
+
+HX_HIDDEN_BEGIN
 
 void hx_controller_compile(const hxControllerDefinition *definition, hxControllerModel *model);
 
@@ -17,5 +20,7 @@ void hx_controller_begin(const hxControllerModel *model, double t, hxControllerS
 
 /* One tick: the commands of this input are state->output. */
 void hx_controller_tick(const hxControllerModel *model, const hxControllerInput *input, hxControllerState *state);
+
+HX_HIDDEN_END
 
 #endif

@@ -3,9 +3,12 @@
 #ifndef HX_FOOT_LAW_H
 #define HX_FOOT_LAW_H
 
+#include "hexapod/inside.h"
 #include "plane.h"
 #include "slip_pid.h"
 #include "suspension.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxFootLawModel {
   hxSlipPid pid;
@@ -31,5 +34,7 @@ void hx_foot_law_compile(const hxControllerDefinition *definition, hxFootLawMode
 
 /* One period on. */
 void hx_foot_law_step(const hxFootLawModel *model, const hxFootInput *input, hxFootLaw *law);
+
+HX_HIDDEN_END
 
 #endif

@@ -4,7 +4,10 @@
 #define HX_HOLD_H
 
 #include "hexapod/controller.h"
+#include "hexapod/inside.h"
 #include "plane.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxHoldModel {
   int64_t every; /* steps between two looks */
@@ -45,5 +48,7 @@ void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *mode
 
 /* Brings the corrections up to date. */
 void hx_hold_look(const hxHoldModel *model, const hxSight *seen, hxHold *hold);
+
+HX_HIDDEN_END
 
 #endif

@@ -2,8 +2,11 @@
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
+#include "hexapod/inside.h"
 #include "kinematics.h"
 #include "posture.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxDynamicsModel {
   double period, gravity;       /* s, m/s2 */
@@ -53,5 +56,7 @@ void hx_dynamics_place(const hxDynamicsModel *model, const hxLegModel leg[HX_LEG
 
 void hx_dynamics_demand(const hxDynamicsModel *model, const hxLegModel leg[HX_LEGS], const hxMotion *motion,
                         const double speed[HX_LEGS][HX_JOINTS], const hxPosture *posture, hxDemand *demand);
+
+HX_HIDDEN_END
 
 #endif

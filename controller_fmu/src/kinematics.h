@@ -3,7 +3,10 @@
 #define HX_LEG_KINEMATICS_H
 
 #include "hexapod/controller.h"
+#include "hexapod/inside.h"
 #include "plane.h"
+
+HX_HIDDEN_BEGIN
 
 /* Constants of one leg. */
 typedef struct hxLegModel {
@@ -49,5 +52,7 @@ void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity
 /* Angles within the joints' limits and speeds that servos reach. Returns whether the foot misses its target. */
 int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise, double angle[HX_JOINTS],
                  double speed[HX_JOINTS]);
+
+HX_HIDDEN_END
 
 #endif

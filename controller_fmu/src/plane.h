@@ -4,12 +4,7 @@
 
 #include <math.h>
 
-/* a*b + c rounds twice on every machine, whatever an importer's compiler call says about fused arithmetic */
-#if defined(__clang__)
-#pragma clang fp contract(off)
-#elif defined(__GNUC__)
-#pragma GCC optimize("fp-contract=off")
-#endif
+#include "hexapod/inside.h"
 
 typedef struct hxPlane {
   double x, y;

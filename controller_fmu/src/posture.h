@@ -3,7 +3,10 @@
 #ifndef HX_POSTURE_H
 #define HX_POSTURE_H
 
+#include "hexapod/inside.h"
 #include "plane.h"
+
+HX_HIDDEN_BEGIN
 
 /* The torso in the walking frame. */
 typedef struct hxPosture {
@@ -24,5 +27,7 @@ void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane, double *z);
 /* A foot of the walking frame, its place and velocity, seen in the torso frame, in place. */
 void hx_posture_see_place(const hxPosture *posture, hxPlane *plane, double *height);
 void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height, hxPlane *velocity, double *rise);
+
+HX_HIDDEN_END
 
 #endif

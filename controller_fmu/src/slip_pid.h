@@ -3,6 +3,9 @@
 #define HX_SLIP_PID_H
 
 #include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxSlipPid {
   double h;                    /* s */
@@ -20,5 +23,7 @@ typedef struct hxSlipState {
 
 /* One period on under a force [N]; returns the answer [N]. */
 double hx_slip_pid_step(const hxSlipPid *pid, double force, hxSlipState *state);
+
+HX_HIDDEN_END
 
 #endif

@@ -3,6 +3,9 @@
 #define HX_CONTROLLER_STATE_H
 
 #include "compliant.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxControllerModel {
   double period;  /* s */
@@ -47,5 +50,7 @@ struct hxController {
   hxControllerState state;
   char message[HX_MESSAGE_SIZE];
 };
+
+HX_HIDDEN_END
 
 #endif

@@ -3,7 +3,10 @@
 #ifndef HX_SUPPORT_H
 #define HX_SUPPORT_H
 
+#include "hexapod/inside.h"
 #include "inverse_dynamics.h"
+
+HX_HIDDEN_BEGIN
 
 typedef struct hxSupportModel {
   double duty, handover;  /* cycles  a leg's hand-overs never overlap, whatever the gait */
@@ -31,5 +34,7 @@ void hx_support_lowering(const hxSupportModel *model, const hxPlane feet[HX_LEGS
 
 /* Shares of feet in the walking frame; activations are given. */
 void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxShares *shares);
+
+HX_HIDDEN_END
 
 #endif

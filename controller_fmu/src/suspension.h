@@ -3,6 +3,9 @@
 #define HX_SUSPENSION_H
 
 #include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 /* x(k+1) = a x(k) + b f(k) of x = (z, z'), exact under a force held over a period. */
 typedef struct hxSuspension {
@@ -10,5 +13,7 @@ typedef struct hxSuspension {
 } hxSuspension;
 
 void hx_suspension_discretise(double mass, double damping, double stiffness, double period, hxSuspension *suspension);
+
+HX_HIDDEN_END
 
 #endif

@@ -3,6 +3,9 @@
 #define HX_TOUCHDOWN_H
 
 #include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
 
 extern const double hx_early; /* m  a foot that meets the ground with more of its way down to go has met it early */
 
@@ -24,5 +27,7 @@ int hx_touchdown_busy(const hxTouchdown *touchdown);
 
 /* One period [s]. */
 void hx_touchdown_step(double period, const hxMeeting meeting[HX_LEGS], hxTouchdown *touchdown);
+
+HX_HIDDEN_END
 
 #endif

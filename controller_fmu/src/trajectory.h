@@ -2,7 +2,10 @@
 #ifndef HX_TRAJECTORY_H
 #define HX_TRAJECTORY_H
 
+#include "hexapod/inside.h"
 #include "kinematics.h"
+
+HX_HIDDEN_BEGIN
 
 enum { HX_COMMANDS = 6 }; /* vx vy yaw_rate height roll pitch */
 
@@ -84,5 +87,7 @@ int hx_paths_reach(const hxPathModel *model, const hxPaths *paths, int64_t numbe
 
 /* The step `number` periods after the first, from the one before it. */
 void hx_paths_walk(const hxPathModel *model, const hxPaths *paths, int64_t number, hxTwist twist, const hxSteps *before, hxSteps *steps);
+
+HX_HIDDEN_END
 
 #endif

@@ -10,10 +10,14 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.controller import Gains, save_gains
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting
+from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.controller_export import export_controller, make_setup
+from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
 from hexapod_cosim.cosim.robot_files import chosen_format, export_description
+from hexapod_cosim.cosim.scenario_records import CONTROLS
 from hexapod_cosim.cosim.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
 
@@ -37,25 +41,54 @@ def export(
     ] = None,
     urdf: Annotated[bool, typer.Option("--urdf", help="Write the robot as a URDF instead; so does -o FILE.urdf.")] = False,
     mjcf: Annotated[bool, typer.Option("--mjcf", help="Write it as a MuJoCo model instead; so does -o FILE.xml.")] = False,
+    controller: Annotated[
+        str | None, typer.Option("--controller", metavar="|".join(CONTROLS), help="Pack the robot's controller instead of the plant.")
+    ] = None,
+    gait: Annotated[str | None, typer.Option("--gait", help="Of the controller: one of `hexapod list gaits`.")] = None,
+    gains: GainsFile = None,
+    period: Annotated[float, typer.Option("--period", help="Of the controller [s].")] = DEFAULT_PERIOD,
     json: Json = False,
 ) -> None:
-    """Pack the plant FMU of a robot, or write the robot for other tools."""
+    """Pack the plant FMU of a robot, or its controller's, or write the robot for other tools."""
     form, made = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
+    if controller is None and (gait or gains or period != DEFAULT_PERIOD):
+        fix = "add it, or leave --gait, --gains and --period out"
+        raise HexapodError("options of the controller", got="no --controller", expected="--controller kinematic or compliant", fix=fix)
     if form is not None:
         written = export_description(made, output or Path(f"{made.name}{form.suffix}"), form)
         _show_written(written, made, form.name, json=json)
         return
-    path = output or Path(f"{made.name}.fmu")
+    path = _fmu_path(output, made.name if controller is None else f"{made.name}_controller")
+    chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
+    setup = None if controller is None else _controller_setup(made, controller, gait, gains, period)
+    with waiting("compiling" if chosen else None):
+        if setup is None:
+            export_fmu(made, path, fmi=fmi, platforms=chosen)
+        else:
+            export_controller(setup, path, fmi=fmi, platforms=chosen)
+    _show_written(path, made, "fmu", json=json)
+
+
+def _fmu_path(output: Path | None, name: str) -> Path:
+    """Where an FMU goes. Raises HexapodError for what is no FMU's name."""
+    path = output or Path(f"{name}.fmu")
     if path.is_dir():
-        raise HexapodError("not an FMU's name", got=str(path), expected="a file, not a folder", fix=f"write -o {path / made.name}.fmu")
+        raise HexapodError("not an FMU's name", got=str(path), expected="a file, not a folder", fix=f"write -o {path / name}.fmu")
     if path.suffix != ".fmu":
         raise HexapodError(
             "not an FMU's name", got=path.name, expected="a name that ends in .fmu", fix=f"write -o {path.with_suffix('.fmu')}"
         )
-    chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
-    with waiting("compiling" if chosen else None):
-        export_fmu(made, path, fmi=fmi, platforms=chosen)
-    _show_written(path, made, "fmu", json=json)
+    return path
+
+
+def _controller_setup(robot: Robot, control: str, gait: str | None, gains: Path | None, period: float) -> ControllerSetup:
+    """What the controller is made of; gains of another robot or period are warned about."""
+    given = given_gains(gains)
+    with waiting("designing the gains" if control == "compliant" and given is None else None):
+        setup = make_setup(robot, control=control, period=period, gait=gait, gains=given)
+    for warning in setup.build().warnings:
+        warn(warning)
+    return setup
 
 
 def _show_written(path: Path, robot: Robot, kind: str, *, json: bool) -> None:
