@@ -61,7 +61,10 @@ test-endurance: test-library
 	$(BIN)/python tests/endurance.py build/test/plant_fmu/hexapod.so
 
 test-library: setup
+
+test-endurance: setup
 	$(BIN)/python -m pytest -q tests/test_endurance.py
+	$(BIN)/python tests/endurance.py build/test/plant_fmu/hexapod.[sd]*
 
 # memory is measured without sanitizers, which keep what was freed
 test-sanitize: setup

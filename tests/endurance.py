@@ -11,6 +11,7 @@ import _ctypes
 import ctypes
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -164,11 +165,13 @@ TRIALS: dict[str, tuple[Callable[[Path, int], Figures], int]] = {
 
 
 def main(arguments: list[str]) -> int:
-    """One trial, or all at full length."""
-    library = Path(arguments[0])
-    wanted = {arguments[1]: int(arguments[2])} if len(arguments) > 1 else {name: count for name, (_, count) in TRIALS.items()}
-    for name, count in wanted.items():
-        print(name, json.dumps(TRIALS[name][0](library, count)), flush=True)
+    """One trial, or all at full length, each in a process of its own."""
+    library = arguments[0]
+    if len(arguments) == 1:
+        trials = ([sys.executable, __file__, library, name, str(count)] for name, (_, count) in TRIALS.items())
+        return max(subprocess.run(trial, check=False).returncode != 0 for trial in trials)
+    name, count = arguments[1], int(arguments[2])
+    print(name, json.dumps(TRIALS[name][0](Path(library), count)), flush=True)
     return 0
 
 

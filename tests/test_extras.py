@@ -88,7 +88,7 @@ def test_every_input_of_a_leg_and_the_torso_is_in_one_terminal() -> None:
     members = [str(member.get("variableName")) for member in document.iter("TerminalMemberVariable")]
     assert len(members) == len(set(members))
     assert {variable.name for variable in ATHENA.of_causality("input")} <= set(members)
-    assert {name for name in ATHENA.by_name if ".foot." in name} <= set(members)
+    assert {variable.name for variable in ATHENA.of_causality("output") if ".foot." in variable.name} <= set(members)
 
 
 def test_legs_terminals_differ_in_their_variables_alone() -> None:
