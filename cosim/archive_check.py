@@ -35,6 +35,7 @@ PLATFORMS = {
     "x86_64-darwin": (".dylib", MACH, 4, b"\x07\x00\x00\x01"),
     "aarch64-darwin": (".dylib", MACH, 4, b"\x0c\x00\x00\x01"),
 }
+FAT, FAT_ENTRIES = b"\xca\xfe\xba\xbe", 8  # libraries of several machines in one Mach-O file; where the list of them begins, big-endian
 PE_HEADER = 0x3C  # where a PE file says where its header is
 # paths that only the machine where it was made has
 ABSOLUTE = re.compile(rb"(?:/home/|/root/|/Users/|/tmp/|/work/|[A-Z]:[\\/](?:Users|Windows|Program Files|build|work|src)[\\/])[\w.+-]+")
@@ -131,12 +132,16 @@ def _binary_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
 def _library_problems(name: str, data: bytes, platform: str) -> Iterator[str]:
     """By its bytes alone, so that it works for machines that are not this one."""
     _, magic, place, machine = PLATFORMS[platform]
-    if magic == PE and data.startswith(PE):
-        place = int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4
-    if not data.startswith(magic) or place is None or data[place : place + len(machine)] != machine:
+    if magic == MACH and data.startswith(FAT):
+        magic, entries = FAT, int.from_bytes(data[4:8], "big")
+        machines = [data[at : at + 4][::-1] for at in range(FAT_ENTRIES, FAT_ENTRIES + 20 * entries, 20)]
+    else:
+        at = int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4 if place is None else place
+        machines = [data[at : at + len(machine)]]
+    if not data.startswith(magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
-    start = b"\0_" if magic == MACH else b"\0"
+    start = b"\0_" if magic in (MACH, FAT) else b"\0"
     missing = [function for function in standard_functions() if start + function.encode() + b"\0" not in data]
     if missing:
         yield f"{name} lacks {len(missing)} functions of the standard: {', '.join(missing)}"

@@ -16,6 +16,7 @@ from fmpy.validation import validate_fmu
 from hexapod_cosim.cosim.archive_check import archive_problems
 from hexapod_cosim.cosim.components import CONTROLLER
 from hexapod_cosim.cosim.fmu import Fmu, read_description
+from hexapod_cosim.cosim.plant_files import fmi2_platform
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.models import HexapodError
 
@@ -32,11 +33,12 @@ def find_problems(path: Path) -> list[str]:
 
 
 def find_own_problems(path: Path) -> list[str]:
-    """The same without fmpy's checks. Raises FmuError when it is no FMU at all."""
+    """The same without fmpy's checks; what was packed for other machines alone is not run. Raises FmuError when it is no FMU at all."""
     description, problems = read_description(path), archive_problems(path)
     with zipfile.ZipFile(path) as archive:
         problems += _start_value_problems(archive, description)
-    return problems + _run_problems(path) + _guid_problems(path, description)
+        runs_here = any(name.startswith(f"binaries/{fmi2_platform()}/") for name in archive.namelist())
+    return problems + (_run_problems(path) + _guid_problems(path, description) if runs_here else [])
 
 
 def _start_value_problems(archive: zipfile.ZipFile, description: Any) -> list[str]:

@@ -186,3 +186,12 @@ def test_libraries_of_every_platform_are_told_by_their_bytes(good: Path, tmp_pat
             members[f"binaries/{platform}/hexapod{suffix}"] = heads[suffix] + machine + symbols
 
     assert archive_problems(rewritten(good, tmp_path / "all.fmu", add)) == []
+
+
+@pytest.mark.parametrize(("machines", "fine"), [((0x01000007, 0x0100000C), True), ((0x0100000C,), False)])
+def test_a_universal_library_must_hold_the_folder_s_machine(good: Path, tmp_path: Path, machines: tuple[int, ...], fine: bool) -> None:
+    entries = b"".join(machine.to_bytes(4, "big") + bytes(16) for machine in machines)
+    library = b"\xca\xfe\xba\xbe" + len(machines).to_bytes(4, "big") + entries + b"\0"
+    library += b"".join(b"_" + name.encode() + b"\0" for name in standard_functions())
+    change = {"binaries/darwin64/hexapod.dylib": library}
+    assert (archive_problems(rewritten(good, tmp_path / "fat.fmu", lambda members: members.update(change))) == []) == fine
