@@ -1,0 +1,48 @@
+"""A controller FMU in the place of the Python controller: the master steps it as it steps `Controller`."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, vector_names
+from hexapod_cosim.models import LEG_NAMES
+
+LEGS = len(LEG_NAMES)
+COMMANDS = [f"command.{item.name}" for item in fields(BodyCommand)]
+SENSED = ("angle", "foot_force", "quaternion")  # of the measurement
+FLAGS = ("swinging", "unreachable", "fallback")
+
+
+class FmuController:
+    """Drives an initialised controller FMU. The period [s] is the length of its steps."""
+
+    def __init__(self, fmu: Fmu, *, period: float) -> None:
+        self._fmu, self._period = fmu, period
+        self._inputs = fmu.block([*COMMANDS, *(name for key in SENSED for name in MEASURED[key])])
+        shift = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
+        joints = [name for names in COMMANDED.values() for name in names]
+        self._outputs = fmu.block([*joints, *shift, *(f"{leg}.lift" for leg in LEG_NAMES)])
+        self._flags = fmu.block([f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES])
+        angle, speed, torque, rest = np.split(self._outputs.values, [3 * LEGS, 6 * LEGS, 9 * LEGS])
+        self._out = JointCommand(angle.reshape(LEGS, 3), speed.reshape(LEGS, 3), torque.reshape(LEGS, 3))
+        swinging, unreachable, fallback = self._shown = np.zeros((len(FLAGS), LEGS), dtype=np.bool_)
+        self.diagnostics = Diagnostics(swinging, rest[: 2 * LEGS].view(np.complex128), rest[2 * LEGS :], unreachable, fallback)
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """The joint commands for [t, t + period). The result's arrays are reused by the next step. Raises FmuError."""
+        self._sense(command, measurement)
+        self._inputs.set()
+        self._outputs.get()
+        self._flags.get()
+        self._shown[...] = self._flags.values.reshape(self._shown.shape)
+        self._fmu.step(t, self._period)
+        return self._out
+
+    def _sense(self, command: BodyCommand, measurement: Measurement) -> None:
+        parts: list[NDArray[np.float64]] = [getattr(measurement, key).ravel() for key in SENSED]
+        np.concatenate([astuple(command), *parts], out=self._inputs.values)
