@@ -9,12 +9,7 @@ TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 
-.PHONY: help setup demo test test-importers check bench bench-quick control format generate fmu typing clean test-platforms
-SANITIZED := tests/test_fmi.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_importers.py tests/test_plant_misuse.py tests/test_endurance.py
-SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu -type f)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp)
-
-.PHONY: help setup demo test test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean
+.PHONY: help setup demo test test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -26,10 +21,9 @@ help:
 	@echo "make test-sanitize   the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
-	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (10 min)"
+	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
 	@echo "make format    formats C and Python"
-	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml"
-	@echo "make generate  plant_fmu/generated/ from plant_fmu/interface.toml, pictures and reference results from the robot"
+	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
 	@echo "make clean     removes what these made"
 
@@ -56,11 +50,6 @@ test-importers: setup
 test-platforms: setup
 	$(PYTHON) tools/install_emulators.py
 	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/test_platforms.py tests/test_platform_walks.py tests/test_cross_build.py
-
-test-endurance: test-library
-	$(BIN)/python tests/endurance.py build/test/plant_fmu/hexapod.so
-
-test-library: setup
 
 test-endurance: setup
 	$(BIN)/python -m pytest -q tests/test_endurance.py
