@@ -25,6 +25,7 @@ from hexapod_cosim.models.errors import FmuError, HexapodError
 PACKAGE = "ziglang"
 APPLICATION = "hexapod-cosim"
 SHOWN_LINES = 12  # of a compiler's complaints
+PATIENCE = 1200  # s    the compiler was seen to wait for itself for ever, now and then, for Windows
 
 # as plant_fmu/CMakeLists.txt, with reasons
 COMPILE = ("-std=c11", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fvisibility=hidden", "-fno-ident")
@@ -142,7 +143,15 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
 
 def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) -> None:
     environment = compiler_environment(root, cache_folder)
-    process = subprocess.run(command, cwd=root / "in", env=environment, capture_output=True, text=True, errors="replace", check=False)
+    try:
+        process = subprocess.run(
+            command, cwd=root / "in", env=environment, capture_output=True, text=True, errors="replace", check=False, timeout=PATIENCE
+        )
+    except subprocess.TimeoutExpired as error:
+        fix = "run it again: what is done so far is kept"
+        raise FmuError(
+            f"cannot build for {target}", got="a compiler that hangs", expected=f"an end within {PATIENCE} s", fix=fix
+        ) from error
     if process.returncode != 0:
         complaint = "\n".join(process.stderr.splitlines()[:SHOWN_LINES]) or f"exit code {process.returncode}"
         fix = "correct the sources, or install the compiler anew if it is damaged"
