@@ -12,8 +12,8 @@ from hexapod_cosim.models.errors import FmuError
 
 DISTRIBUTION = "hexapod-cosim"
 GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
-SHARED_SOURCES = ("status.c", "checksum.c")  # of the plant's, in every component
-SHARED_HEADERS = ("status.h", "legs.h", "inside.h")
+SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")  # of the plant's, in every component
+SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
 PLANT_ALONE = "plant.c"  # of the FMI layer: the plant as a component
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
 

@@ -101,12 +101,12 @@ class NativeController:
         """To the start, by the definition as it stands."""
         self._checked(self._core.hx_controller_reset(self._handle, self.definition.bytes, t))
 
-    def output(self) -> HxControllerOutput:
+    def output(self) -> Any:
         """Of the input as it stands, at the present time."""
         self._core.hx_controller_output(self._handle, ct.byref(self.input), ct.byref(self.out))
         return self.out
 
-    def go(self, t_end: float, *, rate: HxControllerInput | None = None) -> None:
+    def go(self, t_end: float, *, rate: Any = None) -> None:
         """To t_end under the input as it stands, which changes at a rate [1/s]."""
         self._checked(self._core.hx_controller_step(self._handle, ct.byref(self.input), None if rate is None else ct.byref(rate), t_end))
 
@@ -118,7 +118,7 @@ class NativeController:
             np.ctypeslib.as_array(getattr(self.input, name))[...] = getattr(measurement, name)
         self.input.quaternion[:] = measurement.quaternion.tolist()
 
-    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> HxControllerOutput:
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
         """The joint commands for [t, t + period): the outputs at t, after which time goes on."""
         self.sense(command, measurement)
         out = self.output()
@@ -140,6 +140,6 @@ class NativeController:
         self._checked(self._core.hx_controller_set_state(self._handle, state, len(state)))
 
 
-def commands(out: HxControllerOutput) -> np.ndarray:
+def commands(out: Any) -> np.ndarray:
     """(3, 6, 3) angle_ref, speed_ref and torque_ref, copied."""
     return np.array([np.ctypeslib.as_array(getattr(out, name)) for name in ("angle_ref", "speed_ref", "torque_ref")])

@@ -1,4 +1,4 @@
-"""The arrows between the folders: models <- controller <- cosim; plant_fmu/src sees no FMI, plant_fmu/fmi no physics."""
+"""The arrows between the folders: models <- controller <- cosim; src of plant_fmu and controller_fmu sees no FMI, fmi nothing of src."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from hexapod_cosim.cosim.plant_files import SHARED_HEADERS
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = "hexapod_cosim"
@@ -63,13 +65,17 @@ def test_no_folder_is_imported_under_a_second_name() -> None:
         assert not second, f"{path.relative_to(ROOT)} imports {sorted(second)}: a copy of {PACKAGE}'s"
 
 
-def c_files(*folders: str) -> list[Path]:
-    return [path for folder in folders for path in sorted((ROOT / "plant_fmu" / folder).glob("*.[ch]"))]
+def c_files(*folders: str, component: str = "plant_fmu") -> list[Path]:
+    return [path for folder in folders for path in sorted((ROOT / component / folder).glob("*.[ch]"))]
 
 
-def test_the_physics_includes_itself_its_header_and_the_c_library() -> None:
-    own = {path.name for path in c_files("src", "src/lanes")} | {f"hexapod/{path.name}" for path in c_files("include/hexapod")}
-    files = c_files("src", "src/lanes", "include/hexapod")
+@pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
+def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> None:
+    folders = ("src", "src/lanes", "include/hexapod")
+    own = {path.name for path in c_files("src", "src/lanes", component=component)}
+    public = {"plant_fmu": {path.name for path in c_files("include/hexapod")}, "controller_fmu": {"controller.h", *SHARED_HEADERS}}
+    own |= {f"hexapod/{name}" for name in public[component]}
+    files = c_files(*folders, component=component)
     assert files
     for path in files:
         included = {name.removeprefix("../").removeprefix("lanes/") for name in INCLUDE.findall(path.read_text(encoding="utf-8"))}
@@ -77,16 +83,18 @@ def test_the_physics_includes_itself_its_header_and_the_c_library() -> None:
         assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
 
 
-def test_the_fmi_layer_includes_no_physics() -> None:
-    physics = {path.name for path in c_files("src", "src/lanes")}
-    files = c_files("fmi", "generated")
+@pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
+def test_the_fmi_layer_includes_no_core(component: str) -> None:
+    core = {path.name for path in c_files("src", "src/lanes", component=component)}
+    files = c_files("fmi", "generated", component=component)
     assert files
     for path in files:
         included = set(INCLUDE.findall(path.read_text(encoding="utf-8")))
-        inside = {name for name in included if Path(name).name in physics and not name.startswith("fmi/")}
+        inside = {name for name in included if Path(name).name in core and not name.startswith(("fmi/", "hexapod/"))}
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
-def test_only_the_fmi_layer_names_the_standard() -> None:
-    for path in c_files("src", "src/lanes", "include/hexapod"):
+@pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
+def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
+    for path in c_files("src", "src/lanes", "include/hexapod", component=component):
         assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), f"{path.relative_to(ROOT)} names an FMI type or function"

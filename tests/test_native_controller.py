@@ -82,7 +82,7 @@ def differences(core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: i
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         for flag in ("swinging", "unreachable", "fallback"):
             assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), f"{flag} at step {k}"
-        np.testing.assert_allclose(np.ctypeslib.as_array(out.shift), shown.shift.view(float).reshape(6, 2), atol=1e-12)
+        np.testing.assert_allclose(np.ctypeslib.as_array(out.shift), shown.shift.view(np.float64).reshape(6, 2), atol=1e-12)
         np.testing.assert_allclose(np.ctypeslib.as_array(out.lift), shown.lift, atol=1e-12)
         fallback.append(shown.fallback.copy())
         sense(reference, k, measurement)

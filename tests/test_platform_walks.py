@@ -16,7 +16,7 @@ from platform_walk import EMULATORS, EVERYTHING, build_walker, missing, number, 
 
 from hexapod_cosim.cosim.cross_build import TARGETS, build_library
 from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.platforms import plant_library as library_to_build
+from hexapod_cosim.cosim.platforms import component_library as library_to_build
 from hexapod_cosim.models.robot import load_robot
 
 

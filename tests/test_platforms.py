@@ -48,7 +48,7 @@ def built() -> dict[str, bytes]:
     """The plant's binaries by target, Windows only where it does not take minutes. Built at once, from the cache if they are there."""
     quick = [target for target in TARGETS if target != "x86_64-windows"]
     with ThreadPoolExecutor() as pool:
-        return dict(zip(quick, pool.map(lambda target: build_library(platforms.plant_library(), target), quick), strict=True))
+        return dict(zip(quick, pool.map(lambda target: build_library(platforms.component_library(), target), quick), strict=True))
 
 
 @pytest.fixture(params=list(TARGETS))
@@ -59,7 +59,7 @@ def target(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def data(built: dict[str, bytes], target: str) -> bytes:
-    return built[target] if target in built else build_library(platforms.plant_library(), target)
+    return built[target] if target in built else build_library(platforms.component_library(), target)
 
 
 def parsed(data: bytes) -> Any:
@@ -184,7 +184,7 @@ def test_the_same_sources_make_the_same_bytes_in_another_place(built: dict[str, 
     (cache / "zig").symlink_to(user_cache() / "zig")
     for target in TARGETS if EVERYTHING else ("aarch64-linux", "aarch64-darwin"):
         again = build_library(Library("hexapod", copied, (fmi_headers(),)), target, cache_folder=cache)
-        assert again == build_library(platforms.plant_library(), target), target
+        assert again == build_library(platforms.component_library(), target), target
 
 
 def test_each_version_of_the_standard_has_its_own_names() -> None:
@@ -210,8 +210,8 @@ def test_a_universal_binary_holds_both_processors_whole(built: dict[str, bytes])
 
 def test_fmi_2_and_3_hold_the_same_binaries(built: dict[str, bytes]) -> None:
     quick = ["aarch64-linux", "x86_64-darwin", "aarch64-darwin"]
-    three = platforms.build_binaries(platforms.plant_library(), quick, fmi=3)
+    three = platforms.build_binaries(platforms.component_library(), quick, fmi=3)
     assert three == {f"binaries/{name}/hexapod{TARGETS[name].suffix}": built[name] for name in quick}
-    two = platforms.build_binaries(platforms.plant_library(), ["darwin64", "aarch64-linux"], fmi=2)
+    two = platforms.build_binaries(platforms.component_library(), ["darwin64", "aarch64-linux"], fmi=2)
     assert list(two) == ["binaries/darwin64/hexapod.dylib", "binaries/aarch64-linux/hexapod.so"]
     assert two["binaries/aarch64-linux/hexapod.so"] == built["aarch64-linux"]

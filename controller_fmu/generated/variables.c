@@ -196,24 +196,24 @@ static const hxVariable parameters[] = {
     {"RR.coxa.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.leg[5].link[0].mass), HX_REAL},
     {"RR.femur.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.leg[5].link[1].mass), HX_REAL},
     {"RR.tibia.mass", "kg", 1e-09, 1000000000.0, offsetof(struct hxVariables, definition.leg[5].link[2].mass), HX_REAL},
-    {"LF.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[0].link[0].length), HX_REAL},
-    {"LF.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[0].link[1].length), HX_REAL},
-    {"LF.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[0].link[2].length), HX_REAL},
-    {"LM.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[1].link[0].length), HX_REAL},
-    {"LM.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[1].link[1].length), HX_REAL},
-    {"LM.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[1].link[2].length), HX_REAL},
-    {"LR.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[2].link[0].length), HX_REAL},
-    {"LR.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[2].link[1].length), HX_REAL},
-    {"LR.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[2].link[2].length), HX_REAL},
-    {"RF.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[3].link[0].length), HX_REAL},
-    {"RF.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[3].link[1].length), HX_REAL},
-    {"RF.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[3].link[2].length), HX_REAL},
-    {"RM.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[4].link[0].length), HX_REAL},
-    {"RM.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[4].link[1].length), HX_REAL},
-    {"RM.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[4].link[2].length), HX_REAL},
-    {"RR.coxa.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[5].link[0].length), HX_REAL},
-    {"RR.femur.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[5].link[1].length), HX_REAL},
-    {"RR.tibia.length", "m", 1e-09, 100.0, offsetof(struct hxVariables, definition.leg[5].link[2].length), HX_REAL},
+    {"LF.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[0].length), HX_REAL},
+    {"LF.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[1].length), HX_REAL},
+    {"LF.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[2].length), HX_REAL},
+    {"LM.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[1].link[0].length), HX_REAL},
+    {"LM.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[1].link[1].length), HX_REAL},
+    {"LM.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[1].link[2].length), HX_REAL},
+    {"LR.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[2].link[0].length), HX_REAL},
+    {"LR.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[2].link[1].length), HX_REAL},
+    {"LR.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[2].link[2].length), HX_REAL},
+    {"RF.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[3].link[0].length), HX_REAL},
+    {"RF.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[3].link[1].length), HX_REAL},
+    {"RF.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[3].link[2].length), HX_REAL},
+    {"RM.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[4].link[0].length), HX_REAL},
+    {"RM.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[4].link[1].length), HX_REAL},
+    {"RM.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[4].link[2].length), HX_REAL},
+    {"RR.coxa.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[5].link[0].length), HX_REAL},
+    {"RR.femur.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[5].link[1].length), HX_REAL},
+    {"RR.tibia.length", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[5].link[2].length), HX_REAL},
     {"LF.coxa.offset_y", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[0].offset_y), HX_REAL},
     {"LF.femur.offset_y", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[1].offset_y), HX_REAL},
     {"LF.tibia.offset_y", "m", -100.0, 100.0, offsetof(struct hxVariables, definition.leg[0].link[2].offset_y), HX_REAL},
@@ -466,7 +466,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{44de70d5-bbab-44f6-9308-d3656387e4ea}";
+const char hx_default_guid[] = "{a6786e30-16f0-494d-b69e-af057d064b37}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

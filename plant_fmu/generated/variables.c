@@ -924,7 +924,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{6b2bd6f6-4142-4609-85c5-a27c68123d7a}";
+const char hx_default_guid[] = "{790abad7-4725-4ffe-9f0d-aece5967492f}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

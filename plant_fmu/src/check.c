@@ -1,46 +1,9 @@
 #include "check.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
 
+#include "hexapod/checker.h"
 #include "method.h"
-
-/* Collects the first failure; every check after it is silent. */
-typedef struct {
-  hxStatus status;
-  char *message;
-} hxChecker;
-
-static void fail(hxChecker *c, const char *name, double got, const char *expected) {
-  if (c->status != HX_OK) return;
-  c->status = HX_INVALID_MODEL;
-  if (c->message) snprintf(c->message, HX_MESSAGE_SIZE, "%s: got %.9g, expected %s", name, got, expected);
-}
-
-static double number_at(const void *structure, const hxRange *range) {
-  const char *place = (const char *)structure + range->offset;
-  double real;
-  int whole;
-  if (range->is_int) {
-    memcpy(&whole, place, sizeof whole);
-    return (double)whole;
-  }
-  memcpy(&real, place, sizeof real);
-  return real;
-}
-
-/* Every number within its range; NaN lies in none. */
-static void within(hxChecker *c, const void *structure, const hxRange *range, size_t n) {
-  char expected[96];
-  for (size_t i = 0; i < n; ++i) {
-    const double x = number_at(structure, &range[i]);
-    if (x >= range[i].min && x <= range[i].max) continue;
-    snprintf(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max, range[i].unit);
-    fail(c, range[i].name, x, expected);
-    return;
-  }
-}
 
 /* A body can have inertia I when I and (tr I / 2) 1 - I, its second moments of mass, are positive (semi-)definite:
  * that is the triangle inequality of the principal moments, whatever the axes. */
@@ -54,28 +17,26 @@ static int is_inertia(const double I[6]) {
 
 static void body(hxChecker *c, const char *name, const double inertia[6]) {
   if (!is_inertia(inertia))
-    fail(c, name, inertia[0], "an inertia that a body can have: positive, each principal moment at most the sum of the others");
+    hx_check_fail(c, name, inertia[0], "an inertia that a body can have: positive, each principal moment at most the sum of the others");
 }
 
 static void length_not_zero(hxChecker *c, const char *name, const double *x, int n, const char *expected) {
   double square = 0.0;
   for (int i = 0; i < n; ++i) square += x[i] * x[i];
-  if (!(square > 1e-12)) fail(c, name, sqrt(square), expected);
+  if (!(square > 1e-12)) hx_check_fail(c, name, sqrt(square), expected);
 }
 
 static void legs(hxChecker *c, const hxDefinition *d) {
-  static const char *const leg_names[HX_LEGS] = {"LF", "LM", "LR", "RF", "RM", "RR"};
-  static const char *const joint_names[HX_JOINTS] = {"coxa", "femur", "tibia"};
   char name[32];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxLink *link = &d->leg[leg].link[joint];
       const double tip[3] = {link->length, link->offset_y, link->offset_z};
-      snprintf(name, sizeof name, "%s.%s.inertia_xx", leg_names[leg], joint_names[joint]);
+      hx_joint_label(leg, joint, "inertia_xx", name);
       body(c, name, link->inertia);
-      snprintf(name, sizeof name, "%s.%s.axis", leg_names[leg], joint_names[joint]);
+      hx_joint_label(leg, joint, "axis", name);
       length_not_zero(c, name, link->axis, 3, "a direction: not all zero");
-      snprintf(name, sizeof name, "%s.%s.length", leg_names[leg], joint_names[joint]);
+      hx_joint_label(leg, joint, "length", name);
       length_not_zero(c, name, tip, 3, "a tip away from the joint: length and offsets not all zero");
     }
   }
@@ -86,9 +47,9 @@ static void relations(hxChecker *c, const hxDefinition *d) {
   body(c, "torso.inertia_xx", d->torso.inertia);
   legs(c, d);
   if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) && d->contact.restitution < 1e-3)
-    fail(c, "contact.restitution", d->contact.restitution, "0.001 to 1 with this contact.law, which divides by it");
+    hx_check_fail(c, "contact.restitution", d->contact.restitution, "0.001 to 1 with this contact.law, which divides by it");
   if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
-    fail(c, "solver.step", d->solver.step, "a fixed step > 0 with this solver.method, which has no error estimate");
+    hx_check_fail(c, "solver.step", d->solver.step, "a fixed step > 0 with this solver.method, which has no error estimate");
   length_not_zero(c, "initial.quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");
 }
 
@@ -96,7 +57,7 @@ hxStatus hx_definition_check(const hxDefinition *d, char *message) {
   hxChecker c = {HX_OK, message};
   const hxRange *range;
   const size_t n = hx_definition_ranges(&range);
-  within(&c, d, range, n);
+  hx_check_ranges(&c, d, range, n);
   if (c.status == HX_OK) relations(&c, d);
   return c.status;
 }
@@ -105,6 +66,6 @@ hxStatus hx_input_check(const hxInput *input, char *message) {
   hxChecker c = {HX_OK, message};
   const hxRange *range;
   const size_t n = hx_input_ranges(&range);
-  within(&c, input, range, n);
+  hx_check_ranges(&c, input, range, n);
   return c.status == HX_OK ? HX_OK : HX_INVALID_ARGUMENT;
 }

@@ -1,0 +1,39 @@
+#include "hexapod/checker.h"
+
+#include <stdio.h>
+#include <string.h>
+
+void hx_check_fail(hxChecker *checker, const char *name, double got, const char *expected) {
+  if (checker->status != HX_OK) return;
+  checker->status = HX_INVALID_MODEL;
+  if (checker->message) snprintf(checker->message, HX_MESSAGE_SIZE, "%s: got %.9g, expected %s", name, got, expected);
+}
+
+static double number_at(const void *structure, const hxRange *range) {
+  const char *place = (const char *)structure + range->offset;
+  double real;
+  int whole;
+  if (range->is_int) {
+    memcpy(&whole, place, sizeof whole);
+    return (double)whole;
+  }
+  memcpy(&real, place, sizeof real);
+  return real;
+}
+
+void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *range, size_t n) {
+  char expected[96];
+  for (size_t i = 0; i < n; ++i) {
+    const double x = number_at(structure, &range[i]);
+    if (x >= range[i].min && x <= range[i].max) continue;
+    snprintf(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max, range[i].unit);
+    hx_check_fail(checker, range[i].name, x, expected);
+    return;
+  }
+}
+
+void hx_joint_label(int leg, int joint, const char *quantity, char name[32]) {
+  static const char *const legs[HX_LEGS] = {"LF", "LM", "LR", "RF", "RM", "RR"};
+  static const char *const joints[HX_JOINTS] = {"coxa", "femur", "tibia"};
+  snprintf(name, 32, "%s.%s.%s", legs[leg], joints[joint], quantity);
+}
