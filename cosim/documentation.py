@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from hexapod_cosim.cosim.arrays import arrays
 from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Pattern, Variable
 from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
@@ -25,6 +26,23 @@ CAPABILITIES = {
     "canRunAsynchronuously": "steps that return before they are done",
     "completedIntegratorStepNotNeeded": "model exchange without a call after every step of the solver",
     "canNotUseMemoryManagementFunctions": "needs no memory functions of the importer",
+    "canGetAndSetFMUState": "state saved and restored, bit for bit",
+    "canSerializeFMUState": "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused",
+    "providesDirectionalDerivatives": "directional derivatives",
+    "providesAdjointDerivatives": "adjoint derivatives",
+    "providesPerElementDependencies": "dependencies of single elements of arrays",
+    "hasEventMode": "event mode, where discrete variables change and inputs may",
+    "mightReturnEarlyFromDoStep": "steps that end where discrete variables change, if the importer allows",
+    "providesIntermediateUpdate": "intermediate updates",
+    "providesEvaluateDiscreteStates": "discrete states evaluated without an update",
+    "needsCompletedIntegratorStep": "model exchange needs a call after every step of the solver",
+}
+# how the names in the tables are to be read, and whether they are of arrays
+NAMES = {
+    False: "Below, {leg}, {joint} and {inertia} stand for each of the names above or of xx, yy, zz, xy, xz, yz; [i] for 1, 2, 3 "
+    "(quaternions: to 4).",
+    True: "Below, the numbers behind a name are an array's sizes: 6 legs, 3 joints in the order above, 3 axes; the last index runs "
+    "fastest. What FMI 2.0 calls LF.coxa.angle_ref is the first element of angle_ref.",
 }
 AXES = {"leg": LEG_NAMES, "joint": JOINT_NAMES}
 
@@ -35,7 +53,7 @@ def render_html(interface: Interface, description: str) -> str:
     """The page for one robot's FMU, whose modelDescription.xml is given. What is a component's own is in pages/."""
     root = ElementTree.fromstring(description.encode())
     environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "pages"), autoescape=True, undefined=StrictUndefined)
-    robot = interface.robot
+    robot, arrayed = interface.robot, str(root.get("fmiVersion")).startswith("3")
     return environment.get_template(f"{interface.component.name}.html.jinja").render(
         robot=robot,
         interface=interface,
@@ -44,7 +62,9 @@ def render_html(interface: Interface, description: str) -> str:
         token=root.get("guid", root.get("instantiationToken")),
         kinds=[name for tag, name in INTERFACES.items() if root.find(tag) is not None],
         capabilities=_capabilities(root),
-        groups={causality: _rows(interface, causality) for causality in CAUSALITIES},
+        names=NAMES[arrayed],
+        arrayed=arrayed,
+        groups={causality: _rows(interface, causality, arrayed) for causality in CAUSALITIES},
         weight=robot.total_mass * max(map(abs, robot.gravity)),
     )
 
@@ -64,23 +84,28 @@ def _words(value: str | None) -> str:
     return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
 
 
-def _rows(interface: Interface, causality: str) -> list[Row]:
+def _rows(interface: Interface, causality: str, arrayed: bool) -> list[Row]:
+    if arrayed:
+        chosen = [array for array in arrays(interface) if array.first.causality == causality]
+        sizes = ["".join(f"[{size}]" for size in array.shape) for array in chosen]
+        return [_row(array.name + size, array.description, array.elements, interface) for array, size in zip(chosen, sizes, strict=True)]
     variables = [variable for variable in interface.variables if variable.causality == causality]
-    return [_row(pattern, _matching(pattern, variables), interface) for pattern in interface.patterns if pattern.causality == causality]
+    patterns = [pattern for pattern in interface.patterns if pattern.causality == causality]
+    return [_row(pattern.name, pattern.description, _matching(pattern, variables), interface) for pattern in patterns]
 
 
-def _row(pattern: Pattern, variables: Sequence[Variable], interface: Interface) -> Row:
+def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Interface) -> Row:
     first = variables[0]
     display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(first.unit or "", "")
     choices = interface.enumerations[first.enumeration].items if first.enumeration else ()
     return {
-        "name": pattern.name,
+        "name": name,
         "unit": first.unit or first.enumeration or first.type,
         "display": display,
         "count": str(len(variables)),
         "range": "" if choices else _range(first),
         "start": _starts(variables, [name for name, _ in choices]),
-        "meaning": pattern.description,
+        "meaning": meaning,
         "choices": "; ".join(f"{number} {name}: {text}" for number, (name, text) in enumerate(choices, start=1)),
     }
 

@@ -13,13 +13,14 @@ from hexapod_cosim.cosim.extras import extra_members
 from hexapod_cosim.cosim.files import atomic_path, not_writable
 from hexapod_cosim.cosim.interface import Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
-from hexapod_cosim.cosim.plant_files import binary, fmi2_platform, source_files
+from hexapod_cosim.cosim.model_description3 import render_build_description, render_fmi3
+from hexapod_cosim.cosim.plant_files import FMI2_SOURCE, FMI3_SOURCE, binary, fmi2_platform, fmi3_platform, source_files
 from hexapod_cosim.cosim.platforms import build_binaries, choose_platforms, component_library
 from hexapod_cosim.cosim.reference import reference_members
 from hexapod_cosim.models.errors import FmuError
 from hexapod_cosim.models.records import Robot
 
-FMI_VERSIONS = (2,)
+FMI_VERSIONS = (2, 3)
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
 
@@ -46,27 +47,38 @@ def export_interface(interface: Interface, path: str | Path, *, fmi: int = 2, pl
         raise FmuError("no such FMI version", got=fmi, expected=offered, fix="export with one of these")
     component = interface.component
     if platforms is None:
-        binaries = installed_binary(component)
+        binaries = installed_binary(component, fmi=fmi)
     else:
         binaries = build_binaries(component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi)
-    return write_archive(Path(path), _members(interface, binaries))
+    return write_archive(Path(path), _members(interface, binaries, fmi))
 
 
-def installed_binary(component: Component = PLANT) -> dict[str, bytes]:
+def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
     """This machine's binary as it was built when this package was installed, by its path in the FMU."""
-    library = binary(fmi2_platform(), component)
-    return {f"binaries/{fmi2_platform()}/{component.identifier}{library.suffix}": library.read_bytes()}
+    library, folder = binary(fmi2_platform(), component), fmi2_platform() if fmi == 2 else fmi3_platform()
+    return {f"binaries/{folder}/{component.identifier}{library.suffix}": library.read_bytes()}
 
 
-def _members(interface: Interface, binaries: Mapping[str, bytes]) -> dict[str, bytes]:
+def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
     """Contents of the archive by path."""
-    description = render_fmi2(interface)
+    description = (render_fmi2 if fmi == 2 else render_fmi3)(interface)
     members = {
         "modelDescription.xml": description.xml.encode(),
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
-    members |= dict(binaries) | {f"sources/{name}": path.read_bytes() for name, path in source_files(interface.component).items()}
-    return members | extra_members(interface, description.xml) | _reference(interface, members)
+    members |= dict(binaries) | _sources(interface.component, fmi)
+    return members | extra_members(interface, description.xml, fmi=fmi) | (_reference(interface, members) if fmi == 2 else {})
+
+
+def _sources(component: Component, fmi: int) -> dict[str, bytes]:
+    """All that the binary was made of, but for the other version's layer, whose headers an importer need not have."""
+    other = FMI3_SOURCE if fmi == 2 else FMI2_SOURCE
+    files = {name: path for name, path in source_files(component).items() if name != other}
+    members = {f"sources/{name}": path.read_bytes() for name, path in files.items()}
+    if fmi == 3:
+        description = render_build_description(component, (name for name in files if name.endswith(".c")))
+        members["sources/buildDescription.xml"] = description.encode()
+    return members
 
 
 def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from hexapod_cosim.cosim.arrays import arrays
 from hexapod_cosim.cosim.documentation import render_html
 from hexapod_cosim.cosim.interface import Interface
 from hexapod_cosim.cosim.plant_files import licence_file
 from hexapod_cosim.cosim.portrait import draw_robot
-from hexapod_cosim.cosim.terminals import FOLDER, ICON, render_terminals
+from hexapod_cosim.cosim.terminals import FOLDER, ICON, render_terminals, render_terminals3
 
 PICTURE = "model.png"
 LICENCE = "documentation/licenses/license.txt"
 PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
 
 
-def extra_members(interface: Interface, description: str) -> dict[str, bytes]:
+def extra_members(interface: Interface, description: str, *, fmi: int = 2) -> dict[str, bytes]:
     """Contents by path in the archive, for an FMU whose modelDescription.xml is given."""
+    ports = [array.name for array in arrays(interface) if array.first.causality in ("input", "output")]
+    terminals = render_terminals(list(interface.by_name)) if fmi == 2 else render_terminals3(ports)
     return {
         "documentation/index.html": render_html(interface, description).encode(),
         LICENCE: licence_file().read_bytes(),
-        f"{FOLDER}/terminalsAndIcons.xml": render_terminals(list(interface.by_name)).encode(),
+        f"{FOLDER}/terminalsAndIcons.xml": terminals.encode(),
         **pictures(interface),
     }
 

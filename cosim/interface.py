@@ -88,9 +88,10 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Pattern:
-    """One entry of interface.toml, for documentation: what its variables have in common."""
+    """One entry of interface.toml: what its variables have in common."""
 
     name: str
+    axes: tuple[tuple[str, tuple[str, ...]], ...]  # of the name, each with its labels; the variables come with the first axis slowest
     causality: Causality
     kind: str  # the unit, or the type
     description: str
@@ -106,6 +107,7 @@ class Interface:
     variables: tuple[Variable, ...]
     states: tuple[State, ...]  # in the order in which importers exchange them
     event_indicators: int
+    shows_events: str | None  # the pattern whose variables are the indicators
     patterns: tuple[Pattern, ...]
     units: tuple[Unit, ...]
     enumerations: Mapping[str, Enumeration]
@@ -176,7 +178,8 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
         variables=variables,
         states=tuple(_states(table)),
         event_indicators=table["event"]["indicators"] if "event" in table else 0,
-        patterns=tuple(_pattern(entry, causality) for causality in CAUSALITIES for entry in table.get(causality, [])),
+        shows_events=table["event"]["shown_by"] if "event" in table else None,
+        patterns=tuple(_pattern(entry, causality, table["axis"]) for causality in CAUSALITIES for entry in table.get(causality, [])),
         units=tuple(_unit(name, entry) for name, entry in table["unit"].items()),
         enumerations=enumerations,
         log_categories=table["log_category"],
@@ -215,8 +218,10 @@ def _unit(name: str, entry: Any) -> Unit:
     return Unit(name=name, exponents=exponents, display=display, type=entry.get("type"))
 
 
-def _pattern(entry: Mapping[str, Any], causality: Causality) -> Pattern:
-    return Pattern(name=entry["name"], causality=causality, kind=entry.get("unit", entry.get("type", "")), description=entry["description"])
+def _pattern(entry: Mapping[str, Any], causality: Causality, axes: Mapping[str, list[str]]) -> Pattern:
+    own = tuple((axis, tuple(labels)) for axis, labels in _axes(entry, axes).items())
+    kind = entry.get("unit", entry.get("type", ""))
+    return Pattern(name=entry["name"], axes=own, causality=causality, kind=kind, description=entry["description"])
 
 
 def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace) -> Iterable[Variable]:
@@ -228,10 +233,15 @@ def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration
 
 def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable[tuple[Mapping[str, Any], dict[str, tuple[int, str]]]]:
     """An entry with each combination of its axes: axis -> (index from 0, label)."""
-    labels = dict(axes) | {"i": [str(i + 1) for i in range(entry.get("size", 0))]}
-    used = [axis or "i" for axis in re.findall(r"\{(\w+)\}|\[i\]", entry["name"])]
-    for combination in itertools.product(*(enumerate(labels[axis]) for axis in used)):
+    used = _axes(entry, axes)
+    for combination in itertools.product(*map(enumerate, used.values())):
         yield entry, dict(zip(used, combination, strict=True))
+
+
+def _axes(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> dict[str, list[str]]:
+    """The labels of the axes in an entry's name, in its order."""
+    labels = dict(axes) | {"i": [str(i + 1) for i in range(entry.get("size", 0))]}
+    return {axis or "i": labels[axis or "i"] for axis in re.findall(r"\{(\w+)\}|\[i\]", entry["name"])}
 
 
 def _variable(

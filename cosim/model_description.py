@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from hexapod_cosim.cosim.components import Component
 from hexapod_cosim.cosim.interface import Enumeration, Interface, Unit, Variable
-from hexapod_cosim.cosim.plant_files import DISTRIBUTION, source_files
+from hexapod_cosim.cosim.plant_files import DISTRIBUTION, FMI3_SOURCE, source_files
 
 # what the binary can do; tests/test_fmi.py and tests/test_fmi_exchange.py hold each of these to its word
 BOTH = {
@@ -50,20 +50,12 @@ def render_fmi2(interface: Interface) -> ModelDescription:
 
 
 def _document(interface: Interface) -> Element:
-    robot = interface.robot
-    joints = sum(len(leg.links) for leg in robot.legs)
-    root = Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": robot.name + interface.component.suffix, "guid": "", "version": interface.version,
-        "description": interface.component.description.format(bodies=1 + joints, joints=joints),
-        "license": "MIT", "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
-        "numberOfEventIndicators": str(interface.event_indicators),
-    })  # fmt: skip
+    own = {"fmiVersion": "2.0", "guid": "", "numberOfEventIndicators": str(interface.event_indicators)}
+    root = Element("fmiModelDescription", own | general_facts(interface))
     _add_interfaces(root, interface)
-    _add_units(root, interface.units)
+    add_units(root, interface.units)
     _add_types(root, interface.enumerations.values(), interface.units)
-    categories = SubElement(root, "LogCategories")
-    for name, text in interface.log_categories.items():
-        SubElement(categories, "Category", name=name, description=text)
+    add_log_categories(root, interface)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(interface.stop_time), stepSize=repr(interface.step))
     _add_provenance(root, interface)
     variables = SubElement(root, "ModelVariables")
@@ -90,11 +82,30 @@ def _flag(value: bool) -> str:
 def _add_sources(element: Element, component: Component) -> None:
     files = SubElement(element, "SourceFiles")
     for name in source_files(component):
-        if name.endswith(".c"):
+        if name.endswith(".c") and name != FMI3_SOURCE:
             SubElement(files, "File", name=name)
 
 
-def _add_units(root: Element, units: Iterable[Unit]) -> None:
+def general_facts(interface: Interface) -> dict[str, str]:
+    """The attributes of the document that are the same in both versions of the standard."""
+    robot = interface.robot
+    joints = sum(len(leg.links) for leg in robot.legs)
+    return {
+        "modelName": robot.name + interface.component.suffix, "version": interface.version, "license": "MIT",
+        "description": interface.component.description.format(bodies=1 + joints, joints=joints),
+        "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
+    }  # fmt: skip
+
+
+def add_log_categories(root: Element, interface: Interface) -> None:
+    """The log's categories."""
+    categories = SubElement(root, "LogCategories")
+    for name, text in interface.log_categories.items():
+        SubElement(categories, "Category", name=name, description=text)
+
+
+def add_units(root: Element, units: Iterable[Unit]) -> None:
+    """The units, with how users like to see them."""
     parent = SubElement(root, "UnitDefinitions")
     for unit in units:
         element = SubElement(parent, "Unit", name=unit.name)

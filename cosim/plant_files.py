@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import sys
 import tomllib
 from importlib import metadata, util
@@ -15,6 +16,7 @@ GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")  # of the plant's, in every component
 SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
 PLANT_ALONE = "plant.c"  # of the FMI layer: the plant as a component
+FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"  # each needs the headers of its own standard alone
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
 
 _HERE = Path(__file__).resolve().parent
@@ -79,6 +81,13 @@ def fmi2_platform() -> str:
     """The folder of an FMI 2 archive that holds this machine's binary, as importers look for it."""
     system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
     return system + ("64" if sys.maxsize > 2**32 else "32")
+
+
+def fmi3_platform() -> str:
+    """The same in an FMI 3 archive."""
+    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    return f"{machine}-{system}"
 
 
 def binary(fmi_platform: str, component: Component = PLANT) -> Path:

@@ -237,8 +237,8 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
 
 
 def test_what_is_not_offered_is_refused_by_name(plant_build: Path, tmp_path: Path) -> None:
-    with pytest.raises(HexapodError, match=r"FMI version.*got 3"):
-        export_fmu(load_robot("athena"), tmp_path / "a.fmu", fmi=3)
+    with pytest.raises(HexapodError, match=r"FMI version.*got 4"):
+        export_fmu(load_robot("athena"), tmp_path / "a.fmu", fmi=4)
     with pytest.raises(HexapodError, match="amiga64"):
         export_fmu(load_robot("athena"), tmp_path / "a.fmu", platforms=["amiga64"])
     assert list(tmp_path.iterdir()) == []

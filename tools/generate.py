@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hexapod_cosim.controller import make_gait
+from hexapod_cosim.cosim.arrays import arrays
 from hexapod_cosim.cosim.components import PLANT, Component
 from hexapod_cosim.cosim.controller_interface import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.documentation import render_html
@@ -85,15 +86,17 @@ def render_variables(interface: Interface, guid: str) -> str:
     """The table of variables as C."""
     lines = [_head("variables.c - every variable of the FMU: where it is and what it may be."), "#include <float.h>", ""]
     lines += ['#include "fmi/variables.h"', ""]
+    runs = {array.reference: len(array.elements) for array in arrays(interface)}
     for causality in CAUSALITIES:
-        if rows := list(map(_row, interface.of_causality(causality))):
+        if rows := [_row(variable, runs.get(variable.reference, 0)) for variable in interface.of_causality(causality)]:
             lines += [f"static const hxVariable {causality}s[] = {{", *rows, "};", ""]
     lines += ["const hxSection hx_sections[HX_CAUSALITIES] = {"]
     for causality in CAUSALITIES:
         first, any_there = interface.first_reference[causality], interface.of_causality(causality)
         row = f"{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s" if any_there else f"{first}, 0, 0"
         lines += [f"    [HX_{causality.upper()}] = {{{row}}},"]
-    lines += ["};", "", "const char *const hx_log_category_names[] = {"]
+    lines += ["};", "", f"const unsigned hx_time_reference = {interface.first_reference['independent']};"]
+    lines += ["", "const char *const hx_log_category_names[] = {"]
     lines += [f'    "{name}",' for name in interface.log_categories]
     lines += ["};", "", *_states(interface)]
     lines += [f'const char hx_default_guid[] = "{guid}";', "", *_enumeration_checks(interface), ""]
@@ -113,9 +116,9 @@ def _states(interface: Interface) -> list[str]:
     return lines
 
 
-def _row(variable: Variable) -> str:
+def _row(variable: Variable, run: int) -> str:
     place = f"offsetof(struct hxVariables, {variable.field})"
-    return f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, {TYPES[variable.type]}}},'
+    return f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, {TYPES[variable.type]}, {run}}},'
 
 
 def _limits(variable: Variable) -> str:

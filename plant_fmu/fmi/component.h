@@ -47,6 +47,11 @@ typedef struct hxContinuous {
   hxStatus (*set)(hxComponent *component, const struct hxVariables *variables, double t);
 
   void (*rates)(hxComponent *component, struct hxVariables *variables); /* at the present time under the input */
+
+  /* hx_component_step, but *event tells whether discrete variables changed on the way, and with stop the step ends where the first did.
+   * Going on from there to the same end under the same input gives, bit for bit, what the step would have given without the stop. */
+  hxStatus (*step)(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event);
+
   void (*indicate)(const hxComponent *component, double indicator[]);
   int (*update)(hxComponent *component); /* what an event brings about; whether the state changed */
 

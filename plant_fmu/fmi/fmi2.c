@@ -67,10 +67,7 @@ typedef enum fmi2Call {
 
 /* The standard's tables of allowed calls (sections 3.2.3 and 4.2.4), but for liberties that importers take and that harm nothing: values are
  * read before initialisation, states and their rates in it, and a terminated instance is terminated again. */
-static const struct {
-  const char *name;
-  int modes, interfaces;
-} calls[] = {
+static const hxCall calls[] = {
     [SET_DEBUG_LOGGING] = {"fmi2SetDebugLogging", ANY_MODE, EITHER},
     [SETUP_EXPERIMENT] = {"fmi2SetupExperiment", HX_MODE_INSTANTIATED, EITHER},
     [ENTER_INITIALIZATION_MODE] = {"fmi2EnterInitializationMode", HX_MODE_INSTANTIATED, EITHER},
@@ -109,31 +106,10 @@ static const struct {
     [GET_NOMINALS] = {"fmi2GetNominalsOfContinuousStates", ANY_MODE, HX_MODEL_EXCHANGE},
 };
 
-static const char *mode_name(int mode) {
-  if (mode == HX_MODE_INSTANTIATED) return "before fmi2EnterInitializationMode";
-  if (mode == HX_MODE_INITIALIZATION) return "in initialization mode";
-  if (mode == HX_MODE_EVENT) return "in event mode";
-  if (mode == HX_MODE_CONTINUOUS) return "in continuous-time mode";
-  return mode == HX_MODE_STEP ? "between steps" : "after fmi2Terminate";
-}
-
-static const char *interface_name(int interface) { return interface == HX_MODEL_EXCHANGE ? "model exchange" : "co-simulation"; }
-
 /* the instance of a call that is legal now; NULL, with a message, otherwise */
 static fmi2Instance *enter(fmi2Component component, fmi2Call call) {
   fmi2Instance *instance = component;
-  if (!instance) return NULL;
-  if (!(calls[call].interfaces & instance->base.state.interface)) {
-    hx_log(&instance->base, HX_LOG_ERROR, "%s: got a call of %s, expected one of %s, which was instantiated; nothing was changed",
-           calls[call].name, interface_name(calls[call].interfaces), interface_name(instance->base.state.interface));
-    return NULL;
-  }
-  if (!(calls[call].modes & instance->base.state.mode)) {
-    hx_log(&instance->base, HX_LOG_ERROR, "%s: got a call %s, where the standard does not allow it; nothing was changed", calls[call].name,
-           mode_name(instance->base.state.mode));
-    return NULL;
-  }
-  return instance;
+  return instance && hx_call_admit(&instance->base, &calls[call]) ? instance : NULL;
 }
 
 static fmi2Status status_of(hxStatus status) {
@@ -141,11 +117,8 @@ static fmi2Status status_of(hxStatus status) {
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi2Discard : fmi2Error;
 }
 
-/* whether n elements may be at a place; complains if not */
 static int given(fmi2Instance *instance, fmi2Call call, size_t n, const void *array, const void *other) {
-  if (n == 0 || (array && other)) return 1;
-  hx_log(&instance->base, HX_LOG_ERROR, "%s: got NULL, expected an array of %zu; nothing was changed", calls[call].name, n);
-  return 0;
+  return hx_call_given(&instance->base, &calls[call], n, array, other);
 }
 
 /* ---------------------------------------------------------------------------------------------- log */
@@ -165,32 +138,10 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
                              escaped);
 }
 
-/* what is passed on: refusals and discarded steps always, the rest when the importer wants it */
-static const unsigned always_logged = 1u << HX_LOG_ERROR | 1u << HX_LOG_DISCARD;
-
-static int find_category(const char *name) {
-  for (int k = 0; k < HX_LOG_CATEGORIES; k++)
-    if (name && strcmp(name, hx_log_category_names[k]) == 0) return k;
-  return -1;
-}
-
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[]) {
   fmi2Instance *instance = enter(c, SET_DEBUG_LOGGING);
-  unsigned chosen = nCategories == 0 ? ~0u : 0;
   if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories)) return fmi2Error;
-  for (size_t i = 0; i < nCategories; i++) {
-    const int k = find_category(categories[i]);
-    if (k < 0) {
-      hx_log(&instance->base, HX_LOG_ERROR,
-             "fmi2SetDebugLogging: got category '%s', expected one of modelDescription.xml; nothing was changed",
-             categories[i] ? categories[i] : "(NULL)");
-      return fmi2Error;
-    }
-    chosen |= k == HX_LOG_ALL ? ~0u : 1u << k;
-  }
-  const unsigned logged = instance->base.logged;
-  instance->base.logged = (loggingOn ? chosen : logged & ~chosen) | always_logged;
-  return fmi2OK;
+  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn, nCategories, categories));
 }
 
 /* ---------------------------------------------------------------------------------------------- life */
@@ -206,7 +157,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   if (!instance) return NULL;
   if (functions) instance->callbacks = *functions;
   instance->base.sink = log_sink;
-  instance->base.logged = loggingOn ? ~0u : always_logged;
+  instance->base.logged = loggingOn ? ~0u : HX_LOG_ALWAYS;
   if (instanceName) snprintf(instance->base.name, sizeof instance->base.name, "%s", instanceName);
   instance->base.state.interface = fmuType == fmi2CoSimulation ? HX_CO_SIMULATION : HX_MODEL_EXCHANGE;
   hxStatus status = HX_INVALID_ARGUMENT;
@@ -227,31 +178,12 @@ void fmi2FreeInstance(fmi2Component c) {
   free(instance);
 }
 
-/* the plant's accuracy is its own parameter, so that results do not depend on an importer's settings */
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
   fmi2Instance *instance = enter(c, SETUP_EXPERIMENT);
-  if (!instance) return fmi2Error;
-  if (!isfinite(startTime) || (stopTimeDefined && !(stopTime >= startTime))) {
-    hx_log(&instance->base, HX_LOG_ERROR,
-           "fmi2SetupExperiment: got %g s to %g s, expected a finite start and a stop not before it; nothing was changed", startTime,
-           stopTimeDefined ? stopTime : startTime);
-    return fmi2Error;
-  }
-  if (fabs(startTime) > hx_latest_start) {
-    hx_log(&instance->base, HX_LOG_ERROR,
-           "fmi2SetupExperiment: got a start at %.17g s, expected one within %g s of 0, as a later clock is too coarse for the plant's "
-           "steps; nothing was changed, count time from a later origin",
-           startTime, hx_latest_start);
-    return fmi2Error;
-  }
-  instance->base.state.start_time = startTime;
-  instance->base.state.stop_time = stopTimeDefined ? stopTime : INFINITY;
-  instance->base.state.model_stale = 1;
-  if (!toleranceDefined || (tolerance > 0.0 && tolerance < 1.0)) return fmi2OK;
-  hx_log(&instance->base, HX_LOG_WARNING, "fmi2SetupExperiment: got tolerance %g, expected one in ]0, 1[; ignored, solver.tolerance holds",
-         tolerance);
-  return fmi2Warning;
+  const char *name = calls[SETUP_EXPERIMENT].name;
+  if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined, stopTime) != HX_OK) return fmi2Error;
+  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance) ? fmi2OK : fmi2Warning;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
@@ -385,14 +317,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
   fmi2Instance *instance = enter(c, SERIALIZE);
   if (!instance || !given(instance, SERIALIZE, 1, FMUstate, serializedState)) return fmi2Error;
-  if (size < hx_instance_state_size()) {
-    hx_log(&instance->base, HX_LOG_ERROR, "fmi2SerializeFMUstate: got room for %zu bytes, expected %zu; nothing was written", size,
-           hx_instance_state_size());
-    return fmi2Error;
-  }
-  if (hx_instance_seal(&instance->base, FMUstate) != HX_OK) return fmi2Error;
-  memcpy(serializedState, FMUstate, hx_instance_state_size());
-  return fmi2OK;
+  return status_of(hx_instance_serialize(&instance->base, calls[SERIALIZE].name, FMUstate, serializedState, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate) {
@@ -421,22 +346,12 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
   return fmi2Error;
 }
 
-/* derivatives are of order 1; complains about others */
-static int are_first(fmi2Instance *instance, fmi2Call call, size_t n, const fmi2Integer order[]) {
-  for (size_t i = 0; i < n; i++)
-    if (order[i] != 1) {
-      hx_log(&instance->base, HX_LOG_ERROR, "%s: got order %d, expected 1; nothing was done", calls[call].name, (int)order[i]);
-      return 0;
-    }
-  return 1;
-}
-
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
                                        const fmi2Real value[]) {
   fmi2Instance *instance = enter(c, SET_INPUT_DERIVATIVES);
   if (!instance || !given(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) || !given(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
     return fmi2Error;
-  if (!are_first(instance, SET_INPUT_DERIVATIVES, nvr, order)) return fmi2Error;
+  if (!hx_call_first_order(&instance->base, &calls[SET_INPUT_DERIVATIVES], nvr, order)) return fmi2Error;
   return status_of(hx_instance_set_input_rates(&instance->base, vr, nvr, value));
 }
 
@@ -445,7 +360,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
   fmi2Instance *instance = enter(c, GET_OUTPUT_DERIVATIVES);
   if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
     return fmi2Error;
-  if (!are_first(instance, GET_OUTPUT_DERIVATIVES, nvr, order)) return fmi2Error;
+  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order)) return fmi2Error;
   return status_of(hx_instance_get_output_rates(&instance->base, vr, nvr, value));
 }
 

@@ -161,8 +161,7 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
   return HX_OK;
 }
 
-hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value) {
-  char *variables = (char *)&instance->state.variables;
+hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value) {
   hxCausality causality;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = hx_instance_find(instance, type, reference[i], &causality);
@@ -170,6 +169,14 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
     const hxStatus status = check_set(instance, variable, causality, value_at(type, value, i));
     if (status != HX_OK) return status;
   }
+  return HX_OK;
+}
+
+hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value) {
+  char *variables = (char *)&instance->state.variables;
+  hxCausality causality = HX_INPUT;
+  const hxStatus status = hx_instance_check_set(instance, type, reference, n, value);
+  if (status != HX_OK) return status;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = hx_variable_find(reference[i], &causality);
     const int number = type == HX_REAL ? 0 : ((const int *)value)[i],
@@ -188,6 +195,32 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
 
 double hx_instance_time(const hxInstance *instance) {
   return instance->state.model_stale ? instance->state.start_time : hx_component_time(instance->component);
+}
+
+hxStatus hx_instance_set_experiment(hxInstance *instance, const char *call, double start, int stop_defined, double stop) {
+  if (!isfinite(start) || (stop_defined && !(stop >= start))) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got %g s to %g s, expected a finite start and a stop not before it; nothing was changed", call,
+           start, stop_defined ? stop : start);
+    return HX_INVALID_ARGUMENT;
+  }
+  if (fabs(start) > hx_latest_start) {
+    hx_log(instance, HX_LOG_ERROR,
+           "%s: got a start at %.17g s, expected one within %g s of 0, as a later clock is too coarse for the plant's "
+           "steps; nothing was changed, count time from a later origin",
+           call, start, hx_latest_start);
+    return HX_INVALID_ARGUMENT;
+  }
+  instance->state.start_time = start;
+  instance->state.stop_time = stop_defined ? stop : INFINITY;
+  instance->state.model_stale = 1;
+  return HX_OK;
+}
+
+/* the plant's accuracy is its own parameter, so that results do not depend on an importer's settings */
+int hx_instance_note_tolerance(hxInstance *instance, const char *call, int defined, double tolerance) {
+  if (!defined || (tolerance > 0.0 && tolerance < 1.0)) return 1;
+  hx_log(instance, HX_LOG_WARNING, "%s: got tolerance %g, expected one in ]0, 1[; ignored, solver.tolerance holds", call, tolerance);
+  return 0;
 }
 
 hxStatus hx_instance_initialize(hxInstance *instance) {
@@ -215,8 +248,8 @@ static double clock_tolerance(double t, double h, double sums) {
   return fmax(last_bits, fmin(1e-9 + sums * fabs(t), 0.5 * h));
 }
 
-/* the component goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up */
-hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
+/* whether there can be such a step */
+static hxStatus check_step(hxInstance *instance, double t, double h) {
   const double now = hx_instance_time(instance);
   if (!(h > 0.0 && h <= longest_step)) {
     hx_log(instance, HX_LOG_ERROR,
@@ -239,13 +272,11 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
         h, t, instance->state.stop_time);
     return HX_INVALID_ARGUMENT;
   }
-  /* an extra step of rounding size may end where it began or before our own time: it is done */
-  if (t + h <= now) return HX_OK;
-  hxInput end;
-  hxStatus status = hx_instance_ramp_end(instance, h, &end);
-  if (status != HX_OK) return status;
-  status = hx_component_step(instance->component, &instance->state.variables, instance->state.ramped ? &instance->state.input_rate : NULL,
-                             t + h);
+  return HX_OK;
+}
+
+/* what is left to do after the component's step: its input is that of its end */
+static hxStatus finish_step(hxInstance *instance, double t, double h, const hxInput *end, hxStatus status) {
   if (status == HX_INVALID_ARGUMENT) {
     hx_log(instance, HX_LOG_ERROR, "step from %.17g s by %.17g s: %s; the state is unchanged", t, h,
            hx_component_message(instance->component));
@@ -256,11 +287,32 @@ hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
            h, hx_component_message(instance->component));
     return status;
   }
-  instance->state.variables.input = end;
+  instance->state.variables.input = *end;
   if (!instance->state.ramped) memset(&instance->state.input_rate, 0, sizeof instance->state.input_rate);
   instance->state.ramped = 0;
   hx_stale(instance);
   return HX_OK;
+}
+
+/* The component goes from its own time to t + h, so that the importer's clock is adopted and errors do not pile up; an extra step of
+ * rounding size may end where it began or before our own time: it is done. */
+hxStatus hx_instance_step(hxInstance *instance, double t, double h) {
+  const hxInput *rate = instance->state.ramped ? &instance->state.input_rate : NULL;
+  hxInput end;
+  hxStatus status = check_step(instance, t, h);
+  if (status != HX_OK || t + h <= hx_instance_time(instance)) return status;
+  status = hx_instance_ramp_end(instance, h, &end);
+  if (status != HX_OK) return status;
+  return finish_step(instance, t, h, &end, hx_component_step(instance->component, &instance->state.variables, rate, t + h));
+}
+
+hxStatus hx_instance_step_to_event(hxInstance *instance, double t, double h, int stop, int *event) {
+  const struct hxVariables *variables = &instance->state.variables;
+  *event = 0;
+  if (!hx_continuous || instance->state.ramped) return hx_instance_step(instance, t, h);
+  const hxStatus status = check_step(instance, t, h);
+  if (status != HX_OK || t + h <= hx_instance_time(instance)) return status;
+  return finish_step(instance, t, h, &variables->input, hx_continuous->step(instance->component, variables, t + h, stop, event));
 }
 
 /* the component goes back as well, so that saved states of a reset instance and of a new one are the same bytes */

@@ -64,9 +64,22 @@ void hx_instance_close(hxInstance *instance);
 /* Values by reference, n at once. Integers and Booleans come as int, by the type asked for. */
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value);
 hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value);
+hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value);
+
+/* FMI 3: of whole arrays, n_values numbers in all; integers are int64_t, Booleans bool. */
+hxStatus hx_arrays_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value, size_t n_values);
+hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value, size_t n_values);
+hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,
+                               const double change[], size_t n_change, double result[], size_t n_result);
+hxStatus hx_arrays_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n, double rate[], size_t n_rate);
+
+/* When it all begins and, if stop_defined, ends. The tolerance is not used, only looked at: the sound ones return 1. */
+hxStatus hx_instance_set_experiment(hxInstance *instance, const char *call, double start, int stop_defined, double stop);
+int hx_instance_note_tolerance(hxInstance *instance, const char *call, int defined, double tolerance);
 
 hxStatus hx_instance_initialize(hxInstance *instance); /* the component takes the parameters */
 hxStatus hx_instance_step(hxInstance *instance, double t, double h);
+hxStatus hx_instance_step_to_event(hxInstance *instance, double t, double h, int stop, int *event); /* see component.h */
 void hx_instance_reset(hxInstance *instance);
 double hx_instance_time(const hxInstance *instance);
 
@@ -86,14 +99,30 @@ hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[],
 hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n, const double rate[]);
 hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n, double rate[]);
 
-/* Saved states: one block without pointers. check finds out whether n bytes are an intact one of this FMU. */
+/* Saved states: one block without pointers. serialize copies one into room for n bytes, with the checksum that check verifies; check finds
+ * out whether n bytes are an intact one of this FMU. */
 size_t hx_instance_state_size(void);
 void hx_instance_save(const hxInstance *instance, void *block);
 hxStatus hx_instance_restore(hxInstance *instance, const void *block);
-hxStatus hx_instance_seal(hxInstance *instance, void *block); /* writes the checksum that check verifies */
+hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *block, void *bytes, size_t n);
 hxStatus hx_instance_check(hxInstance *instance, const void *block, size_t n);
 
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);
+
+/* A function of the standard: when it may be called, as masks. */
+typedef struct hxCall {
+  const char *name;
+  int modes, interfaces;
+} hxCall;
+
+/* Whether a call is legal now; whether n elements may be at two places; whether derivatives are of order 1. They complain if not. */
+int hx_call_admit(hxInstance *instance, const hxCall *call);
+int hx_call_given(hxInstance *instance, const hxCall *call, size_t n, const void *array, const void *other);
+int hx_call_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]);
+
+/* What is passed on: refusals and discarded steps always, the rest when the importer wants it. choose: these categories, all when n = 0. */
+enum { HX_LOG_ALWAYS = 1u << HX_LOG_ERROR | 1u << HX_LOG_DISCARD };
+hxStatus hx_log_choose(hxInstance *instance, const char *call, int on, size_t n, const char *const category[]);
 
 /* Reads start_values.txt of the resources into start; *found says whether there is one. */
 hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found);

@@ -55,6 +55,10 @@ static void rates(hxComponent *component, struct hxVariables *variables) {
   hx_plant_rates(plant_of(component), &variables->input, &variables->rate);
 }
 
+static hxStatus step(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event) {
+  return hx_plant_step_to_event(plant_of(component), &variables->input, t_end, stop, event);
+}
+
 static void indicate(const hxComponent *component, double indicator[]) { hx_plant_penetration(const_plant(component), indicator); }
 
 static int update(hxComponent *component) { return hx_plant_update_contacts(plant_of(component)); }
@@ -71,6 +75,7 @@ static const hxContinuous continuous = {
     .get = get_state,
     .set = set_state,
     .rates = rates,
+    .step = step,
     .indicate = indicate,
     .update = update,
     .tangent = tangent,

@@ -12,7 +12,7 @@ typedef struct hxStateHeader {
   char magic[8];
   uint32_t format;
   uint32_t size;     /* of the block: another word size or component makes another one */
-  uint64_t checksum; /* of what follows the header; written by hx_instance_seal */
+  uint64_t checksum; /* of what follows the header; written by hx_instance_serialize */
   char guid[HX_GUID_SIZE];
 } hxStateHeader;
 
@@ -51,11 +51,16 @@ static const char *fault(const hxInstance *instance, const hxStateHeader *header
   return strncmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL : "one of another FMU";
 }
 
-hxStatus hx_instance_seal(hxInstance *instance, void *bytes) {
-  hxStateBlock *block = bytes;
+hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *saved, void *bytes, size_t n) {
+  hxStateBlock *block = saved;
   const char *what = fault(instance, &block->header);
   if (what) return refuse(instance, what);
+  if (n < hx_instance_state_size()) {
+    hx_log(instance, HX_LOG_ERROR, "%s: got room for %zu bytes, expected %zu; nothing was written", call, n, hx_instance_state_size());
+    return HX_INVALID_ARGUMENT;
+  }
   block->header.checksum = checksum(block);
+  memcpy(bytes, block, hx_instance_state_size());
   return HX_OK;
 }
 

@@ -17,6 +17,7 @@ typedef struct hxVariable {
   double min, max;   /* inclusive, finite: what lies outside, infinite or NaN is refused */
   unsigned short offset; /* into struct hxVariables */
   unsigned char type;    /* hxType */
+  unsigned short run;    /* FMI 3: rows of the array that begins here, 1 for a scalar; 0 within an array */
 } hxVariable;
 
 /* The variables of one causality; their value references are first, first + 1, ... */
@@ -37,6 +38,9 @@ typedef struct hxStateRow {
 /* In the order of the state in struct hxVariables; none without model exchange. */
 extern const hxStateRow *const hx_states;
 extern const size_t hx_state_count;
+
+/* FMI 3: the reference of the independent variable, time. */
+extern const unsigned hx_time_reference;
 
 /* Names of the log categories, in the order of hxLogCategory. */
 extern const char *const hx_log_category_names[];

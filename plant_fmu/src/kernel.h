@@ -10,6 +10,11 @@
 
 HX_HIDDEN_BEGIN
 
+/* Touch-downs and lift-offs: whether a call ends at the first, and whether there was one. */
+typedef struct hxEvents {
+  int stop, found;
+} hxEvents;
+
 typedef struct hxKernel {
   const char *name;
   int (*runs_here)(void); /* whether this processor has its instructions */
@@ -17,8 +22,10 @@ typedef struct hxKernel {
   /* Sets contacts, energy, counters and time of a motion that starts here and now. */
   void (*start)(const hxModel *model, double t, hxState *state);
 
-  /* Advances the state to t_end exactly; the command changes by the ramp per second, or is held (NULL). On failure the state is somewhere on the way and the message says why. */
-  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state, char *message);
+  /* Advances the state to t_end exactly, or to an event; the command changes by the ramp per second, or is held (NULL). A command older than
+   * the state is that of a call which an event broke off. On failure the state is somewhere on the way and the message says why. */
+  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
+                        hxState *state, char *message);
 
   /* dy/dt, with or without the multipliers on the way. */
   void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate);

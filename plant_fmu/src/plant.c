@@ -19,7 +19,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 4;
+static const uint64_t saved_version = 5;
 
 static uint64_t checksum(const hxSaved *saved) { return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model)); }
 
@@ -66,8 +66,6 @@ static double largest(double so_far, const void *first, size_t n) {
   return so_far;
 }
 
-hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) { return hx_plant_step_ramp(plant, input, NULL, t_end); }
-
 /* a rate as a command, unless it is none; *finite says whether it is one of numbers */
 static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *finite) {
   const double size = largest(0.0, rate, sizeof *rate / sizeof(double));
@@ -77,7 +75,8 @@ static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *fi
   return command;
 }
 
-hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end) {
+/* An event breaks a call off; what goes on under the same held input is the same call, so that the motion does not depend on it. */
+static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end, hxEvents *events) {
   const hxState before = plant->state;
   hxCommand command, change;
   int finite;
@@ -90,9 +89,30 @@ hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput 
   }
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
-  hx_command_from_input(&command, input, plant->state.time);
-  status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, &plant->state, plant->message);
-  if (status != HX_OK) plant->state = before;
+  const uint64_t fingerprint = !ramp && (events->stop || before.call_input) ? hx_checksum(1, input, sizeof *input) : 0;
+  const int goes_on = before.call_input && before.call_input == fingerprint && before.call_start < before.time;
+  hx_command_from_input(&command, input, goes_on ? before.call_start : before.time);
+  status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state, plant->message);
+  if (status != HX_OK) {
+    plant->state = before;
+    return status;
+  }
+  const int broken_off = plant->state.time < t_end;
+  plant->state.call_input = broken_off ? fingerprint : 0;
+  plant->state.call_start = broken_off ? command.time : 0.0;
+  return HX_OK;
+}
+
+hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) { return hx_plant_step_ramp(plant, input, NULL, t_end); }
+
+hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end) {
+  return run(plant, input, rate, t_end, &(hxEvents){.stop = 0});
+}
+
+hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop, int *event) {
+  hxEvents events = {.stop = stop};
+  const hxStatus status = run(plant, input, NULL, t_end, &events);
+  *event = events.found && status == HX_OK;
   return status;
 }
 
@@ -143,6 +163,7 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
                   "coordinates: got a number that is not finite, or a quaternion near 0; expected a state of the robot");
   hx_kernel()->place(&plant->model, x, &plant->state.motion);
   plant->state.time = t;
+  plant->state.call_input = 0;
   return HX_OK;
 }
 

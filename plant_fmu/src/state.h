@@ -5,6 +5,8 @@
 #ifndef HX_STATE_H
 #define HX_STATE_H
 
+#include <stdint.h>
+
 #include "hexapod/hexapod.h"
 #include "hexapod/inside.h"
 
@@ -80,6 +82,8 @@ typedef struct hxState {
   double next_step;        /* s  what the error control would take next */
   double first_step;       /* s  the same for the first step of a call, which new inputs shorten */
   double stored_at_start;  /* J  energy the audit starts from */
+  double call_start;       /* s  when the call began that an event broke off */
+  uint64_t call_input;     /* checksum of its input; 0: no call was broken off */
   hxMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;

@@ -224,6 +224,10 @@ HX_API hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end
  * what speed_ref moves the drives by. */
 HX_API hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end);
 
+/* hx_plant_step, but *event tells whether a foot touched down or lifted off, and with stop the call ends there, hx_plant_time says when.
+ * Going on under the same input to the same end gives, bit for bit, what the call would have given without the stop. */
+HX_API hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop, int *event);
+
 /* Everything there is to see at the present time under this input. */
 HX_API void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output);
 

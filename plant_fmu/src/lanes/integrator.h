@@ -301,8 +301,9 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   return HX_OK;
 }
 
-/* From state->time to t_end; the last step lands on it exactly. */
-static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state, char *message) {
+/* From state->time to t_end; the last step lands on it exactly. A call that an event broke off goes on as if it had not been. */
+static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
+                       hxState *state, char *message) {
   hxStart start = {.model = model,
                    .command = command,
                    .ramp = ramp,
@@ -311,9 +312,11 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .y = &state->motion};
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
-  double first = fmin(state->first_step, state->next_step), *next_step = &first; /* new inputs: a larger error than the last step's */
-  while (state->time < t_end) {
+  double first = fmin(state->first_step, state->next_step); /* new inputs: a larger error than the last step's */
+  double *next_step = command->time < state->time ? &state->next_step : &first;
+  while (state->time < t_end && !(events->stop && events->found)) {
     const double left = t_end - state->time;
+    const hxContactState before = state->contact;
     double taken;
     start.t = state->time;
     const hxStatus status = advance(&start, left, next_step, state, &taken, message);
@@ -321,13 +324,14 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
     if (next_step == &first) state->first_step = first, next_step = &state->next_step;
     const double t = state->time + taken;
     state->time = taken >= left || t_end - t < step_floor ? t_end : t;
+    events->found |= memcmp(before.closed, state->contact.closed, sizeof before.closed) != 0;
   }
   return HX_OK;
 }
 
-static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state,
-                          char *message) {
-  const double t_start = state->time;
+static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
+                          hxState *state, char *message) {
+  const double t_start = command->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
   if (count > steps_allowed(t_end - t_start)) {
     snprintf(message, HX_MESSAGE_SIZE,
@@ -336,18 +340,18 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
              model->step, count, steps_allowed(t_end - t_start));
     return HX_STEP_TOO_SMALL;
   }
-  for (double i = 1.0; i <= count; i += 1.0) {
+  for (double i = 1.0; i <= count && !(events->stop && events->found); i += 1.0) {
     const double t = i < count ? t_start + (t_end - t_start) * (i / count) : t_end;
-    const hxStatus status = run_to(model, command, ramp, t, state, message);
+    const hxStatus status = run_to(model, command, ramp, t, events, state, message);
     if (status != HX_OK) return status;
   }
   return HX_OK;
 }
 
-/* Advances the state to t_end exactly. On failure the state is somewhere on the way and the message says why. */
-static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxState *state,
-                             char *message) {
-  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end, state, message);
+/* Advances the state to t_end exactly, or to an event. On failure the state is somewhere on the way and the message says why. */
+static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
+                             hxState *state, char *message) {
+  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end, events, state, message);
   fill_motion_slots(&state->motion);
   return status;
 }
