@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from command import Call
+from fmi3_plant import Plant3
 from fmi_plant import Plant
 
 from hexapod_cosim.cosim.cli import main
@@ -56,6 +57,19 @@ def plant(plant_library: Path) -> Iterator[Plant]:
 def running(plant: Plant) -> Plant:
     """The same, ready to step."""
     return plant.initialize()
+
+
+@pytest.fixture
+def plant3(plant_library: Path) -> Iterator[Plant3]:
+    """An FMI 3.0 co-simulation instance, not yet initialised."""
+    with Plant3(plant_library) as instance:
+        yield instance
+
+
+@pytest.fixture
+def running3(plant3: Plant3) -> Plant3:
+    """The same, ready to step."""
+    return plant3.initialize()
 
 
 @pytest.fixture(scope="session")

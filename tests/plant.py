@@ -50,6 +50,7 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_plant_time": (Real, [plant]),
         "hx_plant_message": (ct.c_char_p, [plant]),
         "hx_plant_state_size": (ct.c_size_t, []),
+        "hx_plant_step_to_event": (status, [plant, ct.POINTER(HxInput), Real, ct.c_int, ct.POINTER(ct.c_int)]),
         "hx_plant_get_state": (None, [plant, ct.c_char_p]),
         "hx_plant_set_state": (status, [plant, ct.c_char_p, ct.c_size_t]),
         "hx_plant_get_bodies": (None, [plant, Doubles]),
@@ -212,6 +213,12 @@ class Plant:
     def step(self, t_end: float, command: Command | None = None) -> None:
         """Integrates to t_end [s] under a command (default: hold the stance)."""
         self._check(self.core.hx_plant_step(self.handle, inputs(command or self.hold()), t_end))
+
+    def step_to_event(self, t_end: float, command: Command, *, stop: bool = True) -> bool:
+        """Integrates to t_end [s], or to the next event if `stop`; whether there was one."""
+        event = ct.c_int()
+        self._check(self.core.hx_plant_step_to_event(self.handle, inputs(command), t_end, stop, event))
+        return bool(event.value)
 
     def output_record(self, command: Command | None = None) -> Any:
         """The HxOutput of the present state under a command."""

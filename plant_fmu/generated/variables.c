@@ -926,7 +926,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{1d2d8fd6-2e2d-49d9-ab16-83e84950f571}";
+const char hx_default_guid[] = "{87b543c6-3488-47e7-8aba-ac7ee3ebf675}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

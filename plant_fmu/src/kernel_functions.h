@@ -11,7 +11,7 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   static const hxCommand no_command;
   hxWork work;
   state->time = t;
-  state->call_start = 0.0, state->call_input = 0;
+  state->call_start = state->call_input = 0.0;
   state->next_step = state->first_step = fmin(cautious_step, model->step_max);
   state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;

@@ -75,6 +75,9 @@ static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *fi
   return command;
 }
 
+/* tells inputs apart: 52 bits of a checksum, never 0 */
+static double fingerprint_of(const hxInput *input) { return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12); }
+
 /* An event breaks a call off; what goes on under the same held input is the same call, so that the motion does not depend on it. */
 static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end, hxEvents *events) {
   const hxState before = plant->state;
@@ -89,8 +92,8 @@ static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, d
   }
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
-  const uint64_t fingerprint = !ramp && (events->stop || before.call_input) ? hx_checksum(1, input, sizeof *input) : 0;
-  const int goes_on = before.call_input && before.call_input == fingerprint && before.call_start < before.time;
+  const double fingerprint = !ramp && (events->stop || before.call_input != 0.0) ? fingerprint_of(input) : 0.0;
+  const int goes_on = before.call_input != 0.0 && before.call_input == fingerprint && before.call_start < before.time;
   hx_command_from_input(&command, input, goes_on ? before.call_start : before.time);
   status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state, plant->message);
   if (status != HX_OK) {
@@ -98,7 +101,7 @@ static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, d
     return status;
   }
   const int broken_off = plant->state.time < t_end;
-  plant->state.call_input = broken_off ? fingerprint : 0;
+  plant->state.call_input = broken_off ? fingerprint : 0.0;
   plant->state.call_start = broken_off ? command.time : 0.0;
   return HX_OK;
 }
@@ -163,7 +166,7 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
                   "coordinates: got a number that is not finite, or a quaternion near 0; expected a state of the robot");
   hx_kernel()->place(&plant->model, x, &plant->state.motion);
   plant->state.time = t;
-  plant->state.call_input = 0;
+  plant->state.call_input = 0.0;
   return HX_OK;
 }
 

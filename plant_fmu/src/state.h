@@ -5,8 +5,6 @@
 #ifndef HX_STATE_H
 #define HX_STATE_H
 
-#include <stdint.h>
-
 #include "hexapod/hexapod.h"
 #include "hexapod/inside.h"
 
@@ -83,7 +81,7 @@ typedef struct hxState {
   double first_step;       /* s  the same for the first step of a call, which new inputs shorten */
   double stored_at_start;  /* J  energy the audit starts from */
   double call_start;       /* s  when the call began that an event broke off */
-  uint64_t call_input;     /* checksum of its input; 0: no call was broken off */
+  double call_input;       /* 1  checksum of its input, a whole number; 0: no call was broken off */
   hxMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
