@@ -48,16 +48,16 @@ def archive_problems(path: Path) -> list[str]:
         if damaged:
             return [f"{damaged} is damaged: its checksum is wrong"]
         found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
-        problems = list(_zip_problems(archive))
+        problems = list(zip_problems(archive))
     problems += schema_problems(DESCRIPTION, found[DESCRIPTION], "fmi2/fmi2ModelDescription.xsd")
     if problems:
         return problems
     root = ElementTree.fromstring(found[DESCRIPTION])
-    checks = (_source_problems, _binary_problems, _terminal_problems, _document_problems)
+    checks = (_source_problems, _binary_problems, _terminal_problems, document_problems)
     return description_problems(root) + [problem for check in checks for problem in check(root, found)]
 
 
-def _zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
+def zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
     """Section 2.3: what any unpacker can be expected to handle."""
     names = archive.namelist()
     for name in sorted({name for name in names if names.count(name) > 1}):
@@ -108,7 +108,7 @@ def _is_there(include: str, name: str, present: Iterable[str]) -> bool:
 def standard_functions(header: str = HEADERS[0]) -> list[str]:
     """Every function that the standard asks of a binary."""
     text = (Path(fmpy.__file__).parent / "c-code" / header).read_text(encoding="utf-8")
-    return re.findall(r"FMI2_Export fmi2\w+TYPE\s+(fmi2\w+);", text)
+    return re.findall(r"FMI[23]_Export fmi[23]\w+TYPE\s+(fmi[23]\w+);", text)
 
 
 def _binary_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
@@ -124,12 +124,12 @@ def _binary_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
         for identifier in sorted(identifiers):
             name = f"binaries/{platform}/{identifier}{PLATFORMS[platform][0]}"
             if name in found:
-                yield from _library_problems(name, found[name], platform)
+                yield from library_problems(name, found[name], platform)
             else:
                 yield f"{name} is missing: importers look for the modelIdentifier"
 
 
-def _library_problems(name: str, data: bytes, platform: str) -> Iterator[str]:
+def library_problems(name: str, data: bytes, platform: str, *, header: str = HEADERS[0]) -> Iterator[str]:
     """By its bytes alone, so that it works for machines that are not this one."""
     _, magic, place, machine = PLATFORMS[platform]
     if magic == MACH and data.startswith(FAT):
@@ -142,7 +142,7 @@ def _library_problems(name: str, data: bytes, platform: str) -> Iterator[str]:
         yield f"{name} is no library of {platform}"
         return
     start = b"\0_" if magic in (MACH, FAT) else b"\0"
-    missing = [function for function in standard_functions() if start + function.encode() + b"\0" not in data]
+    missing = [function for function in standard_functions(header) if start + function.encode() + b"\0" not in data]
     if missing:
         yield f"{name} lacks {len(missing)} functions of the standard: {', '.join(missing)}"
 
@@ -179,7 +179,7 @@ def _group_problems(parent: Element, path: str, known: set[str]) -> Iterator[str
         yield from _group_problems(terminal, f"{where}.", known)
 
 
-def _document_problems(_: Element, found: dict[str, bytes]) -> Iterator[str]:
+def document_problems(_: Element | None, found: dict[str, bytes]) -> Iterator[str]:
     for name, use in ((LICENCE, "the licence"), (PAGE, "the documentation")):
         if not found.get(name, b"").strip():
             yield f"{name}, {use}, is missing"

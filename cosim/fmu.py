@@ -28,6 +28,7 @@ from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 WARNING = STATUS.index("warning")
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
+FIX = "make one with `hexapod export -o FILE.fmu`"
 SUFFIX = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}  # of fmi2Get..., fmi2Set...
 
 
@@ -283,20 +284,25 @@ class Fmu:
 
 def read_description(path: Path) -> Any:
     """Model description, as fmpy reads it, of an FMI 2.0 co-simulation FMU. Raises FmuError for anything else."""
-    fix = "make one with `hexapod export -o FILE.fmu`"
+    description = open_description(path)
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        kind = "co-simulation" if description.coSimulation else "model exchange only"
+        raise FmuError(
+            "wrong kind of FMU", got=f"FMI {description.fmiVersion}, {kind}", expected="FMI 2.0 for co-simulation", fix=FIX, where=str(path)
+        )
+    return description
+
+
+def open_description(path: Path) -> Any:
+    """Model description, as fmpy reads it, of an FMU of any version. Raises FmuError when it is none."""
     if not path.is_file():
-        raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=fix)
+        raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)
     try:
         description = read_model_description(path, validate=False)
     except (zipfile.BadZipFile, KeyError) as error:
         raise FmuError(
-            "not an FMU", got=error.args[0], expected="a ZIP file with a modelDescription.xml", fix=fix, where=str(path)
+            "not an FMU", got=error.args[0], expected="a ZIP file with a modelDescription.xml", fix=FIX, where=str(path)
         ) from error
     except Exception as error:
-        raise FmuError("the FMU's modelDescription.xml cannot be read", got=str(error), fix=fix, where=str(path)) from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        kind = "co-simulation" if description.coSimulation else "model exchange only"
-        raise FmuError(
-            "wrong kind of FMU", got=f"FMI {description.fmiVersion}, {kind}", expected="FMI 2.0 for co-simulation", fix=fix, where=str(path)
-        )
+        raise FmuError("the FMU's modelDescription.xml cannot be read", got=str(error), fix=FIX, where=str(path)) from error
     return description

@@ -156,10 +156,11 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
         "start": variable.start,
         "derivative": interface.derivative_of.get(variable.name),
     }
-    SubElement(element, variable.type, {name: _text(value) for name, value in attributes.items() if value is not None})
+    SubElement(element, variable.type, {name: attribute_text(value) for name, value in attributes.items() if value is not None})
 
 
-def _text(value: float | int | str) -> str:
+def attribute_text(value: float | int | str) -> str:
+    """A number, truth or text as XML has it."""
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else repr(value)

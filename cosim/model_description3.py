@@ -9,7 +9,14 @@ from xml.etree.ElementTree import Element, SubElement
 from hexapod_cosim.cosim.arrays import Array, arrays
 from hexapod_cosim.cosim.components import Component
 from hexapod_cosim.cosim.interface import Enumeration, Interface, Unit
-from hexapod_cosim.cosim.model_description import ModelDescription, add_log_categories, add_units, general_facts, render_fmi2
+from hexapod_cosim.cosim.model_description import (
+    ModelDescription,
+    add_log_categories,
+    add_units,
+    attribute_text,
+    general_facts,
+    render_fmi2,
+)
 from hexapod_cosim.cosim.plant_files import DISTRIBUTION
 
 # what the binary can do; tests/test_fmi3.py holds each of these to its word
@@ -130,7 +137,7 @@ def _add_variable(parent: Element, array: Array, units: Iterable[Unit], derivati
         "start": _starts(array),
         "derivative": derivative_of,
     }
-    stated = {name: _text(value) for name, value in attributes.items() if value is not None}
+    stated = {name: attribute_text(value) for name, value in attributes.items() if value is not None}
     element = SubElement(parent, TYPES[first.type], stated)
     for size in array.shape:
         SubElement(element, "Dimension", start=str(size))
@@ -138,12 +145,7 @@ def _add_variable(parent: Element, array: Array, units: Iterable[Unit], derivati
 
 def _starts(array: Array) -> str | None:
     """The elements' start values; None for outputs."""
-    values = [element.start for element in array.elements]
-    return None if array.first.start is None else " ".join(repr(value) for value in values)
-
-
-def _text(value: float | int | str) -> str:
-    return value if isinstance(value, str) else repr(value)
+    return None if array.first.start is None else " ".join(attribute_text(e.start) for e in array.elements if e.start is not None)
 
 
 def _add_structure(root: Element, interface: Interface, variables: tuple[Array, ...]) -> None:

@@ -15,9 +15,10 @@ from fmpy.validation import validate_fmu
 
 from hexapod_cosim.cosim.archive_check import archive_problems
 from hexapod_cosim.cosim.components import CONTROLLER
-from hexapod_cosim.cosim.fmu import Fmu, read_description
+from hexapod_cosim.cosim.fmu import Fmu, open_description, read_description
 from hexapod_cosim.cosim.plant_files import fmi2_platform
 from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.validation3 import find_own_problems3
 from hexapod_cosim.models import HexapodError
 
 START_VALUES = "resources/start_values.txt"
@@ -28,6 +29,9 @@ FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
 
 def find_problems(path: Path) -> list[str]:
     """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when it is no FMU at all."""
+    description = open_description(path)
+    if description.fmiVersion.startswith("3.") and description.coSimulation is not None:
+        return [*map(str, validate_fmu(str(path))), *find_own_problems3(path, description)]
     read_description(path)
     return [*map(str, validate_fmu(str(path))), *find_own_problems(path)]
 

@@ -1,0 +1,140 @@
+"""Is this FMI 3.0 FMU one of ours, and sound? What `cosim/validation.py` asks of FMI 2.0, where the standards differ."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator
+from contextlib import chdir, suppress
+from itertools import chain
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any
+from xml.etree import ElementTree
+
+from fmpy import extract, platform_tuple
+from fmpy.fmi3 import FMU3Slave
+
+from hexapod_cosim.cosim.archive_check import BUILD_DESCRIPTION, DESCRIPTION, TERMINALS, document_problems, library_problems, zip_problems
+from hexapod_cosim.cosim.description_check import schema_problems
+
+SCHEMAS = {DESCRIPTION: "fmi3ModelDescription", BUILD_DESCRIPTION: "fmi3BuildDescription", TERMINALS: "fmi3TerminalsAndIcons"}
+START_VALUES, CHECKSUM = "resources/start_values.txt", "checksum "
+FOREIGN_TOKEN = "{00000000-0000-0000-0000-000000000000}"
+TRIAL_STEP = 0.001  # s
+
+
+def find_own_problems3(path: Path, description: Any) -> list[str]:
+    """What is wrong, one sentence each, of an FMU whose model description fmpy has read."""
+    with zipfile.ZipFile(path) as archive:
+        damaged = archive.testzip()
+        if damaged:
+            return [f"{damaged} is damaged: its checksum is wrong"]
+        found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+        problems = list(zip_problems(archive))
+    for member, schema in SCHEMAS.items():
+        problems += schema_problems(member, found[member], f"fmi3/{schema}.xsd") if member in found else [f"{member} is missing"]
+    if problems:
+        return problems
+    checks = (_source_problems(found), _binary_problems(found, description), _terminal_problems(found, description))
+    problems += [*chain(*checks), *document_problems(None, found), *_start_value_problems(found, description)]
+    return problems or _run_problems(path, description)
+
+
+def _source_problems(found: dict[str, bytes]) -> Iterator[str]:
+    """Sources listed and present, both ways."""
+    root = ElementTree.fromstring(found[BUILD_DESCRIPTION])
+    listed = {f"sources/{file.get('name')}" for file in root.iter("SourceFile")}
+    for name in sorted(listed - set(found)):
+        yield f"{BUILD_DESCRIPTION} lists {name}, which is not in the archive"
+    for name in sorted(name for name in found if name.startswith("sources/") and name.endswith(".c") and name not in listed):
+        yield f"{name} is not listed by {BUILD_DESCRIPTION}"
+
+
+def _binary_problems(found: dict[str, bytes], description: Any) -> Iterator[str]:
+    for name in sorted(name for name in found if name.startswith("binaries/")):
+        path = PurePosixPath(name)
+        if path.stem != description.coSimulation.modelIdentifier:
+            yield f"{name} does not have the name of the modelIdentifier"
+        else:
+            yield from library_problems(name, found[name], path.parts[1], header="fmi3Functions.h")
+
+
+def _terminal_problems(found: dict[str, bytes], description: Any) -> Iterator[str]:
+    known = {variable.name for variable in description.modelVariables}
+    for member in ElementTree.fromstring(found[TERMINALS]).iter("TerminalMemberVariable"):
+        if member.get("variableName") not in known:
+            yield f"{TERMINALS} has {member.get('variableName')!r}, which is no variable"
+
+
+def _start_value_problems(found: dict[str, bytes], description: Any) -> Iterator[str]:
+    """The binary takes its robot from start_values.txt, importers see modelDescription.xml: both must say the same."""
+    if START_VALUES not in found:
+        yield f"{START_VALUES} is missing: the binary takes the robot from it"
+        return
+    token, *lines = found[START_VALUES].decode("utf-8", errors="replace").splitlines()
+    if token != description.instantiationToken:
+        yield f"{START_VALUES} has token {token!r}, modelDescription.xml {description.instantiationToken!r}"
+    stated = _stated(description)
+    for line in lines:
+        reference, _, rest = line.partition(" ")
+        if line.startswith(CHECKSUM):  # which the binary checks as it loads
+            continue
+        if not reference.isdigit() or int(reference) not in stated or _number(rest.split(" ")[0]) != stated.pop(int(reference)):
+            yield f"{START_VALUES}: {line!r} is not what modelDescription.xml says"
+    for left in stated:
+        yield f"{START_VALUES} lacks the value reference {left}"
+
+
+def _stated(description: Any) -> dict[int, float]:
+    """Start values by the references of elements: an array's own, and those that follow."""
+    values: dict[int, float] = {}
+    for variable in description.modelVariables:
+        if variable.start is not None:
+            numbers = str(variable.start).split()
+            values |= {variable.valueReference + place: _number(number) for place, number in enumerate(numbers)}
+    return values
+
+
+def _number(word: str) -> float:
+    if word in ("true", "false"):
+        return float(word == "true")
+    return float.fromhex(word) if "x" in word else float(word)
+
+
+def _run_problems(path: Path, description: Any) -> list[str]:
+    """Loads this machine's binary, if there is one, starts it and takes a step; and it must refuse a foreign token."""
+    with TemporaryDirectory(prefix="hexapod-validate-") as folder:
+        extract(path, folder)
+        if not (Path(folder) / "binaries" / platform_tuple).is_dir():
+            return []
+        try:
+            _try(folder, description, description.instantiationToken)
+        except Exception as error:  # fmpy's errors have no common type
+            return [f"binaries: {error}"]
+        with suppress(Exception):  # as it should
+            _try(folder, description, FOREIGN_TOKEN)
+            return [f"binaries: it takes the token {FOREIGN_TOKEN}, expected that of modelDescription.xml alone"]
+    return []
+
+
+def _try(folder: str, description: Any, token: str) -> None:
+    """Raises what fmpy raises when a call comes back with an error."""
+    identifier = description.coSimulation.modelIdentifier
+    with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
+        fmu = FMU3Slave(guid=token, modelIdentifier=identifier, unzipDirectory=folder, instanceName="validate")
+    try:
+        fmu.instantiate(logMessage=_say_nothing)
+    except Exception:
+        fmu.freeLibrary()
+        raise
+    try:
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        fmu.doStep(0.0, TRIAL_STEP)
+        fmu.terminate()
+    finally:
+        fmu.freeInstance()
+
+
+def _say_nothing(*_: object) -> None:
+    """A logger."""
