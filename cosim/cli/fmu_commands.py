@@ -30,7 +30,7 @@ def export(
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="The file to write; default ROBOT.fmu, ROBOT.urdf or ROBOT.xml.")
     ] = None,
     robot: RobotName = "athena",
-    fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard.")] = 2,
+    fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard: 2 or 3.")] = 2,
     platforms: Annotated[
         str | None,
         typer.Option(
