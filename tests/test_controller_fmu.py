@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import Call
+from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from gains import PERIOD, make_gains
 
@@ -142,6 +143,19 @@ def fmu(compliant_fmu: Path) -> Iterator[Fmu]:
 def test_checkers_find_nothing(compliant_fmu: Path) -> None:
     assert validate_fmu(compliant_fmu) == []
     assert find_problems(compliant_fmu) == []
+
+
+def test_fmi_3_walks_the_same_walk(plant_build: Path, tmp_path: Path, compliant_fmu: Path) -> None:
+    robot = load_robot("athena")
+    setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot))
+    path = export_controller(setup, tmp_path / "controller.fmu", fmi=3)
+    assert validate_fmu(path) == []
+    walks, steps = [], {"stop_time": 1.0, "output_interval": PERIOD, "step_size": PERIOD, "start_values": {"command.vx": 0.05}}
+    for fmu, angle_ref in ((path, "angle_ref"), (compliant_fmu, "RR.tibia.angle_ref")):
+        found = simulate_fmu(str(fmu), output=[angle_ref], **steps)
+        walks.append(np.array([np.ravel(row[1])[-1] for row in found]))
+    np.testing.assert_array_equal(walks[0], walks[1])
+    assert np.ptp(walks[0]) > 0.1  # rad
 
 
 def test_its_variables_have_the_plants_names_units_and_directions_reversed(fmu: Fmu, athena_fmu: Path) -> None:

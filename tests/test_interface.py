@@ -139,12 +139,17 @@ def test_generated_files_are_what_the_generator_makes() -> None:
 
 def test_a_stale_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     generator = load_generator()
-    monkeypatch.setattr(generator, "GENERATED", tmp_path)
+    monkeypatch.setattr(generator, "ROOT", tmp_path)
     for path, text in generator.stale_files().items():
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     assert generator.stale_files() == {}
-    (tmp_path / "defaults.c").write_text("/* by hand */", encoding="utf-8")
-    assert list(generator.stale_files()) == [tmp_path / "defaults.c"]
+    for component in ("plant_fmu", "controller_fmu"):
+        changed = tmp_path / component / "generated" / "defaults.c"
+        kept = changed.read_text(encoding="utf-8")
+        changed.write_text("/* by hand */", encoding="utf-8")
+        assert list(generator.stale_files()) == [changed]
+        changed.write_text(kept, encoding="utf-8")
 
 
 def test_the_model_description_tells_what_the_interface_says(athena_fmu: Path) -> None:
