@@ -17,17 +17,19 @@ from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
 from hexapod_cosim.cosim.robot_files import chosen_format, export_description
+from hexapod_cosim.cosim.robot_package import chosen_package, export_package, package_path, read_values
 from hexapod_cosim.cosim.scenario_records import CONTROLS
 from hexapod_cosim.cosim.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
 
 RobotName = Annotated[str, typer.Option("--robot", metavar="FILE", help="A robot file, a URDF, or a name of `hexapod list robots`.")]
 DEFAULT_PERIOD = 0.005  # s, the default macro-step
+DEFAULT_CONTROL = "compliant"  # of a package
 
 
 def export(
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="The file to write; default ROBOT.fmu, ROBOT.urdf or ROBOT.xml.")
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="The file to write; default ROBOT.fmu, .ssp, .urdf or .xml.")
     ] = None,
     robot: RobotName = "athena",
     fmi: Annotated[int, typer.Option("--fmi", help="Version of the standard: 2 or 3.")] = 2,
@@ -41,6 +43,13 @@ def export(
     ] = None,
     urdf: Annotated[bool, typer.Option("--urdf", help="Write the robot as a URDF instead; so does -o FILE.urdf.")] = False,
     mjcf: Annotated[bool, typer.Option("--mjcf", help="Write it as a MuJoCo model instead; so does -o FILE.xml.")] = False,
+    ssp: Annotated[
+        bool, typer.Option("--ssp", help="Write plant and controller, connected and walking, as a package (SSP); so does -o FILE.ssp.")
+    ] = False,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Of the package: controller.command.vx=0.05, plant.friction.mu=0.5, ..."),
+    ] = None,
     controller: Annotated[
         str | None, typer.Option("--controller", metavar="|".join(CONTROLS), help="Pack the robot's controller instead of the plant.")
     ] = None,
@@ -49,8 +58,10 @@ def export(
     period: Annotated[float, typer.Option("--period", help="Of the controller [s].")] = DEFAULT_PERIOD,
     json: Json = False,
 ) -> None:
-    """Pack the plant FMU of a robot, or its controller's, or write the robot for other tools."""
+    """Pack the plant FMU of a robot, or its controller's, or both as a package, or write the robot for other tools."""
     form, made = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
+    package = chosen_package(output, wanted=ssp, described=form is not None, values=values)
+    controller = DEFAULT_CONTROL if package and controller is None else controller
     if controller is None and (gait or gains or period != DEFAULT_PERIOD):
         fix = "add it, or leave --gait, --gains and --period out"
         raise HexapodError("options of the controller", got="no --controller", expected="--controller kinematic or compliant", fix=fix)
@@ -58,15 +69,17 @@ def export(
         written = export_description(made, output or Path(f"{made.name}{form.suffix}"), form)
         _show_written(written, made, form.name, json=json)
         return
-    path = _fmu_path(output, made.name if controller is None else f"{made.name}_controller")
+    path = package_path(output, made.name) if package else _fmu_path(output, made.name if controller is None else f"{made.name}_controller")
     chosen = None if platforms is None else [name.strip() for name in platforms.split(",")]
     setup = None if controller is None else _controller_setup(made, controller, gait, gains, period)
     with waiting("compiling" if chosen else None):
-        if setup is None:
+        if setup is not None and package:
+            export_package(setup, path, values=read_values(values or []), platforms=chosen)
+        elif setup is None:
             export_fmu(made, path, fmi=fmi, platforms=chosen)
         else:
             export_controller(setup, path, fmi=fmi, platforms=chosen)
-    _show_written(path, made, "fmu", json=json)
+    _show_written(path, made, "ssp" if package else "fmu", json=json)
 
 
 def _fmu_path(output: Path | None, name: str) -> Path:

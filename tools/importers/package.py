@@ -60,7 +60,7 @@ def run(package: Path, names: Sequence[str], *, step: float, steps: int, order: 
     at_once: controllers answer the outputs of the same communication point, in `order`; else those of the point before, but for the first.
     """
     rows = []
-    with opened(package) as running:
+    with opened(package, end=step * steps) as running:
         seen = [running.components[name.partition(".")[0]].block([name.partition(".")[2]]) for name in names]
         running.settle(order)
         for k in range(steps):
@@ -77,8 +77,8 @@ def run(package: Path, names: Sequence[str], *, step: float, steps: int, order: 
 
 
 @contextmanager
-def opened(package: Path) -> Iterator[Running]:
-    """A package's components with its parameter sets in place, initialised at time 0."""
+def opened(package: Path, *, end: float) -> Iterator[Running]:
+    """A package's components with its parameter sets in place, initialised at time 0, to run until `end` [s]."""
     described = read_ssd(str(package))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(TemporaryDirectory()))
@@ -94,7 +94,7 @@ def opened(package: Path) -> Iterator[Running]:
         ends = [(one.startElement, one.startConnector, one.endElement, one.endConnector) for one in described.system.connections]
         wires = list(wired(components, ends))
         for fmu in components.values():
-            fmu.initialise(0.0, 1.0)
+            fmu.initialise(0.0, end)
         yield Running(components, wires)
 
 

@@ -1,0 +1,58 @@
+"""The Python master and controller on a package's walk, on time and with measurements that are one period old."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
+from hexapod_cosim.cosim.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.master import JointController, run
+from hexapod_cosim.cosim.recorder import Recorder, Recording
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.schedule import make_schedule
+from hexapod_cosim.cosim.signals import Signals
+
+
+class Late:
+    """Answers each time with the measurements of the period before, but for the first; what it remembers it takes from the present ones.
+
+    So does a controller FMU whose inputs are set after its outputs were read: its laws go on with every measurement, its answers come late.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+        self._before: Measurement | None = None
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """The joint commands for [t, t + period)."""
+        state = self.controller.save()
+        shown = self.controller.step(t, command, self._before or measurement)
+        answer = JointCommand(shown.angle_ref.copy(), shown.speed_ref.copy(), shown.torque_ref.copy())
+        self.controller.restore(state)
+        self.controller.step(t, command, measurement)
+        self._before = copy(measurement)
+        return answer
+
+
+def copy(measurement: Measurement) -> Measurement:
+    """Values as they are now."""
+    return Measurement(**{name: np.array(value) for name, value in vars(measurement).items()})
+
+
+def walk(setup: ControllerSetup, fmu: Path, *, duration: float, overrides: list[str], late: bool) -> Recording:
+    """Rows after each step, under the Python controller of this set-up."""
+    settings = [f"duration={duration}", f"macro_step={setup.period}", *overrides]
+    schedule = make_schedule(load_scenario("walk_flat", overrides=settings))
+    controller = setup.build()
+    judged: JointController = Late(controller) if late else controller
+    with Fmu(fmu) as plant:
+        plant.initialise(0.0, duration)
+        signals = Signals(plant)
+        recorder = Recorder(signals, schedule.times, schedule.rows)
+        outcome = run(plant, signals, judged, schedule, recorder, h=setup.period)
+    if outcome.cause is not None:
+        raise outcome.cause
+    return outcome.recording.rows(slice(1, None))
