@@ -7,6 +7,7 @@ had on this machine is named with the reason; the exit code says whether those t
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from rich.table import Table
 
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.recorder import Recording, read_csv
+from tools.importers.packages import PackageRow, compare_packages, version
 from tools.importers.walk import STEP, Walk, record
 
 HERE = Path(__file__).resolve().parent
@@ -27,6 +29,7 @@ DURATION = 3.0  # s    three gait cycles and a half
 ROUND_OFF = 1e-10  # a last bit in when a step ends, carried through a walk whose servo torques and reactions jump at every touch-down
 SMALL = 1e-3  # SI     an output that never gets larger is judged by this: residuals are themselves round-off
 LAST_LINES = 3
+FMI_SIM = "0.7.0"
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Importer:
     """A program that walks: `adapter` FMU INPUTS NAMES OUTPUTS."""
 
     name: str
-    package: str
+    package: str  # "": of crates.io
     adapter: str
     given: str  # how it takes inputs
 
@@ -42,6 +45,7 @@ class Importer:
 IMPORTERS = (
     Importer("libcosim", "libcosimpy", "libcosim_walk.py", "override manipulator, held over the step"),
     Importer("Ecos", "ecospy", "ecos_walk.py", "set before the step, held over it"),
+    Importer("fmi-sim", "", "fmi_sim_walk.py", "CSV read by itself, rows at the communication points"),
 )
 
 
@@ -64,12 +68,21 @@ def main() -> int:
     """Prints the table; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--duration", type=float, default=DURATION, help="of the walk [s]")
-    walk = record(BUILD / "walk", duration=parser.parse_args().duration)
+    duration = parser.parse_args().duration
+    walk = record(BUILD / "walk", duration=duration)
     python = environment()
     rows = [row("hexapod's master", package_version(), "as recorded", walk.recorded, walk)]
-    rows += [through(importer, walk, python) for importer in IMPORTERS]
+    missing = install_fmi_sim(python)
+    for importer in IMPORTERS:
+        if not importer.package and missing:
+            rows.append(Row(importer.name, "", importer.given, None, None, missing))
+        else:
+            rows.append(through(importer, walk, python))
     show(rows, walk)
-    return 0 if all(one.difference is None or one.difference <= ROUND_OFF for one in rows) else 1
+    packages = compare_packages(BUILD / "package", python, duration=duration)
+    show_packages(packages)
+    agree = [one.difference is None or one.difference <= ROUND_OFF for one in rows]
+    return 0 if all([*agree, *(one.agrees for one in packages)]) else 1
 
 
 def environment() -> Path:
@@ -83,22 +96,42 @@ def environment() -> Path:
     return python
 
 
+def install_fmi_sim(python: Path) -> str:
+    """fmi-sim from crates.io; returns "", or why it cannot be had. To build it takes libclang, which PyPI has, and gcc's headers."""
+    folder = BUILD / "cargo"
+    if (folder / "bin" / "fmi-sim").exists():
+        return ""
+    if shutil.which("cargo") is None:
+        return "cargo (Rust) is not installed"
+    headers = subprocess.run(["gcc", "-print-file-name=include"], capture_output=True, text=True, check=False).stdout.strip()
+    libclang = next(python.parents[1].glob("lib/python3*/site-packages/clang/native"), Path())
+    environment = os.environ | {"LIBCLANG_PATH": str(libclang), "BINDGEN_EXTRA_CLANG_ARGS": f"-I{headers}"}
+    command = [
+        "cargo",
+        "install",
+        "fmi-sim",
+        "--version",
+        FMI_SIM,
+        "--locked",
+        "--root",
+        str(folder),
+        "--target-dir",
+        str(folder / "target"),
+    ]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    return "" if done.returncode == 0 else " / ".join(done.stderr.strip().splitlines()[-LAST_LINES:])
+
+
 def through(importer: Importer, walk: Walk, python: Path) -> Row:
     """The walk through one importer."""
-    outputs = walk.folder / f"{importer.package}.csv"
+    outputs = walk.folder / f"{importer.name}.csv"
     outputs.unlink(missing_ok=True)
     arguments = map(str, (python, HERE / "adapters" / importer.adapter, walk.fmu, walk.inputs, walk.wanted, outputs))
     done = subprocess.run(list(arguments), capture_output=True, text=True, check=False)
     if done.returncode:
         said = " / ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
         return Row(importer.name, "", importer.given, None, None, said)
-    return row(importer.name, version(importer, python), importer.given, read_csv(outputs), walk)
-
-
-def version(importer: Importer, python: Path) -> str:
-    """Of the importer's package."""
-    code = f"from importlib.metadata import version; print(version({importer.package!r}))"
-    return subprocess.run([str(python), "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+    return row(importer.name, version(importer.package, python) if importer.package else FMI_SIM, importer.given, read_csv(outputs), walk)
 
 
 def row(name: str, release: str, given: str, found: Recording, walk: Walk) -> Row:
@@ -129,6 +162,15 @@ def show(rows: list[Row], walk: Walk) -> None:
     table = Table("importer", "version", "inputs", "largest difference", "told its own times", "remark", title=title)
     for one in rows:
         table.add_row(one.name, one.version, one.given, shown(one.difference), shown(one.own), one.remark)
+    Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
+
+
+def show_packages(rows: list[PackageRow]) -> None:
+    """Prints the table of packages."""
+    title = "plant and controller in a package, against the Python master with the Python controller"
+    table = Table("tool", "version", "on time", "measurements a period late", title=title)
+    for one in rows:
+        table.add_row(one.name, one.version, shown(one.prompt), shown(one.late) if not one.trouble else one.trouble)
     Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
 
 
