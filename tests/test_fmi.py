@@ -19,7 +19,6 @@ from fmi_plant import (
     DO_STEP_STATUS,
     ERROR,
     LAST_SUCCESSFUL_TIME,
-    MODEL_EXCHANGE,
     OK,
     PENDING_STATUS,
     TERMINATED,
@@ -77,7 +76,7 @@ def test_what_is_not_offered_is_an_error_with_a_message(running: Plant, function
         {"guid": ""},
         {"name": None},
         {"name": ""},
-        {"kind": MODEL_EXCHANGE},
+        {"kind": 7},
     ],
 )
 def test_a_wrong_instantiation_is_refused_with_a_message(plant_library: Path, arguments: dict[str, str | None]) -> None:

@@ -345,16 +345,6 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
   return no_variables(c, SET_OTHER, nvr);
 }
 
-fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Clock value[]) {
-  (void)vr, (void)value;
-  return no_variables(c, GET_OTHER, nvr);
-}
-
-fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Clock value[]) {
-  (void)vr, (void)value;
-  return no_variables(c, SET_OTHER, nvr);
-}
-
 /* ---------------------------------------------------------------------------------------------- dependencies */
 
 /* which element depends on which is not told: providesPerElementDependencies says so */
@@ -460,37 +450,30 @@ fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference vr[]
   return no_variables(c, CLOCKS, nvr);
 }
 
-fmi3Status fmi3GetShiftDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Float64 shift[]) {
-  (void)vr, (void)shift;
-  return no_variables(c, CLOCKS, nvr);
+fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
+  (void)clockReference, (void)activationTime;
+  return not_supported(c, "fmi3ActivateModelPartition");
 }
 
-fmi3Status fmi3GetShiftFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3UInt64 counter[], fmi3UInt64 resolution[]) {
-  (void)vr, (void)counter, (void)resolution;
-  return no_variables(c, CLOCKS, nvr);
-}
+#define NO_CLOCKS(Name, Type)                                                                                                              \
+  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type value[]) {                                         \
+    (void)vr, (void)value;                                                                                                                 \
+    return no_variables(c, CLOCKS, nvr);                                                                                                   \
+  }
+#define NO_CLOCK_FRACTIONS(Name, Type)                                                                                                     \
+  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type counter[], Type resolution[]) {                    \
+    (void)vr, (void)counter, (void)resolution;                                                                                             \
+    return no_variables(c, CLOCKS, nvr);                                                                                                   \
+  }
 
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Float64 interval[]) {
-  (void)vr, (void)interval;
-  return no_variables(c, CLOCKS, nvr);
-}
-
-fmi3Status fmi3SetIntervalFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3UInt64 counter[],
-                                   const fmi3UInt64 resolution[]) {
-  (void)vr, (void)counter, (void)resolution;
-  return no_variables(c, CLOCKS, nvr);
-}
-
-fmi3Status fmi3SetShiftDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Float64 shift[]) {
-  (void)vr, (void)shift;
-  return no_variables(c, CLOCKS, nvr);
-}
-
-fmi3Status fmi3SetShiftFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3UInt64 counter[],
-                                const fmi3UInt64 resolution[]) {
-  (void)vr, (void)counter, (void)resolution;
-  return no_variables(c, CLOCKS, nvr);
-}
+NO_CLOCKS(GetClock, fmi3Clock)
+NO_CLOCKS(SetClock, const fmi3Clock)
+NO_CLOCKS(GetShiftDecimal, fmi3Float64)
+NO_CLOCKS(SetIntervalDecimal, const fmi3Float64)
+NO_CLOCKS(SetShiftDecimal, const fmi3Float64)
+NO_CLOCK_FRACTIONS(GetShiftFraction, fmi3UInt64)
+NO_CLOCK_FRACTIONS(SetIntervalFraction, const fmi3UInt64)
+NO_CLOCK_FRACTIONS(SetShiftFraction, const fmi3UInt64)
 
 /* ---------------------------------------------------------------------------------------------- events */
 
@@ -616,11 +599,4 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi
   put(earlyReturn, event && reached < t + h);
   if (lastSuccessfulTime) *lastSuccessfulTime = reached;
   return status_of(status);
-}
-
-/* ---------------------------------------------------------------------------------------------- scheduled execution */
-
-fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
-  (void)clockReference, (void)activationTime;
-  return not_supported(c, "fmi3ActivateModelPartition");
 }
