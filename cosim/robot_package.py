@@ -15,6 +15,7 @@ from hexapod_cosim.models import HexapodError, unknown_name
 
 PLANT, CONTROLLER = "plant", "controller"  # in the order in which their outputs follow from each other
 SUFFIX = ".ssp"
+FMI = 2
 STOP = 10.0  # s
 WALK: Mapping[str, float] = MappingProxyType({"command.vx": 0.08})  # m/s    the paper's experiment
 
@@ -46,11 +47,16 @@ def export_package(
         return export_ssp(path, fmus, title=setup.robot.name, experiment=experiment, values={**values, **walk})
 
 
-def chosen_package(path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None) -> bool:
-    """Whether a package is asked for, by name or by the suffix of the file. Raises HexapodError for two formats, and for values of none."""
+def chosen_package(path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None, fmi: int = 2) -> bool:
+    """Whether a package is asked for, by name or by the suffix of the file.
+
+    Raises HexapodError for two formats, for values of none, and for FMI 3.0, whose arrays an SSP 1.0 package cannot connect.
+    """
     package = wanted or (path is not None and path.suffix == SUFFIX)
     if package and described:
         raise HexapodError("two formats at once", got="--ssp and a URDF or MJCF", expected="one of them", fix="run the command twice")
+    if package and fmi != FMI:
+        raise HexapodError("no package of such FMUs", got=f"--fmi {fmi}", expected=f"--fmi {FMI}", fix="leave out --fmi")
     if values and not package:
         fix = "add --ssp; a robot's own values belong into its file"
         raise HexapodError("--set without a package", got=values[0], expected="--ssp", fix=fix)

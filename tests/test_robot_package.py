@@ -113,6 +113,7 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
         (("--set", "plant.friction.mu=0.5", "-o", "one.fmu"), "without a package"),
         (("--ssp", "-o", "one.fmu"), "not a package's name"),
         (("--ssp", "--urdf"), "two formats"),
+        (("--ssp", "--fmi", "3"), "no package of such FMUs"),
         (("--controller", "kinematic", "--set", "plant.friction.nu=1", "-o", "one.ssp"), "did you mean 'friction.mu'"),
     ],
 )

@@ -60,7 +60,7 @@ def export(
 ) -> None:
     """Pack the plant FMU of a robot, or its controller's, or both as a package, or write the robot for other tools."""
     form, made = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
-    package = chosen_package(output, wanted=ssp, described=form is not None, values=values)
+    package = chosen_package(output, wanted=ssp, described=form is not None, values=values, fmi=fmi)
     controller = DEFAULT_CONTROL if package and controller is None else controller
     if controller is None and (gait or gains or period != DEFAULT_PERIOD):
         fix = "add it, or leave --gait, --gains and --period out"
