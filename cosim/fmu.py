@@ -8,7 +8,6 @@ from __future__ import annotations
 import ctypes
 import math
 import zipfile
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from functools import partial
@@ -19,14 +18,12 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave, defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.logging import addLoggerProxy
+from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.fmu_log import STATUS, WARNING, FmuLog
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-WARNING = STATUS.index("warning")
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
 FIX = "make one with `hexapod export -o FILE.fmu`"
 SUFFIX = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}  # of fmi2Get..., fmi2Set...
@@ -106,9 +103,9 @@ class Fmu:
         self.path = Path(path)
         self.description = read_description(self.path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
-        self._log: deque[str] = deque(maxlen=20)
+        self._logged = FmuLog()
+        self._log = self._logged.messages
         self.forget = self._log.clear  # what the FMU said before a call is of no interest after it
-        self._callbacks = self._make_callbacks()
         self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
         self._slave: Any = None
         try:
@@ -125,7 +122,7 @@ class Fmu:
         with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
             slave = FMU2Slave(instanceName=name, **facts)
         try:
-            slave.instantiate(callbacks=self._callbacks, loggingOn=True)
+            slave.instantiate(callbacks=self._logged.callbacks, loggingOn=True)
         except Exception:
             slave.freeLibrary()
             raise
@@ -133,18 +130,6 @@ class Fmu:
         self._begin, self._length = ctypes.c_double(), ctypes.c_double()
         self._reset = self.bind("fmi2Reset")
         self._do_step = self.bind("fmi2DoStep", self._begin, self._length, ctypes.c_int(1))  # 1: nothing before is needed again
-
-    def _make_callbacks(self) -> fmi2CallbackFunctions:
-        callbacks = fmi2CallbackFunctions()
-        callbacks.logger = fmi2CallbackLoggerTYPE(self._write_log)
-        callbacks.allocateMemory = defaultCallbacks.allocateMemory
-        callbacks.freeMemory = defaultCallbacks.freeMemory
-        addLoggerProxy(ctypes.byref(callbacks))  # formats the variadic message in C
-        return callbacks
-
-    def _write_log(self, _environment: object, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
-        if status >= WARNING:
-            self._log.append(message.decode("utf-8", errors="replace"))
 
     def _not_loaded(self, error: Exception) -> FmuError:
         said = self._log[-1] if self._log else str(error)
@@ -274,6 +259,7 @@ class Fmu:
             slave.fmiCallLogger = None
             slave.freeInstance()
         self._directory.cleanup()
+        self._logged.close()
 
     def __enter__(self) -> Self:
         return self
