@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any, Literal
 
 from hexapod_cosim.cosim.components import PLANT, Component
+from hexapod_cosim.cosim.patterns import expand, expand_names, labelled, own_axes
 from hexapod_cosim.cosim.plant_files import interface_file, package_version
 from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
@@ -219,29 +220,16 @@ def _unit(name: str, entry: Any) -> Unit:
 
 
 def _pattern(entry: Mapping[str, Any], causality: Causality, axes: Mapping[str, list[str]]) -> Pattern:
-    own = tuple((axis, tuple(labels)) for axis, labels in _axes(entry, axes).items())
+    own = tuple((axis, tuple(labels)) for axis, labels in own_axes(entry, axes).items())
     kind = entry.get("unit", entry.get("type", ""))
     return Pattern(name=entry["name"], axes=own, causality=causality, kind=kind, description=entry["description"])
 
 
 def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace) -> Iterable[Variable]:
     for causality in CAUSALITIES:
-        places = itertools.chain.from_iterable(_places(entry, table["axis"]) for entry in table.get(causality, []))
+        places = itertools.chain.from_iterable(expand(entry, table["axis"]) for entry in table.get(causality, []))
         for reference, (entry, place) in enumerate(places, start=table["first_reference"][causality]):
             yield _variable(entry, place, reference, causality, enumerations, roots, table)
-
-
-def _places(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> Iterable[tuple[Mapping[str, Any], dict[str, tuple[int, str]]]]:
-    """An entry with each combination of its axes: axis -> (index from 0, label)."""
-    used = _axes(entry, axes)
-    for combination in itertools.product(*map(enumerate, used.values())):
-        yield entry, dict(zip(used, combination, strict=True))
-
-
-def _axes(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> dict[str, list[str]]:
-    """The labels of the axes in an entry's name, in its order."""
-    labels = dict(axes) | {"i": [str(i + 1) for i in range(entry.get("size", 0))]}
-    return {axis or "i": labels[axis or "i"] for axis in re.findall(r"\{(\w+)\}|\[i\]", entry["name"])}
 
 
 def _variable(
@@ -252,7 +240,7 @@ def _variable(
     enumeration = enumerations.get(entry.get("type", ""))
     kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
     variable = Variable(
-        name=_labelled(entry["name"], labels),
+        name=labelled(entry["name"], labels),
         reference=reference,
         type=kind,
         causality=causality,
@@ -265,44 +253,19 @@ def _variable(
         enumeration=enumeration.name if enumeration else None,
         field=re.sub(r"\[(\w+)\]", lambda match: f"[{place[match[1]][0]}]", entry["field"]),
         description=entry["description"].format(**labels),
-        depends=_names(entry.get("depends"), labels, table),
-        initial=_names(entry.get("initial"), labels, table),
+        depends=expand_names(entry.get("depends"), labels, table),
+        initial=expand_names(entry.get("initial"), labels, table),
     )
     _check_start(variable)
     return variable
 
 
-def _labelled(pattern: str, labels: Mapping[str, str]) -> str:
-    return pattern.replace("[i]", f"[{labels.get('i')}]").format(**labels)
-
-
 def _states(table: Mapping[str, Any]) -> Iterable[State]:
     for entry in table.get("state", []):
-        for _, place in _places(entry, table["axis"]):
+        for _, place in expand(entry, table["axis"]):
             labels = {axis: label for axis, (_, label) in place.items()}
-            name, derivative = (_labelled(entry[key], labels) for key in ("name", "derivative"))
-            yield State(name=name, derivative=derivative, initial=_names(entry["initial"], labels, table) or ())
-
-
-def _names(patterns: Iterable[str] | None, labels: Mapping[str, str], table: Mapping[str, Any]) -> tuple[str, ...] | None:
-    """Names by patterns: @ begins a group, {axis} is one's own label, * every leg, joint or index (of three, or of a quaternion's four)."""
-    if patterns is None:
-        return None
-    found: list[str] = []
-    for pattern in patterns:
-        group = table["group"][pattern[1:]] if pattern.startswith("@") else None
-        found += _every(_labelled(pattern, labels), table["axis"]) if group is None else _names(group, labels, table) or ()
-    return tuple(found)
-
-
-def _every(pattern: str, axes: Mapping[str, list[str]]) -> list[str]:
-    """A name for every label of its stars: a leg at the beginning, a joint inside, an index in brackets (a quaternion has four)."""
-    indices = [f"[{i + 1}]" for i in range(4 if "quaternion" in pattern else 3)]
-    joints, legs = ([f".{joint}." for joint in axes["joint"]], [f"{leg}." for leg in axes["leg"]])
-    names = [pattern]
-    for star, labels in (("[*]", indices), (".*.", joints), ("*.", legs)):
-        names = [name.replace(star, label, 1) for name in names for label in (labels if star in name else [star])]
-    return names
+            name, derivative = (labelled(entry[key], labels) for key in ("name", "derivative"))
+            yield State(name=name, derivative=derivative, initial=expand_names(entry["initial"], labels, table) or ())
 
 
 def _start(
