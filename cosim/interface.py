@@ -85,6 +85,7 @@ class State:
     name: str
     derivative: str
     initial: tuple[str, ...]
+    reinit: bool  # whether an event may set it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +132,11 @@ class Interface:
     def derivative_of(self) -> Mapping[str, int]:
         """By the names of derivatives, places of the states that they are derivatives of."""
         return {state.derivative: self.index[state.name] for state in self.states}
+
+    @cached_property
+    def reinitialised(self) -> frozenset[str]:
+        """Names of the states that an event may set."""
+        return frozenset(state.name for state in self.states if state.reinit)
 
     def depends(self, name: str) -> tuple[str, ...] | None:
         """States and inputs that an output or a derivative is a direct function of; None: all."""
@@ -265,7 +271,12 @@ def _states(table: Mapping[str, Any]) -> Iterable[State]:
         for _, place in expand(entry, table["axis"]):
             labels = {axis: label for axis, (_, label) in place.items()}
             name, derivative = (labelled(entry[key], labels) for key in ("name", "derivative"))
-            yield State(name=name, derivative=derivative, initial=expand_names(entry["initial"], labels, table) or ())
+            yield State(
+                name=name,
+                derivative=derivative,
+                initial=expand_names(entry["initial"], labels, table) or (),
+                reinit=entry.get("reinit", False),
+            )
 
 
 def _start(

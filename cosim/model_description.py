@@ -155,6 +155,7 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
         "nominal": variable.nominal,
         "start": variable.start,
         "derivative": interface.derivative_of.get(variable.name),
+        "reinit": "true" if variable.name in interface.reinitialised else None,
     }
     SubElement(element, variable.type, {name: attribute_text(value) for name, value in attributes.items() if value is not None})
 

@@ -32,11 +32,10 @@ MODEL_EXCHANGE = {"needsCompletedIntegratorStep": "false", "providesEvaluateDisc
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
     "providesIntermediateUpdate": "false",
-    "mightReturnEarlyFromDoStep": "true",
     "canReturnEarlyAfterIntermediateUpdate": "false",
-    "hasEventMode": "true",
     "providesEvaluateDiscreteStates": "false",
 }
+EVENTS = ("hasEventMode", "mightReturnEarlyFromDoStep")  # of components with events
 TYPES = {"Real": "Float64", "Enumeration": "Enumeration", "Boolean": "Boolean"}
 TIME = "time"
 
@@ -84,7 +83,8 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
     both |= {"providesDirectionalDerivatives": "true" if has_states else "false"}
     if has_states:
         SubElement(root, "ModelExchange", both | MODEL_EXCHANGE)
-    SubElement(root, "CoSimulation", both | CO_SIMULATION | {"maxOutputDerivativeOrder": str(int(has_states))})
+    events = dict.fromkeys(EVENTS, "true" if has_states else "false")
+    SubElement(root, "CoSimulation", both | CO_SIMULATION | events | {"maxOutputDerivativeOrder": str(int(has_states))})
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
@@ -109,7 +109,7 @@ def _add_variables(root: Element, interface: Interface, variables: Iterable[Arra
     references = _references(variables)
     derivative_of = {state.derivative: references[state.name] for state in interface.states}
     for variable in variables:
-        _add_variable(parent, variable, interface.units, derivative_of.get(variable.first.name))
+        _add_variable(parent, variable, interface, derivative_of.get(variable.first.name))
 
 
 def _references(variables: Iterable[Array]) -> dict[str, int]:
@@ -117,10 +117,10 @@ def _references(variables: Iterable[Array]) -> dict[str, int]:
     return {element.name: array.reference for array in variables for element in array.elements}
 
 
-def _add_variable(parent: Element, array: Array, units: Iterable[Unit], derivative_of: int | None) -> None:
+def _add_variable(parent: Element, array: Array, interface: Interface, derivative_of: int | None) -> None:
     first = array.first
-    displays = {unit.name: unit.display[0] for unit in units if unit.display}
-    types = {unit.name: unit.type for unit in units}
+    displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
+    types = {unit.name: unit.type for unit in interface.units}
     attributes: dict[str, float | int | str | None] = {
         "name": array.name,
         "valueReference": array.reference,
@@ -136,6 +136,7 @@ def _add_variable(parent: Element, array: Array, units: Iterable[Unit], derivati
         "nominal": first.nominal,
         "start": _starts(array),
         "derivative": derivative_of,
+        "reinit": "true" if first.name in interface.reinitialised else None,
     }
     stated = {name: attribute_text(value) for name, value in attributes.items() if value is not None}
     element = SubElement(parent, TYPES[first.type], stated)

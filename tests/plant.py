@@ -58,7 +58,7 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_plant_get_coordinates": (None, [plant, ct.POINTER(HxCoordinates)]),
         "hx_plant_set_coordinates": (status, [plant, Real, ct.POINTER(HxCoordinates)]),
         "hx_plant_rates": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxCoordinates)]),
-        "hx_plant_penetration": (None, [plant, Doubles]),
+        "hx_plant_indicators": (None, [plant, Doubles]),
         "hx_plant_update_contacts": (ct.c_int, [plant]),
         "hx_plant_tangent": (status, [plant, *[ct.POINTER(kind) for kind in (HxInput, HxInput, HxCoordinates, HxCoordinates, HxOutput)]]),
         "hx_plant_accelerations": (None, [plant, ct.POINTER(HxInput), Doubles, Doubles, Doubles]),

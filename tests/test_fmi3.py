@@ -14,7 +14,7 @@ from fmi3_plant import ARRAYS, TIME, Plant3
 from fmi_plant import ATHENA, DISCARD, ERROR, OK, Plant
 
 from hexapod_cosim.cosim.arrays import array_name
-from hexapod_cosim.cosim.model_description3 import CAPABILITIES, CO_SIMULATION, MODEL_EXCHANGE
+from hexapod_cosim.cosim.model_description3 import CAPABILITIES, CO_SIMULATION, EVENTS, MODEL_EXCHANGE
 
 H = 0.005  # s, communication step
 DROP = 0.15  # m, a torso that high falls for some 50 ms before the feet touch down
@@ -57,7 +57,7 @@ def test_every_function_of_the_standard_is_exported(plant_library: Path) -> None
 
 def test_what_is_declared_is_what_these_tests_hold_it_to() -> None:
     declared = CAPABILITIES | CO_SIMULATION | MODEL_EXCHANGE
-    offered = {name for name, value in declared.items() if value == "true"}
+    offered = {name for name, value in declared.items() if value == "true"} | set(EVENTS)
     assert offered == {
         "canGetAndSetFMUState", "canSerializeFMUState", "canHandleVariableCommunicationStepSize", "mightReturnEarlyFromDoStep",
         "hasEventMode",
@@ -283,6 +283,15 @@ def test_damaged_bytes_are_refused(running3: Plant3) -> None:
         assert running3.deserialize(bytes(damaged))[0] == ERROR
     assert running3.deserialize(bytes(data[:-1]))[0] == ERROR
     running3.free(state)
+
+
+def test_a_state_saved_in_event_mode_goes_on_where_there_is_none(plant3: Plant3, plant_library: Path) -> None:
+    with Plant3(plant_library, events=True) as other:
+        saved = other.initialize().save()
+        plant3.initialize()
+        assert plant3.call("fmi3SetFMUState", saved) == OK
+        assert plant3.step(0.0, H).status == OK, plant3.last_message
+        other.free(saved)
 
 
 def test_a_state_of_the_other_interface_is_refused(running3: Plant3, plant_library: Path) -> None:

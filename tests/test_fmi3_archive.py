@@ -128,7 +128,7 @@ def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(exported3: Path, pla
         assert by_name[state.name].valueReference == ARRAYS[state.name].reference
         flat += [element.name for element in ARRAYS[state.name].elements]
     assert flat == STATE_NAMES
-    assert [indicator.variable.name for indicator in description.eventIndicators] == ["foot.penetration"]
+    assert [indicator.variable.name for indicator in description.eventIndicators] == ["foot.event_indicator"]
     with Plant3(plant_library, kind="ModelExchange") as plant, Plant(plant_library, kind=MODEL_EXCHANGE) as other:
         plant.initialize()
         other.initialize()

@@ -55,3 +55,11 @@ def test_the_arc_tangent_is_that_of_the_quadrant(core: ct.CDLL) -> None:
         got, expected = core.hx_probe_atan2(ct.c_double(y), ct.c_double(x)), math.atan2(y, x)
         assert abs(got - expected) <= FEW_ULPS * abs(expected)
     assert core.hx_probe_atan2(ct.c_double(0.0), ct.c_double(0.0)) == 0.0
+
+
+@pytest.mark.parametrize("x", [math.nan, math.inf, -math.inf, 1e9, 1e308])
+def test_what_is_no_angle_has_no_sine(core: ct.CDLL, x: float) -> None:
+    sine, cosine, _ = evaluated(core, np.array([x, 0.0]))
+    assert np.isnan(sine[0])
+    assert np.isnan(cosine[0])
+    assert (sine[1], cosine[1]) == (0.0, 1.0)

@@ -79,6 +79,7 @@ def render_structure(component: Component) -> str:
     lines += ["struct hxVariables {", f"  hx{kind}Definition definition; /* parameters */", "  hxInput input;", f"  hx{kind}Output output;"]
     if component is PLANT:
         lines += ["  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */"]
+        lines += ["  double indicator[HX_LEGS]; /* events are its changes of sign */"]
     return "\n".join([*lines, "};", "", "#endif", ""])
 
 

@@ -53,7 +53,7 @@ typedef struct hxContinuous {
   hxStatus (*step)(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event);
 
   void (*indicate)(const hxComponent *component, double indicator[]);
-  int (*update)(hxComponent *component); /* what an event brings about; whether the state changed */
+  int (*update)(hxComponent *component, struct hxVariables *variables); /* what an event brings about; whether the state changed */
 
   /* Derivatives of output and rate along a change of input and state: rows of the same structure. */
   hxStatus (*tangent)(hxComponent *component, const struct hxVariables *variables, const struct hxVariables *change,

@@ -16,12 +16,23 @@ static hxStatus check_count(hxInstance *instance, const char *what, size_t got, 
 
 static size_t indicator_count(void) { return hx_continuous ? hx_continuous->indicators : 0; }
 
+hxStatus hx_instance_check_finite(hxInstance *instance, const double number[], size_t n, const char *what) {
+  for (size_t i = 0; i < n; i++)
+    if (!isfinite(number[i])) {
+      hx_log(instance, HX_LOG_DISCARD, "%s: got a state at which they are not finite, expected one of the robot; try a smaller step", what);
+      return HX_NOT_FINITE;
+    }
+  return HX_OK;
+}
+
 /* ---------------------------------------------------------------------------------------------- states */
 
 /* the component at the state of the variables, at a time */
 static hxStatus put(hxInstance *instance, double t) {
   const hxStatus status = hx_continuous->set(instance->component, &instance->state.variables, t);
-  if (status != HX_OK) hx_log(instance, HX_LOG_ERROR, "continuous states: %s; nothing was set", hx_component_message(instance->component));
+  if (status != HX_OK)
+    hx_log(instance, HX_LOG_DISCARD, "continuous states: %s; nothing was set, try a smaller step",
+           hx_component_message(instance->component));
   hx_stale(instance);
   return status;
 }
@@ -54,6 +65,7 @@ hxStatus hx_instance_get_rates(hxInstance *instance, double rate[], size_t n) {
   hxStatus status = check_count(instance, "derivatives", n, hx_state_count);
   if (status != HX_OK || n == 0) return status;
   status = hx_instance_refresh(instance, 0, 1);
+  if (status == HX_OK) status = hx_instance_check_finite(instance, rate_of(&instance->state.variables), n, "derivatives");
   if (status == HX_OK) memcpy(rate, rate_of(&instance->state.variables), n * sizeof *rate);
   return status;
 }
@@ -75,8 +87,7 @@ hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], si
 }
 
 hxStatus hx_instance_update(hxInstance *instance, int *states_changed) {
-  *states_changed = hx_continuous ? hx_continuous->update(instance->component) : 0;
-  if (*states_changed) hx_continuous->get(instance->component, &instance->state.variables);
+  *states_changed = hx_continuous ? hx_continuous->update(instance->component, &instance->state.variables) : 0;
   hx_stale(instance);
   return HX_OK;
 }

@@ -223,7 +223,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
 static fmi2Status get_values(fmi2Component c, fmi2Call call, hxType type, const fmi2ValueReference vr[], size_t nvr, void *value) {
   fmi2Instance *instance = enter(c, call);
   if (!instance || !given(instance, call, nvr, vr, value)) return fmi2Error;
-  return hx_instance_get(&instance->base, type, vr, nvr, value) == HX_OK ? fmi2OK : fmi2Error;
+  return status_of(hx_instance_get(&instance->base, type, vr, nvr, value));
 }
 
 static fmi2Status set_values(fmi2Component c, fmi2Call call, hxType type, const fmi2ValueReference vr[], size_t nvr, const void *value) {

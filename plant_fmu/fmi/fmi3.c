@@ -12,7 +12,6 @@ typedef struct fmi3InstanceData {
   hxInstance base; /* first: a pointer to it is a pointer to this */
   fmi3InstanceEnvironment environment;
   fmi3LogMessageCallback log;
-  int uses_event_mode;
   int may_return_early;
 } fmi3InstanceData;
 
@@ -206,7 +205,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
   fmi3InstanceData *instance = new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
   (void)visible, (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables, (void)intermediateUpdate;
   if (instance) {
-    instance->uses_event_mode = eventModeUsed;
+    instance->base.uses_event_mode = eventModeUsed && hx_continuous;
     instance->may_return_early = earlyReturnAllowed;
   }
   return open_instance(instance, instantiationToken, resourcePath);
@@ -240,7 +239,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefi
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
   fmi3InstanceData *instance = enter(c, EXIT_INITIALIZATION_MODE);
   if (!instance || hx_instance_initialize(&instance->base) != HX_OK) return fmi3Error;
-  const int events = instance->uses_event_mode || instance->base.state.interface == HX_MODEL_EXCHANGE;
+  const int events = instance->base.uses_event_mode || instance->base.state.interface == HX_MODEL_EXCHANGE;
   instance->base.state.mode = events ? HX_MODE_EVENT : HX_MODE_STEP;
   hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s", hx_instance_time(&instance->base));
   return fmi3OK;
@@ -249,8 +248,9 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
   fmi3InstanceData *instance = enter(c, ENTER_EVENT_MODE);
   if (!instance) return fmi3Error;
-  if (instance->base.state.mode == HX_MODE_STEP && !instance->uses_event_mode) {
-    hx_log(&instance->base, HX_LOG_ERROR, "fmi3EnterEventMode: got a call, expected none, as eventModeUsed was false; nothing was changed");
+  if (instance->base.state.mode == HX_MODE_STEP && !instance->base.uses_event_mode) {
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "fmi3EnterEventMode: got a call, expected none, as there are no events or eventModeUsed was false; nothing was changed");
     return fmi3Error;
   }
   instance->base.state.mode = HX_MODE_EVENT;
@@ -594,7 +594,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi
   if (!instance) return fmi3Error;
   const hxStatus status = hx_instance_step_to_event(&instance->base, t, h, instance->may_return_early, &event);
   const double reached = hx_instance_time(&instance->base);
-  put(eventHandlingNeeded, event && instance->uses_event_mode);
+  put(eventHandlingNeeded, event && instance->base.uses_event_mode);
   put(terminateSimulation, 0);
   put(earlyReturn, event && reached < t + h);
   if (lastSuccessfulTime) *lastSuccessfulTime = reached;

@@ -114,7 +114,8 @@ hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate) {
   return HX_OK;
 }
 
-hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
+/* brings what is asked for up to date; all of it must be numbers */
+static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n) {
   const char *variables = (const char *)&instance->state.variables;
   hxCausality causality;
   int needs_output = 0, needs_rate = 0;
@@ -127,6 +128,19 @@ hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned refer
     const hxStatus status = hx_instance_refresh(instance, needs_output, needs_rate);
     if (status != HX_OK) return status;
   }
+  for (size_t i = 0; i < n && type == HX_REAL; i++) {
+    const hxVariable *variable = hx_variable_find(reference[i], &causality);
+    const hxStatus status = hx_instance_check_finite(instance, (const double *)(variables + variable->offset), 1, variable->name);
+    if (status != HX_OK) return status;
+  }
+  return HX_OK;
+}
+
+hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
+  const char *variables = (const char *)&instance->state.variables;
+  hxCausality causality;
+  const hxStatus status = prepare_get(instance, type, reference, n);
+  if (status != HX_OK) return status;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = hx_variable_find(reference[i], &causality);
     if (type == HX_REAL)

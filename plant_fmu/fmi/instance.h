@@ -53,6 +53,7 @@ struct hxInstance {
   struct hxVariables start; /* what a reset returns to: definition and input, compiled in or from the resources */
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
+  int uses_event_mode; /* of co-simulation: the importer handles events */
   unsigned logged; /* bit k: category k is passed on */
   hxLogSink *sink;
 };
@@ -137,6 +138,9 @@ static inline void hx_stale(hxInstance *instance) { instance->state.output_stale
  * of the type asked for. */
 hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate);
 const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality);
+
+/* Whether numbers are finite; a solver is told to try a smaller step otherwise. */
+hxStatus hx_instance_check_finite(hxInstance *instance, const double number[], size_t n, const char *what);
 
 /* The row of a reference, or NULL; and a value's fitness for it (NaN and infinities fit nowhere). */
 const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality);

@@ -1,6 +1,8 @@
 /* plant.c - the plant as an FMU's component */
 #include "fmi/component.h"
 
+#include <string.h>
+
 static hxPlant *plant_of(hxComponent *component) { return (hxPlant *)component; }
 static const hxPlant *const_plant(const hxComponent *component) { return (const hxPlant *)component; }
 
@@ -53,19 +55,30 @@ static hxStatus set_state(hxComponent *component, const struct hxVariables *vari
 
 static void rates(hxComponent *component, struct hxVariables *variables) {
   hx_plant_rates(plant_of(component), &variables->input, &variables->rate);
+  hx_plant_indicators(const_plant(component), variables->indicator);
 }
 
 static hxStatus step(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event) {
   return hx_plant_step_to_event(plant_of(component), &variables->input, t_end, stop, event);
 }
 
-static void indicate(const hxComponent *component, double indicator[]) { hx_plant_penetration(const_plant(component), indicator); }
+static void indicate(const hxComponent *component, double indicator[]) { hx_plant_indicators(const_plant(component), indicator); }
 
-static int update(hxComponent *component) { return hx_plant_update_contacts(plant_of(component)); }
+/* slack bristles are the only states that an event sets */
+static int update(hxComponent *component, struct hxVariables *variables) {
+  hxCoordinates now;
+  if (!hx_plant_update_contacts(plant_of(component))) return 0;
+  hx_plant_get_coordinates(const_plant(component), &now);
+  memcpy(variables->state.bristle, now.bristle, sizeof now.bristle);
+  return 1;
+}
 
 static hxStatus tangent(hxComponent *component, const struct hxVariables *variables, const struct hxVariables *change,
                         struct hxVariables *result) {
-  return hx_plant_tangent(plant_of(component), &variables->input, &change->input, &change->state, &result->rate, &result->output);
+  const hxStatus status =
+      hx_plant_tangent(plant_of(component), &variables->input, &change->input, &change->state, &result->rate, &result->output);
+  memcpy(result->indicator, result->output.foot.penetration, sizeof result->indicator);
+  return status;
 }
 
 static const hxContinuous continuous = {

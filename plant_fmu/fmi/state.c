@@ -48,7 +48,7 @@ static hxStatus refuse(hxInstance *instance, const char *what) {
 static const char *fault(const hxInstance *instance, const hxStateHeader *header) {
   if (memcmp(header->magic, state_magic, sizeof state_magic) != 0) return "bytes that are no saved state";
   if (header->format != STATE_FORMAT || header->size != hx_instance_state_size()) return "one of another version or platform";
-  return strncmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL : "one of another FMU";
+  return memcmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL : "one of another FMU";
 }
 
 hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *saved, void *bytes, size_t n) {
@@ -81,5 +81,8 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   if (block->instance.interface != instance->state.interface) return refuse(instance, "one of the other interface");
   if (hx_component_set_state(instance->component, block->component) != HX_OK) return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);
+  /* saved by an instance with event mode: here steps follow one another */
+  if (instance->state.interface == HX_CO_SIMULATION && instance->state.mode == HX_MODE_EVENT && !instance->uses_event_mode)
+    instance->state.mode = HX_MODE_STEP;
   return HX_OK;
 }

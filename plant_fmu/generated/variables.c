@@ -830,6 +830,12 @@ static const hxVariable locals[] = {
     {"der(RR.foot.bristle[1])", "m/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, rate.bristle[5][0]), HX_REAL, 0},
     {"der(RR.foot.bristle[2])", "m/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, rate.bristle[5][1]), HX_REAL, 0},
     {"der(RR.foot.bristle[3])", "m/s", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, rate.bristle[5][2]), HX_REAL, 0},
+    {"LF.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[0]), HX_REAL, 6},
+    {"LM.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[1]), HX_REAL, 0},
+    {"LR.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[2]), HX_REAL, 0},
+    {"RF.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[3]), HX_REAL, 0},
+    {"RM.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[4]), HX_REAL, 0},
+    {"RR.foot.event_indicator", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, indicator[5]), HX_REAL, 0},
 };
 
 const hxSection hx_sections[HX_CAUSALITIES] = {
@@ -926,7 +932,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{87b543c6-3488-47e7-8aba-ac7ee3ebf675}";
+const char hx_default_guid[] = "{c2a7a5ea-eb8a-4968-84e8-4c8c00b11fab}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

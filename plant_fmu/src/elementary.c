@@ -11,6 +11,10 @@ static double alternating_series(double z, int first) {
 
 /* x = k pi/2 + r with |r| <= pi/4, then k quarter turns */
 void hx_sin_cos(double x, double *sine, double *cosine) {
+  if (!(fabs(x) < 1e9)) { /* no quarter turn can be told any more */
+    *sine = *cosine = NAN;
+    return;
+  }
   /* pi/2 in three pieces, the first two of 33 bits: k times them is exact */
   const double high = 0x1.921fb544p+0, mid = 0x1.0b4611a6p-34, low = 0x1.3198a2e037073p-69;
   const double k = floor(x * 0.6366197723675814 + 0.5);

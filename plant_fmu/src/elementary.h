@@ -6,7 +6,7 @@
 
 HX_HIDDEN_BEGIN
 
-/* Both to an error below one unit in the last place of 1, for |x| < 1e5. */
+/* Both to an error below one unit in the last place of 1, for |x| < 1e5; NaN from 1e9 on. */
 void hx_sin_cos(double x, double *sine, double *cosine);
 
 /* ln(1 + x), x > -1, to a few units in the last place. */

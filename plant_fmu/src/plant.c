@@ -152,18 +152,20 @@ void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x) {
   hx_kernel()->coordinates(&plant->model, &plant->state, &no_command, x, NULL);
 }
 
-/* whether a state is one: finite, with an attitude */
+/* m, m/s, rad/s, J and, for angles, rad: what is beyond is a solver's stray step, not a state */
+static const double largest_coordinate = 1e9, largest_angle = 1e5;
+
 static int are_coordinates(const hxCoordinates *x) {
-  const double *entry = (const double *)x, *p = x->quaternion;
-  double sum = 0.0;
-  for (int i = 0; i < HX_COORDINATES; ++i) sum += 0.0 * entry[i];
-  return sum == 0.0 && p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] > 1e-6;
+  const double *p = x->quaternion;
+  return largest(0.0, x, HX_COORDINATES) <= largest_coordinate && largest(0.0, x->angle, HX_LEGS * HX_JOINTS) <= largest_angle &&
+         p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] > 1e-6;
 }
 
 hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x) {
   if (!isfinite(t) || !are_coordinates(x))
-    return refuse(plant, HX_INVALID_ARGUMENT,
-                  "coordinates: got a number that is not finite, or a quaternion near 0; expected a state of the robot");
+    return refuse(plant, HX_NOT_FINITE,
+                  "coordinates: got numbers that are not finite, angles beyond 1e5 rad, others beyond 1e9 SI units or a "
+                  "quaternion near 0, expected a state of the robot");
   hx_kernel()->place(&plant->model, x, &plant->state.motion);
   plant->state.time = t;
   plant->state.call_input = 0.0;
@@ -176,22 +178,33 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, NULL, rate);
 }
 
-void hx_plant_penetration(const hxPlant *plant, double penetration[HX_LEGS]) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+/* m  Solvers that find one foot's sign change lose another's that comes within their rounding. So a foot touches the ground from this deep, and
+ * leaves it from this high; in between it does so when it is on its way there as another one switches (docs/equations.md). */
+static const double switch_band = 1e-10;
+
+static void all_feet(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
   hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
-  memcpy(penetration, delta, HX_LEGS * sizeof(double));
 }
 
-/* m  solvers that find one foot's sign change lose another's that comes within their rounding: a foot so near the ground counts as having
- * gone on where it is going */
-static const double near_ground = 1e-9;
+void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
+  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  all_feet(plant, delta, ddelta);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    indicator[leg] = delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
+}
+
+/* the penetration by which a foot switches, or stays as it is */
+static double switching_depth(int closed, double delta, double ddelta) {
+  if (closed) return delta <= -switch_band || (delta < 0.0 && ddelta < 0.0) ? -1.0 : 1.0;
+  return delta >= switch_band || (delta > 0.0 && ddelta > 0.0) ? 1.0 : -1.0;
+}
 
 int hx_plant_update_contacts(hxPlant *plant) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
   const hxMotion before = plant->state.motion;
-  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
+  all_feet(plant, delta, ddelta);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
-    if (fabs(delta[slot]) < near_ground) delta[slot] = ddelta[slot];
+    delta[slot] = switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
   plant->state.touchdowns += hx_contact_switch(&plant->model, delta, ddelta, &plant->state.contact);
   if (plant->model.friction_law == HX_FRICTION_BRISTLE) hx_contact_slacken(&plant->state.contact, &plant->state.motion);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;

@@ -240,11 +240,12 @@ HX_API void hx_plant_get_state(const hxPlant *plant, void *bytes);
 HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size);
 
 /* For solvers of others: y' = f(t, y, u) in coordinates, between touch-downs and lift-offs. The importer looks for sign changes of the feet's
- * penetration and then has the contacts updated. */
+ * indicators, > 0 for feet that touch the ground and < 0 for others, and then has the contacts updated. */
 HX_API void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x);
-HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x); /* contacts stay as they are */
+HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x); /* contacts stay; HX_NOT_FINITE: no state */
 HX_API void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate);
-HX_API void hx_plant_penetration(const hxPlant *plant, double penetration[HX_LEGS]); /* m  < 0: clearance */
+HX_API void hx_plant_indicators(const hxPlant *plant,
+                                double indicator[HX_LEGS]); /* m  penetration, but for a tenth of a nanometre (docs/equations.md) */
 HX_API int hx_plant_update_contacts(hxPlant *plant); /* touch-downs and lift-offs that are due; whether coordinates changed (bristles) */
 
 /* What small changes of input and coordinates make of rates and outputs: derivatives along that direction, exact to rounding (complex

@@ -126,15 +126,17 @@ static void normalise_quaternions(hxMotion *m) {
     }
 }
 
-/* The command at a time. A drive whose angle_ref moves by itself is not moved by speed_ref as well. */
+/* The command at a time; in kinematic mode speed_ref moves the drives whose angle_ref does not move by itself. */
 static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
-  enum { SIZE = sizeof(hxCommand) / sizeof(double), ANGLES = HX_JOINTS * HX_SLOTS, TIME = offsetof(hxCommand, time) / sizeof(double) };
+  enum { SIZE = sizeof(hxCommand) / sizeof(double), ANGLES = HX_JOINTS * HX_SLOTS };
   const double *from = (const double *)start->command, *rate = (const double *)start->ramp;
-  double *to = (double *)now, moves = 0.0;
+  double *to = (double *)now;
   if (!start->ramp) return start->command;
-  for (int i = 0; i < SIZE; ++i) to[i] = i == TIME ? start->command->time : from[i] + (t - start->command->time) * rate[i];
-  for (int i = 0; i < ANGLES; ++i) moves += fabs(rate[i]);
-  if (moves > 0.0) now->time = t;
+  const double elapsed = t - start->command->time;
+  for (int i = 0; i < SIZE; ++i) to[i] = from[i] + elapsed * rate[i];
+  for (int i = 0; i < ANGLES && start->model->servo_mode == HX_SERVO_KINEMATIC; ++i)
+    if (rate[i] == 0.0) to[i] = from[i] + elapsed * now->speed[i / HX_SLOTS][i % HX_SLOTS];
+  now->time = t;
   return now;
 }
 
