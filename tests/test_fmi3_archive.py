@@ -133,7 +133,7 @@ def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(exported3: Path, pla
         plant.initialize()
         other.initialize()
         assert plant.row("fmi3GetContinuousStates", 70).tolist() == other.reals(STATE_NAMES)
-        assert plant.row("fmi3GetEventIndicators", 6).tolist() == plant.get("foot.penetration")[0].tolist()
+        assert plant.row("fmi3GetEventIndicators", 6).tolist() == plant.get("foot.event_indicator")[0].tolist()
         rates = [state.derivative for state in ATHENA.states]
         assert plant.row("fmi3GetContinuousStateDerivatives", 70).tolist() == other.reals(rates)
         assert plant.row("fmi3GetNominalsOfContinuousStates", 70).min() > 0.0
