@@ -68,3 +68,15 @@ def test_a_missing_resource_is_found(plant_build: Path, tmp_path: Path) -> None:
             if not name.startswith("resources/"):
                 new.writestr(name, old.read(name))
     assert any("resources/start_values.txt is missing" in problem for problem in find_own_problems(tmp_path / "bare.fmu"))
+
+
+@pytest.mark.parametrize("text", [b"nonsense", b"<fmiModelDescription fmiVersion='2.0' />"])
+def test_an_unreadable_description_is_told_as_json_too(call: Call, tmp_path: Path, text: bytes) -> None:
+    bad = tmp_path / "bad.fmu"
+    with zipfile.ZipFile(bad, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+    code, out, err = call("validate", bad, "--json")
+    printed = json.loads(out)
+    assert code == 1
+    assert (printed["fmu"], printed["valid"], len(printed["problems"])) == (str(bad), False, 1)
+    assert printed["problems"][0] in err

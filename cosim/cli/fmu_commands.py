@@ -114,7 +114,12 @@ def _show_written(path: Path, robot: Robot, kind: str, *, json: bool) -> None:
 
 def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")], json: Json = False) -> None:
     """Check an FMU of ours and say what is wrong."""
-    problems = find_problems(fmu)
+    try:
+        problems = find_problems(fmu)
+    except HexapodError as error:  # not even to be read
+        if json:
+            show_json({"fmu": str(fmu), "valid": False, "problems": [str(error)]})
+        raise
     if json:
         show_json({"fmu": str(fmu), "valid": not problems, "problems": problems})
     else:
