@@ -22,6 +22,7 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.fmu_log import STATUS, WARNING, FmuLog
+from hexapod_cosim.cosim.plant_files import packed_binary
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
@@ -118,9 +119,10 @@ class Fmu:
         """Unpacks, loads the binary and makes the instance, every message of which lands in our log."""
         extract(self.path, self._directory.name)
         identifier = self.description.coSimulation.modelIdentifier
+        library = packed_binary(self._directory.name, identifier)
         facts = {"guid": self.description.guid, "modelIdentifier": identifier, "unzipDirectory": self._directory.name}
         with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
-            slave = FMU2Slave(instanceName=name, **facts)
+            slave = FMU2Slave(instanceName=name, libraryPath=library, **facts)
         try:
             slave.instantiate(callbacks=self._logged.callbacks, loggingOn=True)
         except Exception:

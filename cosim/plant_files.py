@@ -18,6 +18,7 @@ SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
 PLANT_ALONE = "plant.c"  # of the FMI layer: the plant as a component
 FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"  # each needs the headers of its own standard alone
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
+X86 = {"x86_64", "amd64", "i386", "i486", "i586", "i686", "x86"}  # as platform.machine() has them in lower case
 
 _HERE = Path(__file__).resolve().parent
 _TREE = _HERE.parent / "plant_fmu"
@@ -78,16 +79,25 @@ def fmi_headers() -> Path:
 
 
 def fmi2_platform() -> str:
-    """The folder of an FMI 2 archive that holds this machine's binary, as importers look for it."""
+    """The folder of an FMI 2 archive that holds this machine's binary; processors that FMI 2 has no name for go by FMI 3's (2.0.5)."""
     system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
+    if system != "darwin" and platform.machine().lower() not in X86:  # darwin64 is for both processors of Macs
+        return fmi3_platform()
     return system + ("64" if sys.maxsize > 2**32 else "32")
 
 
 def fmi3_platform() -> str:
     """The same in an FMI 3 archive."""
     system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     return f"{machine}-{system}"
+
+
+def packed_binary(folder: str | Path, identifier: str) -> str | None:
+    """This machine's binary in an unpacked FMI 2 FMU; None if it is not where it should be: then fmpy looks, in linux64 on Arm too."""
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    path = Path(folder).resolve() / "binaries" / fmi2_platform() / f"{identifier}{suffix}"
+    return str(path) if path.is_file() else None
 
 
 def binary(fmi_platform: str, component: Component = PLANT) -> Path:

@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 from hexapod_cosim.cosim.archive_check import archive_problems
 from hexapod_cosim.cosim.components import CONTROLLER
 from hexapod_cosim.cosim.fmu import Fmu, open_description, read_description
-from hexapod_cosim.cosim.plant_files import fmi2_platform
+from hexapod_cosim.cosim.plant_files import fmi2_platform, packed_binary
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.cosim.validation3 import find_own_problems3
 from hexapod_cosim.models import HexapodError
@@ -108,7 +108,8 @@ def _guid_problems(path: Path, description: Any) -> list[str]:
         identifier = description.coSimulation.modelIdentifier
         try:
             with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
-                slave = FMU2Slave(guid=FOREIGN_GUID, modelIdentifier=identifier, unzipDirectory=folder, instanceName="validate")
+                facts = {"guid": FOREIGN_GUID, "modelIdentifier": identifier, "libraryPath": packed_binary(folder, identifier)}
+                slave = FMU2Slave(unzipDirectory=folder, instanceName="validate", **facts)
         except Exception:  # fmpy's errors have no common type; that it does not load is told elsewhere
             return []
         try:

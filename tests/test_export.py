@@ -254,3 +254,31 @@ def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(e
     original = fmpy.simulate_fmu(str(exported), output=names, stop_time=0.2)
     for name in names:
         assert np.array_equal(rebuilt[name], original[name])
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "two", "three"),
+    [
+        ("linux", "x86_64", "linux64", "x86_64-linux"),
+        ("linux", "aarch64", "aarch64-linux", "aarch64-linux"),
+        ("win32", "AMD64", "win64", "x86_64-windows"),
+        ("darwin", "x86_64", "darwin64", "x86_64-darwin"),
+        ("darwin", "arm64", "darwin64", "aarch64-darwin"),
+    ],
+)
+def test_a_machine_s_own_folder_names_its_processor(
+    monkeypatch: pytest.MonkeyPatch, system: str, machine: str, two: str, three: str
+) -> None:
+    monkeypatch.setattr(plant_files.sys, "platform", system)
+    monkeypatch.setattr(plant_files.platform, "machine", lambda: machine)
+    assert (plant_files.fmi2_platform(), plant_files.fmi3_platform()) == (two, three)
+
+
+def test_an_arm_machine_s_binary_is_found_where_it_was_packed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(plant_files.sys, "platform", "linux")
+    monkeypatch.setattr(plant_files.platform, "machine", lambda: "aarch64")
+    assert plant_files.packed_binary(tmp_path, "hexapod") is None  # fmpy looks elsewhere
+    library = tmp_path / "binaries" / "aarch64-linux" / "hexapod.so"
+    library.parent.mkdir(parents=True)
+    library.touch()
+    assert plant_files.packed_binary(tmp_path, "hexapod") == str(library)
