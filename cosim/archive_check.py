@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 import fmpy
 
 from hexapod_cosim.cosim.description_check import INTERFACES, description_problems, schema_problems, variables
-from hexapod_cosim.cosim.extras import LICENCE, PICTURE
+from hexapod_cosim.cosim.extras import LICENCE, PICTURES
 from hexapod_cosim.cosim.terminals import FOLDER, ICON
 
 DESCRIPTION, TERMINALS, PAGE = "modelDescription.xml", f"{FOLDER}/terminalsAndIcons.xml", "documentation/index.html"
@@ -183,7 +183,7 @@ def document_problems(_: Element | None, found: dict[str, bytes]) -> Iterator[st
     for name, use in ((LICENCE, "the licence"), (PAGE, "the documentation")):
         if not found.get(name, b"").strip():
             yield f"{name}, {use}, is missing"
-    for name in (PICTURE, f"{FOLDER}/{ICON}"):
+    for name in (PICTURES[2], f"{FOLDER}/{ICON}"):
         if name in found and not found[name].startswith(PNG):
             yield f"{name} is no PNG"
     for name, data in found.items():

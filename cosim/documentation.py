@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
@@ -49,13 +50,22 @@ AXES = {"leg": LEG_NAMES, "joint": JOINT_NAMES}
 Row = dict[str, str]
 
 
-def render_html(interface: Interface, description: str) -> str:
-    """The page for one robot's FMU, whose modelDescription.xml is given. What is a component's own is in pages/."""
+def render_html(interface: Interface, description: str, *, picture: str, reference: bool) -> str:
+    """The page for one robot's FMU. What is a component's own is in pages/.
+
+    Args:
+        interface: what to tell of.
+        description: its modelDescription.xml.
+        picture: the robot's picture, by its path in the archive.
+        reference: whether the archive has reference results.
+    """
     root = ElementTree.fromstring(description.encode())
     environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "pages"), autoescape=True, undefined=StrictUndefined)
     robot, arrayed = interface.robot, str(root.get("fmiVersion")).startswith("3")
     return environment.get_template(f"{interface.component.name}.html.jinja").render(
         robot=robot,
+        picture=posixpath.relpath(picture, "documentation"),
+        reference=reference,
         interface=interface,
         joints=sum(len(leg.links) for leg in robot.legs),
         fmi=root.get("fmiVersion"),

@@ -67,7 +67,8 @@ def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> d
         "resources/start_values.txt": start_values(interface, description.guid).encode(),
     }
     members |= dict(binaries) | _sources(interface.component, fmi)
-    return members | extra_members(interface, description.xml, fmi=fmi) | (_reference(interface, members) if fmi == 2 else {})
+    reference = _reference(interface, members) if fmi == 2 else {}
+    return members | extra_members(interface, description.xml, fmi=fmi, reference=bool(reference)) | reference
 
 
 def _sources(component: Component, fmi: int) -> dict[str, bytes]:

@@ -153,3 +153,18 @@ def test_the_page_s_links_lead_somewhere(exported: Path) -> None:
     for target in targets:
         name = target[1:] if target.startswith("#") else posixpath.normpath(f"documentation/{target}")
         assert name in (anchors if target.startswith("#") else present), target
+
+
+@pytest.mark.parametrize(("fmi", "platforms"), [(2, None), (2, "sources"), (3, None)])
+def test_the_page_tells_of_what_is_in_the_archive_alone(plant_build: Path, tmp_path: Path, fmi: int, platforms: str | None) -> None:
+    with zipfile.ZipFile(export_fmu(load_robot("athena"), tmp_path / "athena.fmu", fmi=fmi, platforms=platforms)) as archive:
+        page, names = archive.read("documentation/index.html").decode(), archive.namelist()
+    assert (FOLDER in page) == any(name.startswith(FOLDER) for name in names) == ((fmi, platforms) == (2, None))
+    links = re.findall(r'(?:src|href)="([^"#:]+)"', page)
+    assert len(links) >= 2  # the picture and the licence
+    assert {posixpath.normpath(f"documentation/{link}") for link in links} <= set(names)
+
+
+@pytest.mark.parametrize(("fmi", "picture"), [(2, "model.png"), (3, "documentation/diagram.png")])
+def test_the_picture_is_where_the_standard_has_it(fmi: int, picture: str) -> None:
+    assert list(pictures(ATHENA, fmi=fmi)) == [picture, "terminalsAndIcons/icon.png"]

@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.components import PLANT, Component
 from hexapod_cosim.cosim.controller_interface import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.documentation import render_html
 from hexapod_cosim.cosim.export import start_values
+from hexapod_cosim.cosim.extras import PICTURES
 from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.model_description import render_fmi2
 from hexapod_cosim.cosim.terminals import render_terminals
@@ -63,7 +64,7 @@ def render_component(interface: Interface) -> dict[Path, str]:
         folder / "variables.c": render_variables(interface, description.guid),
         folder / "defaults.c": render_defaults(interface),
         folder / "modelDescription.xml": description.xml,
-        folder / "index.html": render_html(interface, description.xml),
+        folder / "index.html": render_html(interface, description.xml, picture=PICTURES[2], reference=interface.component is PLANT),
         folder / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
         folder / "start_values.txt": start_values(interface, description.guid),
     }
