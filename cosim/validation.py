@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import zipfile
 from contextlib import chdir
 from pathlib import Path
@@ -18,11 +17,10 @@ from hexapod_cosim.cosim.components import CONTROLLER
 from hexapod_cosim.cosim.fmu import Fmu, open_description, read_description
 from hexapod_cosim.cosim.plant_files import fmi2_platform, packed_binary
 from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.start_value_check import START_VALUES, start_value_problems
 from hexapod_cosim.cosim.validation3 import find_own_problems3
 from hexapod_cosim.models import HexapodError
 
-START_VALUES = "resources/start_values.txt"
-CHECKSUM = "checksum "
 TRIAL_STEP = 0.001  # s
 FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
 
@@ -40,49 +38,11 @@ def find_own_problems(path: Path) -> list[str]:
     """The same without fmpy's checks; what was packed for other machines alone is not run. Raises FmuError when it is no FMU at all."""
     description, problems = read_description(path), archive_problems(path)
     with zipfile.ZipFile(path) as archive:
-        problems += _start_value_problems(archive, description)
-        runs_here = any(name.startswith(f"binaries/{fmi2_platform()}/") for name in archive.namelist())
+        names = archive.namelist()
+        data = archive.read(START_VALUES) if START_VALUES in names else None
+        problems += start_value_problems(data, description.guid, description)
+        runs_here = any(name.startswith(f"binaries/{fmi2_platform()}/") for name in names)
     return problems + (_run_problems(path) + _guid_problems(path, description) if runs_here else [])
-
-
-def _start_value_problems(archive: zipfile.ZipFile, description: Any) -> list[str]:
-    """The binary takes its robot from start_values.txt, importers see modelDescription.xml: both must say the same."""
-    if START_VALUES not in archive.namelist():
-        return [f"{START_VALUES} is missing: the binary takes the robot from it"]
-    guid, *lines = archive.read(START_VALUES).decode("utf-8", errors="replace").split("\n")
-    lines = [line for line in lines if not line.startswith(CHECKSUM)]  # which the binary checks as it loads
-    problems = (
-        [] if guid.strip() == description.guid else [f"{START_VALUES} has GUID {guid.strip()!r}, modelDescription.xml {description.guid!r}"]
-    )
-    known = {variable.valueReference: variable for variable in description.modelVariables}
-    for number, line in enumerate(lines, start=2):
-        problems += _line_problems(f"{START_VALUES} line {number}", line.split(), known)
-    return problems
-
-
-def _line_problems(where: str, words: list[str], known: dict[int, Any]) -> list[str]:
-    if not words:
-        return []
-    try:
-        reference, value = int(words[0]), _number(words[1])
-    except (ValueError, IndexError):
-        return [f"{where}: got {' '.join(words)!r}, expected a value reference and a value"]
-    if reference not in known:
-        return [f"{where}: value reference {reference} is not in modelDescription.xml"]
-    variable = known[reference]
-    stated = _start(variable)
-    same = stated is not None and math.isclose(stated, value, rel_tol=1e-12, abs_tol=1e-300)
-    return [] if same else [f"{where}: {variable.name} is {value!r}, modelDescription.xml says {variable.start!r}"]
-
-
-def _number(word: str) -> float:
-    return float.fromhex(word) if "x" in word else float(word)
-
-
-def _start(variable: Any) -> float | None:
-    if variable.start in ("true", "false"):
-        return float(variable.start == "true")
-    return None if variable.start is None else float(variable.start)
 
 
 def _run_problems(path: Path) -> list[str]:

@@ -16,9 +16,9 @@ from fmpy.fmi3 import FMU3Slave
 
 from hexapod_cosim.cosim.archive_check import BUILD_DESCRIPTION, DESCRIPTION, TERMINALS, document_problems, library_problems, zip_problems
 from hexapod_cosim.cosim.description_check import schema_problems
+from hexapod_cosim.cosim.start_value_check import START_VALUES, start_value_problems
 
 SCHEMAS = {DESCRIPTION: "fmi3ModelDescription", BUILD_DESCRIPTION: "fmi3BuildDescription", TERMINALS: "fmi3TerminalsAndIcons"}
-START_VALUES, CHECKSUM = "resources/start_values.txt", "checksum "
 FOREIGN_TOKEN = "{00000000-0000-0000-0000-000000000000}"
 TRIAL_STEP = 0.001  # s
 
@@ -36,7 +36,11 @@ def find_own_problems3(path: Path, description: Any) -> list[str]:
     if problems:
         return problems
     checks = (_source_problems(found), _binary_problems(found, description), _terminal_problems(found, description))
-    problems += [*chain(*checks), *document_problems(None, found), *_start_value_problems(found, description)]
+    problems += [
+        *chain(*checks),
+        *document_problems(None, found),
+        *start_value_problems(found.get(START_VALUES), description.instantiationToken, description),
+    ]
     return problems or _run_problems(path, description)
 
 
@@ -64,41 +68,6 @@ def _terminal_problems(found: dict[str, bytes], description: Any) -> Iterator[st
     for member in ElementTree.fromstring(found[TERMINALS]).iter("TerminalMemberVariable"):
         if member.get("variableName") not in known:
             yield f"{TERMINALS} has {member.get('variableName')!r}, which is no variable"
-
-
-def _start_value_problems(found: dict[str, bytes], description: Any) -> Iterator[str]:
-    """The binary takes its robot from start_values.txt, importers see modelDescription.xml: both must say the same."""
-    if START_VALUES not in found:
-        yield f"{START_VALUES} is missing: the binary takes the robot from it"
-        return
-    token, *lines = found[START_VALUES].decode("utf-8", errors="replace").splitlines()
-    if token != description.instantiationToken:
-        yield f"{START_VALUES} has token {token!r}, modelDescription.xml {description.instantiationToken!r}"
-    stated = _stated(description)
-    for line in lines:
-        reference, _, rest = line.partition(" ")
-        if line.startswith(CHECKSUM):  # which the binary checks as it loads
-            continue
-        if not reference.isdigit() or int(reference) not in stated or _number(rest.split(" ")[0]) != stated.pop(int(reference)):
-            yield f"{START_VALUES}: {line!r} is not what modelDescription.xml says"
-    for left in stated:
-        yield f"{START_VALUES} lacks the value reference {left}"
-
-
-def _stated(description: Any) -> dict[int, float]:
-    """Start values by the references of elements: an array's own, and those that follow."""
-    values: dict[int, float] = {}
-    for variable in description.modelVariables:
-        if variable.start is not None:
-            numbers = str(variable.start).split()
-            values |= {variable.valueReference + place: _number(number) for place, number in enumerate(numbers)}
-    return values
-
-
-def _number(word: str) -> float:
-    if word in ("true", "false"):
-        return float(word == "true")
-    return float.fromhex(word) if "x" in word else float(word)
 
 
 def _run_problems(path: Path, description: Any) -> list[str]:

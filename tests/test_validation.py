@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -29,6 +30,8 @@ def tampered(source: Path, target: Path, member: str, change: Callable[[bytes], 
         ("resources/start_values.txt", lambda text: text.replace(b" torso.mass", b"p1 torso.mass"), "torso.mass"),
         ("resources/start_values.txt", lambda text: text + b"99999 1.0\n", "99999"),
         ("resources/start_values.txt", lambda text: text + b"nonsense\n", "'nonsense'"),
+        ("resources/start_values.txt", lambda text: text[: text.index(b"\n") + 1], "more"),
+        ("resources/start_values.txt", lambda text: re.sub(rb"\n\d+ \S+ torso.mass\n", b"\n", text), "lacks the value reference"),
         ("binaries/linux64/hexapod.so", lambda _: b"no library", "cannot be loaded"),
     ],
 )
