@@ -13,13 +13,18 @@ from xml.etree.ElementTree import Element
 
 import fmpy
 
-from hexapod_cosim.cosim.description_check import INTERFACES, description_problems, schema_problems, variables
+from hexapod_cosim.cosim.description_check import description_problems, schema_problems, variables
 from hexapod_cosim.cosim.extras import LICENCE, PICTURES
 from hexapod_cosim.cosim.terminals import FOLDER, ICON
+from hexapod_cosim.cosim.variable_check import INTERFACES
 
 DESCRIPTION, TERMINALS, PAGE = "modelDescription.xml", f"{FOLDER}/terminalsAndIcons.xml", "documentation/index.html"
 BUILD_DESCRIPTION = "sources/buildDescription.xml"
-HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")  # the importer's own
+# the importer's own headers, by version of the standard; the first declares all functions
+HEADERS = {
+    2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
 DEFLATE_VERSION = 20  # of the ZIP format, the latest that the standard lets an FMU need
 DESCRIPTOR = 1 << 3  # general purpose bit: sizes stand behind the data
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -53,8 +58,26 @@ def archive_problems(path: Path) -> list[str]:
     if problems:
         return problems
     root = ElementTree.fromstring(found[DESCRIPTION])
-    checks = (_source_problems, _binary_problems, _terminal_problems, document_problems)
-    return description_problems(root) + [problem for check in checks for problem in check(root, found)]
+    problems += [*description_problems(root), *_source_problems(root, found)]
+    return problems + member_problems(root, found, [variable.name for variable in variables(root)], fmi=2)
+
+
+def member_problems(root: Element, found: dict[str, bytes], names: Iterable[str], *, fmi: int) -> list[str]:
+    """What is wrong with an archive's members, for either version of the standard.
+
+    Args:
+        root: of modelDescription.xml.
+        found: the members by path.
+        names: the variables'.
+        fmi: version of the standard.
+    """
+    checks = (
+        include_problems(found, fmi),
+        binary_problems(root, found, fmi),
+        terminal_problems(set(names), found),
+        document_problems(found, fmi),
+    )
+    return [problem for check in checks for problem in check]
 
 
 def zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
@@ -89,10 +112,16 @@ def _source_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
             yield f"sources/{name} is not listed by {interface.tag}"
         for name in sorted({name for name in listed if listed.count(name) > 1}):
             yield f"{interface.tag} lists the source {name} more than once"
+
+
+def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
+    """Headers that sources include, there but for the standard's."""
+    present = {name.removeprefix("sources/") for name in found if name.startswith("sources/")}
     for name in sorted(present):
-        if PurePosixPath(name).name in HEADERS:
+        if PurePosixPath(name).name in HEADERS[fmi]:
             yield f"sources/{name} is the standard's, which importers have themselves"
-        missing = [include for include in _includes(found[f"sources/{name}"]) if not _is_there(include, name, present)]
+        includes = [include for include in _includes(found[f"sources/{name}"]) if include not in HEADERS[fmi]]
+        missing = [include for include in includes if not _is_there(include, name, present)]
         for include in missing:
             yield f'sources/{name} includes "{include}", which is not in the archive'
 
@@ -102,16 +131,17 @@ def _includes(text: bytes) -> list[str]:
 
 
 def _is_there(include: str, name: str, present: Iterable[str]) -> bool:
-    return include in HEADERS or include in present or posixpath.normpath(PurePosixPath(name).parent / include) in present
+    return include in present or posixpath.normpath(PurePosixPath(name).parent / include) in present
 
 
-def standard_functions(header: str = HEADERS[0]) -> list[str]:
+def standard_functions(fmi: int = 2) -> list[str]:
     """Every function that the standard asks of a binary."""
-    text = (Path(fmpy.__file__).parent / "c-code" / header).read_text(encoding="utf-8")
+    text = (Path(fmpy.__file__).parent / "c-code" / HEADERS[fmi][0]).read_text(encoding="utf-8")
     return re.findall(r"FMI[23]_Export fmi[23]\w+TYPE\s+(fmi[23]\w+);", text)
 
 
-def _binary_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
+def binary_problems(root: Element, found: dict[str, bytes], fmi: int) -> Iterator[str]:
+    """A library for every interface in each platform's folder."""
     elements = [root.find(name) for name in INTERFACES]
     identifiers = {str(element.get("modelIdentifier")) for element in elements if element is not None}
     platforms = sorted({PurePosixPath(name).parts[1] for name in found if name.startswith("binaries/")})
@@ -124,12 +154,12 @@ def _binary_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
         for identifier in sorted(identifiers):
             name = f"binaries/{platform}/{identifier}{PLATFORMS[platform][0]}"
             if name in found:
-                yield from library_problems(name, found[name], platform)
+                yield from library_problems(name, found[name], platform, fmi=fmi)
             else:
                 yield f"{name} is missing: importers look for the modelIdentifier"
 
 
-def library_problems(name: str, data: bytes, platform: str, *, header: str = HEADERS[0]) -> Iterator[str]:
+def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> Iterator[str]:
     """By its bytes alone, so that it works for machines that are not this one."""
     _, magic, place, machine = PLATFORMS[platform]
     if magic == MACH and data.startswith(FAT):
@@ -142,12 +172,13 @@ def library_problems(name: str, data: bytes, platform: str, *, header: str = HEA
         yield f"{name} is no library of {platform}"
         return
     start = b"\0_" if magic in (MACH, FAT) else b"\0"
-    missing = [function for function in standard_functions(header) if start + function.encode() + b"\0" not in data]
+    missing = [function for function in standard_functions(fmi) if start + function.encode() + b"\0" not in data]
     if missing:
         yield f"{name} lacks {len(missing)} functions of the standard: {', '.join(missing)}"
 
 
-def _terminal_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
+def terminal_problems(known: set[str], found: dict[str, bytes]) -> Iterator[str]:
+    """Terminals of known variables, and the icon that they place."""
     if TERMINALS not in found:
         return
     broken = schema_problems(TERMINALS, found[TERMINALS], "fmi3/fmi3TerminalsAndIcons.xsd")
@@ -157,7 +188,6 @@ def _terminal_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
     document = ElementTree.fromstring(found[TERMINALS])
     if document.find("GraphicalRepresentation") is not None and f"{FOLDER}/{ICON}" not in found:
         yield f"{FOLDER}/{ICON} is missing, though {TERMINALS} places it"
-    known = {str(variable.get("name")) for variable, _ in variables(root)}
     top = document.find("Terminals")
     if top is not None:
         yield from _group_problems(top, "", known)
@@ -179,11 +209,12 @@ def _group_problems(parent: Element, path: str, known: set[str]) -> Iterator[str
         yield from _group_problems(terminal, f"{where}.", known)
 
 
-def document_problems(_: Element | None, found: dict[str, bytes]) -> Iterator[str]:
-    for name, use in ((LICENCE, "the licence"), (PAGE, "the documentation")):
+def document_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
+    """Licence, page and pictures there; nothing that tells of the machine where they were made."""
+    for name, use in ((LICENCE, "the licence"), (PAGE, "the documentation"), (PICTURES[fmi], "the robot's picture")):
         if not found.get(name, b"").strip():
             yield f"{name}, {use}, is missing"
-    for name in (PICTURES[2], f"{FOLDER}/{ICON}"):
+    for name in (PICTURES[fmi], f"{FOLDER}/{ICON}"):
         if name in found and not found[name].startswith(PNG):
             yield f"{name} is no PNG"
     for name, data in found.items():

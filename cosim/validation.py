@@ -7,19 +7,22 @@ from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from xml.etree import ElementTree
 
 from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
 from fmpy.validation import validate_fmu
 
-from hexapod_cosim.cosim.archive_check import archive_problems
+from hexapod_cosim.cosim.archive_check import DESCRIPTION, archive_problems
 from hexapod_cosim.cosim.components import CONTROLLER
+from hexapod_cosim.cosim.description3_check import description_problems3
+from hexapod_cosim.cosim.description_check import description_problems, schema_problems
 from hexapod_cosim.cosim.fmu import Fmu, open_description, read_description
 from hexapod_cosim.cosim.plant_files import fmi2_platform, packed_binary
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.cosim.start_value_check import START_VALUES, start_value_problems
 from hexapod_cosim.cosim.validation3 import find_own_problems3
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import FmuError, HexapodError
 
 TRIAL_STEP = 0.001  # s
 FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
@@ -27,11 +30,30 @@ FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
 
 def find_problems(path: Path) -> list[str]:
     """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when it is no FMU at all."""
-    description = open_description(path)
+    try:
+        description = open_description(path)
+    except FmuError:
+        problems = _unread_problems(path)
+        if not problems:
+            raise
+        return problems
     if description.fmiVersion.startswith("3.") and description.coSimulation is not None:
         return [*map(str, validate_fmu(str(path))), *find_own_problems3(path, description)]
     read_description(path)
     return [*map(str, validate_fmu(str(path))), *find_own_problems(path)]
+
+
+def _unread_problems(path: Path) -> list[str]:
+    """Of a modelDescription.xml that fmpy makes no sense of: it refers to what is not there, say. Empty if it cannot be parsed at all."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            data = archive.read(DESCRIPTION)
+        root = ElementTree.fromstring(data)
+    except (OSError, zipfile.BadZipFile, KeyError, ElementTree.ParseError):
+        return []
+    fmi3 = root.get("fmiVersion", "").startswith("3.")
+    broken = schema_problems(DESCRIPTION, data, "fmi3/fmi3ModelDescription.xsd" if fmi3 else "fmi2/fmi2ModelDescription.xsd")
+    return broken or (description_problems3 if fmi3 else description_problems)(root)
 
 
 def find_own_problems(path: Path) -> list[str]:

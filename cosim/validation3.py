@@ -5,8 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Iterator
 from contextlib import chdir, suppress
-from itertools import chain
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 from xml.etree import ElementTree
@@ -14,7 +13,8 @@ from xml.etree import ElementTree
 from fmpy import extract, platform_tuple
 from fmpy.fmi3 import FMU3Slave
 
-from hexapod_cosim.cosim.archive_check import BUILD_DESCRIPTION, DESCRIPTION, TERMINALS, document_problems, library_problems, zip_problems
+from hexapod_cosim.cosim.archive_check import BUILD_DESCRIPTION, DESCRIPTION, TERMINALS, member_problems, zip_problems
+from hexapod_cosim.cosim.description3_check import description_problems3, variables3
 from hexapod_cosim.cosim.description_check import schema_problems
 from hexapod_cosim.cosim.start_value_check import START_VALUES, start_value_problems
 
@@ -35,12 +35,10 @@ def find_own_problems3(path: Path, description: Any) -> list[str]:
         problems += schema_problems(member, found[member], f"fmi3/{schema}.xsd") if member in found else [f"{member} is missing"]
     if problems:
         return problems
-    checks = (_source_problems(found), _binary_problems(found, description), _terminal_problems(found, description))
-    problems += [
-        *chain(*checks),
-        *document_problems(None, found),
-        *start_value_problems(found.get(START_VALUES), description.instantiationToken, description),
-    ]
+    root = ElementTree.fromstring(found[DESCRIPTION])
+    problems += [*description_problems3(root), *_source_problems(found)]
+    problems += member_problems(root, found, [variable.name for variable in variables3(root)], fmi=3)
+    problems += start_value_problems(found.get(START_VALUES), description.instantiationToken, description)
     return problems or _run_problems(path, description)
 
 
@@ -52,22 +50,6 @@ def _source_problems(found: dict[str, bytes]) -> Iterator[str]:
         yield f"{BUILD_DESCRIPTION} lists {name}, which is not in the archive"
     for name in sorted(name for name in found if name.startswith("sources/") and name.endswith(".c") and name not in listed):
         yield f"{name} is not listed by {BUILD_DESCRIPTION}"
-
-
-def _binary_problems(found: dict[str, bytes], description: Any) -> Iterator[str]:
-    for name in sorted(name for name in found if name.startswith("binaries/")):
-        path = PurePosixPath(name)
-        if path.stem != description.coSimulation.modelIdentifier:
-            yield f"{name} does not have the name of the modelIdentifier"
-        else:
-            yield from library_problems(name, found[name], path.parts[1], header="fmi3Functions.h")
-
-
-def _terminal_problems(found: dict[str, bytes], description: Any) -> Iterator[str]:
-    known = {variable.name for variable in description.modelVariables}
-    for member in ElementTree.fromstring(found[TERMINALS]).iter("TerminalMemberVariable"):
-        if member.get("variableName") not in known:
-            yield f"{TERMINALS} has {member.get('variableName')!r}, which is no variable"
 
 
 def _run_problems(path: Path, description: Any) -> list[str]:

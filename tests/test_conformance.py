@@ -117,6 +117,7 @@ DAMAGED_MEMBERS: list[tuple[str, Change | None, str]] = [
     ("documentation/index.html", lambda data: data + b"file:///Users/me", "holds a path"),
     ("documentation/licenses/license.txt", None, "the licence, is missing"),
     ("model.png", lambda data: b"GIF89a", "model.png is no PNG"),
+    ("model.png", None, "model.png, the robot's picture, is missing"),
     ("terminalsAndIcons/icon.png", None, "terminalsAndIcons/icon.png is missing"),
     (TERMINALS, lambda data: b"<terminals>", "is no XML"),
     (TERMINALS, replaced('matchingRule="plug"', ""), "matchingRule"),

@@ -73,13 +73,20 @@ def test_a_missing_resource_is_found(plant_build: Path, tmp_path: Path) -> None:
     assert any("resources/start_values.txt is missing" in problem for problem in find_own_problems(tmp_path / "bare.fmu"))
 
 
-@pytest.mark.parametrize("text", [b"nonsense", b"<fmiModelDescription fmiVersion='2.0' />"])
-def test_an_unreadable_description_is_told_as_json_too(call: Call, tmp_path: Path, text: bytes) -> None:
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        (b"nonsense", "cannot be read"),
+        (b"<other/>", "No matching global declaration"),
+        (b"<fmiModelDescription fmiVersion='2.0' />", "'guid' is required"),
+    ],
+)
+def test_an_unreadable_description_is_told_as_json_too(call: Call, tmp_path: Path, text: bytes, part: str) -> None:
     bad = tmp_path / "bad.fmu"
     with zipfile.ZipFile(bad, "w") as archive:
         archive.writestr("modelDescription.xml", text)
-    code, out, err = call("validate", bad, "--json")
+    code, out, _ = call("validate", bad, "--json")
     printed = json.loads(out)
     assert code == 1
-    assert (printed["fmu"], printed["valid"], len(printed["problems"])) == (str(bad), False, 1)
-    assert printed["problems"][0] in err
+    assert (printed["fmu"], printed["valid"]) == (str(bad), False)
+    assert any(part in problem for problem in printed["problems"]), printed
