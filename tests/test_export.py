@@ -6,6 +6,8 @@ import contextlib
 import ctypes
 import dataclasses
 import os
+import platform
+import sys
 import zipfile
 from pathlib import Path
 from urllib.parse import quote
@@ -269,14 +271,14 @@ def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(e
 def test_a_machine_s_own_folder_names_its_processor(
     monkeypatch: pytest.MonkeyPatch, system: str, machine: str, two: str, three: str
 ) -> None:
-    monkeypatch.setattr(plant_files.sys, "platform", system)
-    monkeypatch.setattr(plant_files.platform, "machine", lambda: machine)
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
     assert (plant_files.fmi2_platform(), plant_files.fmi3_platform()) == (two, three)
 
 
 def test_an_arm_machine_s_binary_is_found_where_it_was_packed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(plant_files.sys, "platform", "linux")
-    monkeypatch.setattr(plant_files.platform, "machine", lambda: "aarch64")
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
     assert plant_files.packed_binary(tmp_path, "hexapod") is None  # fmpy looks elsewhere
     library = tmp_path / "binaries" / "aarch64-linux" / "hexapod.so"
     library.parent.mkdir(parents=True)
