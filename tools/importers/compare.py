@@ -1,7 +1,7 @@
 """`python -m tools.importers.compare`: the same recorded walk through importers that no one here wrote, and how far each is from fmpy.
 
 Everything lies in build/importers: an environment of the importers' own, the walk, each importer's answers. An importer that cannot be
-had on this machine is named with the reason; the exit code says whether those that ran agree.
+installed on this machine is named with the reason; one that was installed has to run and agree, or the exit code says so.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,16 +20,17 @@ from rich.console import Console
 from rich.table import Table
 
 from hexapod_cosim.cosim.plant_files import package_version
-from hexapod_cosim.cosim.recorder import Recording, read_csv
-from tools.importers.packages import PackageRow, compare_packages, version
+from hexapod_cosim.cosim.recorder import Recording
+from tools.importers.outcome import Outcome, answers, last_lines, not_installed, shortcomings, version
+from tools.importers.packages import TOOLS, PackageRow, compare_packages
 from tools.importers.walk import STEP, Walk, record
 
 HERE = Path(__file__).resolve().parent
+ADAPTERS = HERE / "adapters"
 BUILD = HERE.parents[1] / "build" / "importers"
 DURATION = 3.0  # s    three gait cycles and a half
 ROUND_OFF = 1e-10  # a last bit in when a step ends, carried through a walk whose servo torques and reactions jump at every touch-down
 SMALL = 1e-3  # SI     an output that never gets larger is judged by this: residuals are themselves round-off
-LAST_LINES = 3
 FMI_SIM = "0.7.0"
 
 
@@ -37,15 +39,15 @@ class Importer:
     """A program that walks: `adapter` FMU INPUTS NAMES OUTPUTS."""
 
     name: str
-    package: str  # "": of crates.io
+    packages: tuple[str, ...]  # of PyPI, itself first; (): of crates.io
     adapter: str
     given: str  # how it takes inputs
 
 
 IMPORTERS = (
-    Importer("libcosim", "libcosimpy", "libcosim_walk.py", "override manipulator, held over the step"),
-    Importer("Ecos", "ecospy", "ecos_walk.py", "set before the step, held over it"),
-    Importer("fmi-sim", "", "fmi_sim_walk.py", "CSV read by itself, rows at the communication points"),
+    Importer("libcosim", ("libcosimpy",), "libcosim_walk.py", "override manipulator, held over the step"),
+    Importer("Ecos", ("ecospy", "tbb"), "ecos_walk.py", "set before the step, held over it"),
+    Importer("fmi-sim", (), "fmi_sim_walk.py", "CSV read by itself, rows at the communication points"),
 )
 
 
@@ -53,7 +55,7 @@ IMPORTERS = (
 class Row:
     """What came of an importer. Differences are the largest of all outputs and times, each of its output's largest value.
 
-    difference: from fmpy;  own: from fmpy told the importer's own times, to the last bit.
+    difference: from fmpy;  own: from fmpy told the importer's own times, to the last bit;  missing: it could not be installed.
     """
 
     name: str
@@ -62,6 +64,12 @@ class Row:
     difference: float | None
     own: float | None
     remark: str
+    missing: bool = False
+
+    @property
+    def agrees(self) -> bool:
+        """It ran, and what is left is round-off."""
+        return self.difference is not None and self.difference <= ROUND_OFF
 
 
 def main() -> int:
@@ -71,18 +79,22 @@ def main() -> int:
     duration = parser.parse_args().duration
     walk = record(BUILD / "walk", duration=duration)
     python = environment()
-    rows = [row("hexapod's master", package_version(), "as recorded", walk.recorded, walk)]
+    ours = row("hexapod's master", package_version(), "as recorded", walk.recorded, walk)
     missing = install_fmi_sim(python)
-    for importer in IMPORTERS:
-        if not importer.package and missing:
-            rows.append(Row(importer.name, "", importer.given, None, None, missing))
-        else:
-            rows.append(through(importer, walk, python))
-    show(rows, walk)
-    packages = compare_packages(BUILD / "package", python, duration=duration)
-    show_packages(packages)
-    agree = [one.difference is None or one.difference <= ROUND_OFF for one in rows]
-    return 0 if all([*agree, *(one.agrees for one in packages)]) else 1
+    rows = [through(importer, walk, python, missing="" if importer.packages else missing) for importer in IMPORTERS]
+    show([ours, *rows], walk)
+    masters, tools = compare_packages(BUILD / "package", python, duration=duration)
+    show_packages([*masters, *tools])
+    return verdict(rows, tools, ours=[ours, *masters])
+
+
+def verdict(importers: Sequence[Row], tools: Sequence[PackageRow], *, ours: Sequence[Outcome]) -> int:
+    """Says what is not good enough, and returns the exit code. Masters of our own (`ours`) have to agree, whatever can be installed."""
+    wrong = [f"{one.name} does not agree" for one in ours if not one.agrees]
+    wrong += shortcomings("importers", importers, wanted=len(IMPORTERS)) + shortcomings("tools for packages", tools, wanted=len(TOOLS))
+    for text in wrong:
+        print(text, file=sys.stderr)
+    return 1 if wrong else 0
 
 
 def environment() -> Path:
@@ -119,19 +131,20 @@ def install_fmi_sim(python: Path) -> str:
         str(folder / "target"),
     ]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    return "" if done.returncode == 0 else " / ".join(done.stderr.strip().splitlines()[-LAST_LINES:])
+    return "" if done.returncode == 0 else last_lines(done.stderr)
 
 
-def through(importer: Importer, walk: Walk, python: Path) -> Row:
-    """The walk through one importer."""
+def through(importer: Importer, walk: Walk, python: Path, *, missing: str = "") -> Row:
+    """The walk through one importer; `missing`: why it could not be installed, if that is known."""
+    missing = missing or not_installed(importer.packages, python)
+    if missing:
+        return Row(importer.name, "", importer.given, None, None, missing, missing=True)
     outputs = walk.folder / f"{importer.name}.csv"
-    outputs.unlink(missing_ok=True)
-    arguments = map(str, (python, HERE / "adapters" / importer.adapter, walk.fmu, walk.inputs, walk.wanted, outputs))
-    done = subprocess.run(list(arguments), capture_output=True, text=True, check=False)
-    if done.returncode:
-        said = " / ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
-        return Row(importer.name, "", importer.given, None, None, said)
-    return row(importer.name, version(importer.package, python) if importer.package else FMI_SIM, importer.given, read_csv(outputs), walk)
+    found, said = answers([python, ADAPTERS / importer.adapter, walk.fmu, walk.inputs, walk.wanted, outputs], outputs)
+    release = version(importer.packages[0], python) if importer.packages else FMI_SIM
+    if found is None:
+        return Row(importer.name, release, importer.given, None, None, said)
+    return row(importer.name, release, importer.given, found, walk)
 
 
 def row(name: str, release: str, given: str, found: Recording, walk: Walk) -> Row:
@@ -139,13 +152,16 @@ def row(name: str, release: str, given: str, found: Recording, walk: Walk) -> Ro
     difference, worst = judged(found, walk.reference)
     lengths = (np.full(len(found.time), STEP), np.diff(found.time, prepend=0.0))  # importers pass h, or the difference of their times
     whole = len(found.time) == len(walk.reference.time)
-    own = min(judged(found, walk.replay(found.time, steps))[0] for steps in lengths) if whole else None
+    own = min(judged(found, walk.replay(found.time, steps))[0] for steps in lengths) if whole and np.isfinite(found.time).all() else None
     return Row(name, release, given, difference, own, worst)
 
 
 def judged(found: Recording, reference: Recording) -> tuple[float, str]:
     """The largest difference of all outputs and times, of the output's largest value, and where."""
     names = reference.names[1:]
+    lacking = set(names).difference(found.names)
+    if lacking:
+        return np.inf, f"without {min(lacking)}"
     ours, theirs = reference.columns(names), found.columns(names)
     if ours.shape != theirs.shape:
         return np.inf, f"{len(theirs)} rows, expected {len(ours)}"
