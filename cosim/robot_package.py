@@ -10,8 +10,9 @@ from types import MappingProxyType
 from hexapod_cosim.cosim.controller_export import export_controller
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
+from hexapod_cosim.cosim.platforms import choose_platforms
 from hexapod_cosim.cosim.ssp import NOTHING, Experiment, export_ssp
-from hexapod_cosim.models import HexapodError, unknown_name
+from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
 PLANT, CONTROLLER = "plant", "controller"  # in the order in which their outputs follow from each other
 SUFFIX = ".ssp"
@@ -32,11 +33,14 @@ def export_package(
         path: the file to write; it appears complete or not at all.
         values: of parameters and of the walking command, in place of what the FMUs start with and of 0.08 m/s straight on.
         stop: time at which tools end if they are told nothing else [s].
-        platforms: of both FMUs, as for `export_fmu`.
+        platforms: of both FMUs, as for `export_fmu`, but one at least: what uses a package compiles nothing.
 
-    Raises what `export_fmu`, `export_controller` and `export_ssp` raise.
+    Raises what `export_fmu`, `export_controller` and `export_ssp` raise, FmuError for no platform.
     """
-    chosen = None if platforms is None else list(platforms)
+    chosen = None if platforms is None else choose_platforms(platforms, fmi=FMI)
+    if chosen == []:
+        fix = "name platforms, or leave out --platforms for this machine's"
+        raise FmuError("a package of FMUs without binaries", got="--platforms sources", expected="a binary at least", fix=fix)
     walk = {CONTROLLER: {**WALK, **values.get(CONTROLLER, NOTHING)}}
     with TemporaryDirectory(prefix="hexapod-package-") as folder:
         fmus = {

@@ -6,6 +6,7 @@ the walking command, stays an input and is in the parameter set. Enumerations ke
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP}  # readers look for these prefixes, not for the namespaces
 PARAMETER_SET = "start"  # one name for all components' sets: a tool that is told to apply it applies all
 TYPES = ("Real", "Boolean")
+OPTIONS = {"control": "choose it with --controller", "gait.pattern": "choose it with --gait"}  # enumerations of no robot file
 KINDS = ("input", "output", "parameter")
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
@@ -83,8 +85,8 @@ def export_ssp(
         experiment: step and stop time that tools take if they are told nothing else.
         values: of parameters and unconnected inputs, by component and name, in place of the FMU's start values.
 
-    Raises FmuError: not co-simulation FMUs, nothing to connect, a value for something that is not there; HexapodError: a path that cannot
-    be written.
+    Raises FmuError: not co-simulation FMUs, nothing to connect, a value for something that is not there or out of its range;
+    HexapodError: a path that cannot be written.
     """
     components = [Component(name, fmu, read_description(fmu)) for name, fmu in fmus.items()]
     connections = connect(components)
@@ -133,14 +135,11 @@ def structure(components: Sequence[Component], connections: Iterable[Connection]
 
 
 def parameter_set(component: Component, connections: Iterable[Connection], values: Mapping[str, float]) -> Element:
-    """The component's parameters and unconnected inputs as an .ssv file's root. Raises FmuError for a value of anything else."""
+    """The component's parameters and unconnected inputs as an .ssv file's root. Raises FmuError for other values."""
     driven = {one.name for one in connections if one.end == component.name}
     settable = component.of("parameter") | {name: one for name, one in component.of("input").items() if name not in driven}
-    for name in values:
-        if name not in settable:
-            near = nearest_name(name, settable)
-            fix = f"did you mean {near!r}?" if near else "name a parameter or an input that nothing drives"
-            raise FmuError(f"{component.name} has no such value to set", got=name, fix=fix)
+    for name, value in values.items():
+        _check_value(component, settable, name, value)
     root = Element("ssv:ParameterSet", _heading(PARAMETER_SET, "ssv", "ssc"))
     parameters = SubElement(root, "ssv:Parameters")
     for name, variable in settable.items():
@@ -148,6 +147,33 @@ def parameter_set(component: Component, connections: Iterable[Connection], value
         SubElement(parameter, f"ssv:{variable.type}", {"value": _start(variable, values.get(name))} | _unit(variable, component))
     _add_units(root, "ssv:Units", [component])
     return root
+
+
+def _check_value(component: Component, settable: Mapping[str, Any], name: str, value: float) -> None:
+    """Raises FmuError for a value of something that no package can set, or one that the FMU would refuse."""
+    if name in {one.name for one in component.description.modelVariables if one.type == "Enumeration"}:
+        table, _, key = name.rpartition(".")
+        fix = OPTIONS.get(name) or f"write {key} under [{table}] of a robot file, and give that with --robot FILE"
+        expected = "a real or Boolean variable: readers of packages refuse enumerations"
+        raise FmuError(f"{component.name}: an enumeration cannot be set in a package", got=name, expected=expected, fix=fix)
+    if name not in settable:
+        near = nearest_name(name, settable)
+        fix = f"did you mean {near!r}?" if near else "name a parameter or an input that nothing drives"
+        raise FmuError(f"{component.name} has no such value to set", got=name, fix=fix)
+    low, high = _range(settable[name])
+    whole = settable[name].type != "Boolean" or value in (0.0, 1.0)
+    if not (whole and math.isfinite(value) and low <= value <= high):
+        expected = f"{low:g} to {high:g} {settable[name].unit or ''}".rstrip()
+        raise FmuError(f"{component.name}.{name} is out of range", got=value, expected=expected, fix="give a value within")
+
+
+def _range(variable: Any) -> tuple[float, float]:
+    """Its least and largest value, of its own or of its type."""
+    if variable.type == "Boolean":
+        return 0.0, 1.0
+    sources = [one for one in (variable, variable.declaredType) if one is not None]
+    low, high = (next((float(getattr(one, key)) for one in sources if getattr(one, key) is not None), None) for key in ("min", "max"))
+    return -math.inf if low is None else low, math.inf if high is None else high
 
 
 def _heading(name: str, *prefixes: str) -> dict[str, str]:

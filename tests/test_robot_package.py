@@ -15,7 +15,7 @@ from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.robot_package import CONTROLLER, PLANT, export_package, read_values
 from hexapod_cosim.cosim.signals import COMMANDED, MEASURED
-from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models import FmuError, HexapodError, load_robot
 from tools.importers import late
 from tools.importers.compare import judged
 from tools.importers.package import run
@@ -24,6 +24,7 @@ ORDER = (PLANT, CONTROLLER)
 STEPS = 160  # the ramp, lift-offs and touch-downs
 # the controllers' last bits, which the servos' stiffness and the ground's turn into forces
 SAME = 1e-9
+KINEMATIC = ("--ssp", "--controller", "kinematic", "--set")
 # of outputs that inputs do not reach at once
 SEEN = (
     "torso.position[1]",
@@ -114,7 +115,15 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
         (("--ssp", "-o", "one.fmu"), "not a package's name"),
         (("--ssp", "--urdf"), "two formats"),
         (("--ssp", "--fmi", "3"), "no package of such FMUs"),
-        (("--controller", "kinematic", "--set", "plant.friction.nu=1", "-o", "one.ssp"), "did you mean 'friction.mu'"),
+        (("--ssp", "--platforms", "sources"), "without binaries"),
+        ((*KINEMATIC, "plant.friction.nu=1"), "did you mean 'friction.mu'"),
+        ((*KINEMATIC, "plant.friction.mu=-5"), "plant.friction.mu is out of range: got -5.0, expected 0 to 100"),
+        ((*KINEMATIC, "plant.friction.mu=nan"), "got nan, expected 0 to 100"),
+        ((*KINEMATIC, "plant.friction.mu=1e400"), "got inf, expected 0 to 100"),
+        ((*KINEMATIC, "controller.command.vx=99"), "controller.command.vx is out of range: got 99.0, expected -10 to 10 m/s"),
+        ((*KINEMATIC, "plant.friction.law=3"), "readers of packages refuse enumerations"),
+        ((*KINEMATIC, "controller.gait.pattern=2"), "choose it with --gait"),
+        ((*KINEMATIC, "plant.friction.law=3"), "write law under [friction] of a robot file, and give that with --robot FILE"),
     ],
 )
 def test_what_cannot_be_packed_is_refused_and_nothing_written(
@@ -124,4 +133,17 @@ def test_what_cannot_be_packed_is_refused_and_nothing_written(
     code, _, err = call("export", *arguments)
     assert code != 0
     assert said in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_validate_says_that_it_checks_fmus_alone(call: Call, package: Path) -> None:
+    code, out, err = call("validate", package)
+    assert (code != 0, out) == (True, "")
+    assert "packages are not checked" in err
+    assert "validate the FMUs in package/resources" in err
+
+
+def test_a_package_for_no_platform_is_refused(setup: ControllerSetup, tmp_path: Path) -> None:
+    with pytest.raises(FmuError, match="without binaries"):
+        export_package(setup, tmp_path / "no.ssp", platforms=[])
     assert not list(tmp_path.iterdir())

@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
 from hexapod_cosim.cosim.robot_files import chosen_format, export_description
+from hexapod_cosim.cosim.robot_package import SUFFIX as PACKAGE_SUFFIX
 from hexapod_cosim.cosim.robot_package import chosen_package, export_package, package_path, read_values
 from hexapod_cosim.cosim.scenario_records import CONTROLS
 from hexapod_cosim.cosim.validation import find_problems
@@ -114,6 +115,9 @@ def _show_written(path: Path, robot: Robot, kind: str, *, json: bool) -> None:
 
 def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")], json: Json = False) -> None:
     """Check an FMU of ours and say what is wrong."""
+    if fmu.suffix == PACKAGE_SUFFIX:
+        fix = f"unpack it (`unzip {fmu.name} -d package`) and validate the FMUs in package/resources"
+        raise FmuError("packages are not checked here", got=fmu.name, expected="an FMU", fix=fix)
     try:
         problems = find_problems(fmu)
     except HexapodError as error:  # not even to be read
