@@ -11,7 +11,7 @@ import typer
 
 from hexapod_cosim.controller import Gains, save_gains
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.controller_export import export_controller, make_setup
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
@@ -25,10 +25,17 @@ from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
 
 RobotName = Annotated[str, typer.Option("--robot", metavar="FILE", help="A robot file, a URDF, or a name of `hexapod list robots`.")]
 DEFAULT_PERIOD = 0.005  # s, the default macro-step
+OF_CONTROLLER = ("gait", "gains", "period")
+DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
+IDLE = {
+    DESCRIPTION: ("fmi", "platforms", "controller", *OF_CONTROLLER),
+    PLANT_FMU: OF_CONTROLLER,
+}  # options that do nothing, by what is written
 DEFAULT_CONTROL = "compliant"  # of a package
 
 
 def export(
+    context: typer.Context,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="FILE", help="The file to write; default ROBOT.fmu, .ssp, .urdf or .xml.")
     ] = None,
@@ -63,9 +70,7 @@ def export(
     form, made = chosen_format(output, urdf=urdf, mjcf=mjcf), load_robot(robot)
     package = chosen_package(output, wanted=ssp, described=form is not None, values=values, fmi=fmi)
     controller = DEFAULT_CONTROL if package and controller is None else controller
-    if controller is None and (gait or gains or period != DEFAULT_PERIOD):
-        fix = "add it, or leave --gait, --gains and --period out"
-        raise HexapodError("options of the controller", got="no --controller", expected="--controller kinematic or compliant", fix=fix)
+    _refuse_idle(context, DESCRIPTION if form is not None else PLANT_FMU if controller is None else None)
     if form is not None:
         written = export_description(made, output or Path(f"{made.name}{form.suffix}"), form)
         _show_written(written, made, form.name, json=json)
@@ -81,6 +86,14 @@ def export(
         else:
             export_controller(setup, path, fmi=fmi, platforms=chosen)
     _show_written(path, made, "ssp" if package else "fmu", json=json)
+
+
+def _refuse_idle(context: typer.Context, written: str | None) -> None:
+    """Raises HexapodError for options that were typed, by name, and have no effect on what is written."""
+    given = [f"--{name}" for name in IDLE.get(written or "", ()) if is_given(context, name)]
+    if given:
+        fix = "leave them out" if written == DESCRIPTION else "leave them out, or add --controller kinematic or compliant"
+        raise HexapodError(f"options that do nothing for {written}", got=" ".join(given), expected="none of them", fix=fix)
 
 
 def _fmu_path(output: Path | None, name: str) -> Path:

@@ -20,6 +20,12 @@ from hexapod_cosim.cosim.files import to_json
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 
 
+def is_given(context: typer.Context, name: str) -> bool:
+    """Whether an option was typed rather than left at its default."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
 def show_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
     """Prints JSON; NaN becomes null."""
     print(to_json(content))
