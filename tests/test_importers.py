@@ -18,7 +18,9 @@ from tools.importers.walk import STEP, Walk, record
 
 DURATION = 0.6  # s    the ramp, a lift-off and a touch-down
 STANDING = 200  # steps of the C importer without commands
-SOURCE = Path(__file__).resolve().parents[1] / "examples" / "importer.c"
+MOST_LINES = 60  # of the C importer
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE, README = ROOT / "examples" / "importer.c", ROOT / "README.md"
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +104,32 @@ def test_the_c_importer_stands_without_commands(walk: Walk, importer: Path, tmp_
     found = read_csv(tmp_path / "outputs.csv")
     assert len(found.time) == STANDING + 1
     assert np.ptp(found.column("torso.position[3]")) < 1e-6
+
+
+def test_the_c_importer_has_the_lines_that_the_readme_says() -> None:
+    lines = SOURCE.read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= MOST_LINES
+    assert f"a C program of {MOST_LINES} lines" in README.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("quote", ['"', ""], ids=["quoted", "plain"])
+@pytest.mark.parametrize("column", ["LF.coxa.angel_ref", "LF.coxa.angle_re", "m"])
+def test_the_c_importer_names_a_column_that_the_fmu_does_not_know(
+    walk: Walk, importer: Path, tmp_path: Path, column: str, quote: str
+) -> None:
+    names = ("time", "LF.coxa.angle_ref", column)
+    (tmp_path / "commands.csv").write_text(",".join(f"{quote}{name}{quote}" for name in names) + "\n0,0,0\n", encoding="utf-8")
+    done = run(importer, walk.unpacked, tmp_path / "commands.csv")
+    assert (done.returncode, done.stderr) == (1, f"importer: trouble with {column}\n")
+
+
+def test_the_c_importer_refuses_a_short_row_and_takes_names_without_quotes(walk: Walk, importer: Path, tmp_path: Path) -> None:
+    commands = tmp_path / "commands.csv"
+    commands.write_text("time,LF.coxa.angle_ref,LM.coxa.angle_ref\n0,0.1,0.1\n0.005,0.1\n", encoding="utf-8")
+    done = run(importer, walk.unpacked, commands)
+    assert done.returncode == 1
+    assert "a row of too few commands" in done.stderr
+    assert len(done.stdout.splitlines()) == 3  # names and the rows before each of two steps
 
 
 @pytest.mark.parametrize(("words", "said"), [((), "modelDescription.xml"), (("no_such_folder",), "folder")])
