@@ -36,15 +36,20 @@ def platform_targets(fmi: int) -> Mapping[str, tuple[str, ...]]:
 
 
 def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
-    """The folders that names stand for: "all", "sources" for none, or folders. Raises FmuError for a name that is none of these."""
-    chosen, known = [names] if isinstance(names, str) else list(names), platform_targets(fmi)
+    """The folders that names stand for: "all", "sources" for none, or platforms as either version of the standard calls them.
+
+    A platform of FMI 2 that is several of FMI 3 (darwin64) stands for all of these, and each of these for it. Raises FmuError for a name
+    that is none of these.
+    """
+    chosen, targets, known = [names] if isinstance(names, str) else list(names), set[str](), platform_targets(fmi)
     for name in chosen:
-        if name not in known and name not in (ALL, SOURCES):
-            expected = ", ".join((*known, ALL, f"{SOURCES} for no binary at all"))
-            raise FmuError(f"no such platform of FMI {fmi}", got=name, expected=expected, fix="name some of these, separated by commas")
+        if name not in _FMI2 and name not in _FMI3 and name not in (ALL, SOURCES):
+            expected = ", ".join((*dict.fromkeys((*_FMI2, *_FMI3)), ALL, f"{SOURCES} for no binary at all"))
+            raise FmuError("no such platform", got=name, expected=expected, fix="name some of these, separated by commas")
+        targets.update(TARGETS if name == ALL else _FMI2.get(name, _FMI3.get(name, ())))
     if SOURCES in chosen and len(chosen) > 1:
         raise FmuError("contradicting platforms", got=", ".join(chosen), expected=f"{SOURCES} alone", fix=f"leave out {SOURCES}")
-    return [name for name in known if name in chosen or ALL in chosen]
+    return [folder for folder, parts in known.items() if targets.intersection(parts)]
 
 
 def component_library(component: Component = PLANT) -> Library:

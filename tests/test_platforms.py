@@ -202,6 +202,17 @@ def test_each_version_of_the_standard_has_its_own_names() -> None:
         platforms.choose_platforms(["sources", "linux64"], fmi=2)
 
 
+def test_either_standard_s_names_do_for_either_version() -> None:
+    assert platforms.choose_platforms(["win64", "darwin64"], fmi=3) == ["x86_64-windows", "x86_64-darwin", "aarch64-darwin"]
+    assert platforms.choose_platforms(["x86_64-windows", "x86_64-linux"], fmi=2) == ["linux64", "win64"]
+    assert platforms.choose_platforms(["aarch64-darwin"], fmi=3) == ["aarch64-darwin"]
+    assert platforms.choose_platforms(["aarch64-darwin", "x86_64-darwin"], fmi=2) == ["darwin64"]  # one file for both
+    assert platforms.choose_platforms(["win64", "x86_64-windows"], fmi=3) == ["x86_64-windows"]
+    assert platforms.choose_platforms(["sources"], fmi=3) == []
+    with pytest.raises(FmuError, match="got 'win32', expected linux64, win64"):
+        platforms.choose_platforms(["win32"], fmi=3)
+
+
 def test_a_universal_binary_holds_both_processors_whole(built: dict[str, bytes]) -> None:
     parts = [built["x86_64-darwin"], built["aarch64-darwin"]]
     joined = join_mach_o(parts)

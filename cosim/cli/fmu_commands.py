@@ -45,7 +45,8 @@ def export(
         str | None,
         typer.Option(
             "--platforms",
-            help="Cross-compile for these, separated by commas (linux64, win64, darwin64, aarch64-linux) or all; sources: no binary. "
+            help="Cross-compile for these, separated by commas (linux64, win64, darwin64, aarch64-linux, or FMI 3's names of them) or all; "
+            "sources: no binary. "
             "Default: this machine's installed one.",
         ),
     ] = None,
