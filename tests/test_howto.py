@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,9 +13,21 @@ from pathlib import Path
 import pytest
 
 PAGES = Path(__file__).parents[1] / "docs" / "howto"
-BLOCKS = re.findall(r"```(\w*)\n(.*?)```", (PAGES / "fmpy.md").read_text(encoding="utf-8"), flags=re.DOTALL)
-COMMANDS = [line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith("fmpy ")]
-PYTHON = [text for kind, text in BLOCKS if kind == "python"]
+
+
+def blocks(page: str) -> list[tuple[str, str]]:
+    """Kind and text of a page's code."""
+    return re.findall(r"```(\w*)\n(.*?)```", (PAGES / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+
+
+def commands(page: str, program: str) -> list[str]:
+    """The lines of plain blocks that call a program, without their comments."""
+    lines = [line.split("#")[0].strip() for kind, text in blocks(page) if not kind for line in text.splitlines()]
+    return [line for line in lines if line.startswith(program + " ")]
+
+
+COMMANDS = commands("fmpy.md", "fmpy")
+PYTHON = [text for kind, text in blocks("fmpy.md") if kind == "python"]
 SHORT = "0.5"  # s
 
 
@@ -48,6 +61,25 @@ def test_the_code_of_the_page_on_fmpy_walks(folder: Path) -> None:
     shorter = PYTHON[0].replace("stop_time=10.0", f"stop_time={SHORT}")
     assert shorter != PYTHON[0]
     assert float(run(folder, sys.executable, "-c", shorter + '\nprint(abs(result["torso.position[1]"][-1]))')) > 1e-3
+
+
+@pytest.fixture(scope="module")
+def robots(folder: Path) -> Path:
+    """Where a reader with a robot of one's own is: it lies there as a robot file and as a URDF."""
+    shutil.copy(Path(__file__).parents[1] / "models" / "athena.toml", folder / "my.toml")
+    run(folder, "hexapod", "export", "-o", "my.urdf")
+    return folder
+
+
+def test_the_pages_on_robots_and_packages_have_commands() -> None:
+    assert len(commands("my-robot.md", "hexapod")) >= 4
+    assert len(commands("libcosim_ecos.md", "hexapod")) >= 2
+
+
+@pytest.mark.parametrize("command", [line for page in ("my-robot.md", "libcosim_ecos.md") for line in commands(page, "hexapod")])
+def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
+    shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
+    assert run(robots, *shlex.split(command), *shorter)
 
 
 @pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.name)

@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -34,10 +35,22 @@ def run(folder: Path, *arguments: str) -> str:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the README's reader is: the FMU is there from the first command on."""
+    """Where the README's reader is: the FMU is there from the first command on, and a URDF of one's own."""
     folder = tmp_path_factory.mktemp("reader")
     run(folder, *shlex.split(commands("hexapod export")[0]))
+    run(folder, "hexapod", "export", "-o", "my.urdf")
     return folder
+
+
+def test_the_readme_exports_every_kind_of_file() -> None:
+    lines = " ".join(commands("hexapod export"))
+    assert all(option in lines for option in ("--fmi 3", "--robot my.urdf", "--controller", "--ssp"))
+
+
+@pytest.mark.parametrize("command", commands("hexapod export")[1:])
+def test_an_export_of_the_readme_writes_its_file(folder: Path, command: str) -> None:
+    assert shlex.split(command)[-1] in run(folder, *shlex.split(command))
+    assert zipfile.is_zipfile(folder / shlex.split(command)[-1])
 
 
 @pytest.mark.parametrize("command", [line for line in commands("hexapod") if "simulate" in line or "list" in line or "design" in line])
