@@ -59,7 +59,7 @@ def test_without_the_compiler_the_error_says_how_to_get_it(call: Call, monkeypat
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"), [("amiga64", "linux64, win64, darwin64, aarch64-linux"), ("", "linux64"), ("x86_64-linux", "linux64")]
+    ("name", "expected"), [("amiga64", "linux64, win64, darwin64, aarch64-linux"), ("", "linux64"), ("x86_64-amiga", "linux64")]
 )
 def test_platforms_that_are_none_are_refused_with_those_there_are(call: Call, tmp_path: Path, name: str, expected: str) -> None:
     code, _, err = call("export", "--platforms", name, "-o", tmp_path / "a.fmu")
