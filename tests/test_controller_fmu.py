@@ -340,7 +340,8 @@ def test_the_command_packs_what_simulate_walks_with(call: Call, tmp_path: Path) 
     ("arguments", "said"),
     [
         (["--controller", "complaint"], "did you mean 'compliant'?"), (["--controller", "kinematic", "--gait", "trot"], "gait"),
-        (["--gait", "ripple"], "add --controller kinematic or compliant"), (["--controller", "kinematic", "--period", "0.7"], "impossible controller period"),
+        (["--gait", "ripple"], "add --controller kinematic or compliant"),
+        (["--controller", "kinematic", "--period", "0.7"], "impossible controller period"),
         (["--controller", "kinematic", "-o", "walk.zip"], "a name that ends in .fmu"),
     ],
 )  # fmt: skip
