@@ -278,18 +278,10 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 /* ---------------------------------------------------------------------------------------------- saved states */
 
-/* the block a pointer points to, made if there is none yet; NULL when out of memory */
-static void *state_block(fmi2Instance *instance, fmi2FMUstate *FMUstate) {
-  if (!*FMUstate) *FMUstate = calloc(1, hx_instance_state_size());
-  if (!*FMUstate) hx_log(&instance->base, HX_LOG_ERROR, "saved state: out of memory; free some and try again");
-  return *FMUstate;
-}
-
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
   fmi2Instance *instance = enter(c, GET_STATE);
-  if (!instance || !given(instance, GET_STATE, 1, FMUstate, FMUstate) || !state_block(instance, FMUstate)) return fmi2Error;
-  hx_instance_save(&instance->base, *FMUstate);
-  return fmi2OK;
+  if (!instance || !given(instance, GET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
+  return status_of(hx_instance_keep(&instance->base, FMUstate));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
@@ -323,9 +315,7 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate) {
   fmi2Instance *instance = enter(c, DESERIALIZE);
   if (!instance || !given(instance, DESERIALIZE, 1, serializedState, FMUstate)) return fmi2Error;
-  if (hx_instance_check(&instance->base, serializedState, size) != HX_OK || !state_block(instance, FMUstate)) return fmi2Error;
-  memcpy(*FMUstate, serializedState, hx_instance_state_size());
-  return fmi2OK;
+  return status_of(hx_instance_deserialize(&instance->base, serializedState, size, FMUstate));
 }
 
 /* ---------------------------------------------------------------------------------------------- co-simulation */

@@ -363,18 +363,10 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
 
 /* ---------------------------------------------------------------------------------------------- saved states */
 
-/* the block a pointer points to, made if there is none yet; NULL when out of memory */
-static void *state_block(fmi3InstanceData *instance, fmi3FMUState *state) {
-  if (!*state) *state = calloc(1, hx_instance_state_size());
-  if (!*state) hx_log(&instance->base, HX_LOG_ERROR, "saved state: out of memory; free some and try again");
-  return *state;
-}
-
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
   fmi3InstanceData *instance = enter(c, GET_STATE);
-  if (!instance || !given(instance, GET_STATE, 1, state, state) || !state_block(instance, state)) return fmi3Error;
-  hx_instance_save(&instance->base, *state);
-  return fmi3OK;
+  if (!instance || !given(instance, GET_STATE, 1, state, state)) return fmi3Error;
+  return status_of(hx_instance_keep(&instance->base, state));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
@@ -408,9 +400,7 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte by
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
   fmi3InstanceData *instance = enter(c, DESERIALIZE);
   if (!instance || !given(instance, DESERIALIZE, 1, bytes, state)) return fmi3Error;
-  if (hx_instance_check(&instance->base, bytes, size) != HX_OK || !state_block(instance, state)) return fmi3Error;
-  memcpy(*state, bytes, size);
-  return fmi3OK;
+  return status_of(hx_instance_deserialize(&instance->base, bytes, size, state));
 }
 
 /* ---------------------------------------------------------------------------------------------- derivatives */

@@ -100,13 +100,13 @@ hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[],
 hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n, const double rate[]);
 hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n, double rate[]);
 
-/* Saved states: one block without pointers. serialize copies one into room for n bytes, with the checksum that check verifies; check finds
- * out whether n bytes are an intact one of this FMU. */
+/* Saved states: one block without pointers, taken with calloc where *block is NULL, to be freed by the caller. serialize copies one into room for
+ * n bytes, with the checksum that deserialize verifies; deserialize makes one of n intact bytes of this FMU. */
 size_t hx_instance_state_size(void);
-void hx_instance_save(const hxInstance *instance, void *block);
+hxStatus hx_instance_keep(hxInstance *instance, void **block);
 hxStatus hx_instance_restore(hxInstance *instance, const void *block);
 hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *block, void *bytes, size_t n);
-hxStatus hx_instance_check(hxInstance *instance, const void *block, size_t n);
+hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t n, void **block);
 
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);
 

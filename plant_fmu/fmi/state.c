@@ -2,6 +2,7 @@
 #include "fmi/instance.h"
 
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { STATE_FORMAT = 3 };
@@ -24,7 +25,7 @@ typedef struct hxStateBlock {
 
 size_t hx_instance_state_size(void) { return sizeof(hxStateBlock) + hx_component_state_size(); }
 
-void hx_instance_save(const hxInstance *instance, void *bytes) {
+static void save(const hxInstance *instance, void *bytes) {
   hxStateBlock *block = bytes;
   memset(&block->header, 0, sizeof block->header);
   memcpy(block->header.magic, state_magic, sizeof state_magic);
@@ -33,6 +34,20 @@ void hx_instance_save(const hxInstance *instance, void *bytes) {
   block->header.size = (uint32_t)hx_instance_state_size();
   memcpy(&block->instance, &instance->state, sizeof instance->state);
   hx_component_get_state(instance->component, block->component);
+}
+
+/* memory for a saved state, taken where there is none yet */
+static hxStatus need_block(hxInstance *instance, void **block) {
+  if (!*block) *block = calloc(1, hx_instance_state_size());
+  if (*block) return HX_OK;
+  hx_log(instance, HX_LOG_ERROR, "saved state: out of memory; free some and try again");
+  return HX_OUT_OF_MEMORY;
+}
+
+hxStatus hx_instance_keep(hxInstance *instance, void **block) {
+  const hxStatus status = need_block(instance, block);
+  if (status == HX_OK) save(instance, *block);
+  return status;
 }
 
 /* bytes may be unaligned */
@@ -65,13 +80,20 @@ hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *sav
 }
 
 /* bytes may be unaligned: the header is copied out */
-hxStatus hx_instance_check(hxInstance *instance, const void *bytes, size_t n) {
+static hxStatus check(hxInstance *instance, const void *bytes, size_t n) {
   hxStateHeader header;
   if (n != hx_instance_state_size()) return refuse(instance, n < hx_instance_state_size() ? "too few bytes" : "too many bytes");
   memcpy(&header, bytes, sizeof header);
   const char *what = fault(instance, &header);
   if (what) return refuse(instance, what);
   return header.checksum == checksum(bytes) ? HX_OK : refuse(instance, "damaged bytes");
+}
+
+hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t n, void **block) {
+  hxStatus status = check(instance, bytes, n);
+  if (status == HX_OK) status = need_block(instance, block);
+  if (status == HX_OK) memcpy(*block, bytes, n);
+  return status;
 }
 
 hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
