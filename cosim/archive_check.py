@@ -48,18 +48,25 @@ ABSOLUTE = re.compile(rb"(?:/home/|/root/|/Users/|/tmp/|/work/|[A-Z]:[\\/](?:Use
 
 def archive_problems(path: Path) -> list[str]:
     """What is wrong with the archive and its documents, one sentence each. Raises KeyError without a modelDescription.xml."""
-    with zipfile.ZipFile(path) as archive:
-        damaged = archive.testzip()
-        if damaged:
-            return [f"{damaged} is damaged: its checksum is wrong"]
-        found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
-        problems = list(zip_problems(archive))
+    found, problems = read_members(path)
+    if found is None:
+        return problems
     problems += schema_problems(DESCRIPTION, found[DESCRIPTION], "fmi2/fmi2ModelDescription.xsd")
     if problems:
         return problems
     root = ElementTree.fromstring(found[DESCRIPTION])
     problems += [*description_problems(root), *_source_problems(root, found)]
     return problems + member_problems(root, found, [variable.name for variable in variables(root)], fmi=2)
+
+
+def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
+    """The archive's files by path, None if one is damaged; and what is wrong with it as a ZIP."""
+    with zipfile.ZipFile(path) as archive:
+        damaged = archive.testzip()
+        if damaged:
+            return None, [f"{damaged} is damaged: its checksum is wrong"]
+        found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+        return found, list(zip_problems(archive))
 
 
 def member_problems(root: Element, found: dict[str, bytes], names: Iterable[str], *, fmi: int) -> list[str]:

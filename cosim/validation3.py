@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator
 from contextlib import chdir, suppress
 from pathlib import Path
@@ -13,7 +12,7 @@ from xml.etree import ElementTree
 from fmpy import extract, platform_tuple
 from fmpy.fmi3 import FMU3Slave
 
-from hexapod_cosim.cosim.archive_check import BUILD_DESCRIPTION, DESCRIPTION, TERMINALS, member_problems, zip_problems
+from hexapod_cosim.cosim.archive_check import BUILD_DESCRIPTION, DESCRIPTION, TERMINALS, member_problems, read_members
 from hexapod_cosim.cosim.description3_check import description_problems3, variables3
 from hexapod_cosim.cosim.description_check import schema_problems
 from hexapod_cosim.cosim.start_value_check import START_VALUES, start_value_problems
@@ -25,12 +24,9 @@ TRIAL_STEP = 0.001  # s
 
 def find_own_problems3(path: Path, description: Any) -> list[str]:
     """What is wrong, one sentence each, of an FMU whose model description fmpy has read."""
-    with zipfile.ZipFile(path) as archive:
-        damaged = archive.testzip()
-        if damaged:
-            return [f"{damaged} is damaged: its checksum is wrong"]
-        found = {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
-        problems = list(zip_problems(archive))
+    found, problems = read_members(path)
+    if found is None:
+        return problems
     for member, schema in SCHEMAS.items():
         problems += schema_problems(member, found[member], f"fmi3/{schema}.xsd") if member in found else [f"{member} is missing"]
     if problems:

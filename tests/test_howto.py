@@ -2,40 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from pages import blocks, commands, run
 
 PAGES = Path(__file__).parents[1] / "docs" / "howto"
-
-
-def blocks(page: str) -> list[tuple[str, str]]:
-    """Kind and text of a page's code."""
-    return re.findall(r"```(\w*)\n(.*?)```", (PAGES / page).read_text(encoding="utf-8"), flags=re.DOTALL)
-
-
-def commands(page: str, program: str) -> list[str]:
-    """The lines of plain blocks that call a program, without their comments."""
-    lines = [line.split("#")[0].strip() for kind, text in blocks(page) if not kind for line in text.splitlines()]
-    return [line for line in lines if line.startswith(program + " ")]
-
-
-COMMANDS = commands("fmpy.md", "fmpy")
-PYTHON = [text for kind, text in blocks("fmpy.md") if kind == "python"]
+COMMANDS = commands(PAGES / "fmpy.md", "fmpy")
+PYTHON = [text for kind, text in blocks(PAGES / "fmpy.md") if kind == "python"]
 SHORT = "0.5"  # s
-
-
-def run(folder: Path, *arguments: str) -> str:
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False, env=os.environ | {"PATH": path})
-    assert done.returncode == 0, done.stderr + done.stdout
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -72,11 +51,11 @@ def robots(folder: Path) -> Path:
 
 
 def test_the_pages_on_robots_and_packages_have_commands() -> None:
-    assert len(commands("my-robot.md", "hexapod")) >= 4
-    assert len(commands("libcosim_ecos.md", "hexapod")) >= 2
+    assert len(commands(PAGES / "my-robot.md", "hexapod")) >= 4
+    assert len(commands(PAGES / "libcosim_ecos.md", "hexapod")) >= 2
 
 
-@pytest.mark.parametrize("command", [line for page in ("my-robot.md", "libcosim_ecos.md") for line in commands(page, "hexapod")])
+@pytest.mark.parametrize("command", [line for page in ("my-robot.md", "libcosim_ecos.md") for line in commands(PAGES / page, "hexapod")])
 def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
     shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
     assert run(robots, *shlex.split(command), *shorter)

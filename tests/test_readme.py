@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
 import sys
 import zipfile
+from functools import partial
 from pathlib import Path
 
+import pages
 import pytest
+from pages import blocks, run
 
 from hexapod_cosim.cosim.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```(\w*)\n(.*?)```", README, flags=re.DOTALL)
-
-
-def commands(program: str) -> list[str]:
-    """The lines of plain blocks that call a program, without their comments."""
-    lines = [line.split("#")[0].strip() for kind, text in BLOCKS if not kind for line in text.splitlines()]
-    return [line for line in lines if line.startswith(program + " ")]
-
-
-def run(folder: Path, *arguments: str) -> str:
-    """Runs a program of this environment in a folder; fails with what it printed."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False, env=os.environ | {"PATH": path})
-    assert done.returncode == 0, done.stderr + done.stdout
-    return done.stdout
+BLOCKS = blocks(ROOT / "README.md")
+commands = partial(pages.commands, ROOT / "README.md")
 
 
 @pytest.fixture(scope="module")
