@@ -17,8 +17,8 @@ from hexapod_cosim.models import HexapodError
 RUN_FILE = "run.json"  # marks a folder as ours
 RUNNING = "running"
 OUR_FILES = (
-    "results.csv", "results.partial.csv", "seeds.csv", "seeds.partial.csv", "metrics.json", "scenario.toml",
-    "report.html", "plots", "kinematic", "compliant",
+    "results.parquet", "results.csv", "commands.csv", "results.partial.parquet", "results.partial.csv", "seeds.csv", "seeds.partial.csv",
+    "metrics.json", "scenario.toml", "report.html", "plots", "kinematic", "compliant",
 )  # fmt: skip
 
 

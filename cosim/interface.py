@@ -175,7 +175,7 @@ def load_interface(robot: Robot) -> Interface:
 
 def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace) -> Interface:
     """A component's interface, with start values from the attributes of `roots`. Raises HexapodError when one does not fit its variable."""
-    table = _table(component)
+    table = read_table(component)
     enumerations = {name: _enumeration(name, entry) for name, entry in table["enumeration"].items()}
     variables = tuple(_expand_all(table, enumerations, roots))
     return Interface(
@@ -197,7 +197,8 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
 
 
 @cache
-def _table(component: Component) -> dict[str, Any]:
+def read_table(component: Component) -> dict[str, Any]:
+    """A component's interface.toml, which no one may change."""
     return tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
 
 

@@ -1,20 +1,17 @@
-"""What a run leaves: one row per macro-step in columns made beforehand, written as CSV that fmpy and spreadsheets read."""
+"""What a run leaves: one row per macro-step in columns made beforehand."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from itertools import pairwise
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.files import atomic_text
 from hexapod_cosim.cosim.signals import JOINTS, LEGS, Signals, foot_names, foot_vector_names, joint_names, vector_names
 from hexapod_cosim.models import HexapodError, ScenarioError, nearest_name
 
@@ -125,32 +122,3 @@ class Recorder:
     def recording(self) -> Recording:
         """The rows so far."""
         return Recording(self.names, self._data[: self._count])
-
-
-def write_csv(recording: Recording, path: Path) -> None:
-    """Header of quoted names, then one line per row; every number reads back the same. Appears under `path` whole or not at all."""
-    with atomic_text(path) as file:
-        file.write(",".join(f'"{name}"' for name in recording.names) + "\n")
-        for row in recording.data:
-            line = repr(row.tolist())[1:-1] + ","  # each number in the shortest text that reads back the same
-            file.write(line.replace(", ", ",").replace(".0,", ",")[:-1] + "\n")
-
-
-def read_csv(path: Path) -> Recording:
-    """A recording from its CSV file. Raises HexapodError when it is missing or none."""
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            names = tuple(next(csv.reader(file)))
-            data = np.loadtxt(file, delimiter=",", ndmin=2)
-    except OSError as error:
-        raise HexapodError("no recording", got=str(path), expected="results.csv of a run", fix="run `hexapod simulate` again") from error
-    except (StopIteration, ValueError, csv.Error) as error:
-        raise HexapodError("not a recording", got=str(error), expected="a header and rows of numbers", where=str(path)) from error
-    if not names or names[0] != "time" or data.shape[1] != len(names):
-        raise HexapodError(
-            "not a recording",
-            got=f"first column {names[0]!r}, {data.shape[1]} of {len(names)} columns",
-            expected="time first",
-            where=str(path),
-        )
-    return Recording(names, data)

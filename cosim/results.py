@@ -12,12 +12,13 @@ from typing import Any
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, claim_folder, clear_folder, read_json, write_json, write_text
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.metrics import View
-from hexapod_cosim.cosim.recorder import read_csv, write_csv
+from hexapod_cosim.cosim.recordings import COMMANDS, read_recording, write_commands, write_recording
 from hexapod_cosim.cosim.run import Result
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.models import HexapodError
 
-RESULTS, PARTIAL, METRICS_FILE, SCENARIO = "results.csv", "results.partial.csv", "metrics.json", "scenario.toml"
+RESULTS, PARTIAL, METRICS_FILE, SCENARIO = "results", "results.partial", "metrics.json", "scenario.toml"
+ABOUT = ("title", "control", "robot", "fmu", "versions")  # of the facts, in Parquet
 
 
 @dataclass(frozen=True)
@@ -63,17 +64,22 @@ def results_folder(path: Path) -> Iterator[Folder]:
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
-    """Writes a run into a prepared folder; one that did not complete leaves `results.partial.csv` and no figures. Returns the files."""
-    outcome = result.outcome
-    patterns = result.scenario.outputs.csv if result.completed else ("*",)
-    recording = outcome.recording.chosen(patterns)
-    files = [folder / SCENARIO, folder / (RESULTS if result.completed else PARTIAL)]
-    write_text(files[0], to_toml(result.scenario.to_table()))
-    write_csv(recording, files[1])
+    """Writes a run into a prepared folder; one that did not complete leaves `results.partial.*` and no figures. Returns the files, the
+    scenario first and the recording next.
+    """
+    facts, outputs, scenario = run_facts(result), result.scenario.outputs, to_toml(result.scenario.to_table())
+    whole = result.outcome.recording
+    write_text(folder / SCENARIO, scenario)
+    about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
+    kept, stem = (whole.chosen(outputs.csv), RESULTS) if result.completed else (whole, PARTIAL)
+    files = [folder / SCENARIO, *write_recording(kept, folder, stem, formats=outputs.formats, about=about)]
+    if result.completed and "csv" in outputs.formats:
+        files.append(folder / COMMANDS)
+        write_commands(whole, files[-1])
     if result.completed:
         files.append(folder / METRICS_FILE)
         write_json(files[-1], dict(result.metrics))
-    write_json(folder / RUN_FILE, run_facts(result))
+    write_json(folder / RUN_FILE, facts)
     return [*files, folder / RUN_FILE]
 
 
@@ -101,7 +107,7 @@ def read_result(folder: Path) -> Stored:
     if facts.get("status") != COMPLETED:
         got = f"{facts.get('status')}: {facts.get('reason')}" if facts.get("reason") else facts.get("status")
         raise HexapodError("the run did not complete", got=got, expected="a completed run", fix="run it again", where=str(folder))
-    view = View(read_csv(folder / RESULTS), facts["parameters"], facts["gait_period"])
+    view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
     scenario = (folder / SCENARIO).read_text(encoding="utf-8")
     return Stored(view, read_json(folder / METRICS_FILE), facts, scenario)
 

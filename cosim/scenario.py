@@ -18,6 +18,7 @@ from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.quantities import to_si
 from hexapod_cosim.cosim.scenario_checks import check_parameters, check_steps
 from hexapod_cosim.cosim.scenario_records import (
+    FORMATS,
     KEYS,
     PLAIN_KEYS,
     SECTIONS,
@@ -185,12 +186,16 @@ def _read_parts(table: Any, where: str) -> Parts:
 
 
 def _read_outputs(table: Any, where: str) -> Outputs:
-    refuse_unknown_keys(expect_table(table, where), ["csv", "plots"], where)
-    patterns, plots = table.get("csv", ["*"]), table.get("plots", True)
+    refuse_unknown_keys(expect_table(table, where), [item.name for item in fields(Outputs)], where)
+    patterns, plots, formats = table.get("csv", ["*"]), table.get("plots", True), table.get("formats", FORMATS)
     if not isinstance(patterns, list | tuple) or not all(isinstance(item, str) for item in patterns):
         fix = 'write csv = ["torso.*", "*.foot.normal_force"]'
         raise ScenarioError("wrong type", got=patterns, expected="a list of name patterns", fix=fix, where=f"{where}.csv")
-    return Outputs(csv=tuple(patterns), plots=_truth(plots, f"{where}.plots"))
+    if not isinstance(formats, list | tuple) or not formats or not all(item in FORMATS for item in formats):
+        fix, expected = 'write formats = ["parquet"]', "a list of one or both of " + ", ".join(FORMATS)
+        raise ScenarioError("value not allowed", got=formats, expected=expected, fix=fix, where=f"{where}.formats")
+    chosen = tuple(item for item in FORMATS if item in formats)
+    return Outputs(csv=tuple(patterns), formats=chosen, plots=_truth(plots, f"{where}.plots"))
 
 
 def _truth(value: Any, where: str) -> bool:

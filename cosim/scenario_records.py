@@ -13,6 +13,7 @@ from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "compliant")
 FAULTS = ("dead", "stuck")
+FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait, "terrain": Terrain, "contact": Contact, "friction": Friction, "servo": Servo, "solver": Solver, "baumgarte": Baumgarte,
 }  # fmt: skip
@@ -77,7 +78,8 @@ class Variation:
 class Outputs:
     """What is written."""
 
-    csv: tuple[str, ...] = ("*",)  # patterns of variable names
+    csv: tuple[str, ...] = ("*",)  # patterns of variable names: the columns that are kept, whatever the format
+    formats: tuple[str, ...] = FORMATS
     plots: bool = True
 
 

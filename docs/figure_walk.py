@@ -16,6 +16,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.plots import SETTINGS, STYLES
+from hexapod_cosim.cosim.recordings import read_recording
+from hexapod_cosim.cosim.results import RESULTS
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, Robot, load_robot
 from hexapod_cosim.models.kinematics import axis_rotation, rotation_matrix
 
@@ -26,11 +28,10 @@ FORCE_SCALE = 4e-3  # m/N, of the arrows
 WINDOW = (7.0, 9.0)  # s
 
 
-def read(path: Path) -> dict[str, Array]:
-    """Columns of a results.csv by name."""
-    with path.open(encoding="utf-8") as file:
-        names = [name.strip('"') for name in file.readline().rstrip().split(",")]
-    return dict(zip(names, np.genfromtxt(path, delimiter=",", skip_header=1).T, strict=True))
+def read(folder: Path) -> dict[str, Array]:
+    """Columns of a run by name."""
+    recording = read_recording(folder, RESULTS)
+    return dict(zip(recording.names, recording.data.T, strict=True))
 
 
 def vectors(data: dict[str, Array], name: str, size: int, row: int) -> Array:
@@ -82,7 +83,7 @@ def draw_walk(axis: Axes, data: dict[str, Array], title: str) -> None:
 
 def main(folder: Path) -> None:
     """Draws the figure from folder/kinematic and folder/compliant."""
-    runs = {control: read(folder / control / "results.csv") for control in ("kinematic", "compliant")}
+    runs = {control: read(folder / control) for control in ("kinematic", "compliant")}
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=(10, 6.6), dpi=130)
         grid = figure.add_gridspec(2, 2, height_ratios=[1.15, 1])

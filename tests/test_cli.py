@@ -13,12 +13,13 @@ from command import COMMAND, QUICK, Call
 
 from hexapod_cosim.cosim.comparison import read_seeds
 from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.recorder import read_csv
+from hexapod_cosim.cosim.recordings import read_csv
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Variation
 from hexapod_cosim.cosim.variation import STANDARD
 
 CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]  # the shortest walk with figures
+RUN = {"commands.csv", "metrics.json", "results.csv", "results.parquet", "run.json", "scenario.toml"}
 FIGURES = {"foot_forces", "slip", "posture", "path", "torques", "energy", "footfall"}
 
 
@@ -83,7 +84,7 @@ def test_compare_leaves_results_figures_report_and_the_scenario_as_run(compared:
     }  # fmt: skip
     assert {path.name for path in (folder / "plots").iterdir()} == {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
     for control in ("kinematic", "compliant"):
-        assert {path.name for path in (folder / control).iterdir()} == {"metrics.json", "results.csv", "run.json", "scenario.toml"}
+        assert {path.name for path in (folder / control).iterdir()} == RUN
         assert load_scenario(folder / control / "scenario.toml").control == control
     assert json.loads((folder / "run.json").read_text())["status"] == "completed"
     assert json.loads((folder / "metrics.json").read_text()) == {key: value for key, value in printed.items() if key != "report"}
@@ -134,7 +135,7 @@ def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path
     assert f"wrote {tmp_path / 'out'}/" in out
 
 
-def test_columns_of_the_csv_can_be_chosen(call: Call, tmp_path: Path) -> None:
+def test_recorded_columns_can_be_chosen(call: Call, tmp_path: Path) -> None:
     code, _, _ = call("simulate", "stand", "-o", tmp_path / "out", *QUICK, "--set", "outputs.csv=['torso.roll', '*.contact']")
     assert code == 0
     names = read_csv(tmp_path / "out" / "results.csv").names
@@ -146,7 +147,7 @@ def test_a_folder_of_an_earlier_run_is_written_anew(call: Call, tmp_path: Path) 
     assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2")[0] == 0
     assert (folder / "report.html").is_file()
     assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
-    assert {path.name for path in folder.iterdir()} == {"metrics.json", "results.csv", "run.json", "scenario.toml"}
+    assert {path.name for path in folder.iterdir()} == RUN
 
 
 @pytest.mark.parametrize("what", ["robots", "scenarios", "gaits", "terrains", "laws"])

@@ -15,8 +15,10 @@ import pytest
 from command import COMMAND, QUICK, Call, assert_refused, settings
 
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
-from hexapod_cosim.cosim.recorder import Recording, read_csv, write_csv
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.recordings import read_csv, write_commands
 
+PARTIAL = {"results.partial.csv", "results.partial.parquet", "run.json", "scenario.toml"}
 # an explicit method of fixed step without error control has nowhere to go under an endless force
 REFUSED = ["solver.method=rk4", "solver.step=0.005", "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"]
 
@@ -30,7 +32,7 @@ def test_a_run_that_ends_early_keeps_what_was_recorded_under_another_name(call: 
     assert ended
     assert "not finite" in err
     assert "Traceback" not in err
-    assert {path.name for path in folder.iterdir()} == {"results.partial.csv", "run.json", "scenario.toml"}
+    assert {path.name for path in folder.iterdir()} == PARTIAL
     assert read_csv(folder / "results.partial.csv").time[-1] == pytest.approx(float(ended[1]))
     assert json.loads((folder / "run.json").read_text())["status"] == "failed"
     assert_refused(call("report", folder), "the run did not complete")
@@ -40,7 +42,7 @@ def test_a_comparison_that_ends_early_says_so_in_both_folders(call: Call, tmp_pa
     folder = tmp_path / "out"
     assert call("compare", "walk_flat", "-o", folder, *QUICK, *settings(*REFUSED))[0] == 1
     assert {path.name for path in folder.iterdir()} == {"kinematic", "run.json"}
-    assert {path.name for path in (folder / "kinematic").iterdir()} == {"results.partial.csv", "run.json", "scenario.toml"}
+    assert {path.name for path in (folder / "kinematic").iterdir()} == PARTIAL
     assert all(json.loads((place / "run.json").read_text())["status"] == "failed" for place in (folder, folder / "kinematic"))
 
 
@@ -60,7 +62,7 @@ def test_ctrl_c_keeps_what_was_recorded_under_another_name(plant_build: Path, tm
     assert process.returncode == 130
     assert out == ""
     assert "Traceback" not in err
-    assert {path.name for path in folder.iterdir()} == {"results.partial.csv", "run.json", "scenario.toml"}
+    assert {path.name for path in folder.iterdir()} == PARTIAL
     recording = read_csv(folder / "results.partial.csv")
     np.testing.assert_allclose(recording.time, 0.005 * np.arange(len(recording.time)), atol=1e-9)
     assert json.loads((folder / "run.json").read_text())["status"] == "interrupted"
@@ -91,9 +93,9 @@ def test_an_interrupt_while_results_are_written_waits_for_them(
 ) -> None:
     def struck(recording: Recording, path: Path) -> None:
         signal.raise_signal(number)
-        write_csv(recording, path)
+        write_commands(recording, path)
 
-    monkeypatch.setattr("hexapod_cosim.cosim.results.write_csv", struck)
+    monkeypatch.setattr("hexapod_cosim.cosim.results.write_commands", struck)
     folder = tmp_path / "out"
     code, out, err = call("simulate", "stand", "-o", folder, *QUICK)
     assert (code, out) == (130, "")

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.recorder import Recording, write_csv
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.recordings import write_csv
 from hexapod_cosim.cosim.robot_package import PLANT
 from tools.importers import compare, packages
 from tools.importers.compare import IMPORTERS, Importer, Row, verdict

@@ -12,7 +12,8 @@ import fmpy
 import numpy as np
 import pytest
 
-from hexapod_cosim.cosim.recorder import Recording, read_csv, write_csv
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.recordings import read_csv, write_csv
 from tools.importers.compare import ROUND_OFF, judged
 from tools.importers.walk import STEP, Walk, record
 

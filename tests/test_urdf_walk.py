@@ -8,12 +8,14 @@ import re
 from pathlib import Path
 
 import fmpy
-import numpy as np
 import pytest
 from command import Call, assert_refused
 from disguised_urdf import disguised, stances
 from foreign_urdf import SIDE, athena_table, spider_table, spider_urdf
 
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.recordings import read_recording
+from hexapod_cosim.cosim.results import RESULTS
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.models import LEG_NAMES, RobotError, list_robots, load_robot
 
@@ -32,24 +34,19 @@ def files(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def walked(call: Call, robot: Path, folder: Path, duration: float) -> dict[str, np.ndarray]:
+def walked(call: Call, robot: Path, folder: Path, duration: float) -> Recording:
     settings = [f"robot={robot}", f"duration={duration}", "outputs.plots=false"]
     code, _, err = call("simulate", "walk_flat", "-o", folder, *(word for text in settings for word in ("--set", text)))
     assert code == 0, err
-    table = np.genfromtxt(folder / "results.csv", delimiter=",", names=True, deletechars="")
-    return {name: table[name] for name in table.dtype.names or ()}
-
-
-def column(result: dict[str, np.ndarray], start: str) -> np.ndarray:
-    return next(values for name, values in result.items() if name.startswith(start))
+    return read_recording(folder, RESULTS)
 
 
 def test_a_urdf_robot_walks_as_the_same_robot_in_a_file_of_ours(call: Call, files: Path) -> None:
     ours, theirs = (walked(call, files / f"{name}.toml", files / name, 2.0) for name in ("ours", "side"))
     for axis in (1, 2, 3):
         name = f"torso.position[{axis}]"
-        assert column(theirs, name) == pytest.approx(column(ours, name), abs=SAME_WALK)
-    assert column(ours, "torso.position[1]")[-1] > SAME_COURSE
+        assert theirs.column(name) == pytest.approx(ours.column(name), abs=SAME_WALK)
+    assert ours.column("torso.position[1]")[-1] > SAME_COURSE
 
 
 def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Path) -> None:
@@ -66,8 +63,8 @@ def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Pa
     tibia |= {key: tibia[key] - quarter for key in ("angle_min", "angle_max", "stance")}
     (tmp_path / "hanging.toml").write_text(to_toml(table), encoding="utf-8")
     ours, hanging = (walked(call, tmp_path / f"{name}.toml", tmp_path / name, 2.0) for name in ("ours", "hanging"))
-    assert column(hanging, "torso.position[1]") == pytest.approx(column(ours, "torso.position[1]"), abs=SAME_WALK)
-    assert column(hanging, "LF.tibia.angle") + quarter == pytest.approx(column(ours, "LF.tibia.angle"), abs=SAME_WALK)
+    assert hanging.column("torso.position[1]") == pytest.approx(ours.column("torso.position[1]"), abs=SAME_WALK)
+    assert hanging.column("LF.tibia.angle") + quarter == pytest.approx(ours.column("LF.tibia.angle"), abs=SAME_WALK)
 
 
 def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> None:
@@ -80,7 +77,7 @@ def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> No
     names = [f"{leg}.foot.normal_force" for leg in LEG_NAMES]
     result = fmpy.simulate_fmu(str(path), output=names, stop_time=1.0)
     assert sum(result[name][-1] for name in names) == pytest.approx(robot.weight, rel=1e-3)  # the last tremor
-    course = column(walked(call, files / "spider.urdf", files / "walk", 2.0), "torso.position[1]")
+    course = walked(call, files / "spider.urdf", files / "walk", 2.0).column("torso.position[1]")
     assert course[-1] > SAME_COURSE
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu, read_description
-from hexapod_cosim.cosim.recorder import Recording, read_csv, write_csv
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.models import load_robot
