@@ -6,7 +6,6 @@ The force is held over a period, so the discretisation by the matrix exponential
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm
 
 from hexapod_cosim.controller.gains import SuspensionGains
 from hexapod_cosim.controller.kinematics import Array
@@ -14,6 +13,8 @@ from hexapod_cosim.controller.kinematics import Array
 
 def discretise(gains: SuspensionGains, *, period: float) -> tuple[Array, Array]:
     """A (2, 2) and B (2,) of the suspension under a force held for a period [s]."""
+    from scipy.linalg import expm  # noqa: PLC0415  slow to import
+
     system = np.zeros((3, 3))
     system[0, 1] = 1.0
     system[1] = np.array([-gains.stiffness, -gains.damping, 1.0]) / gains.mass

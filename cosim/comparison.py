@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from hexapod_cosim.cosim.batch import Summary
 from hexapod_cosim.cosim.files import atomic_text
@@ -136,6 +135,8 @@ def change_of(name: str, pairs: Sequence[tuple[float, float]]) -> Change:
 
 def half_width_of(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
     """Half the width of the interval in which the mean of what these are drawn from lies with CONFIDENCE; NaN for fewer than two."""
+    from scipy.special import stdtrit  # noqa: PLC0415  slow to import
+
     n = len(values)
     if n < 2:
         return math.nan

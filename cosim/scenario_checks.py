@@ -7,7 +7,7 @@ from dataclasses import fields
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.scenario_records import MAX_STEPS, SETTINGS, Command, Outputs, Scenario, Sensors, Variation
+from hexapod_cosim.cosim.scenario_records import MAX_STEPS, SETTINGS, UNUSED, Command, Outputs, Scenario, Sensors, Variation
 from hexapod_cosim.models import ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.schema import specs
 
@@ -44,7 +44,7 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
             expected = f"a parameter of the FMU; this is an {others[name]}"
             raise ScenarioError("not a parameter", got=name, expected=expected, fix=fix, where=f"--set {name}" if name in given else where)
         if name in given:
-            raise _unknown("setting", name, [*_setting_names(), *known], "a key of the scenario or a parameter", where=f"--set {name}")
+            raise _unknown("setting", name, [*setting_names(), *known], "a key of the scenario or a parameter", where=f"--set {name}")
         where = f"{scenario.where}: parameters"
         if isinstance(value, Mapping):
             fix = 'write names with dots in quotes: "torso.mass" = 2.7'
@@ -59,10 +59,10 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
     return ScenarioError(f"unknown {kind}", got=name, expected=f"{expected} of the FMU", fix=fix, where=where)
 
 
-def _setting_names() -> list[str]:
+def setting_names() -> list[str]:
     """The scenario's dotted keys."""
     records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
-    keys = [(section, key) for section, record in records.items() for key in specs(record)]
+    keys = [(section, key) for section, record in records.items() for key in specs(record) if key not in UNUSED.get(section, ())]
     plain = {"outputs": Outputs, "compliance": Parts}
     keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]
     return [f"{section}.{key}" for section, key in keys]

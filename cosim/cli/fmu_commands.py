@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.controller import Gains, save_gains
+from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, show_table, waiting, warn
 from hexapod_cosim.cosim.controller_export import export_controller, make_setup
@@ -23,7 +24,12 @@ from hexapod_cosim.cosim.scenario_records import CONTROLS
 from hexapod_cosim.cosim.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
 
-RobotName = Annotated[str, typer.Option("--robot", metavar="FILE", help="A robot file, a URDF, or a name of `hexapod list robots`.")]
+RobotName = Annotated[
+    str,
+    typer.Option(
+        "--robot", metavar="FILE", help="A robot file, a URDF, or a name of `hexapod list robots`.", autocompletion=completion.robot
+    ),
+]
 DEFAULT_PERIOD = 0.005  # s, the default macro-step
 OF_CONTROLLER = ("gait", "gains", "period")
 DESCRIPTION, PLANT_FMU = "a robot's description", "the plant's FMU"
@@ -60,9 +66,17 @@ def export(
         typer.Option("--set", metavar="NAME=VALUE", help="Of the package: controller.command.vx=0.05, plant.friction.mu=0.5, ..."),
     ] = None,
     controller: Annotated[
-        str | None, typer.Option("--controller", metavar="|".join(CONTROLS), help="Pack the robot's controller instead of the plant.")
+        str | None,
+        typer.Option(
+            "--controller",
+            metavar="|".join(CONTROLS),
+            help="Pack the robot's controller instead of the plant.",
+            autocompletion=completion.control,
+        ),
     ] = None,
-    gait: Annotated[str | None, typer.Option("--gait", help="Of the controller: one of `hexapod list gaits`.")] = None,
+    gait: Annotated[
+        str | None, typer.Option("--gait", help="Of the controller: one of `hexapod list gaits`.", autocompletion=completion.gait)
+    ] = None,
     gains: GainsFile = None,
     period: Annotated[float, typer.Option("--period", help="Of the controller [s].")] = DEFAULT_PERIOD,
     json: Json = False,
@@ -151,7 +165,13 @@ def design(
     robot: RobotName = "athena",
     macro_step: Annotated[float, typer.Option("--period", "--macro-step", help="Period of the controller [s].")] = DEFAULT_PERIOD,
     settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="REQUIREMENT=VALUE", help="Ask for something else (phase_margin=50).")
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="REQUIREMENT=VALUE",
+            help="Ask for something else (phase_margin=50).",
+            autocompletion=completion.requirement,
+        ),
     ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/design.")] = None,
     json: Json = False,

@@ -55,7 +55,17 @@ def _choices(enumeration: str) -> Rows:
 LISTS: dict[str, Callable[[], Rows]] = {"robots": robots, "scenarios": scenarios, "gaits": gaits, "terrains": terrains, "laws": laws}
 
 
-def list_what(what: Annotated[str, typer.Argument(metavar="|".join(LISTS), help="What to list.")], json: Json = False) -> None:
+What = Annotated[
+    str,
+    typer.Argument(
+        metavar="|".join(LISTS),
+        help="What to list.",
+        autocompletion=lambda incomplete: [name for name in LISTS if name.startswith(incomplete)],
+    ),
+]
+
+
+def list_what(what: What, json: Json = False) -> None:
     """List robots, scenarios, gaits, terrains or laws."""
     if what not in LISTS:
         raise unknown_name("list", what, LISTS)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import (
     FmuFile,
     FolderName,
@@ -29,7 +30,10 @@ from hexapod_cosim.cosim.run import Result
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
 
-Control = Annotated[str | None, typer.Option("--control", metavar="|".join(CONTROLS), help="Overrides the scenario's control.")]
+Control = Annotated[
+    str | None,
+    typer.Option("--control", metavar="|".join(CONTROLS), help="Overrides the scenario's control.", autocompletion=completion.control),
+]
 
 
 def simulate(

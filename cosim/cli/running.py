@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import Gains, load_gains
+from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, warn
 from hexapod_cosim.cosim.interrupts import held_interrupts
 from hexapod_cosim.cosim.master import INTERRUPTED
@@ -21,9 +22,18 @@ from hexapod_cosim.cosim.run import simulate as run_scenario
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.models import HexapodError
 
-Name = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or a name of `hexapod list scenarios`.")]
+Name = Annotated[
+    str,
+    typer.Argument(metavar="SCENARIO", help="A scenario file, or a name of `hexapod list scenarios`.", autocompletion=completion.scenario),
+]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a key of the scenario (gait.period=0.8) or an FMU parameter.")
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set a key of the scenario (gait.period=0.8) or an FMU parameter.",
+        autocompletion=completion.setting,
+    ),
 ]
 FolderName = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/SCENARIO.")]
 FmuFile = Annotated[Path | None, typer.Option("--fmu", metavar="FILE", help="Use this FMU instead of exporting the robot's own.")]

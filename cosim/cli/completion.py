@@ -1,0 +1,57 @@
+"""What a shell offers for a half-typed word: names, and keys of --set with what they mean. Reads names only, loads no robot."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.controller import PATTERNS, Requirements
+from hexapod_cosim.cosim.columns import Column, plant_variables
+from hexapod_cosim.cosim.scenario import list_scenarios
+from hexapod_cosim.cosim.scenario_checks import setting_names
+from hexapod_cosim.cosim.scenario_records import CONTROLS, KEYS, SECTIONS
+from hexapod_cosim.models import list_robots
+
+Offers = list[tuple[str, str]]  # word, meaning
+Complete = Callable[[str], Offers]
+
+
+def _offering(words: Callable[[], Iterable[tuple[str, str]]]) -> Complete:
+    """A completion that offers of some words those that begin as typed."""
+
+    def complete(incomplete: str) -> Offers:
+        return [(word, meaning) for word, meaning in words() if word.startswith(incomplete)]
+
+    return complete
+
+
+def _scenarios() -> Iterator[tuple[str, str]]:
+    for name, path in list_scenarios().items():
+        yield name, str(_toml(path).get("title", ""))
+
+
+def _toml(path: Path) -> Mapping[str, Any]:
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _settings() -> Iterator[tuple[str, str]]:
+    """Keys of a scenario, then parameters of the plant's FMU."""
+    for name in (*(key for key in KEYS if key not in SECTIONS), *setting_names()):
+        yield f"{name}=", "of the scenario"
+    for name, column in plant_variables("parameter").items():
+        yield f"{name}=", _meaning(column)
+
+
+def _meaning(column: Column) -> str:
+    return f"{column.description} [{column.unit}]"
+
+
+scenario = _offering(_scenarios)
+setting = _offering(_settings)
+robot = _offering(lambda: ((name, "") for name in list_robots()))
+gait = _offering(lambda: ((name, f"duty factor {pattern.duty:.3g}") for name, pattern in PATTERNS.items()))
+control = _offering(lambda: ((name, "") for name in CONTROLS))
+requirement = _offering(lambda: ((f"{item.name}=", "") for item in fields(Requirements)))
