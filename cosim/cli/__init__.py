@@ -8,8 +8,9 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Sequence
+from typing import Any
 
-FAILURE, INTERRUPT = 1, 130
+FAILURE, USAGE, INTERRUPT = 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,17 +31,38 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(given: list[str]) -> int:
-    from hexapod_cosim.cosim.cli.app import app  # noqa: PLC0415  a second of imports, in which Ctrl-C may come
+    import typer  # noqa: PLC0415  a second of imports, in which Ctrl-C may come
+
+    from hexapod_cosim.cosim.cli.app import app  # noqa: PLC0415
     from hexapod_cosim.cosim.interrupts import termination_as_interrupt  # noqa: PLC0415
     from hexapod_cosim.models import HexapodError  # noqa: PLC0415
 
+    usage_error: Any = typer.BadParameter.__mro__[1]  # which typer does not export
     try:
         with termination_as_interrupt():
-            app(args=given, prog_name="hexapod")
-    except SystemExit as stop:  # typer ends so, after Ctrl-C too: it keeps KeyboardInterrupt to itself
+            code = app(args=given, prog_name="hexapod", standalone_mode=False)
+    except usage_error as error:
+        return _usage(error, given)
+    except SystemExit as stop:  # typer ends so when it answers a shell
         return 0 if stop.code is None else stop.code if isinstance(stop.code, int) else FAILURE
     except HexapodError as error:
         print(f"hexapod: {error}", file=sys.stderr)
         if "--debug" in given:
             traceback.print_exception(error)
-    return FAILURE
+        return FAILURE
+    return code if isinstance(code, int) else 0  # after Ctrl-C too: typer keeps KeyboardInterrupt to itself
+
+
+def _usage(error: Any, given: Sequence[str]) -> int:
+    """One paragraph for words that are no command of ours; help where there are none at all. Returns the exit code."""
+    from hexapod_cosim.models import HexapodError  # noqa: PLC0415
+
+    if not given:
+        print(error.format_message(), file=sys.stderr)
+        return USAGE
+    context = error.ctx  # None for an option without its value
+    path, usage = (context.command_path, context.command.get_usage(context)) if context else ("hexapod", "")
+    said, expected = (" ".join(text.split()) for text in (error.format_message().rstrip("."), usage.removeprefix("Usage: ")))
+    told = HexapodError("not understood", got=said, expected=expected or "a value after it", fix=f"`{path} --help` explains it")
+    print(f"hexapod: {told}", file=sys.stderr)
+    return USAGE

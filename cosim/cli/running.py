@@ -13,7 +13,7 @@ import typer
 
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli import completion
-from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, warn
+from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, waiting, warn
 from hexapod_cosim.cosim.interrupts import held_interrupts
 from hexapod_cosim.cosim.master import INTERRUPTED
 from hexapod_cosim.cosim.results import Folder, write_result
@@ -88,9 +88,10 @@ def run_into(
 
 @contextmanager
 def drawing(folder: Path) -> Iterator[None]:
-    """Says on an interrupt what is there and what is not."""
+    """Says that figures are drawn, on a terminal, and on an interrupt what is there and what is not."""
     try:
-        yield
+        with waiting("drawing figures and report"):
+            yield
     except KeyboardInterrupt:
         warn(f"the results in {folder} are whole, the figures are not: `hexapod report {folder}` draws them")
         raise

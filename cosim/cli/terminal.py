@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -47,8 +48,8 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: 
         table.add_column(name, justify="right" if k in right else "left", no_wrap=k < len(columns) - 1)
     for row in rows:
         table.add_row(*map(Text, row))
-    width = None if sys.stdout.isatty() else 160
-    Console(width=width, highlight=False).print(table)
+    shown = sys.stdout.isatty()
+    Console(width=None if shown else 160, force_terminal=shown, highlight=False).print(table)
 
 
 def warn(text: str) -> None:
@@ -66,12 +67,59 @@ def waiting(label: str | None) -> Iterator[None]:
         yield
 
 
-class _Speed(ProgressColumn):
-    """Simulated over wall time."""
+class _Simulated(ProgressColumn):
+    """Simulated time, and how it compares with the clock on the wall since the first step."""
 
     def render(self, task: Task) -> Text:
-        speed = task.completed / task.elapsed if task.elapsed else 0.0
-        return Text(f"{task.completed:5.1f} s  {speed:4.0f} x real time")
+        return Text(f"{task.completed:5.1f} of {task.total:g} s  {_rate(task):4.0f} x real time")
+
+
+class _Counted(ProgressColumn):
+    """How many of how many runs, and how many a minute since the count began; `already` were there then."""
+
+    def render(self, task: Task) -> Text:
+        rate = f"{60.0 * _rate(task):4.0f} a minute" if _rate(task) else ""
+        return Text(f"{task.completed:.0f} of {task.total:.0f} runs  {rate}")
+
+
+class _Left(ProgressColumn):
+    """What is left of the wait; in the end how long it took."""
+
+    max_refresh = 0.5
+
+    def render(self, task: Task) -> Text:
+        if task.finished and task.finished_time is not None:
+            return Text(f"in {_clock(task.finished_time)}")
+        rate = _rate(task)
+        return Text(f"{_clock((task.remaining or 0.0) / rate)} left" if rate else "")
+
+
+def _rate(task: Task) -> float:
+    """What was done since the task was started, a second; 0 as long as that is not known."""
+    elapsed = task.finished_time or task.elapsed
+    return (task.completed - float(task.fields["already"])) / elapsed if elapsed else 0.0
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(math.ceil(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+@contextmanager
+def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[[float], None]]:
+    """A progress bar that moves to and fro until it is told for the first time how much is done, and counts from there."""
+    columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(label, total=total, start=False, already=0.0)
+
+        def tell(done: float) -> None:
+            if bar.tasks[0].start_time is None:
+                bar.start_task(task)
+                bar.update(task, already=done)
+            bar.update(task, completed=done)
+
+        yield tell
 
 
 @contextmanager
@@ -80,10 +128,8 @@ def progress_bar(label: str, duration: float) -> Iterator[master.Progress | None
     if not sys.stderr.isatty():
         yield None
         return
-    columns = (TextColumn("{task.description:<12}"), BarColumn(), _Speed(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(label, total=duration)
-        yield lambda done: bar.update(task, completed=done)
+    with _bar(label, duration, _Simulated()) as tell:
+        yield tell
 
 
 @contextmanager
@@ -92,7 +138,5 @@ def counting_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
     if not sys.stderr.isatty():
         yield lambda _done: None
         return
-    columns = (TextColumn("{task.description:<12}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda done: bar.update(task, completed=done)
+    with _bar(label, total, _Counted()) as tell:
+        yield tell
