@@ -6,16 +6,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 SANITIZED := tests/test_fmi.py tests/test_fmi3.py tests/test_fmi3_order.py tests/test_plant_events.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_fmi_importers.py tests/test_fmi_exchange.py tests/test_plant_coordinates.py tests/test_plant_misuse.py tests/test_endurance.py
 
-.PHONY: help setup demo test test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
 	@echo "make demo      the paper's comparison; says where its report is"
 	@echo "make test      every test"
+	@echo "make test-browser  the report in Chromium, at full length, and how long it takes to open (1 min)"
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
 	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
@@ -45,6 +46,9 @@ demo: setup
 test: setup typing
 	$(BIN)/python -m pytest
 
+test-browser: setup
+	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/test_browser.py
+
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
 
@@ -66,6 +70,7 @@ check: setup typing
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
 	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py
+	$(PYTHON) tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 
@@ -85,6 +90,7 @@ format: setup
 	$(BIN)/ruff check --fix-only --quiet .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(C_FILES)
+	$(PYTHON) tools/build_viewer.py --format
 
 generate: setup
 	$(BIN)/python tools/generate.py

@@ -102,7 +102,7 @@ def packed_binary(folder: str | Path, identifier: str) -> str | None:
 
 def binary(fmi_platform: str, component: Component = PLANT) -> Path:
     """The FMU's shared library for a platform such as linux64, the newest at hand. Raises FmuError when there is none or it is stale."""
-    found = [path for folder in _plant_folders() for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")]
+    found = [path for folder in plant_folders() for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")]
     if not found:
         expected = "one of: " + ", ".join(platforms) if (platforms := installed_platforms()) else "a built one"
         raise FmuError(f"no {component.name} binary for this platform", got=fmi_platform, expected=expected, fix=BUILD)
@@ -113,7 +113,7 @@ def binary(fmi_platform: str, component: Component = PLANT) -> Path:
 
 def installed_platforms() -> list[str]:
     """Platforms whose binary is at hand."""
-    return sorted({path.name for folder in _plant_folders() for path in (folder / "binaries").glob("*") if path.is_dir()})
+    return sorted({path.name for folder in plant_folders() for path in (folder / "binaries").glob("*") if path.is_dir()})
 
 
 def _built(path: Path) -> int:
@@ -134,7 +134,7 @@ def _refuse_stale(path: Path, component: Component) -> None:
         )
 
 
-def _plant_folders() -> list[Path]:
+def plant_folders() -> list[Path]:
     """Folders laid out like the wheel's hexapod_cosim/plant: an editable install keeps it in site-packages, a build in build/plant."""
     if not in_source_tree():
         return [_INSTALLED]

@@ -233,7 +233,7 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
     library.parent.mkdir(parents=True)
     library.write_bytes(b"")
     os.utime(library, (built, built))
-    monkeypatch.setattr(plant_files, "_plant_folders", lambda: [tmp_path])
+    monkeypatch.setattr(plant_files, "plant_folders", lambda: [tmp_path])
     with pytest.raises(HexapodError, match="older than its sources") if stale else contextlib.nullcontext():
         assert plant_files.binary(plant_files.fmi2_platform()) == library
 

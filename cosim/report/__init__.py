@@ -1,24 +1,51 @@
-"""The report of a run or a comparison: one static HTML file with everything in it."""
+"""The report of a run or a comparison: one HTML file with everything in it, that replays the walk and works without a network."""
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from hexapod_cosim.cosim.comparison import BETTER, SAME, WORSE, Change, Comparison
 from hexapod_cosim.cosim.files import write_text
 from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS
+from hexapod_cosim.cosim.report.headline import cards, headline, plain_headline
+from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
+from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.results import Stored
 from hexapod_cosim.cosim.toml_text import to_toml
 
 REPORT, PLOTS = "report.html", "plots"
 
 Rows = list[dict[str, Any]]
+
+
+class Section(NamedTuple):
+    """Plots that belong together."""
+
+    name: str  # of the static figure that shows the same
+    title: str
+    caption: str
+    shape: str = ""  # how its plots lie: three in a row, "pairs", or "wide"
+
+
+SECTIONS = (
+    Section("foot_forces", "Foot forces", "Normal force of each foot, in body weights."),
+    Section("slip", "Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot."),
+    Section("posture", "Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", "pairs"),
+    Section("torques", "Torques", "The largest absolute torque over the six legs, joint by joint."),
+    Section("energy", "Energy audit", "Work, loss and stored energy since the start; beside them what the books do not explain.", "pairs"),
+    Section("footfall", "Footfall", "Bars: the foot is on the ground. Grey bands: the gait plans it to swing.", "wide"),
+    Section(
+        "path",
+        "Path of the torso",
+        "The torso from above, dots where it is at the replay's time; dotted, where the command leads.",
+        "overhead",
+    ),
+)
 
 
 def write_report(
@@ -41,27 +68,61 @@ def write_report(
     missing = [f"{FIGURES[name].title} is not drawn: {reason}" for name, reason in skipped.items()]
     for text in missing:
         tell(text)
-    environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "report"), autoescape=True, undefined=StrictUndefined)
     first = next(iter(runs.values()))
-    figures = [
-        (item.title, item.caption, _embedded(folder / PLOTS / f"{name}.svg")) for name, item in FIGURES.items() if name not in skipped
-    ]
-    if comparison is None:
-        rows, notes, losses = metric_rows({label: run.metrics for label, run in runs.items()}), "", []
-    else:
-        rows, notes, losses = comparison_rows(comparison), about(comparison), comparison.losses
-    facts = {label: run.facts for label, run in runs.items()}
-    page = environment.get_template("report.html.jinja").render(
-        title=first.facts["title"], labels=list(runs), rows=rows, about=notes, losses=losses, figures=figures, facts=facts, missing=missing,
-        scenario=first.scenario if scenario is None else scenario, command=first.facts.get("command", "") if command is None else command,
+    content = _one_run(first) if comparison is None else _comparison(comparison)
+    page = render(
+        "report.html.jinja",
+        title=first.facts["title"],
+        labels=list(runs),
+        facts={label: run.facts for label, run in runs.items()},
+        told={label: _told(run.facts) for label, run in runs.items()},
+        warnings=[f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]] + content.pop("losses"),
+        sections=[section._asdict() | {"drawn": section.name not in skipped} for section in SECTIONS if section.name not in skipped],
+        missing=missing,
+        scenario=first.scenario if scenario is None else scenario,
+        command=first.facts.get("command", "") if command is None else command,
         gains={label: to_toml(run.facts["gains"]) for label, run in runs.items() if run.facts.get("gains")},
-    )  # fmt: skip
+        **content,
+        **_replay(runs),
+    )
     write_text(folder / REPORT, page)
     return [*files, folder / REPORT]
 
 
-def _embedded(svg: Path) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode("ascii")
+def _one_run(run: Stored) -> dict[str, Any]:
+    rows = metric_rows({run.facts["control"]: run.metrics})
+    return {
+        "headline": plain_headline(run.metrics, run.facts),
+        "cards": [],
+        "rows": rows,
+        "about": "",
+        "losses": [],
+        "lead": _robot(run.facts),
+    }
+
+
+def _comparison(comparison: Comparison) -> dict[str, Any]:
+    rows, notes = comparison_rows(comparison), about(comparison)
+    lead = notes or "One run of each control."
+    return {"headline": headline(comparison), "cards": cards(comparison, rows), "rows": rows, "about": notes, "losses": comparison.losses,
+            "lead": lead}  # fmt: skip
+
+
+def _replay(runs: Mapping[str, Stored]) -> dict[str, Any]:
+    """Viewer and recordings; where there is no viewer, what to do about it."""
+    script = viewer_script()
+    if script is None:
+        return {"viewer": "", "payload": "", "thinned": [], "no_viewer": NO_VIEWER}
+    payload, thinned = make_payload(runs)
+    return {"viewer": script, "payload": Markup(as_json(payload)), "thinned": thinned, "no_viewer": ""}
+
+
+def _told(facts: Mapping[str, Any]) -> str:
+    return f"{facts['simulated']:.6g} s simulated in {facts['wall']:.3g} s ({facts['realtime_factor']:.3g} x real time)"
+
+
+def _robot(facts: Mapping[str, Any]) -> str:
+    return f"Robot {facts['robot']['name']}, {_told(facts)}."
 
 
 def metric_rows(metrics: Mapping[str, Mapping[str, float | None]]) -> Rows:

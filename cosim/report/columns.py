@@ -1,0 +1,167 @@
+"""What of a recording goes into a report, in the units that people read, and how many of its rows.
+
+A recording that lacks what a column is made of goes without that column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.metrics import CONTACT_SHARE, View, body_height, commanded_path, robot_weight
+from hexapod_cosim.cosim.recorder import ColumnError
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+
+Array = NDArray[np.float64]
+Columns = dict[str, Array]
+
+MOST_ROWS = 20_000  # of a run: 100 s at 5 ms as they are; more would only make the page slow to open
+ENERGIES = ("actuator_work", "dissipated", "potential", "kinetic", "push_work", "residual")
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Columns of a run, thinned if need be."""
+
+    time: Array  # (rows,) s
+    columns: Columns  # (rows,) each
+    bucket: int  # rows of the recording that two of these stand for; 1: these are all rows
+
+
+def choose(view: View, *, most_rows: int = MOST_ROWS) -> Chosen:
+    """The columns of a report. Of longer recordings two rows stand for each `bucket` of rows: what is replayed is as it was at their times,
+    what is drawn as a curve holds the bucket's least and largest value, in the order in which they came, so that no peak is lost.
+    """
+    replayed, drawn = _gathered(view, REPLAYED), _gathered(view, DRAWN)
+    time = view.recording.time
+    if len(time) <= most_rows:
+        return Chosen(time, replayed | drawn, 1)
+    bucket = -(-2 * len(time) // most_rows)
+    rows = _two_of_each(len(time), bucket)
+    envelopes = {name: envelope(values, bucket) for name, values in drawn.items()}
+    return Chosen(time[rows], {name: values[rows] for name, values in replayed.items()} | envelopes, bucket)
+
+
+def _two_of_each(rows: int, bucket: int) -> NDArray[np.intp]:
+    """First and middle row of each bucket, the recording's last row instead of the last one's middle."""
+    first = np.arange(0, rows, bucket)
+    chosen = np.column_stack([first, np.minimum(first + bucket // 2, rows - 1)]).reshape(-1)
+    chosen[-1] = rows - 1
+    return chosen
+
+
+def envelope(values: Array, bucket: int) -> Array:
+    """(2 x buckets,) least and largest value of each bucket of rows, in the order in which they came."""
+    short = -len(values) % bucket
+    table = np.concatenate([values, np.repeat(values[-1:], short)]).reshape(-1, bucket)
+    places = np.sort(np.column_stack([table.argmin(axis=1), table.argmax(axis=1)]), axis=1)
+    return np.asarray(np.take_along_axis(table, places, axis=1).reshape(-1))
+
+
+Maker = Callable[[View], Iterator[tuple[str, Array]]]
+
+
+def _gathered(view: View, makers: Mapping[str, Maker]) -> Columns:
+    columns: Columns = {}
+    for make in makers.values():
+        try:
+            columns |= dict(make(view))
+        except ColumnError:
+            continue
+    return columns
+
+
+def _pose(view: View) -> Iterator[tuple[str, Array]]:
+    """Position [m] and attitude of the torso, angles of the joints [rad]: what the viewer's kinematics starts from."""
+    yield from _split(("torso.x", "torso.y", "torso.z"), view.recording.vector("torso.position"))
+    yield from _split(("torso.qw", "torso.qx", "torso.qy", "torso.qz"), view.recording.vector("torso.quaternion", 4))
+    names = [f"{leg}.{joint}.angle" for leg in LEG_NAMES for joint in JOINT_NAMES]
+    yield from _split(names, view.recording.joints("angle").reshape(-1, len(names)))
+
+
+def _forces(view: View) -> Iterator[tuple[str, Array]]:
+    """Forces on the feet in body weights, world axes."""
+    force = view.recording.foot_vectors("force") / robot_weight(view.parameters)
+    yield from _split([f"{leg}.force.{axis}" for leg in LEG_NAMES for axis in "xyz"], force.reshape(len(force), -1))
+
+
+def _contacts(view: View) -> Iterator[tuple[str, Array]]:
+    yield from _split([f"{leg}.contact" for leg in LEG_NAMES], view.recording.feet("contact"))
+
+
+def _swings(view: View) -> Iterator[tuple[str, Array]]:
+    """When the gait plans a leg to swing."""
+    names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
+    yield from _split([f"{leg}.swing" for leg in LEG_NAMES], view.recording.columns(names))
+
+
+def _slipped(view: View) -> Iterator[tuple[str, Array]]:
+    """Way [m] that each foot has slipped since the start, world x and y: what its velocity under load sums up to."""
+    time = view.recording.time
+    velocity = np.where(_loaded(view)[:, :, None], view.recording.foot_vectors("velocity"), 0.0)[:, :, :2]
+    way = _running_integral(time, velocity.reshape(len(time), -1))
+    yield from _split([f"{leg}.slipped.{axis}" for leg in LEG_NAMES for axis in "xy"], way)
+
+
+def _commanded(view: View) -> Iterator[tuple[str, Array]]:
+    yield from _split(("command.x", "command.y"), commanded_path(view.recording))
+
+
+def _normal_forces(view: View) -> Iterator[tuple[str, Array]]:
+    """In body weights."""
+    yield from _split([f"{leg}.load" for leg in LEG_NAMES], view.recording.feet("normal_force") / robot_weight(view.parameters))
+
+
+def _slip(view: View) -> Iterator[tuple[str, Array]]:
+    """Speed of loaded feet along the ground [mm/s], and the way [mm] slipped by all feet since the start."""
+    speed = 1e3 * np.where(_loaded(view), view.recording.feet("slip_speed"), 0.0)
+    yield from _split([f"{leg}.slip" for leg in LEG_NAMES], speed)
+    yield "slip.way", _running_integral(view.recording.time, speed.sum(axis=1))
+
+
+def _height(view: View) -> Iterator[tuple[str, Array]]:
+    yield "height", 1e3 * body_height(view.recording, view.parameters)  # mm
+
+
+def _attitude(view: View) -> Iterator[tuple[str, Array]]:
+    for name in ("roll", "pitch", "yaw"):
+        yield name, np.degrees(np.unwrap(view.recording.column(f"torso.{name}")))
+
+
+def _torques(view: View) -> Iterator[tuple[str, Array]]:
+    """Largest absolute torque [N m] among the six legs, joint by joint."""
+    yield from _split([f"{joint}.torque" for joint in JOINT_NAMES], np.abs(view.recording.joints("torque")).max(axis=1))
+
+
+def _energies(view: View) -> Iterator[tuple[str, Array]]:
+    """Since the start [J], the residual [mJ]."""
+    for name in ENERGIES:
+        values = view.recording.column(f"energy.{name}")
+        yield f"energy.{name}", (values - values[:1]) * (1e3 if name == "residual" else 1.0)
+
+
+REPLAYED: dict[str, Maker] = {
+    "pose": _pose, "forces": _forces, "contacts": _contacts, "swings": _swings, "slipped": _slipped, "commanded": _commanded,
+}  # fmt: skip
+DRAWN: dict[str, Maker] = {
+    "normal_forces": _normal_forces, "slip": _slip, "height": _height, "attitude": _attitude, "torques": _torques, "energies": _energies,
+}  # fmt: skip
+
+
+def _loaded(view: View) -> NDArray[np.bool_]:
+    """(rows, 6) whether a foot bears a load, as the metrics judge it."""
+    return np.asarray(view.recording.feet("normal_force") > CONTACT_SHARE * robot_weight(view.parameters))
+
+
+def _split(names: list[str] | tuple[str, ...], table: Array) -> Iterator[tuple[str, Array]]:
+    return zip(names, table.T, strict=True)
+
+
+def _running_integral(time: Array, values: Array) -> Array:
+    """Of values (rows, ...) over time, 0 at the first row; the trapezoidal rule."""
+    steps = 0.5 * (values[1:] + values[:-1])
+    width = np.diff(time).reshape(-1, *(1 for _ in values.shape[1:]))
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps * width, axis=0)])

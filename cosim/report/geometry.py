@@ -1,0 +1,73 @@
+"""What the viewer draws: the robot and the ground of a run, as its FMU's parameters describe them."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.cosim.metrics import FLAT
+from hexapod_cosim.cosim.portrait import COLOURS, THICKNESS
+from hexapod_cosim.cosim.results import Stored
+from hexapod_cosim.cosim.signals import vector_names
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
+
+Parameters = Mapping[str, float]
+
+FLATNESS = 0.25  # height of a torso of which no one knows the size, of its width between the hips
+SAME = 1e-6  # m    of a hip's place: the robot file is still the robot that walked
+
+
+def describe_robot(run: Stored) -> dict[str, Any]:
+    """Torso, feet and legs [m, rad]; colours and thicknesses as in the FMU's picture."""
+    parameters = run.view.parameters
+    return {
+        "torso": {"com": _vector(parameters, "torso.com"), "size": torso_size(run)},
+        "foot": parameters["foot.radius"],
+        "legs": [_leg(parameters, leg) for leg in LEG_NAMES],
+        "joints": list(JOINT_NAMES),
+        "colours": {name: f"rgb({red},{green},{blue})" for name, (red, green, blue) in COLOURS.items()},
+        "thickness": list(THICKNESS),
+    }
+
+
+def _leg(parameters: Parameters, leg: str) -> dict[str, Any]:
+    links = [
+        {
+            "axis": _vector(parameters, f"{leg}.{joint}.axis"),
+            "tip": [parameters[f"{leg}.{joint}.{part}"] for part in ("length", "offset_y", "offset_z")],
+        }
+        for joint in JOINT_NAMES
+    ]
+    return {"name": leg, "hip": _vector(parameters, f"{leg}.hip_position"), "yaw": parameters[f"{leg}.hip_yaw"], "links": links}
+
+
+def torso_size(run: Stored) -> list[float]:
+    """Edges of the torso [m]: the robot file's where it is at hand and still the same robot, else what spans the hips."""
+    parameters = run.view.parameters
+    hips = np.array([_vector(parameters, f"{leg}.hip_position") for leg in LEG_NAMES])
+    try:
+        robot = load_robot(tomllib.loads(run.scenario)["robot"])
+    except (HexapodError, KeyError, TypeError, tomllib.TOMLDecodeError):
+        robot = None
+    if robot is not None and np.allclose(hips, [leg.hip_position for leg in robot.legs], rtol=0.0, atol=SAME):
+        return [float(edge) for edge in robot.torso.size]
+    length, width = np.ptp(hips[:, :2], axis=0).tolist()
+    return [length, width, FLATNESS * width]
+
+
+def describe_ground(parameters: Parameters) -> dict[str, float]:
+    """Height [m] at the origin, its rise per metre and the heading [rad] along which it rises."""
+    flat = parameters.get("terrain.kind", FLAT) == FLAT
+    return {
+        "height": parameters.get("terrain.height", 0.0),
+        "rise": 0.0 if flat else math.tan(parameters.get("terrain.incline", 0.0)),
+        "heading": parameters.get("terrain.heading", 0.0),
+    }
+
+
+def _vector(parameters: Parameters, stem: str) -> list[float]:
+    return [parameters[name] for name in vector_names(stem)]

@@ -1,0 +1,47 @@
+"""Pages from templates: what all reports share."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from hexapod_cosim.cosim.plant_files import plant_folders
+
+VIEWER = Path("viewer") / "viewer.js"  # in the plant's folder, where CMake installs it
+NO_VIEWER = (
+    "Replay and plots are left out: this installation was built without the viewer (HX_VIEWER=OFF). "
+    "`pip install` without that option, then `hexapod report` of this folder, adds them."
+)
+
+
+@cache
+def environment() -> Environment:
+    """Templates of this folder; `base.html.jinja` is what a report extends."""
+    return Environment(
+        loader=PackageLoader("hexapod_cosim.cosim", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def render(template: str, **content: Any) -> str:
+    """A page in the colours of the figures."""
+    from hexapod_cosim.cosim.plots import STYLES  # noqa: PLC0415  matplotlib is slow to import
+
+    colours = {label: style["color"] for label, style in STYLES.items()}
+    return environment().get_template(template).render(colours=colours, **content)
+
+
+def viewer_script() -> Markup | None:
+    """The viewer's JavaScript, the newest at hand, to stand in a <script>; None where the installation has none."""
+    found = [folder / VIEWER for folder in plant_folders() if (folder / VIEWER).is_file()]
+    if not found:
+        return None
+    text = max(found, key=lambda path: path.stat().st_mtime).read_text(encoding="utf-8")
+    return Markup(text.replace("</script", "<\\/script"))

@@ -1,0 +1,40 @@
+"""All that a report's viewer shows, as one JSON text."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from hexapod_cosim.cosim.metrics import CONTACT_SHARE
+from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
+from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
+from hexapod_cosim.cosim.report.packing import pack
+from hexapod_cosim.cosim.results import Stored
+
+
+def make_payload(runs: Mapping[str, Stored], *, most_rows: int = MOST_ROWS) -> tuple[dict[str, Any], list[str]]:
+    """The runs for the viewer, and in words how those were thinned that have more than `most_rows` rows."""
+    chosen = {label: choose(run.view, most_rows=most_rows) for label, run in runs.items()}
+    thinned = [_told(label, run, chosen[label]) for label, run in runs.items() if chosen[label].bucket > 1]
+    content = {"contact": CONTACT_SHARE, "runs": [_describe(label, run, chosen[label]) for label, run in runs.items()]}
+    return content, thinned
+
+
+def as_json(payload: Mapping[str, Any]) -> str:
+    """JSON that may stand in a <script>: nothing in it can end one."""
+    return json.dumps(payload, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _describe(label: str, run: Stored, chosen: Chosen) -> dict[str, Any]:
+    view = run.view
+    about = {"label": label, "period": view.period, "bucket": chosen.bucket}
+    return about | {"robot": describe_robot(run), "ground": describe_ground(view.parameters)} | pack(chosen.time, chosen.columns)
+
+
+def _told(label: str, run: Stored, chosen: Chosen) -> str:
+    rows = len(run.view.recording.time)
+    return (
+        f"{label}: {rows} rows were recorded, too many for a page. Curves show the least and the largest value "
+        f"of every {chosen.bucket} rows, so that no peak is lost; the replay shows {len(chosen.time)} of the rows."
+    )

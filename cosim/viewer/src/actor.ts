@@ -1,0 +1,92 @@
+import { type Color, DirectionalLight, Fog, HemisphereLight, Scene, Vector3 } from "three";
+import { ForceArrows } from "./arrows";
+import { Floor, groundHeight, groundNormal } from "./ground";
+import { footCentres, type Pose, poseAt } from "./kinematics";
+import type { Recording } from "./recording";
+import { RobotModel } from "./robot";
+import type { Stance } from "./stances";
+import type { Colours } from "./theme";
+import { Trails } from "./trails";
+import type { PackedRun } from "./types";
+
+const LAMP = new Vector3(0.9, 1.3, 2.6); // m    from the robot
+const REACH = 0.55; // m    around the robot in which it casts shadows
+
+/** One run as a scene: the robot, the ground, forces and trails at a time. */
+export class Actor {
+  readonly scene = new Scene();
+  readonly place = new Vector3();
+  private readonly model: RobotModel;
+  private readonly floor: Floor;
+  private readonly arrows: ForceArrows;
+  private readonly lamp = new DirectionalLight("#ffffff", 2.1);
+  private readonly sky = new HemisphereLight("#ffffff", "#8d9099", 1.6);
+  private trails: Trails | undefined;
+  private print: Color | undefined;
+
+  constructor(
+    readonly run: PackedRun,
+    readonly recording: Recording,
+    mark: Color,
+  ) {
+    this.model = new RobotModel(run.robot, mark);
+    this.floor = new Floor(run.ground);
+    this.arrows = new ForceArrows(run.robot.legs.length);
+    this.lamp.castShadow = true;
+    this.lamp.shadow.mapSize.set(1024, 1024);
+    this.lamp.shadow.radius = 5;
+    this.lamp.shadow.normalBias = 0.004;
+    Object.assign(this.lamp.shadow.camera, { left: -REACH, right: REACH, top: REACH, bottom: -REACH, near: 0.5, far: 6 });
+    this.scene.add(this.model, this.floor, this.arrows, this.lamp, this.lamp.target, this.sky);
+  }
+
+  addTrails(stances: readonly Stance[], enlarged: number): void {
+    this.trails = new Trails(stances, this.recording, this.run.ground, enlarged, this.run.robot.foot);
+    if (this.print) this.trails.paint(this.print);
+    this.scene.add(this.trails);
+  }
+
+  paint(colours: Colours): void {
+    this.scene.background = colours.sky;
+    this.scene.fog = new Fog(colours.sky, 2.2, 6.5);
+    this.floor.paint(colours.floor, colours.grid);
+    this.arrows.paint(colours.force);
+    this.sky.intensity = colours.dark ? 1.15 : 1.7;
+    this.lamp.intensity = colours.dark ? 2.2 : 2.3;
+    this.print = colours.print;
+    this.trails?.paint(colours.print);
+  }
+
+  /** Brings everything to a time; beyond its recording the run stays as it ended. */
+  show(time: number): void {
+    const pose = this.poseAt(time);
+    this.place.set(pose.position.x, pose.position.y, groundHeight(this.run.ground, pose.position.x, pose.position.y));
+    this.model.place(pose, this.touching(time));
+    this.showForces(pose, time);
+    this.floor.follow(pose.position.x, pose.position.y);
+    this.lamp.target.position.copy(this.place);
+    this.lamp.position.copy(this.place).add(LAMP);
+    this.trails?.show(time);
+  }
+
+  poseAt(time: number): Pose {
+    return poseAt(this.recording, this.run.robot, time);
+  }
+
+  private touching(time: number): boolean[] {
+    const { row } = this.recording.place(time);
+    return this.run.robot.legs.map(
+      ({ name }) => this.recording.has(`${name}.contact`) && this.recording.column(`${name}.contact`)[row] > 0.5,
+    );
+  }
+
+  private showForces(pose: Pose, time: number): void {
+    const normal = groundNormal(this.run.ground);
+    const soles = footCentres(this.run.robot, pose).map((foot) => foot.addScaledVector(normal, -this.run.robot.foot));
+    const forces = this.run.robot.legs.map(({ name }) => {
+      const axes = ["x", "y", "z"].map((axis) => `${name}.force.${axis}`);
+      return this.recording.has(...axes) ? new Vector3(...axes.map((axis) => this.recording.value(axis, time))) : new Vector3();
+    });
+    this.arrows.show(soles, forces);
+  }
+}

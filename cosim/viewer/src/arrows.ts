@@ -1,0 +1,43 @@
+import { Color, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Vector3 } from "three";
+
+const UP = new Vector3(0, 1, 0);
+const LENGTH = 0.42; // m    of an arrow of one body weight
+const LEAST = 0.01; // body weights: less is not drawn
+const SHAFT = 0.0042; // m
+const HEAD = 0.0125; // m
+
+/** The ground's force on each foot, an arrow from where it acts. */
+export class ForceArrows extends Group {
+  private readonly arrows: { shaft: Mesh; head: Mesh }[];
+  private readonly material = new MeshBasicMaterial({ color: new Color("#e6447c") });
+
+  constructor(count: number) {
+    super();
+    this.arrows = Array.from({ length: count }, () => {
+      const shaft = new Mesh(new CylinderGeometry(SHAFT, SHAFT, 1, 12), this.material);
+      const head = new Mesh(new ConeGeometry(HEAD, 2.6 * HEAD, 18), this.material);
+      this.add(shaft, head);
+      return { shaft, head };
+    });
+  }
+
+  paint(colour: Color): void {
+    this.material.color.copy(colour);
+  }
+
+  /** Forces in body weights, at points on the ground. */
+  show(points: readonly Vector3[], forces: readonly Vector3[]): void {
+    this.arrows.forEach(({ shaft, head }, k) => {
+      const size = forces[k].length();
+      shaft.visible = head.visible = size > LEAST;
+      if (size <= LEAST) return;
+      const direction = forces[k].clone().divideScalar(size);
+      const length = LENGTH * size;
+      shaft.scale.set(1, length, 1);
+      shaft.position.copy(points[k]).addScaledVector(direction, 0.5 * length);
+      head.position.copy(points[k]).addScaledVector(direction, length + HEAD);
+      shaft.quaternion.setFromUnitVectors(UP, direction);
+      head.quaternion.copy(shaft.quaternion);
+    });
+  }
+}

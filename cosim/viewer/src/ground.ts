@@ -1,0 +1,83 @@
+import {
+  CanvasTexture,
+  type Color,
+  Group,
+  Mesh,
+  MeshLambertMaterial,
+  PlaneGeometry,
+  Quaternion,
+  RepeatWrapping,
+  SRGBColorSpace,
+  Vector3,
+} from "three";
+import type { Ground } from "./types";
+
+const SIZE = 24; // m    of what is drawn; fog hides its edge
+const TILE = 0.5; // m    of the grid's picture
+const CELLS = 5; // of a tile: lines every 10 cm
+const PIXELS = 512;
+
+/** Unit normal of the ground. */
+export function groundNormal(ground: Ground): Vector3 {
+  return new Vector3(-ground.rise * Math.cos(ground.heading), -ground.rise * Math.sin(ground.heading), 1).normalize();
+}
+
+/** Height of the ground at a place. */
+export function groundHeight(ground: Ground, x: number, y: number): number {
+  return ground.height + ground.rise * (x * Math.cos(ground.heading) + y * Math.sin(ground.heading));
+}
+
+/** The plane the robot walks on, with a grid of 10 cm; it moves along by whole tiles. */
+export class Floor extends Group {
+  private readonly plane: Mesh<PlaneGeometry, MeshLambertMaterial>;
+
+  constructor(private readonly ground: Ground) {
+    super();
+    this.plane = new Mesh(new PlaneGeometry(SIZE, SIZE), new MeshLambertMaterial());
+    this.plane.receiveShadow = true;
+    this.add(this.plane);
+    this.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), groundNormal(ground)));
+    this.follow(0, 0);
+  }
+
+  /** Keeps the middle of the plane near a place. */
+  follow(x: number, y: number): void {
+    const place = new Vector3(x, y, groundHeight(this.ground, x, y));
+    const origin = new Vector3(0, 0, this.ground.height);
+    const along = place.sub(origin).applyQuaternion(this.quaternion.clone().invert());
+    const snapped = new Vector3(Math.round(along.x / TILE) * TILE, Math.round(along.y / TILE) * TILE, 0);
+    this.position.copy(snapped.applyQuaternion(this.quaternion).add(origin));
+  }
+
+  paint(surface: Color, line: Color): void {
+    this.plane.material.map?.dispose();
+    this.plane.material.map = gridTexture(`#${surface.getHexString()}`, `#${line.getHexString()}`);
+    this.plane.material.needsUpdate = true;
+  }
+}
+
+function gridTexture(surface: string, line: string): CanvasTexture {
+  const canvas = document.createElement("canvas");
+  canvas.width = canvas.height = PIXELS;
+  const brush = canvas.getContext("2d")!;
+  brush.fillStyle = surface;
+  brush.fillRect(0, 0, PIXELS, PIXELS);
+  brush.strokeStyle = line;
+  for (let k = 0; k <= CELLS; k++) {
+    const at = (k * PIXELS) / CELLS;
+    brush.lineWidth = k % CELLS === 0 ? 7 : 2.5;
+    brush.globalAlpha = k % CELLS === 0 ? 1 : 0.7;
+    brush.beginPath();
+    brush.moveTo(at, 0);
+    brush.lineTo(at, PIXELS);
+    brush.moveTo(0, at);
+    brush.lineTo(PIXELS, at);
+    brush.stroke();
+  }
+  const texture = new CanvasTexture(canvas);
+  texture.wrapS = texture.wrapT = RepeatWrapping;
+  texture.repeat.set(SIZE / TILE, SIZE / TILE);
+  texture.anisotropy = 8;
+  texture.colorSpace = SRGBColorSpace;
+  return texture;
+}

@@ -1,0 +1,49 @@
+import type { Clock } from "./clock";
+import { byId } from "./dom";
+
+const STEP = 0.02; // s    of an arrow key
+const LEAP = 0.5; // s    with shift
+
+export interface Actions {
+  follow(): void;
+  theme(): void;
+}
+
+/** Keys of the replay; those that a field in focus needs itself are left to it. */
+export function listenToKeys(clock: Clock, actions: Actions): void {
+  const help = byId<HTMLDialogElement>("help");
+  const askHelp = () => (help?.open ? help.close() : help?.showModal());
+  byId("help-button")?.addEventListener("click", askHelp);
+  byId("help-close")?.addEventListener("click", () => help?.close());
+  const move = (seconds: number) => {
+    clock.pause();
+    clock.seek(clock.time + seconds);
+  };
+  const keys: Record<string, (event: KeyboardEvent) => void> = {
+    " ": () => clock.toggle(),
+    ArrowLeft: (event) => move(event.shiftKey ? -LEAP : -STEP),
+    ArrowRight: (event) => move(event.shiftKey ? LEAP : STEP),
+    Home: () => clock.seek(clock.start),
+    End: () => clock.seek(clock.end),
+    "+": () => clock.changeSpeed(1),
+    "=": () => clock.changeSpeed(1),
+    "-": () => clock.changeSpeed(-1),
+    f: () => actions.follow(),
+    t: () => actions.theme(),
+    "?": askHelp,
+  };
+  document.addEventListener("keydown", (event) => {
+    const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act || event.ctrlKey || event.metaKey || event.altKey || ownsKey(event)) return;
+    event.preventDefault();
+    act(event);
+  });
+}
+
+/** Whether the focused element does something of its own with the key. */
+function ownsKey(event: KeyboardEvent): boolean {
+  const target = event.target as HTMLElement;
+  if (document.querySelector("dialog[open]") && event.key !== "?") return true;
+  if (target.matches("select, input:not([type=range]), textarea")) return true;
+  return event.key === " " && target.matches("button, a, summary");
+}

@@ -1,0 +1,184 @@
+import uPlot from "uplot";
+import type { Clock } from "./clock";
+import { element } from "./dom";
+import type { Span } from "./span";
+import { property } from "./theme";
+
+export interface Curve {
+  readonly label: string;
+  /** Custom property of the page that holds the colour. */
+  readonly colour: string;
+  readonly dash?: readonly number[];
+  readonly time: ArrayLike<number>;
+  readonly values: ArrayLike<number>;
+  /** The value at a time, for the heading. */
+  at(time: number): number;
+}
+
+export interface PanelOptions {
+  readonly title: string;
+  readonly unit: string;
+  readonly height: number;
+  readonly curves: readonly Curve[];
+  readonly host: HTMLElement;
+  readonly more?: Partial<uPlot.Options>;
+}
+
+/** A plot whose cursor is the replay's time: pressing or dragging anywhere in it moves the replay. */
+export class Panel {
+  private readonly plot: uPlot;
+  private readonly playhead = element("div", "playhead");
+  private readonly readouts: HTMLElement[];
+
+  constructor(
+    private readonly options: PanelOptions,
+    private readonly clock: Clock,
+    private readonly span: Span,
+  ) {
+    const figure = element("figure", "panel");
+    const heading = element("figcaption", "panel-title");
+    this.readouts = options.curves.map((curve) => readout(curve));
+    heading.append(titleOf(options), ...this.readouts.map((value) => value.parentElement!));
+    figure.append(heading);
+    options.host.append(figure);
+    const box = element("div", "panel-box");
+    figure.append(box);
+    this.plot = new uPlot(this.describe(box), dataOf(options.curves), box);
+    this.plot.over.append(this.playhead);
+    this.listenToPointer();
+    new ResizeObserver(() => this.resize(box)).observe(box);
+    span.listen(() => this.showSpan());
+    clock.listen(() => this.showTime());
+    this.showTime();
+  }
+
+  /** Draws anew in the page's present colours. */
+  repaint(): void {
+    this.plot.redraw(false, true);
+  }
+
+  private describe(box: HTMLElement): uPlot.Options {
+    const [min, max] = this.span.limits;
+    const quiet = {
+      stroke: () => property("--muted"),
+      grid: { stroke: () => property("--line"), width: 1 },
+      ticks: { show: false },
+      font: "11px system-ui",
+    };
+    return {
+      width: Math.max(box.clientWidth, 120),
+      height: this.options.height,
+      legend: { show: false },
+      cursor: { show: false },
+      padding: [6, 8, 0, 0],
+      scales: { x: { time: false, min, max }, y: { range: roomy } },
+      axes: [
+        { ...quiet, size: 22, gap: 3, space: 60 },
+        { ...quiet, size: 46, gap: 4, space: 26 },
+      ],
+      series: [{}, ...this.options.curves.map(seriesOf)],
+      ...this.options.more,
+    };
+  }
+
+  private showTime(): void {
+    const left = this.plot.valToPos(this.clock.time, "x");
+    const seen = left >= -0.5 && left <= this.plot.over.clientWidth + 0.5;
+    this.playhead.style.display = seen ? "" : "none";
+    this.playhead.style.transform = `translateX(${left}px)`;
+    this.options.curves.forEach((curve, k) => {
+      this.readouts[k].textContent = figures(curve.at(this.clock.time));
+    });
+  }
+
+  private showSpan(): void {
+    const [min, max] = this.span.limits;
+    this.plot.setScale("x", { min, max });
+    this.showTime();
+  }
+
+  private resize(box: HTMLElement): void {
+    if (box.clientWidth > 0 && box.clientWidth !== this.plot.width) {
+      this.plot.setSize({ width: box.clientWidth, height: this.options.height });
+      this.showTime();
+    }
+  }
+
+  private listenToPointer(): void {
+    const over = this.plot.over;
+    const timeOf = (event: MouseEvent) => this.plot.posToVal(event.clientX - over.getBoundingClientRect().left, "x");
+    over.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      over.setPointerCapture(event.pointerId);
+      this.clock.pause();
+      this.clock.seek(timeOf(event));
+    });
+    over.addEventListener("pointermove", (event) => {
+      if (over.hasPointerCapture(event.pointerId)) this.clock.seek(timeOf(event));
+    });
+    over.addEventListener(
+      "wheel",
+      (event) => {
+        if (!(event.ctrlKey || event.metaKey)) return;
+        event.preventDefault();
+        this.span.zoom(event.deltaY > 0 ? 1.25 : 0.8, timeOf(event));
+      },
+      { passive: false },
+    );
+  }
+}
+
+function titleOf(options: PanelOptions): HTMLElement {
+  const title = element("span", "panel-name", options.title);
+  title.append(element("span", "panel-unit", ` ${options.unit}`));
+  return title;
+}
+
+/** A curve's mark and, in the element returned, its value. */
+function readout(curve: Curve): HTMLElement {
+  const item = element("span", "readout");
+  const mark = element("i", curve.dash ? "mark dashed" : "mark");
+  mark.style.setProperty("--mark", `var(${curve.colour})`);
+  const value = element("b", "value");
+  item.append(mark, element("span", "curve-name", curve.label), value);
+  return value;
+}
+
+function seriesOf(curve: Curve): uPlot.Series {
+  return {
+    label: curve.label,
+    stroke: () => property(curve.colour),
+    width: 1.6,
+    points: { show: false },
+    ...(curve.dash ? { dash: [...curve.dash] } : {}),
+  };
+}
+
+/** Curves that share their times as they are, others joined. */
+function dataOf(curves: readonly Curve[]): uPlot.AlignedData {
+  const time = curves[0].time;
+  if (curves.every((curve) => sameTimes(curve.time, time))) return [time, ...curves.map((curve) => curve.values)] as uPlot.AlignedData;
+  return uPlot.join(curves.map((curve) => [Array.from(curve.time), Array.from(curve.values)] as uPlot.AlignedData));
+}
+
+function sameTimes(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
+  if (a === b) return true;
+  for (let k = 0; k < a.length; k++) if (a[k] !== b[k]) return false;
+  return a.length === b.length;
+}
+
+/** Limits with air above and below; a constant gets a range to lie in. */
+function roomy(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
+  const [from, to] = [low ?? 0, high ?? 1];
+  const air = Math.max(0.07 * (to - from), 1e-6, 1e-4 * Math.abs(to));
+  return [from >= 0 && from < 0.3 * (to - from) ? 0 : from - air, to + air];
+}
+
+/** A value for people. */
+export function figures(value: number): string {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? (0).toFixed(digits) : text).replace("-", "−");
+}

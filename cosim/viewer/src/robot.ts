@@ -1,0 +1,86 @@
+import { type BufferGeometry, CapsuleGeometry, Color, Group, Mesh, MeshStandardMaterial, SphereGeometry, Vector3 } from "three";
+import { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
+import { legPoints, type Pose, torsoOrigin, toVector3 } from "./kinematics";
+import type { Robot } from "./types";
+
+const UP = new Vector3(0, 1, 0); // a capsule's axis as three.js makes it
+const LIT = new Color("#ffd54a"); // a foot on the ground
+const DARK = new Color("#5b626c");
+const STRIPE = 0.16; // of the torso's width: the mark in the control's colour
+
+type Solid = Mesh<BufferGeometry, MeshStandardMaterial>;
+
+/** The robot as capsules and a box, with feet that light up on the ground. */
+export class RobotModel extends Group {
+  private readonly torso = new Group();
+  private readonly links: Mesh[][];
+  private readonly feet: Solid[];
+
+  constructor(
+    private readonly robot: Robot,
+    mark: Color,
+  ) {
+    super();
+    this.add(this.torso);
+    this.makeTorso(mark);
+    this.links = robot.legs.map((_, leg) => this.makeLinks(leg));
+    this.feet = robot.legs.map(() => this.makeFoot());
+  }
+
+  /** Puts it into a pose; `touching` says which feet light up. */
+  place(pose: Pose, touching: readonly boolean[]): void {
+    this.torso.position.copy(torsoOrigin(this.robot, pose));
+    this.torso.quaternion.copy(pose.attitude);
+    this.links.forEach((links, leg) => {
+      const points = legPoints(this.robot, pose, leg);
+      links.forEach((link, joint) => {
+        span(link, points[joint], points[joint + 1]);
+      });
+      const foot = this.feet[leg];
+      foot.position.copy(points[3]);
+      foot.material.color.copy(touching[leg] ? LIT : DARK);
+      foot.material.emissive.copy(LIT).multiplyScalar(touching[leg] ? 0.55 : 0);
+    });
+  }
+
+  private makeTorso(mark: Color): void {
+    const [length, width, height] = this.robot.torso.size;
+    const corner = 0.22 * Math.min(length, width, height);
+    this.torso.add(solid(new RoundedBoxGeometry(length, width, height, 4, corner), this.robot.colours.torso));
+    const lid = solid(new RoundedBoxGeometry(0.72 * length, STRIPE * width, 0.14 * height, 3, 0.05 * height), "#ffffff");
+    lid.material.color.copy(mark);
+    lid.position.set(0, 0, 0.5 * height);
+    const nose = solid(new RoundedBoxGeometry(0.05 * length, 0.5 * width, 0.3 * height, 3, 0.05 * height), "#e8edf3");
+    nose.position.set(0.5 * length, 0, 0.12 * height);
+    this.torso.add(lid, nose);
+  }
+
+  private makeLinks(leg: number): Mesh[] {
+    const data = this.robot.legs[leg].links;
+    const scale = toVector3(data[0].tip).length();
+    return data.map((link, joint) => {
+      const radius = this.robot.thickness[joint] * scale;
+      const mesh = solid(new CapsuleGeometry(radius, toVector3(link.tip).length(), 8, 20), this.robot.colours[this.robot.joints[joint]]);
+      this.add(mesh);
+      return mesh;
+    });
+  }
+
+  private makeFoot(): Solid {
+    const foot = solid(new SphereGeometry(this.robot.foot, 28, 18), "#ffffff");
+    this.add(foot);
+    return foot;
+  }
+}
+
+function solid(geometry: BufferGeometry, colour: string): Solid {
+  const mesh = new Mesh(geometry, new MeshStandardMaterial({ color: new Color(colour), roughness: 0.55, metalness: 0.08 }));
+  mesh.castShadow = true;
+  mesh.receiveShadow = true;
+  return mesh;
+}
+
+function span(link: Mesh, from: Vector3, to: Vector3): void {
+  link.position.copy(from).add(to).multiplyScalar(0.5);
+  link.quaternion.setFromUnitVectors(UP, to.clone().sub(from).normalize());
+}

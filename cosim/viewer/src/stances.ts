@@ -1,0 +1,55 @@
+import { Vector3 } from "three";
+import { groundHeight } from "./ground";
+import { footCentres, poseAt } from "./kinematics";
+import type { Recording } from "./recording";
+import type { Ground, Robot } from "./types";
+
+const MOST_POINTS = 60; // of a trail
+
+/** A foot on the ground from touch-down to lift-off: where, and how far it has slipped since, row by row. */
+export interface Stance {
+  readonly place: Vector3;
+  readonly rows: readonly number[];
+  readonly slipped: readonly { readonly x: number; readonly y: number }[];
+}
+
+/** All stances of all feet; empty when the recording does not tell. */
+export function findStances(recording: Recording, robot: Robot, ground: Ground): Stance[] {
+  return robot.legs.flatMap((leg, index) => {
+    const names = [`${leg.name}.contact`, `${leg.name}.slipped.x`, `${leg.name}.slipped.y`] as const;
+    if (!recording.has(...names, "torso.x", "torso.qw", `${leg.name}.coxa.angle`)) return [];
+    const [contact, x, y] = names.map((name) => recording.column(name));
+    return spans(contact).map(([begin, end]) => {
+      const foot = footCentres(robot, poseAt(recording, robot, recording.time[begin]))[index];
+      const place = new Vector3(foot.x, foot.y, groundHeight(ground, foot.x, foot.y));
+      const rows = sampled(begin, end);
+      return { place, rows, slipped: rows.map((row) => ({ x: x[row] - x[begin], y: y[row] - y[begin] })) };
+    });
+  });
+}
+
+/** First and last row of every time that a flag is up. */
+function spans(flag: Float32Array): [number, number][] {
+  const found: [number, number][] = [];
+  let begin = -1;
+  for (let k = 0; k <= flag.length; k++) {
+    const up = k < flag.length && flag[k] > 0.5;
+    if (up && begin < 0) begin = k;
+    if (!up && begin >= 0) {
+      found.push([begin, k - 1]);
+      begin = -1;
+    }
+  }
+  return found;
+}
+
+function sampled(begin: number, end: number): number[] {
+  const count = Math.min(end - begin + 1, MOST_POINTS);
+  return Array.from({ length: count }, (_, k) => Math.round(begin + ((end - begin) * k) / Math.max(count - 1, 1)));
+}
+
+/** How far a stance's foot slipped in all [m]. */
+export function slippedBy(stance: Stance): number {
+  const last = stance.slipped[stance.slipped.length - 1];
+  return Math.hypot(last.x, last.y);
+}

@@ -1,0 +1,137 @@
+import {
+  BufferAttribute,
+  BufferGeometry,
+  CircleGeometry,
+  Color,
+  DoubleSide,
+  Group,
+  InstancedMesh,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  Quaternion,
+  Vector3,
+} from "three";
+import { groundHeight, groundNormal } from "./ground";
+import type { Recording } from "./recording";
+import { type Stance, slippedBy } from "./stances";
+import type { Ground } from "./types";
+
+const ENLARGED = [1, 2, 5, 10, 20, 50]; // times, at most
+const WISHED = 0.05; // m    of a trail to look at
+const WIDTH = 0.009; // m
+const LEAST = 0.0004; // m    a foot that slipped less left no trail
+const LIFT = 0.0015; // m    above the ground, so that both are seen
+const SCALE = 0.006; // m    of slip for the hottest colour
+const COOL = new Color("#f7c948");
+const HOT = new Color("#c2185b");
+
+/** By how much trails are drawn longer than they are, the same for all runs, so that the longest are well seen. */
+export function enlargement(stances: readonly Stance[]): number {
+  const ways = stances.map(slippedBy).sort((a, b) => a - b);
+  const long = ways[Math.floor(0.95 * (ways.length - 1))] ?? 0;
+  return ENLARGED.filter((times) => times * long <= WISHED).pop() ?? 1;
+}
+
+/** Footprints where feet touched down, and from there the way they slipped under load, yellow to red by how far. */
+export class Trails extends Group {
+  private readonly prints: InstancedMesh;
+  private readonly ribbon: Mesh<BufferGeometry, MeshBasicMaterial>;
+  private readonly printRows: number[];
+  private readonly pieceRows: number[] = [];
+
+  constructor(
+    stances: readonly Stance[],
+    private readonly recording: Recording,
+    ground: Ground,
+    enlarged: number,
+    radius: number,
+  ) {
+    super();
+    const ordered = [...stances].sort((a, b) => a.rows[0] - b.rows[0]);
+    this.printRows = ordered.map((stance) => stance.rows[0]);
+    this.prints = footprints(ordered, ground, radius);
+    this.ribbon = this.makeRibbon(ordered, ground, enlarged);
+    this.add(this.prints, this.ribbon);
+  }
+
+  /** Shows what has happened up to a time. */
+  show(time: number): void {
+    const { row } = this.recording.place(time);
+    this.prints.count = countUpTo(this.printRows, row);
+    this.ribbon.geometry.setDrawRange(0, 6 * countUpTo(this.pieceRows, row));
+  }
+
+  paint(print: Color): void {
+    (this.prints.material as MeshBasicMaterial).color.copy(print);
+  }
+
+  private makeRibbon(stances: readonly Stance[], ground: Ground, enlarged: number): Mesh<BufferGeometry, MeshBasicMaterial> {
+    const pieces = stances.filter((stance) => slippedBy(stance) > LEAST).flatMap((stance) => piecesOf(stance, enlarged));
+    pieces.sort((a, b) => a.row - b.row);
+    const positions: number[] = [];
+    const colours: number[] = [];
+    for (const piece of pieces) {
+      this.pieceRows.push(piece.row);
+      for (const [x, y] of corners(piece)) positions.push(x, y, groundHeight(ground, x, y) + LIFT);
+      const colour = COOL.clone().lerp(HOT, Math.min(piece.way / SCALE, 1));
+      for (let k = 0; k < 6; k++) colours.push(colour.r, colour.g, colour.b);
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(new Float32Array(positions), 3));
+    geometry.setAttribute("color", new BufferAttribute(new Float32Array(colours), 3));
+    const mesh = new Mesh(geometry, new MeshBasicMaterial({ vertexColors: true, side: DoubleSide }));
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+}
+
+interface Piece {
+  readonly row: number;
+  readonly from: readonly [number, number];
+  readonly to: readonly [number, number];
+  readonly way: number;
+}
+
+function piecesOf(stance: Stance, enlarged: number): Piece[] {
+  const points = stance.slipped.map(({ x, y }): [number, number] => [stance.place.x + enlarged * x, stance.place.y + enlarged * y]);
+  return stance.rows.slice(1).map((row, k) => {
+    const { x, y } = stance.slipped[k + 1];
+    return { row, from: points[k], to: points[k + 1], way: Math.hypot(x, y) };
+  });
+}
+
+/** Two triangles as wide as a trail. */
+function corners({ from, to }: Piece): [number, number][] {
+  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+  const length = Math.hypot(dx, dy) || 1;
+  const [sx, sy] = [(-0.5 * WIDTH * dy) / length, (0.5 * WIDTH * dx) / length];
+  const a: [number, number] = [from[0] + sx, from[1] + sy];
+  const b: [number, number] = [from[0] - sx, from[1] - sy];
+  const c: [number, number] = [to[0] + sx, to[1] + sy];
+  const d: [number, number] = [to[0] - sx, to[1] - sy];
+  return [a, b, c, c, b, d];
+}
+
+function footprints(stances: readonly Stance[], ground: Ground, radius: number): InstancedMesh {
+  const material = new MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false });
+  const mesh = new InstancedMesh(new CircleGeometry(0.8 * radius, 24), material, Math.max(stances.length, 1));
+  const normal = groundNormal(ground);
+  const flat = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal);
+  stances.forEach((stance, k) => {
+    mesh.setMatrixAt(k, new Matrix4().compose(stance.place.clone().addScaledVector(normal, 0.5 * LIFT), flat, new Vector3(1, 1, 1)));
+  });
+  mesh.frustumCulled = false;
+  return mesh;
+}
+
+function countUpTo(rows: readonly number[], row: number): number {
+  let low = 0;
+  let high = rows.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (rows[middle] <= row) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}

