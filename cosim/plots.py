@@ -1,7 +1,4 @@
-"""Static figures of one run or of several laid over each other.
-
-Colours are told apart by colour-blind readers (Okabe and Ito), and lines by their dashes too.
-"""
+"""Static figures of one run or of several laid over each other, whose lines are told apart by colours and by dashes."""
 
 from __future__ import annotations
 
@@ -16,49 +13,46 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.files import atomic_path
 from hexapod_cosim.cosim.metrics import CONTACT_SHARE, Array, View, body_height, commanded_path, robot_weight
 from hexapod_cosim.cosim.recorder import ColumnError
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 STYLES: dict[str, dict[str, Any]] = {
-    "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.3},
-    "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.3},
+    "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.0},
+    "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
 }
-PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#000000")
 PLANNED = "0.85"  # grey of the swing that the gait plans
 LEAST_WIDTH = 2.0  # mm of the sideways axis: less would show round-off as a drift
 STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
-SETTINGS = {
-    "font.size": 9.0, "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
-    "svg.fonttype": "none", "svg.hashsalt": "hexapod", "path.simplify": True, "figure.constrained_layout.use": True,
-}  # fmt: skip
-
+SIDES, PLACES = {"L": "left", "R": "right"}, {"F": "front", "M": "middle", "R": "rear"}
+BOOKS = {"actuator_work": "-", "dissipated": (0, (5, 1.2)), "potential": (0, (1, 1)), "kinetic": "-", "push_work": (0, (3, 1, 1, 1))}
 
 Views = Mapping[str, View]  # by control
 
 
 def foot_forces(views: Views) -> Figure:
     """Normal force of each foot over the last cycles, in body weights."""
-    figure = Figure(figsize=(10, 5.2))
+    figure = Figure(figsize=(WIDTH, 3.8))
     axes = figure.subplots(2, 3, sharex=True, sharey=True)
     for label, view in views.items():
         end = view.last_cycles()
         force = end.recording.feet("normal_force") / robot_weight(view.parameters)
         for leg, axis in enumerate(axes.flat):
             axis.plot(end.recording.time, force[:, leg], label=label, **STYLES[label])
-            axis.set_title(LEG_NAMES[leg])
-    _label(axes[-1], "time [s]", axes[:, 0], "normal force [body weights]")
+            axis.set_title(leg_title(leg))
+    _label(axes[-1], "time [s]", axes[:, 0], "normal force [BW]")
     _legend(figure, axes.flat[0])
     return figure
 
 
 def slip(views: Views) -> Figure:
     """Way slipped by all feet since the start, and the slip speed of each foot over the last cycles."""
-    figure = Figure(figsize=(10, 6.4))
+    figure = Figure(figsize=(WIDTH, 5.0))
     grid = figure.add_gridspec(3, 3)
     top = figure.add_subplot(grid[0, :])
-    axes = [figure.add_subplot(grid[1 + leg // 3, leg % 3]) for leg in range(len(LEG_NAMES))]
+    axes = np.ravel(grid[1:, :].subgridspec(2, 3).subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
     for label, view in views.items():
         time, speed = view.recording.time, _loaded_slip(view)
         way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]).sum(axis=1) * np.diff(time))])
@@ -66,7 +60,7 @@ def slip(views: Views) -> Figure:
         end = view.last_cycles()
         for leg, axis in enumerate(axes):
             axis.plot(end.recording.time, 1e3 * _loaded_slip(end)[:, leg], **STYLES[label])
-            axis.set_title(LEG_NAMES[leg])
+            axis.set_title(leg_title(leg))
     top.set_xlabel("time [s]")
     top.set_ylabel("slipped way [mm]")
     _label(axes[3:], "time [s]", axes[::3], "slip speed [mm/s]")
@@ -81,7 +75,7 @@ def _loaded_slip(view: View) -> Array:
 
 def posture(views: Views) -> Figure:
     """Height, roll, pitch and yaw of the torso."""
-    figure = Figure(figsize=(10, 7.2))
+    figure = Figure(figsize=(WIDTH, 5.2))
     axes = figure.subplots(4, 1, sharex=True)
     for label, view in views.items():
         recording = view.recording
@@ -91,20 +85,22 @@ def posture(views: Views) -> Figure:
     for axis, text in zip(axes, ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"), strict=True):
         axis.set_ylabel(text)
     axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(axes)
     _legend(figure, axes[0])
     return figure
 
 
 def path(views: Views) -> Figure:
     """The torso's way seen from above, with the commanded one."""
-    figure = Figure(figsize=(10, 4.0))
+    figure = Figure(figsize=(WIDTH, 3.0))
     axis = figure.subplots()
     for label, view in views.items():
         position = view.recording.vector("torso.position")
         axis.plot(position[:, 0], 1e3 * position[:, 1], label=label, **STYLES[label])
-        axis.plot(position[-1, 0], 1e3 * position[-1, 1], marker="o", color=STYLES[label]["color"])
+        axis.plot(position[-1, 0], 1e3 * position[-1, 1], marker="o", markersize=4, clip_on=False, color=STYLES[label]["color"])
     commanded = commanded_path(next(iter(views.values())).recording)
     axis.plot(commanded[:, 0], 1e3 * commanded[:, 1], color="0.45", linestyle=":", label="commanded, without its ramps")
+    axis.margins(x=0.02)
     axis.set_xlabel("x [m]")
     axis.set_ylabel("y [mm]")
     _legend(figure, axis)
@@ -117,7 +113,7 @@ def path(views: Views) -> Figure:
     axis.set_ylim(low - missing / 2, high + missing / 2)
     figure.draw_without_rendering()  # lays out: the size of the axes is known after it
     enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height))
-    axis.set_title(f"not to scale: y is drawn about {enlarged:.2g} times larger than x", loc="right", fontsize="small")
+    axis.set_title(f"not to scale: y is drawn about {enlarged:.0f} times larger than x", loc="right", fontsize="small")
     return figure
 
 
@@ -127,43 +123,51 @@ def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
 
 def torques(views: Views) -> Figure:
     """Largest absolute torque among the six legs, joint by joint, over the last cycles."""
-    figure = Figure(figsize=(10, 5.6))
+    figure = Figure(figsize=(WIDTH, 4.2))
     axes = figure.subplots(3, 1, sharex=True)
     for label, view in views.items():
         end = view.last_cycles().recording
         largest = np.abs(end.joints("torque")).max(axis=1)
         for joint, axis in enumerate(axes):
             axis.plot(end.time, largest[:, joint], label=label, **STYLES[label])
-            axis.set_ylabel(f"{JOINT_NAMES[joint]}: largest\n|torque| of six legs [N m]")
+            axis.set_ylabel(f"{JOINT_NAMES[joint]} [N m]")
+    for axis in axes:
+        axis.set_ylim(bottom=0.0)  # last: it ends the scaling to what is drawn
+    axes[0].set_title("largest |torque| of the six legs", loc="left")
     axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(axes)
     _legend(figure, axes[0])
     return figure
 
 
 def energy(views: Views) -> Figure:
     """The energy audit: what went in, where it is, where it went, and what the books do not explain."""
-    figure = Figure(figsize=(10, 3.4 * len(views)))
+    figure = Figure(figsize=(WIDTH, 0.3 + 2.4 * len(views)))
     axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
+    pushed = any(np.ptp(view.recording.column("energy.push_work")) for view in views.values())
     for (axis, rest), (label, view) in zip(axes, views.items(), strict=True):
         recording = view.recording
         residual = recording.column("energy.residual")
-        rest.plot(recording.time, 1e3 * (residual - residual[0]), color=PALETTE[-1], linewidth=1.2)
-        rest.set_title(f"{label}: residual")
-        rest.set_ylabel("since the start [mJ]")
-        for color, name in zip(PALETTE, ("actuator_work", "dissipated", "potential", "kinetic", "push_work"), strict=False):
-            values = recording.column(f"energy.{name}")
-            axis.plot(recording.time, values - values[0], color=color, label=name.replace("_", " "), linewidth=1.2)
+        rest.plot(recording.time, 1e3 * (residual - residual[0]), color=PALETTE[-1], linewidth=0.9)
+        rest.set_title(f"{label}: what the books leave over")
+        rest.set_ylabel("residual since the start [mJ]")
+        for color, (name, style) in zip(PALETTE, BOOKS.items(), strict=False):
+            if name != "push_work" or pushed:
+                values = recording.column(f"energy.{name}")
+                axis.plot(recording.time, values - values[0], color=color, linestyle=style, label=name.replace("_", " "), linewidth=1.0)
         axis.set_title(label)
         axis.set_ylabel("since the start [J]")
-        axis.legend(loc="upper left", ncols=3)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
+    for column in axes.T:
+        figure.align_ylabels(column)
+    _legend(figure, axes[0, 0])
     return figure
 
 
 def footfall(views: Views) -> Figure:
     """Which foot is on the ground when, over the last cycles; a grey band is where the gait wants it in the air."""
-    figure = Figure(figsize=(10, 2.4 * len(views)))
+    figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * len(views)))
     axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
     for axis, (label, view) in zip(axes, views.items(), strict=True):
         end = view.last_cycles().recording
@@ -188,6 +192,12 @@ def _bars(axis: Axes, time: Array, on: Any, row: int, *, height: float, color: s
     last = len(time) - 1
     spans = [(time[begin], time[min(end, last)] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
     axis.broken_barh(spans, (row - height / 2, height), color=color, linewidth=0)
+
+
+def leg_title(leg: int) -> str:
+    """Where a leg is, and its name."""
+    name = LEG_NAMES[leg]
+    return f"{SIDES[name[0]]} {PLACES[name[1]]} ({name})"
 
 
 def _label(bottom: Any, x: str, left: Any, y: str) -> None:
@@ -234,8 +244,8 @@ def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]
             except ColumnError as error:
                 skipped[name] = f"{error.got} was not recorded"
                 continue
-            for kind, metadata in (("png", {}), ("svg", {"Date": None})):  # no date: equal runs, equal files
+            for kind, metadata in UNDATED.items():
                 saved.append(folder / f"{name}.{kind}")
                 with atomic_path(saved[-1]) as temporary:
-                    figure.savefig(temporary, format=kind, dpi=130, metadata=metadata)
+                    figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
     return saved, skipped

@@ -15,7 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.plots import SETTINGS, STYLES
+from hexapod_cosim.controller.figure_style import SETTINGS
+from hexapod_cosim.cosim.plots import STYLES
 from hexapod_cosim.cosim.recordings import read_recording
 from hexapod_cosim.cosim.results import RESULTS
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, Robot, load_robot

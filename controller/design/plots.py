@@ -13,6 +13,7 @@ from hexapod_cosim.controller.design.closed import closed_loop, disturbed, splay
 from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps
 from hexapod_cosim.controller.design.loci import Loci, Plants, Response, all_loci, critical_size, frequencies, quick_margins
 from hexapod_cosim.controller.design.standing import StandingPlant, answers, relieved, weight_share
+from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.controller.gains import Gains, GainsError
 from hexapod_cosim.controller.kinematics import Array
 from hexapod_cosim.models import Robot
@@ -23,8 +24,9 @@ BUMP = 0.001  # m    under one foot
 MOST_DELAY, DELAYS = 0.05, 21  # s    further delay shown, and in how many points
 DECIBELS = (-40.0, 30.0)
 SCALES = (40.0, 180.0)  # dB, deg    ends of the margins' scales
-COLOURS = {"worst": "#D55E00", "others": "0.75", "asked": "#0072B2", "without": "#E69F00"}
-TITLES = ("tangential PID", "suspension")
+COLOURS = {"worst": PALETTE[3], "others": "0.75", "asked": PALETTE[0], "without": PALETTE[1]}
+LAWS = {"tangential PID": (PALETTE[2], "o"), "suspension": (PALETTE[4], "s")}
+TITLES = tuple(LAWS)
 NAMES = ("bode", "nyquist", "step", "margins")
 
 
@@ -41,12 +43,15 @@ def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Pat
     )
     loci = all_loci(robot, plants, frequencies(gains.period, DRAWN))
     loops = [one.values * law for one, law in zip(loci, laws.responses(loci[0].omega), strict=True)]
-    figures = (_bode(loops, loci[0].omega, gains), _nyquist(loops, loci[0].omega, gains), _step(robot, plants, laws, gains),
-               _margins(robot, plants, loci, loops, gains))  # fmt: skip
+    from matplotlib import rc_context  # noqa: PLC0415  slow to import
+
     folder = Path(directory)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        return [path for name, figure in zip(NAMES, figures, strict=True) for path in _save(figure, folder, name)]
+        with rc_context(SETTINGS):
+            figures = (_bode(loops, loci[0].omega, gains), _nyquist(loops, loci[0].omega, gains), _step(robot, plants, laws, gains),
+                       _margins(robot, plants, loci, loops, gains))  # fmt: skip
+            return [path for name, figure in zip(NAMES, figures, strict=True) for path in _save(figure, folder, name)]
     except OSError as error:
         raise GainsError(
             "cannot write the design's figures", got=error.strerror, fix="choose a writable folder", where=str(folder)
@@ -57,19 +62,21 @@ def _figure(rows: int, columns: int, gains: Gains, **options: Any) -> tuple[Any,
     # a figure without pyplot: no global state, no display
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(5.2 * columns, 2.8 * rows), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.3 + 2.1 * rows))
     figure.suptitle(f"{gains.robot}, controller period {1e3 * gains.period:g} ms", fontsize="medium")
-    grid = figure.subplots(rows, columns, squeeze=False, **options)
-    for axes in grid.flat:
-        axes.grid(alpha=0.3)
-    return figure, grid
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def _save(figure: Any, folder: Path, name: str) -> list[Path]:
-    paths = [folder / f"{name}.{kind}" for kind in ("svg", "png")]
-    for path in paths:
-        figure.savefig(path, dpi=150)
-    return paths
+    for kind, metadata in UNDATED.items():
+        figure.savefig(folder / f"{name}.{kind}", dpi=DPI, metadata=metadata)
+    return [folder / f"{name}.{kind}" for kind in UNDATED]
+
+
+def _legend_below(figure: Any, *of: Any) -> None:
+    """One legend for all axes, of what is drawn in some of them."""
+    found = {label: line for axes in of for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=len(found))
 
 
 def _each(loops: Response, draw: Callable[..., Any]) -> None:
@@ -77,8 +84,8 @@ def _each(loops: Response, draw: Callable[..., Any]) -> None:
     worst = int(np.abs(1.0 + loops).min(axis=1).argmin())
     for k, loop in enumerate(loops):
         if k != worst:
-            draw(loop, color=COLOURS["others"], lw=0.6, label="_")
-    draw(loops[worst], color=COLOURS["worst"], lw=1.8, label="nearest to -1")
+            draw(loop, color=COLOURS["others"], lw=0.5, label="_")
+    draw(loops[worst], color=COLOURS["worst"], lw=1.4, label="nearest to -1")
 
 
 def _bode(loops: list[Response], omega: Array, gains: Gains) -> Any:
@@ -92,10 +99,9 @@ def _bode(loops: list[Response], omega: Array, gains: Gains) -> Any:
         angle.axhline(-180.0, color="k", lw=0.6)
         label = f"phase margin asked: {needs.phase_margin:g} deg"
         angle.axhline(needs.phase_margin - 180.0, color=COLOURS["asked"], ls="--", lw=1.0, label=label)
-        size.set(title=f"loops of the {title}", ylabel="gain (dB)", ylim=DECIBELS)
-        angle.set(xlabel="frequency (rad/s)", ylabel="phase (deg)", ylim=(-540.0, 180.0), yticks=range(-540, 181, 90))
-        for axes in (size, angle):
-            axes.legend(fontsize="small", loc="lower left")
+        size.set(title=f"loops of the {title}", ylabel="gain [dB]", ylim=DECIBELS)
+        angle.set(xlabel="frequency [rad/s]", ylabel="phase [deg]", ylim=(-540.0, 180.0), yticks=range(-540, 181, 90))
+    _legend_below(figure, *grid[:, 0])
     return figure
 
 
@@ -105,7 +111,7 @@ def _degrees(loop: Response) -> Array:
 
 def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
     figure, grid = _figure(1, 2, gains)
-    figure.set_figheight(5.2)
+    figure.set_figheight(4.0)
     needs, turn = gains.requirements, np.linspace(0.0, 2.0 * np.pi, 200)
     edge = np.radians(needs.phase_margin)
     for axes, all_of, title in zip(grid[0], loops, TITLES, strict=True):
@@ -115,8 +121,9 @@ def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
         axes.plot(np.cos(arc), np.sin(arc), color=COLOURS["asked"], lw=2.0, label="margins asked: not through here")
         axes.plot([-1.0, -(10.0 ** (-needs.gain_margin / 20.0))], [0.0, 0.0], color=COLOURS["asked"], lw=2.0)
         axes.plot([-1.0], [0.0], "k+", ms=10)
-        axes.set(title=f"loops of the {title}", xlabel="real", ylabel="imaginary", xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), aspect="equal")
-        axes.legend(fontsize="small", loc="upper right")
+        axes.set(title=f"loops of the {title}", xlabel="real part [1]", ylabel="imaginary part [1]", aspect="equal")
+        axes.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), xticks=range(-1, 2), yticks=range(-1, 2))
+    _legend_below(figure, grid[0, 0])
     return figure
 
 
@@ -132,21 +139,24 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     with_laws, without = closed_loop(robot, plant, laws), relieved(robot, plant)
     squeezed, bump, share = splay(robot, plant), np.zeros(3 * int(plant.standing.sum())), weight_share(robot)
     bump[2] = -BUMP * answers(robot, plant)[1][0]
-    for system, label, colour in ((without, "without the laws", COLOURS["without"]), (with_laws, "with both laws", COLOURS["worst"])):
+    for system, label, colour, dashes in (
+        (without, "without the laws", COLOURS["without"], "--"),
+        (with_laws, "with both laws", COLOURS["worst"], "-"),
+    ):
         time, forces = disturbed(system, squeezed, duration=STEP_TIME)
-        row[0].step(time, -squeezed @ forces, where="post", color=colour, label=label)
+        row[0].step(time, -squeezed @ forces, where="post", color=colour, ls=dashes, label=label)
         time, forces = disturbed(system, bump, duration=STEP_TIME)
-        row[1].step(time, forces[2] / share, where="post", color=colour, label=label)
+        row[1].step(time, forces[2] / share, where="post", color=colour, ls=dashes, label=label)
     late = laws.systems[1] * delay(laws.delays, period=laws.period)
     deflection = np.asarray(control.forced_response(late, time, forces[2][None]).outputs)
     row[2].step(time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension")
-    row[0].set(title="squeezing force left of 1", ylabel="force (1)")
-    row[1].set(title=f"a foot on a bump of {1e3 * BUMP:g} mm", ylabel="excess load (thirds of the weight)")
-    row[2].set(title="the same", ylabel="deflection (mm)")
+    row[0].set(title="a squeeze of 1", ylabel="squeezing force left [1]")
+    row[1].set(title=f"a foot on a bump of {1e3 * BUMP:g} mm", ylabel="excess load [weight / 3]")
+    row[2].set(title="the same: the suspension gives way", ylabel="deflection [mm]")
     for axes in row:
         axes.axhline(0.0, color="k", lw=0.6)
-        axes.set(xlabel="time (s)")
-        axes.legend(fontsize="small")
+        axes.set(xlabel="time [s]")
+    _legend_below(figure, row[0])
     return figure
 
 
@@ -155,19 +165,21 @@ def _margins(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[
     figure, grid = _figure(2, 2, gains, sharey="row", sharex="col")
     needs, load = gains.requirements, {name: round(float(plant.load(robot).mean()), 2) for name, plant in plants.items()}
     delays, loads, omega = np.linspace(0.0, MOST_DELAY, DELAYS), sorted(set(load.values())), loci[0].omega
-    for all_of, one, title, marker in zip(loops, loci, TITLES, "os", strict=True):
+    for all_of, one, (title, (colour, marker)) in zip(loops, loci, LAWS.items(), strict=True):
         late = [_least(all_of * delay_response(1, omega, period=float(more)), omega) for more in delays]
         borne = [_least(all_of[[load[name] == value for name in one.names]], omega) for value in loads]
         for column, x, found in ((0, 1e3 * delays, late), (1, loads, borne)):
             for axes, values in zip(grid[:, column], np.array(found).T, strict=True):
-                axes.plot(x, values, marker=marker, ms=4, label=title)
-    for axes, asked, label in zip(grid, (needs.gain_margin, needs.phase_margin), ("gain margin (dB)", "phase margin (deg)"), strict=True):
+                axes.plot(x, values, color=colour, marker=marker, ms=3, lw=1.0, clip_on=False, label=title)
+    for axes, asked, label in zip(grid, (needs.gain_margin, needs.phase_margin), ("gain margin [dB]", "phase margin [deg]"), strict=True):
         axes[0].set(ylabel=label)
         for one_of in axes:
-            one_of.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label="asked")
-            one_of.legend(fontsize="small")
-    grid[1, 0].set(xlabel="further delay (ms)", title=f"{SCALES[1]:g} deg: no crossing")
-    grid[1, 1].set(xlabel="mean load of the standing feet (thirds of the weight)")
+            one_of.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label="asked for")
+            one_of.axhline(0.0, color="k", lw=0.6)
+    grid[1, 0].set(xlabel="further delay [ms]", title=f"{SCALES[1]:g} deg: no crossing")
+    grid[1, 1].set(xlabel="mean load of the standing feet [weight / 3]")
+    figure.align_ylabels(grid[:, 0])
+    _legend_below(figure, grid[0, 0])
     return figure
 
 
