@@ -8,16 +8,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from hexapod_cosim.cosim.comparison import BETTER, WORSE, Change, Comparison
+from hexapod_cosim.cosim.metrics import METRICS
 
 # metric -> its name on a card, and what there is less or more of in the sentence
 TOLD = {
     "slip_per_metre": ("slip per metre", "slip"),
     "height_rms": ("height, RMS", "bobbing"),
     "roll_rms": ("roll, RMS", "rolling"),
-    "loading_rate": ("loading rate at touch-down", "jolt at touch-down"),
+    "loading_rate": ("loading rate", "jolt at touch-down"),
     "cost_of_transport": ("cost of transport", "motor work per metre"),
     "torque_rms": ("motor torque, RMS", "motor torque"),
 }
+MILLI = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "m/m": (1e3, "mm/m"), "1": (1.0, "")}  # units that people read on a card
 MOST_GAINS = 4  # in the sentence
 
 
@@ -74,16 +76,30 @@ def _listed(parts: list[Part]) -> list[Part]:
     return [piece for pair in zip(parts, [*between, Part("")], strict=True) for piece in pair if piece.text]
 
 
-def cards(comparison: Comparison, rows: list[dict[str, Any]]) -> list[Card]:
-    """The figures of TOLD, as the table's `rows` have them."""
-    by_name = {row["name"]: row for row in rows}
-    return [_card(TOLD[name][0], by_name[name]) for name in TOLD if comparison.changes[name].pairs]
+def cards(comparison: Comparison) -> list[Card]:
+    """The figures of TOLD, as far as the runs have them."""
+    changes = {name: comparison.changes[name] for name in TOLD if comparison.changes[name].pairs}
+    return [_card(TOLD[name][0], METRICS[name][0], change) for name, change in changes.items()]
 
 
-def _card(name: str, row: Mapping[str, Any]) -> Card:
-    before, after = row["values"]
-    unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    return Card(name, row["change"] or row["verdict"] or "-", f"{before} → {after}{unit}", row["interval"], row["verdict"])
+def _card(name: str, unit: str, change: Change) -> Card:
+    scale, unit = MILLI.get(unit, (1.0, unit))
+    before, after = _digits(scale * change.before), _digits(scale * change.after)
+    known = math.isfinite(change.relative)
+    low, high = change.interval
+    interval = f"95 %: {_share(low).removesuffix(' %')} to {_share(high)}" if math.isfinite(low) else ""
+    return Card(name, _share(change.relative) if known else change.verdict, f"{before} → {after} {unit}", interval, change.verdict)
+
+
+def _digits(value: float) -> str:
+    """Three of them, never as a power of ten."""
+    places = 2 - math.floor(math.log10(abs(value))) if value else 0
+    return f"{value:.{min(max(places, 0), 3)}f}"
+
+
+def _share(value: float) -> str:
+    """Per cent with its sign, to three digits."""
+    return f"{100.0 * value:+.{1 if abs(value) < 1.0 else 0}f} %".replace("-", "−")
 
 
 def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]) -> list[Part]:

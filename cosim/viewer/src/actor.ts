@@ -34,7 +34,8 @@ export class Actor {
     this.arrows = new ForceArrows(run.robot.legs.length);
     this.lamp.castShadow = true;
     this.lamp.shadow.mapSize.set(1024, 1024);
-    this.lamp.shadow.radius = 5;
+    this.lamp.shadow.radius = 4;
+    this.lamp.shadow.intensity = 0.6;
     this.lamp.shadow.normalBias = 0.004;
     Object.assign(this.lamp.shadow.camera, { left: -REACH, right: REACH, top: REACH, bottom: -REACH, near: 0.5, far: 6 });
     this.scene.add(this.model, this.floor, this.arrows, this.lamp, this.lamp.target, this.sky);

@@ -1,4 +1,4 @@
-import { Color, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Vector3 } from "three";
+import { type Color, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Vector3 } from "three";
 
 const UP = new Vector3(0, 1, 0);
 const LENGTH = 0.42; // m    of an arrow of one body weight
@@ -9,13 +9,14 @@ const HEAD = 0.0125; // m
 /** The ground's force on each foot, an arrow from where it acts. */
 export class ForceArrows extends Group {
   private readonly arrows: { shaft: Mesh; head: Mesh }[];
-  private readonly material = new MeshBasicMaterial({ color: new Color("#e6447c") });
+  private readonly material = new MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }); // seen through the legs;
 
   constructor(count: number) {
     super();
     this.arrows = Array.from({ length: count }, () => {
       const shaft = new Mesh(new CylinderGeometry(SHAFT, SHAFT, 1, 12), this.material);
       const head = new Mesh(new ConeGeometry(HEAD, 2.6 * HEAD, 18), this.material);
+      shaft.renderOrder = head.renderOrder = 1;
       this.add(shaft, head);
       return { shaft, head };
     });

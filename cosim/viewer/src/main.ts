@@ -20,32 +20,48 @@ import type { Payload } from "./types";
 const LONGEST_FRAME = 0.1; // s    a tab that slept does not leap
 const SHOWN_CYCLES = 3;
 
+/** Text and tables first, then plots, then the replay, which has to wait for the graphics driver. */
 async function start(): Promise<void> {
+  await painted();
   const payload = JSON.parse(byId("recording")!.textContent!) as Payload;
   document.head.append(element("style", "", plotStyle));
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
   const runs: Run[] = await Promise.all(payload.runs.map(async (run) => ({ run, recording: await unpack(run) })));
-  const from = Math.min(...runs.map(({ recording }) => recording.start));
-  const to = Math.max(...runs.map(({ recording }) => recording.end));
-  const clock = new Clock(from, to);
-  const stage = makeStage(runs);
-  const transport = new Transport(clock, stage);
+  const clock = new Clock(
+    Math.min(...runs.map(({ recording }) => recording.start)),
+    Math.max(...runs.map(({ recording }) => recording.end)),
+  );
+  clock.seek(askedTime() ?? clock.start);
+  const transport = new Transport(clock);
   listenToKeys(clock, { follow: () => transport.toggleFollow(), theme: () => theme.toggle() });
-  stage?.paint(readColours());
-  clock.listen(() => stage?.show(clock.time));
-  begin(clock);
-  stage?.render();
-  runForever(clock, stage);
-  document.documentElement.dataset.opened = "true";
-  if (stage) await addTrails(stage);
   const panels = await makePanels(runs, clock);
   theme.listen(() => {
-    stage?.paint(readColours());
-    stage?.show(clock.time);
     for (const panel of panels) panel.repaint();
   });
-  Object.assign(window, { hexapod: { clock, feet: (label: string) => feetOf(runs, label, clock), stage } });
+  Object.assign(window, { hexapod: { clock, feet: (label: string) => feetOf(runs, label, clock) } });
+  document.documentElement.dataset.opened = "true";
+  await painted();
+  await raiseCurtain(runs, clock, theme, transport);
   document.documentElement.dataset.ready = "true";
+}
+
+/** The stage, and then the walk. */
+async function raiseCurtain(runs: readonly Run[], clock: Clock, theme: Theme, transport: Transport): Promise<void> {
+  const stage = makeStage(runs);
+  if (stage) {
+    const repaint = () => {
+      stage.paint(readColours());
+      stage.show(clock.time);
+    };
+    repaint();
+    theme.listen(repaint);
+    await addTrails(stage);
+    await stage.prepare();
+    clock.listen(() => stage.show(clock.time));
+    transport.attach(stage);
+  }
+  begin(clock);
+  runForever(clock, stage);
 }
 
 /** The 3D view; undefined, and a word in its place, where the browser or the recording cannot give it. */
@@ -72,11 +88,15 @@ function refuse(host: HTMLElement | null, text: string): void {
   host?.classList.add("refused");
 }
 
-/** Plays at once, unless the reader asks for less motion or the address names a time (#t=2.5). */
-function begin(clock: Clock): void {
+/** A time that the page's address names: #t=2.5 */
+function askedTime(): number | undefined {
   const asked = /^#t=([\d.]+)$/.exec(location.hash);
-  clock.seek(asked ? Number(asked[1]) : clock.start);
-  if (!asked && !matchMedia("(prefers-reduced-motion: reduce)").matches) clock.play();
+  return asked ? Number(asked[1]) : undefined;
+}
+
+/** Plays at once, unless the reader asks for less motion or for a time. */
+function begin(clock: Clock): void {
+  if (askedTime() === undefined && !matchMedia("(prefers-reduced-motion: reduce)").matches) clock.play();
 }
 
 function runForever(clock: Clock, stage: Stage | undefined): void {
@@ -116,6 +136,11 @@ async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> 
   drawPath(runs, clock);
   clock.listen(() => cycles.follow(clock.time));
   return panels;
+}
+
+/** After the browser has shown the page's text and tables. */
+function painted(): Promise<void> {
+  return new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
 }
 
 function rest(): Promise<void> {

@@ -1,4 +1,4 @@
-import { type BufferGeometry, CapsuleGeometry, Color, Group, Mesh, MeshStandardMaterial, SphereGeometry, Vector3 } from "three";
+import { type BufferGeometry, CapsuleGeometry, Color, Group, Mesh, MeshLambertMaterial, SphereGeometry, Vector3 } from "three";
 import { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
 import { legPoints, type Pose, torsoOrigin, toVector3 } from "./kinematics";
 import type { Robot } from "./types";
@@ -8,7 +8,7 @@ const LIT = new Color("#ffd54a"); // a foot on the ground
 const DARK = new Color("#5b626c");
 const STRIPE = 0.16; // of the torso's width: the mark in the control's colour
 
-type Solid = Mesh<BufferGeometry, MeshStandardMaterial>;
+type Solid = Mesh<BufferGeometry, MeshLambertMaterial>;
 
 /** The robot as capsules and a box, with feet that light up on the ground. */
 export class RobotModel extends Group {
@@ -74,7 +74,7 @@ export class RobotModel extends Group {
 }
 
 function solid(geometry: BufferGeometry, colour: string): Solid {
-  const mesh = new Mesh(geometry, new MeshStandardMaterial({ color: new Color(colour), roughness: 0.55, metalness: 0.08 }));
+  const mesh = new Mesh(geometry, new MeshLambertMaterial({ color: new Color(colour) }));
   mesh.castShadow = true;
   mesh.receiveShadow = true;
   return mesh;

@@ -3,8 +3,8 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Actor } from "./actor";
 import type { Colours } from "./theme";
 
-const EYE = new Vector3(0.52, -0.72, 0.44); // m    from the robot: its front and right side
-const LOOK = new Vector3(0, 0, 0.07); // m    above the ground
+const EYE = new Vector3(0.68, -0.92, 0.52); // m    from the robot: its front and right side
+const LOOK = new Vector3(0, 0, 0.05); // m    above the ground
 const FIELD = 36; // deg
 const WIDE = 1.25; // width over height of a view that holds the robot at FIELD
 const STACKED = 560; // px   narrower: views above each other
@@ -19,6 +19,7 @@ export class Stage {
   private readonly anchors: Vector3[];
   private following = true;
   private stale = true;
+  private warm = false;
 
   /** Throws when the browser has no WebGL. */
   constructor(
@@ -26,6 +27,7 @@ export class Stage {
     readonly actors: readonly Actor[],
   ) {
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
+    this.renderer.debug.checkShaderErrors = false; // asking would wait for the compiler
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, SHARPEST));
@@ -62,6 +64,14 @@ export class Stage {
     this.stale = true;
   }
 
+  /** Has the graphics driver compile what draws the scenes, while the page goes on, where it can; nothing is drawn before. */
+  async prepare(): Promise<void> {
+    const aside = this.renderer.extensions.has("KHR_parallel_shader_compile");
+    if (aside) await Promise.all(this.actors.map((actor) => this.renderer.compileAsync(actor.scene, this.view)));
+    this.warm = true;
+    this.stale = true;
+  }
+
   /** Back to the view it began with. */
   home(): void {
     this.camera.position.copy(EYE).add(LOOK);
@@ -72,7 +82,7 @@ export class Stage {
 
   /** Draws, if anything has changed. */
   render(): void {
-    if (!this.stale) return;
+    if (!this.stale || !this.warm) return;
     this.stale = false;
     const { width, height, columns, rows } = this.layout();
     const [w, h] = [width / columns, height / rows];

@@ -13,10 +13,9 @@ export class Transport {
   private readonly speed = byId<HTMLSelectElement>("speed");
   private readonly follow = byId<HTMLButtonElement>("follow");
 
-  constructor(
-    private readonly clock: Clock,
-    private readonly stage: Stage | undefined,
-  ) {
+  private stage: Stage | undefined;
+
+  constructor(private readonly clock: Clock) {
     this.prepare();
     this.play?.addEventListener("click", () => clock.toggle());
     this.slider?.addEventListener("input", () => {
@@ -25,9 +24,15 @@ export class Transport {
     });
     this.speed?.addEventListener("change", () => clock.setSpeed(Number(this.speed!.value)));
     this.follow?.addEventListener("click", () => this.toggleFollow());
-    byId("home")?.addEventListener("click", () => stage?.home());
+    byId("home")?.addEventListener("click", () => this.stage?.home());
     clock.listen(() => this.show());
     this.show();
+  }
+
+  /** Gives it the stage whose camera its buttons move. */
+  attach(stage: Stage): void {
+    this.stage = stage;
+    for (const button of [this.follow, byId<HTMLButtonElement>("home")]) if (button) button.disabled = false;
   }
 
   toggleFollow(): void {
@@ -44,7 +49,7 @@ export class Transport {
       this.slider.step = "any";
     }
     this.speed?.append(...SPEEDS.map((speed) => new Option(`${speed}×`, String(speed), speed === 1, speed === 1)));
-    for (const button of [this.follow, byId<HTMLButtonElement>("home")]) if (button) button.hidden = !this.stage;
+    for (const button of [this.follow, byId<HTMLButtonElement>("home")]) if (button) button.disabled = true;
   }
 
   private show(): void {
