@@ -10,7 +10,7 @@ SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 SANITIZED := tests/test_fmi.py tests/test_fmi3.py tests/test_fmi3_order.py tests/test_plant_events.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_fmi_importers.py tests/test_fmi_exchange.py tests/test_plant_coordinates.py tests/test_plant_misuse.py tests/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -24,6 +24,7 @@ help:
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
+	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
 	@echo "make generate  generated/ of plant_fmu and controller_fmu from their interface.toml, pictures and reference results from the robot"
 	@echo "make fmu       out/athena.fmu and out/phantomx_mk4.fmu"
@@ -69,7 +70,7 @@ check: setup typing
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py
+	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	$(PYTHON) tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
@@ -85,6 +86,9 @@ bench-quick: setup
 
 control: setup
 	$(BIN)/python -m benchmarks.control
+
+docs: setup
+	$(BIN)/python -m tools.docs
 
 format: setup
 	$(BIN)/ruff check --fix-only --quiet .

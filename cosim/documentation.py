@@ -74,7 +74,7 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
         capabilities=_capabilities(root),
         names=NAMES[arrayed],
         arrayed=arrayed,
-        groups={causality: _rows(interface, causality, arrayed) for causality in CAUSALITIES},
+        groups={causality: variable_rows(interface, causality, arrayed=arrayed) for causality in CAUSALITIES},
         weight=robot.total_mass * max(map(abs, robot.gravity)),
     )
 
@@ -94,7 +94,8 @@ def _words(value: str | None) -> str:
     return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
 
 
-def _rows(interface: Interface, causality: str, arrayed: bool) -> list[Row]:
+def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> list[Row]:
+    """What to tell of the variables of a causality: a row per pattern, or per FMI 3.0 array."""
     if arrayed:
         chosen = [array for array in arrays(interface) if array.first.causality == causality]
         sizes = ["".join(f"[{size}]" for size in array.shape) for array in chosen]

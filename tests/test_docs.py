@@ -1,0 +1,239 @@
+"""The documentation: its site builds without a warning, its notebooks run, its links lead somewhere, what it says to type works."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from pages import blocks, commands, run
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")] + sorted(DOCS.rglob("*.md"))
+CODE = [
+    path
+    for folder in ("plant_fmu", "controller_fmu", "models", "controller", "cosim", "tests", "benchmarks")
+    for ending in ("*.c", "*.h", "*.py", "*.toml", "*.md")
+    for path in (ROOT / folder).rglob(ending)
+]
+CITED = re.compile(r"\beqs?\. (\d+(?:(?:, | and |-|/)\d+)*)", flags=re.IGNORECASE)
+SHORT = "duration=3"
+
+
+class Page(HTMLParser):
+    """The links and anchors of a built page."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.anchors |= {value for name in ("id", "name") if (value := values.get(name))}
+        self.links += [value for name in ("href", "src") if (value := values.get(name))]
+
+
+@pytest.fixture(scope="session")
+def site(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The whole site, notebooks and validation computed."""
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run([sys.executable, "-m", "tools.docs", "-o", folder / "html", "--work", folder / "pages"], cwd=ROOT,
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "html"
+
+
+@pytest.fixture(scope="module")
+def reader(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The empty folder in which a reader types."""
+    return tmp_path_factory.mktemp("reader")
+
+
+# the site
+
+
+def test_every_link_and_anchor_of_the_site_leads_somewhere(site: Path) -> None:
+    pages = {path: Page(path) for path in site.rglob("*.html")}
+    broken = []
+    for path, page in pages.items():
+        for link in page.links:
+            name, _, anchor = unquote(link).partition("#")
+            if "://" in link or link.startswith(("mailto:", "data:")):
+                continue
+            target = (path.parent / name.partition("?")[0]).resolve() if name else path
+            if not target.exists() or (anchor and target in pages and anchor not in pages[target].anchors):
+                broken.append(f"{path.relative_to(site)}: {link}")
+    assert not broken
+
+
+def test_the_site_needs_no_network(site: Path) -> None:
+    """No page fetches a script, a style, a font or a picture from elsewhere."""
+    kinds = ("<(?:script|img|iframe)[^>]+src=", "<link[^>]+(?:stylesheet|preload|icon)[^>]+href=", r"url\(")
+    fetched = re.compile("|".join(f"""{kind}["']?https?:""" for kind in kinds))
+    for path in [*site.rglob("*.html"), *site.rglob("*.css")]:
+        assert not fetched.search(path.read_text(encoding="utf-8")), path
+
+
+def test_formulas_are_mathml_and_numbered(site: Path) -> None:
+    text = (site / "equations.html").read_text(encoding="utf-8")
+    assert text.count("<math") > 200
+    assert {int(number) for number in re.findall(r'id="eq-(\d+)"', text)} == set(range(1, 22))
+    assert "\\tag" not in re.sub(r'alttext="[^"]*"', "", text)
+
+
+def test_every_variable_is_in_the_reference(site: Path) -> None:
+    for component in ("plant", "controller"):
+        table = tomllib.loads((ROOT / f"{component}_fmu" / "interface.toml").read_text(encoding="utf-8"))
+        names = [entry["name"] for causality in ("input", "output", "parameter", "local") for entry in table.get(causality, [])]
+        text = (site / "reference" / f"{component}.html").read_text(encoding="utf-8")
+        assert len(names) > 40
+        assert not [name for name in names if f">{name}<" not in text]
+
+
+def test_every_command_is_in_the_reference(site: Path) -> None:
+    text = (site / "reference" / "commands.html").read_text(encoding="utf-8")
+    for name in ("export", "simulate", "compare", "design", "report", "validate", "list"):
+        assert f'id="hexapod-{name}"' in text
+
+
+def test_every_function_of_the_c_headers_is_in_the_reference(site: Path) -> None:
+    text = (site / "reference" / "c.html").read_text(encoding="utf-8")
+    for header in (ROOT / "plant_fmu/include/hexapod/hexapod.h", ROOT / "controller_fmu/include/hexapod/controller.h"):
+        functions = re.findall(r"^HX_API [^(]*?(hx_\w+)\(", header.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        assert len(functions) > 10
+        assert not [name for name in functions if f'id="c.{name}"' not in text]
+
+
+def test_the_validation_has_all_its_results(site: Path) -> None:
+    text = (site / "validation.html").read_text(encoding="utf-8")
+    assert "<!-- result" not in text
+    assert text.count("<table") >= 7
+    for law, delivered in (("exact restitution", "0.5000"), ("Hunt-Crossley", "0.6630")):
+        assert re.search(rf"{law}</p></td>.*?{delivered}", text, flags=re.DOTALL)
+
+
+# the pages
+
+
+def test_notebooks_are_committed_without_what_they_put_out() -> None:
+    assert len(NOTEBOOKS) == 3
+    for path in NOTEBOOKS:
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        assert all(not cell.get("outputs") and cell.get("execution_count") is None for cell in cells), path.name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_and_anchors_of_a_page_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"^```.*?^```|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" not in link:
+            name, _, anchor = link.partition("#")
+            target = page.parent / name if name else page
+            assert target.exists(), link
+            assert not anchor or anchor in headings(target), link
+
+
+def headings(page: Path) -> set[str]:
+    """Anchors of a page's headings, as the repository's host makes them."""
+    titles = re.findall(r"^#+ (.*)", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_every_equation_that_the_code_cites_exists() -> None:
+    known = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", (DOCS / "equations.md").read_text(encoding="utf-8"))}
+    assert known == set(range(1, 22))
+    texts = [path.read_text(encoding="utf-8") for path in CODE]
+    cited = {int(number) for text in texts for group in CITED.findall(text) for number in re.findall(r"\d+", group)}
+    assert {1, 4, 5, 15, 20} <= cited <= known
+
+
+# what they say to type
+
+
+def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
+    done = 0
+    for kind, text in blocks(DOCS / "tutorial.md"):
+        if kind == "python":
+            assert run(reader, sys.executable, "-c", text).strip().endswith(("work", "m"))
+            done += 1
+        elif not kind:
+            for line in text.splitlines():
+                run(reader, *shlex.split(line.replace("--show-plot", "")))
+                done += 1
+    assert done >= 11
+
+
+def test_the_controller_of_the_page_lowers_the_roll(reader: Path) -> None:
+    (code,) = (text for kind, text in blocks(DOCS / "howto" / "my-controller.md") if kind == "python" and "peak_roll" in text)
+    without, with_law = map(float, re.findall(r"([\d.]+) mrad", run(reader, sys.executable, "-c", code)))
+    assert with_law < without
+
+
+def test_designed_gains_walk(reader: Path) -> None:
+    for command in commands(DOCS / "howto" / "my-controller.md", "hexapod"):
+        run(reader, *shlex.split(command))
+
+
+def test_the_runs_of_the_page_on_clusters_work(reader: Path) -> None:
+    for command in commands(DOCS / "howto" / "cluster.md", "hexapod"):
+        run(reader, *shlex.split(command))
+    sweep, task = (text for kind, text in blocks(DOCS / "howto" / "cluster.md") if kind == "python")
+    (reader / "sweep.py").write_text(sweep.replace("duration=6", SHORT), encoding="utf-8")
+    run(reader, sys.executable, "sweep.py")
+    assert len((reader / "sweep.csv").read_text(encoding="utf-8").splitlines()) == 7
+    assert run(reader, sys.executable, "-c", task.replace("duration=5", SHORT)).count("completed") == 2
+
+
+def test_the_steps_to_a_new_contact_law_fit_the_code(tmp_path: Path) -> None:
+    """Applied to a copy: the C compiles and has the law under the number that the interface gives it, and the twin agrees."""
+    for folder in ("plant_fmu", "models", "tests"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    patches = [text for kind, text in blocks(DOCS / "howto" / "contact-law.md") if kind == "diff"]
+    assert len(patches) == 7
+    for patch in patches:
+        subprocess.run(["git", "apply", "--unidiff-zero", "-"], cwd=tmp_path, input=patch, text=True, check=True)
+    table = tomllib.loads((tmp_path / "plant_fmu" / "interface.toml").read_text(encoding="utf-8"))["enumeration"]["ContactLaw"]
+    items = [name for name in table if name != "prefix"]
+    assert items[-1] == "hu_guo"
+    got = compiled_scale(tmp_path, law=len(items), restitution=0.4)
+    assert got == pytest.approx(twin_chi(tmp_path, "hu_guo", 0.4), rel=1e-15)
+    assert got == pytest.approx(1.5 * 0.6 / 0.4, rel=1e-15)
+
+
+def compiled_scale(tree: Path, *, law: int, restitution: float) -> float:
+    """The constant that a tree's contact_law.c computes for a law by number."""
+    (tree / "ask.c").write_text(
+        '#include "contact_law.h"\n'
+        "double ask(int law, double e) { hxDefinition d = {0}; d.contact.law = law; d.contact.restitution = e;"
+        " return hx_contact(law)->scale(&d); }\n",
+        encoding="utf-8",
+    )
+    source = [tree / "ask.c", *(tree / "plant_fmu" / "src" / name for name in ("contact_law.c", "elementary.c"))]
+    includes = [f"-I{tree / 'plant_fmu' / name}" for name in ("src", "include")]
+    subprocess.run(["cc", "-shared", "-fPIC", "-std=c11", "-o", tree / "ask.so", *source, *includes, "-lm"], check=True)
+    library = ctypes.CDLL(str(tree / "ask.so"))
+    library.ask.restype, library.ask.argtypes = ctypes.c_double, [ctypes.c_int, ctypes.c_double]
+    return float(library.ask(law, restitution))
+
+
+def twin_chi(tree: Path, law: str, restitution: float) -> float:
+    """chi of a law in a tree's models/, which is looked at in a process of its own."""
+    code = (
+        "import sys, types; sys.meta_path[:] = [finder for finder in sys.meta_path if 'Redirect' not in type(finder).__name__]\n"
+        "package = types.ModuleType('hexapod_cosim'); package.__path__ = ['.']; sys.modules['hexapod_cosim'] = package\n"
+        f"from hexapod_cosim.models.contact import CHI; print(repr(CHI[{law!r}]({restitution})))"
+    )
+    return float(run(tree, sys.executable, "-c", code))

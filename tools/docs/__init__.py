@@ -1,0 +1,1 @@
+"""The documentation's site, built from docs/ by `make docs`."""

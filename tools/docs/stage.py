@@ -1,0 +1,151 @@
+"""Puts the site's pages together: those of docs/ and of the repository's root, and every file of the repository that they link to.
+
+Links on the pages are relative, as a reader of the repository follows them. On the site a link to another page leads to that page, and one
+to a file or folder to a page that shows it, so the site is whole without the repository.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+# pages from elsewhere, and files that a page of the reference tells better than they do
+ELSEWHERE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md", "benchmarks/README.md": "benchmarks.md"}
+INSTEAD = {
+    "README.md": "index.md",
+    "docs/README.md": "index.md",
+    "plant_fmu/interface.toml": "reference/plant.md",
+    "controller_fmu/interface.toml": "reference/controller.md",
+    "plant_fmu/include/hexapod/hexapod.h": "reference/c.md",
+    "controller_fmu/include/hexapod/controller.h": "reference/c.md",
+}
+LANGUAGES = {".py": "python", ".c": "c", ".h": "c", ".cpp": "cpp", ".toml": "toml", ".json": "json", ".xml": "xml", ".md": "markdown"}
+PICTURES = (".png", ".svg", ".jpg")
+LINK = re.compile(r"(?<=\]\()([^)\s]+)(?=\))")
+CODE = re.compile(r"(^```.*?^```[^\n]*$|`[^`\n]+`)", flags=re.DOTALL | re.MULTILINE)
+HIDDEN = ("__pycache__", "generated")
+
+
+class BrokenLinkError(Exception):
+    """A link that leads nowhere."""
+
+
+@dataclass
+class Stage:
+    """A folder that is filled with pages for Sphinx."""
+
+    folder: Path
+    shown: set[str] = field(default_factory=set)  # files and folders of the repository that have a page of their own
+
+    def write(self, name: str, text: str) -> None:
+        """Adds a page."""
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+    def add_page(self, source: Path) -> None:
+        """Adds a page of the repository, its links made those of the site."""
+        name, text = page_name(source), source.read_text(encoding="utf-8")
+        if source.suffix == ".ipynb":
+            notebook = json.loads(text)
+            for cell in notebook["cells"]:
+                if cell["cell_type"] == "markdown":
+                    cell["source"] = self._linked("".join(cell["source"]), source, name)
+            self.write(name, json.dumps(notebook))
+        else:
+            self.write(name, self._linked(text, source, name))
+
+    def _linked(self, text: str, source: Path, name: str) -> str:
+        return outside_code(text, lambda part: LINK.sub(lambda match: self._target(match[1], source, name), part))
+
+    def _target(self, link: str, source: Path, name: str) -> str:
+        """Where a link of a page leads on the site."""
+        path, _, anchor = link.partition("#")
+        if "://" in link or link.startswith("mailto:") or not path:
+            return link
+        found = (source.parent / path).resolve()
+        if not found.exists() or not found.is_relative_to(ROOT):
+            raise BrokenLinkError(f"{source.relative_to(ROOT)}: link to {link}: no such file; expected a path relative to the page")
+        relative = os.path.relpath(self._place(found), PurePosixPath(name).parent)
+        return relative + (f"#{anchor}" if anchor and found.suffix == ".md" else "")
+
+    def _place(self, found: Path) -> str:
+        """The name on the site of something in the repository; it is put there if it is not yet."""
+        inside = found.relative_to(ROOT).as_posix()
+        if inside in INSTEAD:
+            return INSTEAD[inside]
+        if is_page(found):
+            return page_name(found)
+        if found.suffix in PICTURES:
+            return self._copy(found)
+        return self.show(found)
+
+    def _copy(self, found: Path) -> str:
+        name = found.relative_to(DOCS if found.is_relative_to(DOCS) else ROOT).as_posix()
+        (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(found, self.folder / name)
+        return name
+
+    def show(self, found: Path) -> str:
+        """The page that shows a file or lists a folder of the repository."""
+        inside = found.relative_to(ROOT).as_posix()
+        name = f"source/{inside}/index.md" if found.is_dir() else f"source/{inside}.md"
+        if inside not in self.shown:
+            self.shown.add(inside)
+            self.write(name, self._listing(found, name) if found.is_dir() else listing_of(found))
+        return name
+
+    def _listing(self, folder: Path, name: str) -> str:
+        rows = []
+        for entry in sorted(folder.iterdir()):
+            if entry.name.startswith(".") or entry.name in HIDDEN or not (entry.is_dir() or is_text(entry)):
+                continue
+            label = f"`{entry.name}{'/' if entry.is_dir() else ''}`"
+            place = None if entry.is_dir() else os.path.relpath(self._place(entry), PurePosixPath(name).parent)
+            rows.append(f"- [{label}]({place})" if place else f"- {label}")
+        return f"---\norphan: true\n---\n\n# {folder.relative_to(ROOT).as_posix()}/\n\n" + "\n".join(rows) + "\n"
+
+
+def pages() -> Iterator[Path]:
+    """The repository's pages that are the site's too."""
+    yield from sorted(path for path in DOCS.rglob("*.md") if path.name != "README.md" or path.parent != DOCS)
+    yield from sorted(DOCS.rglob("*.ipynb"))
+    yield from (ROOT / name for name in ELSEWHERE)
+
+
+def is_page(path: Path) -> bool:
+    """Whether a file is one of them."""
+    return path.relative_to(ROOT).as_posix() in ELSEWHERE or (path.suffix in {".md", ".ipynb"} and path.is_relative_to(DOCS))
+
+
+def page_name(path: Path) -> str:
+    """What a page is called on the site."""
+    inside = path.relative_to(ROOT).as_posix()
+    if inside in ELSEWHERE:
+        return ELSEWHERE[inside]
+    name = path.relative_to(DOCS)
+    return (name.with_name("index.md") if name.name == "README.md" else name).as_posix()
+
+
+def outside_code(text: str, change: Callable[[str], str]) -> str:
+    """A page with everything but its code, in blocks and in lines, changed."""
+    return "".join(part if part.startswith("`") else change(part) for part in CODE.split(text))
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file is one to be read."""
+    return path.suffix in {*LANGUAGES, ".txt", ".csv", ".jinja", ".cff", ""} and b"\0" not in path.read_bytes()[:1024]
+
+
+def listing_of(path: Path) -> str:
+    """A page that shows a file."""
+    inside, text = path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
+    fence, language = "`" * 8, LANGUAGES.get(path.suffix, "text")
+    return f"---\norphan: true\n---\n\n# {path.name}\n\n`{inside}`\n\n{fence}{language}\n{text.rstrip()}\n{fence}\n"

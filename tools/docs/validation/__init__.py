@@ -1,0 +1,45 @@
+"""The chapter on validation: its tables and figures, computed anew by the code of the tests, or read from what the benchmarks left."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from tools.docs.stage import ROOT
+from tools.docs.validation.shown import Shown
+
+sys.path.insert(0, str(ROOT / "tests"))  # the tests' robots, motions and problems
+
+from building import built, shared_library
+
+from tools.docs.validation import agreement, benchmarks, books, impacts, motion, orders
+
+PLACE = re.compile(r"<!-- result: (\w+) -->")
+COMPUTED: Mapping[str, Callable[[ctypes.CDLL], Shown]] = {
+    "motion": motion.closed_forms,
+    "restitution": impacts.restitution,
+    "penetration": impacts.penetration,
+    "orders": orders.orders,
+    "agreement": agreement.agreement,
+}
+READ: Mapping[str, Callable[[], Shown]] = {
+    "books": books.books,
+    "peers": benchmarks.peers,
+    "speed": benchmarks.speed,
+    "control": benchmarks.control,
+}
+
+
+def fill(folder: Path) -> None:
+    """Puts every result in its place on the page validation.md of a folder."""
+    page, core = folder / "validation.md", ctypes.CDLL(str(shared_library(built(), "plant_fmu", "libhexapod_c")))
+
+    def place(match: re.Match[str]) -> str:
+        name = match[1]
+        shown = COMPUTED[name](core) if name in COMPUTED else READ[name]()
+        return shown.markdown(folder, f"images/validation-{name}")
+
+    page.write_text(PLACE.sub(place, page.read_text(encoding="utf-8")), encoding="utf-8")

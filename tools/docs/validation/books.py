@@ -1,0 +1,48 @@
+"""The energy books of a walk: what they leave unexplained, by the tolerance of the integrator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from hexapod_cosim.cosim.export import export_fmu
+from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.run import simulate
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.models import load_robot
+from tools.docs.validation.shown import PALETTE, Shown, short
+
+TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6)
+DURATION = 4.0  # s
+LEAST = 1e-12  # of the work: below it the residual is rounding
+
+
+def _recordings() -> dict[float, Recording]:
+    with TemporaryDirectory() as folder:
+        fmu = export_fmu(load_robot("athena"), Path(folder) / "athena.fmu")
+        plans = {one: load_scenario("walk_flat", overrides=[f"duration={DURATION}", f"solver.tolerance={one}"]) for one in TOLERANCES}
+        return {one: simulate(plan, fmu=fmu).outcome.recording for one, plan in plans.items()}
+
+
+def books() -> Shown:
+    """The same walk at several tolerances."""
+    walks = {}
+    for tolerance, recording in _recordings().items():
+        work = float(recording.column("energy.actuator_work")[-1])
+        walks[tolerance] = recording.time, np.abs(recording.column("energy.residual")) / work, recording.column("solver.evaluations")[-1]
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        for k, (tolerance, (time, share, _)) in enumerate(walks.items()):
+            axes.semilogy(time[1:], np.maximum(share[1:], LEAST), color=PALETTE[k], label=f"tolerance {tolerance:g}", linewidth=1.1)
+        axes.set(xlabel="time [s]", ylabel="residual / the motors' work")
+        axes.legend(ncols=2)
+
+    rows = [(f"{tolerance:g}", f"{evaluations:.0f}", short(float(share[-1]))) for tolerance, (_, share, evaluations) in walks.items()]
+    return Shown(
+        columns=("solver.tolerance", "evaluations", f"residual over work after {DURATION:g} s"), rows=rows, draw=draw,
+        alt="The energy residual of a walk over time: it falls with the tolerance",
+    )  # fmt: skip
