@@ -127,7 +127,7 @@ def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series], to
     ]
     _write_csv(folder / "settings.csv", settings)
     (folder / "machine.json").write_text(json.dumps(described(tools), indent=2) + "\n", encoding="utf-8")
-    draw(runs, series, folder / "work_precision.svg", title=f"Walking, 2 s, {len({run.walk for run in runs})} walks: error against time")
+    draw(runs, series, folder)
 
 
 def _write_csv(path: Path, records: Sequence[dict[str, Any]]) -> None:

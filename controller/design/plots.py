@@ -111,7 +111,7 @@ def _degrees(loop: Response) -> Array:
 
 def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
     figure, grid = _figure(1, 2, gains)
-    figure.set_figheight(4.0)
+    figure.set_figheight(4.4)
     needs, turn = gains.requirements, np.linspace(0.0, 2.0 * np.pi, 200)
     edge = np.radians(needs.phase_margin)
     for axes, all_of, title in zip(grid[0], loops, TITLES, strict=True):
@@ -152,7 +152,7 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     row[2].step(time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension")
     row[0].set(title="a squeeze of 1", ylabel="squeezing force left [1]")
     row[1].set(title=f"a foot on a bump of {1e3 * BUMP:g} mm", ylabel="excess load [weight / 3]")
-    row[2].set(title="the same: the suspension gives way", ylabel="deflection [mm]")
+    row[2].set(title="the same bump", ylabel="suspension's deflection [mm]")
     for axes in row:
         axes.axhline(0.0, color="k", lw=0.6)
         axes.set(xlabel="time [s]")
