@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -11,6 +12,7 @@ import pinocchio as pin
 import pytest
 from disguised_urdf import random_robot
 
+from hexapod_cosim.cosim.robot_files import FORMATS, export_description
 from hexapod_cosim.models import LEG_NAMES, Robot, foot_positions, list_robots, load_robot
 from hexapod_cosim.models.dynamics import mass_matrix, masses
 from hexapod_cosim.models.kinematics import body_states, rotation_matrix
@@ -103,6 +105,19 @@ def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
     model = pin.buildModelFromXML(text)
     shown, touching = (pin.buildGeomFromUrdfString(model, text, kind) for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION))
     assert (shown.ngeoms, touching.ngeoms) == (1 + 18 + 6, 6)
+
+
+def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path) -> None:
+    """pinocchio's MeshcatVisualizer takes these three: every body has its mass and something of a size to show, without any mesh."""
+    path = export_description(robot, tmp_path / "robot.urdf", FORMATS["urdf"])
+    model, _, shown = pin.buildModelsFromUrdf(str(path), root_joint=pin.JointModelFreeFlyer())
+    joints = [1, *(model.getJointId(name) for name in joint_names("{leg}_{joint}_joint"))]
+    assert [model.inertias[joint].mass for joint in joints] == pytest.approx(masses(robot).tolist(), rel=EXACT)
+    assert {geometry.parentJoint for geometry in shown.geometryObjects} == set(joints)
+    for geometry in shown.geometryObjects:
+        geometry.geometry.computeLocalAABB()
+        assert geometry.geometry.aabb_radius > 0.0
+        assert geometry.meshPath in {"BOX", "CYLINDER", "SPHERE"}
 
 
 def test_mujoco_reads_the_urdf_with_the_same_masses(robot: Robot) -> None:
