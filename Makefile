@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+PARALLEL := -n auto --maxprocesses 8 --dist loadgroup --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
@@ -45,7 +46,7 @@ demo: setup
 	$(BIN)/hexapod compare walk_flat -o out/demo
 
 test: setup typing
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PARALLEL)
 
 test-browser: setup
 	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/test_browser.py

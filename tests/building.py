@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from filelock import FileLock
+
 ROOT = Path(__file__).resolve().parents[1]
 PRESET = os.environ.get("HEXAPOD_PRESET", "test")  # `make test-sanitize` has another
 BUILD = ROOT / "build" / PRESET
@@ -19,13 +21,22 @@ class BuildError(Exception):
 
 
 def built() -> Path:
-    """build/test, up to date; also installed to build/plant. Raises BuildError."""
+    """build/test, up to date; also installed to build/plant. Of the processes of one test run the first builds. Raises BuildError."""
+    BUILD.parent.mkdir(exist_ok=True)
+    session, last = os.environ.get("PYTEST_XDIST_TESTRUNUID", ""), BUILD.parent / f".{PRESET}.session"
+    with FileLock(BUILD.parent / f".{PRESET}.lock"):
+        if not session or not last.exists() or last.read_text(encoding="utf-8") != session:
+            _build()
+            last.write_text(session, encoding="utf-8")
+    return BUILD
+
+
+def _build() -> None:
     if _configure().returncode != 0:
         shutil.rmtree(BUILD, ignore_errors=True)  # configured by a CMake, Python or generator that is gone
         _succeed(_configure())
     _succeed(_cmake("--build", "--preset", PRESET))
     _succeed(_cmake("--install", str(BUILD), "--prefix", str(PACKED)))
-    return BUILD
 
 
 def shared_library(build: Path, component: str, name: str) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -14,10 +15,28 @@ from fmi_plant import Plant
 
 from hexapod_cosim.cosim.cli import main
 
+# what takes longest begins, so that no process is left with it in the end
+LONGEST = (
+    "test_long_walk", "test_walking", "test_endurance", "test_cli", "test_controller_design", "test_howto", "test_batch", "test_readme",
+    "test_control_benchmark", "test_examples", "test_laws_impact", "test_platforms", "test_robot_package", "test_cli_endings",
+)  # fmt: skip
+# what builds the same binaries for other platforms stays together, and so does every other file with its fixtures
+TOGETHER = dict.fromkeys(("test_platforms", "test_platform_walks", "test_cross_build"), "platforms")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Groups and order for several processes (`make test`); in one process everything is as it was."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        return
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(TOGETHER.get(item.path.stem, item.path.stem)))
+    items.sort(key=lambda item: LONGEST.index(item.path.stem) if item.path.stem in LONGEST else len(LONGEST))
+
 
 @pytest.fixture(scope="session")
 def plant_build() -> Path:
-    """build/test, up to date; also installed to build/plant, from where the exporter packs."""
+    """build/test, up to date; also installed to build/plant, from where the exporter packs. Of several processes one builds."""
     try:
         return built()
     except BuildError as error:
