@@ -103,7 +103,7 @@ def _one_run(run: Stored) -> dict[str, Any]:
 
 def _comparison(comparison: Comparison) -> dict[str, Any]:
     rows, notes = comparison_rows(comparison), about(comparison)
-    lead = notes or "One run of each control."
+    lead = notes.replace(" of the mean change.", " in brackets.") or "One run of each control."
     return {"headline": headline(comparison), "cards": cards(comparison), "rows": rows, "about": notes, "losses": comparison.losses,
             "lead": lead}  # fmt: skip
 

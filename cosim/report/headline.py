@@ -15,7 +15,7 @@ TOLD = {
     "slip_per_metre": ("slip per metre", "slip"),
     "height_rms": ("height, RMS", "bobbing"),
     "roll_rms": ("roll, RMS", "rolling"),
-    "loading_rate": ("loading rate", "jolt at touch-down"),
+    "loading_rate": ("loading rate", "jolt on landing"),
     "cost_of_transport": ("cost of transport", "motor work per metre"),
     "torque_rms": ("motor torque, RMS", "motor torque"),
 }
@@ -87,7 +87,7 @@ def _card(name: str, unit: str, change: Change) -> Card:
     before, after = _digits(scale * change.before), _digits(scale * change.after)
     known = math.isfinite(change.relative)
     low, high = change.interval
-    interval = f"95 %: {_share(low).removesuffix(' %')} to {_share(high)}" if math.isfinite(low) else ""
+    interval = f"({_share(low).removesuffix(' %')} to {_share(high)})" if math.isfinite(low) else ""
     return Card(name, _share(change.relative) if known else change.verdict, f"{before} → {after} {unit}", interval, change.verdict)
 
 

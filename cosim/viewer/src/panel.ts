@@ -49,7 +49,6 @@ export class Panel {
     new ResizeObserver(() => this.resize(box)).observe(box);
     span.listen(() => this.showSpan());
     clock.listen(() => this.showTime());
-    this.showTime();
   }
 
   /** Draws anew in the page's present colours. */
@@ -59,6 +58,7 @@ export class Panel {
 
   private describe(box: HTMLElement): uPlot.Options {
     const [min, max] = this.span.limits;
+    const again = () => queueMicrotask(() => this.showTime()); // uPlot lays out in a microtask of its own
     const quiet = {
       stroke: () => property("--muted"),
       grid: { stroke: () => property("--line"), width: 1 },
@@ -78,6 +78,7 @@ export class Panel {
       ],
       series: [{}, ...this.options.curves.map(seriesOf)],
       ...this.options.more,
+      hooks: { ...this.options.more?.hooks, ready: [again], setScale: [again], setSize: [again] },
     };
   }
 
@@ -94,13 +95,11 @@ export class Panel {
   private showSpan(): void {
     const [min, max] = this.span.limits;
     this.plot.setScale("x", { min, max });
-    this.showTime();
   }
 
   private resize(box: HTMLElement): void {
     if (box.clientWidth > 0 && box.clientWidth !== this.plot.width) {
       this.plot.setSize({ width: box.clientWidth, height: this.options.height });
-      this.showTime();
     }
   }
 

@@ -1,0 +1,87 @@
+"""A real browser for the tests: the system's Chromium, driven by Playwright, without a network."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+REQUIRED = os.environ.get("HEXAPOD_BROWSER", "") != ""  # a missing browser is a failure, not a reason to skip
+FULL = os.environ.get("HEXAPOD_BROWSER") == "full"  # the 60 s walk too
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)  # WebGL without a graphics card
+PATIENCE = 120_000  # ms    for a loaded machine without a graphics card; nothing is asserted about it
+
+
+def find_chromium() -> str:
+    """Path of a Chromium; skips the test where there is none, or fails it if HEXAPOD_BROWSER is set."""
+    found = os.environ.get("HEXAPOD_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        (pytest.fail if REQUIRED else pytest.skip)("no Chromium: apt-get install chromium, or HEXAPOD_CHROMIUM=/path/to/it")
+    return str(found)
+
+
+@contextmanager
+def launched(*flags: str) -> Iterator[Any]:
+    """A browser."""
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415  only where there is a browser
+
+    chromium = find_chromium()
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=[*(flags or FLAGS)])
+        yield browser
+        browser.close()
+
+
+class Opened:
+    """A report in a page of its own, and all that went wrong in it."""
+
+    def __init__(self, browser: Any, file: Path, *, address: str = "", size: tuple[int, int] = (1280, 900), **options: Any) -> None:
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        viewport = {"width": size[0], "height": size[1]}
+        self.context = browser.new_context(viewport=viewport, offline=True, **options)
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(PATIENCE)
+        self.page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        begin = time.perf_counter()
+        self.page.goto(file.as_uri() + address)
+        self.page.wait_for_selector("html[data-opened]", state="attached")
+        self.opened = time.perf_counter() - begin  # s    text, tables, plots
+        self.page.wait_for_selector("html[data-ready]", state="attached")
+        self.ready = time.perf_counter() - begin  # s    the replay too
+
+    def close(self) -> None:
+        self.context.close()
+
+    def value(self, expression: str) -> Any:
+        """Of JavaScript in the page; `clock` is the replay's."""
+        return self.page.evaluate(f"(() => {{ const clock = window.hexapod?.clock; return {expression}; }})()")
+
+    def seek(self, seconds: float) -> None:
+        """Stops the replay at a time, drawn."""
+        self.page.evaluate("time => { window.hexapod.clock.pause(); window.hexapod.clock.seek(time); }", seconds)
+        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+    def playheads(self) -> list[float]:
+        """Where the cursor stands in each plot, in pixels of it; -1: not in what the plot shows."""
+        return list(
+            self.page.eval_on_selector_all(
+                ".playhead",
+                "all => all.map(e => e.style.display === 'none' ? -1 : "
+                "e.getBoundingClientRect().left - e.parentElement.getBoundingClientRect().left)",
+            )
+        )
