@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from hexapod_cosim.cosim.plots import SETTINGS
+from hexapod_cosim.controller.figure_style import SETTINGS
 
 THEMES: Mapping[str, Mapping[str, Any]] = {
     "light": {"text.color": "#1f2430", "grid.color": "#9aa4b2", "axes.edgecolor": "#5b6472"},
