@@ -8,6 +8,7 @@ bristle law it stands still there: what it has given way downhill, as one body, 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -52,17 +53,22 @@ def settled(robot: Robot) -> tuple[Array, Array, Array]:
     return pose.position, pose.quaternion, pose.angle
 
 
+@lru_cache(maxsize=64)
 def standing(robot: Robot) -> Standing:
     """Static equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has given way) and joint angles.
 
     Servos in position or torque mode hold the stance by their PD law (a torque servo alone would not stand); kinematic ones exactly.
-    Raises RobotError when there is no such pose: servos too weak or soft, or a slope without friction.
+    Looked up when it was asked for before: the interface and every picture of a robot need it, and it is most of an export's time. Its
+    arrays are read-only. Raises RobotError when there is no such pose: servos too weak or soft, or a slope without friction.
     """
     x = _start(robot)
     residual = _residual(robot, x)
     for _ in range(ITERATIONS):
         if np.max(np.abs(residual)) < RESIDUAL:
-            return _standing(robot, x)
+            pose = _standing(robot, x)
+            for array in vars(pose).values():
+                array.flags.writeable = False
+            return pose
         x, residual = _newton_step(robot, x, residual)
     raise _no_equilibrium(robot, residual)
 

@@ -90,6 +90,14 @@ def test_kinematic_servos_hold_the_stance_exactly() -> None:
     assert standing(robot).angle == pytest.approx(robot.stance, abs=1e-9)
 
 
+def test_a_pose_is_looked_up_for_an_equal_robot_and_cannot_be_changed() -> None:
+    first, second = (standing(robot_on("athena")) for _ in range(2))
+    assert second is first
+    assert standing(robot_on("athena", mode="kinematic")) is not first
+    with pytest.raises(ValueError, match="read-only"):
+        first.angle[0, 0] = 0.0
+
+
 @pytest.mark.parametrize("incline", [0.1, 0.3])
 def test_on_a_slope_the_robot_creeps_downhill_at_the_speed_of_the_tanh_law(incline: float) -> None:
     robot = robot_on("athena", kind="slope", incline=incline)
