@@ -16,6 +16,9 @@ from hexapod_cosim.cosim.report.columns import MOST_ROWS, choose, envelope
 from hexapod_cosim.cosim.report.packing import error_bound, pack
 from hexapod_cosim.cosim.report.payload import as_json
 
+MOST_COLUMNS = 95  # of a run that recorded everything
+REST = 800_000  # bytes of a report without its recordings
+LARGEST = 8_000_000  # bytes of a report of a minute's walk
 ROUND_OFF = 1e-12  # of doubles, relative to the column's largest value
 
 
@@ -108,6 +111,12 @@ def long_recording(rows: int) -> tuple[Recording, float]:
 
 
 LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
+
+
+def test_a_minute_of_both_controls_fits_the_page_even_if_nothing_of_it_compresses() -> None:
+    columns = {str(k): np.random.default_rng(k).uniform(size=12_001) for k in range(MOST_COLUMNS)}
+    packed = pack(0.005 * np.arange(12_001), columns)
+    assert 2 * len(packed["data"]) + REST < LARGEST
 
 
 def test_json_cannot_end_the_script_it_stands_in() -> None:

@@ -46,13 +46,13 @@ def headline(comparison: Comparison) -> list[Part]:
     """What the second control gains and what it costs, as far as the runs are sure of it."""
     first, second = comparison.labels
     gains, losses = _of(comparison, BETTER), _of(comparison, WORSE)
-    begin = Part(f"{second.capitalize()} control")
+    begin = f"Against {first} control, {second}"
     if not gains and not losses:
-        return [begin, Part(f" changes nothing against {first} control that these runs could tell.")]
-    parts = [begin, Part(" walks with " if gains else " brings "), *_listed(gains[:MOST_GAINS] or losses)]
+        return [Part(f"{begin} control changes nothing that these runs could tell.")]
+    parts = [Part(begin), Part(" walks with " if gains else " brings "), *_listed(gains[:MOST_GAINS] or losses)]
     if gains and losses:
         parts += [Part(", and costs "), *_listed(losses)]
-    return [*parts, Part(f" than {first}.")]
+    return [*parts, Part(".")]
 
 
 def _of(comparison: Comparison, verdict: str) -> list[Part]:

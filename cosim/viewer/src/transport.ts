@@ -19,8 +19,9 @@ export class Transport {
     this.prepare();
     this.play?.addEventListener("click", () => clock.toggle());
     this.slider?.addEventListener("input", () => {
+      const asked = Number(this.slider!.value); // pausing shows the time there was
       clock.pause();
-      clock.seek(Number(this.slider!.value));
+      clock.seek(asked);
     });
     this.speed?.addEventListener("change", () => clock.setSpeed(Number(this.speed!.value)));
     this.follow?.addEventListener("click", () => this.toggleFollow());
