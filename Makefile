@@ -89,6 +89,7 @@ control: setup
 	$(BIN)/python -m benchmarks.control
 
 docs: setup
+	rm -rf build/docs
 	$(BIN)/python -m tools.docs
 
 format: setup

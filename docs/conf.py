@@ -54,6 +54,4 @@ copybutton_exclude = ".linenos, .gp, .go"
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#00568f", "color-brand-content": "#0072b2"},
     "dark_css_variables": {"color-brand-primary": "#7cc4f2", "color-brand-content": "#8ccbf5"},
-    "light_logo": "logo-light.svg",
-    "dark_logo": "logo-dark.svg",
 }

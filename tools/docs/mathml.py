@@ -1,14 +1,27 @@
-"""Formulas as MathML, which browsers show by themselves: no script, no font from elsewhere, nothing fetched at reading time."""
+"""Formulas as MathML, which browsers show by themselves: no script, nothing fetched at reading time.
+
+The font that brackets and accents need comes with the site, inside a style sheet: pages opened from a disk may not load font files.
+"""
 
 from __future__ import annotations
 
+import base64
+import io
 import re
 from html import escape
+from pathlib import Path
 from typing import Any
 
+import ziamath
 from docutils import nodes
+from fontTools import subset
+from fontTools.ttLib import TTFont
 from latex2mathml.converter import convert
 
+STYLE = "mathfont.css"
+# letters and signs, accents, Greek, punctuation and primes, arrows, operators, brackets and their pieces, italic letters
+SHOWN = ((0x20, 0x7E), (0xA0, 0xFF), (0x300, 0x338), (0x370, 0x3FF), (0x2010, 0x2064), (0x2190, 0x21FF), (0x2200, 0x22FF), (0x2308, 0x230B),
+         (0x239B, 0x23B1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B))  # fmt: skip
 TAG = re.compile(r"\s*\\tag\{(\w+)\}\s*$")
 
 
@@ -38,7 +51,26 @@ def visit_math_block(translator: Any, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def font_style() -> str:
+    """The style sheet with the font: STIX Two Math (SIL Open Font Licence), as ziamath brings it, without what no page shows."""
+    path = Path(ziamath.__file__).parent / "fonts" / "STIXTwoMath-Regular.ttf"
+    font, bytes_out = TTFont(path), io.BytesIO()
+    chosen = subset.Subsetter(subset.Options(layout_features=["ssty", "dtls", "flac"], notdef_outline=True))
+    chosen.populate(unicodes=[code for start, end in SHOWN for code in range(start, end + 1)])
+    chosen.subset(font)
+    font.save(bytes_out)
+    data = base64.b64encode(bytes_out.getvalue()).decode()
+    return f'@font-face {{ font-family: "Site Math"; src: url("data:font/ttf;base64,{data}") format("truetype"); }}\n'
+
+
+def write_font(app: Any, _error: Any) -> None:
+    """Puts the style sheet beside the site's others."""
+    (Path(app.outdir) / "_static" / STYLE).write_text(font_style(), encoding="utf-8")
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Tells Sphinx."""
+    app.add_css_file(STYLE)
+    app.connect("build-finished", write_font)
     app.add_html_math_renderer("mathml", inline_renderers=(visit_math, None), block_renderers=(visit_math_block, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -26,6 +26,7 @@ INSTEAD = {
     "plant_fmu/include/hexapod/hexapod.h": "reference/c.md",
     "controller_fmu/include/hexapod/controller.h": "reference/c.md",
 }
+PACKAGES = ("models", "controller", "cosim")  # with a page per module in the reference
 LANGUAGES = {".py": "python", ".c": "c", ".h": "c", ".cpp": "cpp", ".toml": "toml", ".json": "json", ".xml": "xml", ".md": "markdown"}
 PICTURES = (".png", ".svg", ".jpg")
 LINK = re.compile(r"(?<=\]\()([^)\s]+)(?=\))")
@@ -103,14 +104,17 @@ class Stage:
         return name
 
     def _listing(self, folder: Path, name: str) -> str:
-        rows = []
-        for entry in sorted(folder.iterdir()):
-            if entry.name.startswith(".") or entry.name in HIDDEN or not (entry.is_dir() or is_text(entry)):
-                continue
-            label = f"`{entry.name}{'/' if entry.is_dir() else ''}`"
-            place = None if entry.is_dir() else os.path.relpath(self._place(entry), PurePosixPath(name).parent)
-            rows.append(f"- [{label}]({place})" if place else f"- {label}")
-        return f"---\norphan: true\n---\n\n# {folder.relative_to(ROOT).as_posix()}/\n\n" + "\n".join(rows) + "\n"
+        entries = [entry for entry in sorted(folder.iterdir()) if not entry.name.startswith(".") and entry.name not in HIDDEN]
+        rows = "\n".join(f"- {_named(entry, name)}" for entry in entries if entry.is_dir() or is_text(entry))
+        return f"---\norphan: true\n---\n\n# {folder.relative_to(ROOT).as_posix()}/\n\n{rows}\n"
+
+
+def _named(entry: Path, page: str) -> str:
+    """A file or folder in a list; a module of a package leads to its reference."""
+    package = entry.parent.relative_to(ROOT).as_posix()
+    if package not in PACKAGES or entry.suffix != ".py" or entry.stem.startswith("_"):
+        return f"`{entry.name}{'/' if entry.is_dir() else ''}`"
+    return f"[`{entry.name}`]({os.path.relpath(f'reference/python/{package}.{entry.stem}.md', PurePosixPath(page).parent)})"
 
 
 def pages() -> Iterator[Path]:
