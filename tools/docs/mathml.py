@@ -22,12 +22,14 @@ STYLE = "mathfont.css"
 # letters and signs, accents, Greek, punctuation and primes, arrows, operators, brackets and their pieces, italic letters
 SHOWN = ((0x20, 0x7E), (0xA0, 0xFF), (0x300, 0x338), (0x370, 0x3FF), (0x2010, 0x2064), (0x2190, 0x21FF), (0x2200, 0x22FF), (0x2308, 0x230B),
          (0x239B, 0x23B1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B))  # fmt: skip
+BAR = re.compile(r"<mo([^>]*)>(?=&#x0007C;)")  # of a norm: no operator
 TAG = re.compile(r"\s*\\tag\{(\w+)\}\s*$")
 
 
 def mathml(latex: str, *, display: str) -> str:
     """A formula as MathML, with what it was written as for readers who copy it."""
-    return str(convert(latex, display=display)).replace("<math ", f'<math alttext="{escape(latex, quote=True)}" ', 1)
+    text = BAR.sub(r'<mo\1 lspace="0" rspace="0">', str(convert(latex, display=display)))
+    return text.replace("<math ", f'<math alttext="{escape(latex, quote=True)}" ', 1)
 
 
 def split_tag(latex: str) -> tuple[str, str]:
