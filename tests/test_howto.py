@@ -59,9 +59,3 @@ def test_the_pages_on_robots_and_packages_have_commands() -> None:
 def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
     shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
     assert run(robots, *shlex.split(command), *shorter)
-
-
-@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.name)
-def test_links_lead_somewhere(page: Path) -> None:
-    links = [link for link in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")) if "://" not in link]
-    assert all((PAGES / link).exists() for link in links), links
