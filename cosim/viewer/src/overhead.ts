@@ -65,7 +65,9 @@ function frameOf(ways: readonly Way[], planned: Way | undefined): Frame {
   const scales = bends ? [Math.min(across, tall), Math.min(across, tall)] : [across, tall];
   const [middle, level] = [0.5 * (left + right), 0.5 * (low + high)];
   const size = `${length.toFixed(2)} m from left to right`;
-  const note = bends ? `To scale, ${size}.` : `${size}; sideways drawn ${(scales[1] / scales[0]).toPrecision(2)} times larger.`;
+  const note = bends
+    ? `To scale, ${size}.`
+    : `${size}, ${(1e3 * Math.max(high - low, LEAST)).toPrecision(2)} mm from top to bottom: sideways drawn ${Math.round(scales[1] / scales[0])} times larger.`;
   return { across: (x) => 0.5 * WIDTH + scales[0] * (x - middle), up: (y) => 0.5 * HEIGHT - scales[1] * (y - level), note };
 }
 

@@ -176,6 +176,7 @@ function roomy(_: uPlot, low: number | null, high: number | null): uPlot.Range.M
 /** A value for people. */
 export function figures(value: number): string {
   if (!Number.isFinite(value)) return "–";
+  if (Number.isInteger(value)) return String(value).replace("-", "−");
   const size = Math.abs(value);
   const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
   const text = value.toFixed(digits);
