@@ -76,6 +76,7 @@ def write_report(
         labels=list(runs),
         facts={label: run.facts for label, run in runs.items()},
         told={label: _told(run.facts) for label, run in runs.items()},
+        walked={label: _walked(run.facts) for label, run in runs.items()},
         warnings=[f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]] + content.pop("losses"),
         sections=[section._asdict() | {"drawn": section.name not in skipped} for section in SECTIONS if section.name not in skipped],
         missing=missing,
@@ -119,6 +120,11 @@ def _replay(runs: Mapping[str, Stored]) -> dict[str, Any]:
 
 def _told(facts: Mapping[str, Any]) -> str:
     return f"{facts['simulated']:.6g} s simulated in {facts['wall']:.3g} s ({facts['realtime_factor']:.3g} x real time)"
+
+
+def _walked(facts: Mapping[str, Any]) -> str:
+    speed = (facts.get("walk") or {}).get("mean_speed")
+    return f"{facts['simulated']:.6g} s" + (f" at {1e3 * speed:.3g} mm/s" if speed is not None and math.isfinite(speed) else "")
 
 
 def _robot(facts: Mapping[str, Any]) -> str:
