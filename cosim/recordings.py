@@ -26,18 +26,26 @@ NONE = ["nan", "NaN", "-nan"]  # how a number that is none is written
 
 
 def write_recording(
-    recording: Recording, folder: Path, stem: str, *, formats: Sequence[str] = FORMATS, about: Mapping[str, Any] | None = None
+    recording: Recording,
+    folder: Path,
+    stem: str,
+    *,
+    formats: Sequence[str] = FORMATS,
+    columns: Sequence[str] = ("*",),
+    about: Mapping[str, Any] | None = None,
 ) -> list[Path]:
-    """Writes STEM.parquet and STEM.csv, or those of them that are wanted. `about`: what was run, texts or what JSON takes.
+    """Writes STEM.parquet, with all columns, and STEM.csv, or those of them that are wanted. Returns the files.
 
-    Returns the files.
+    Args:
+        columns: patterns of the columns that the CSV file has.
+        about: what was run, texts or what JSON takes; metadata of the Parquet file.
     """
     files = [folder / f"{stem}.{kind}" for kind in formats]
     for path in files:
         if path.suffix == ".parquet":
             write_parquet(recording, path, about=about or {})
         else:
-            write_csv(recording, path, units=True)
+            write_csv(recording.chosen(columns), path, units=True)
     return files
 
 

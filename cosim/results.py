@@ -18,6 +18,8 @@ from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.models import HexapodError
 
 RESULTS, PARTIAL, METRICS_FILE, SCENARIO = "results", "results.partial", "metrics.json", "scenario.toml"
+NEEDED = ("title", "control", "simulated", "wall", "realtime_factor", "finished", "gait_period", "parameters", "robot", "fmu", "versions",
+          "platform", "warnings")  # of the facts, for a report  # fmt: skip
 ABOUT = ("title", "control", "robot", "fmu", "versions")  # of the facts, in Parquet
 
 
@@ -65,14 +67,14 @@ def results_folder(path: Path) -> Iterator[Folder]:
 
 def write_result(result: Result, folder: Path) -> list[Path]:
     """Writes a run into a prepared folder; one that did not complete leaves `results.partial.*` and no figures. Returns the files, the
-    scenario first and the recording next.
+    scenario first and the recording next. Parquet, from which reports are made again, holds all columns; CSV those that outputs.csv names.
     """
     facts, outputs, scenario = run_facts(result), result.scenario.outputs, to_toml(result.scenario.to_table())
     whole = result.outcome.recording
     write_text(folder / SCENARIO, scenario)
     about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
-    kept, stem = (whole.chosen(outputs.csv), RESULTS) if result.completed else (whole, PARTIAL)
-    files = [folder / SCENARIO, *write_recording(kept, folder, stem, formats=outputs.formats, about=about)]
+    columns, stem = (outputs.csv, RESULTS) if result.completed else (("*",), PARTIAL)
+    files = [folder / SCENARIO, *write_recording(whole, folder, stem, formats=outputs.formats, columns=columns, about=about)]
     if result.completed and "csv" in outputs.formats:
         files.append(folder / COMMANDS)
         write_commands(whole, files[-1])
@@ -103,13 +105,38 @@ def run_facts(result: Result) -> dict[str, Any]:
 
 def read_result(folder: Path) -> Stored:
     """A completed run from its folder. Raises HexapodError when there is none, or it did not complete."""
-    facts = read_json(folder / RUN_FILE)
-    if facts.get("status") != COMPLETED:
-        got = f"{facts.get('status')}: {facts.get('reason')}" if facts.get("reason") else facts.get("status")
+    facts = read_facts(folder)
+    if facts["status"] != COMPLETED:
+        got = f"{facts['status']}: {facts['reason']}" if facts.get("reason") else facts["status"]
         raise HexapodError("the run did not complete", got=got, expected="a completed run", fix="run it again", where=str(folder))
+    missing = [name for name in NEEDED if name not in facts]
+    if missing:
+        raise _damaged(folder / RUN_FILE, f"no {', '.join(missing)}", "all facts of a run")
+    metrics = read_json(folder / METRICS_FILE)
+    if not isinstance(metrics, dict):
+        raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
     view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
-    scenario = (folder / SCENARIO).read_text(encoding="utf-8")
-    return Stored(view, read_json(folder / METRICS_FILE), facts, scenario)
+    return Stored(view, metrics, facts, read_scenario(folder))
+
+
+def read_facts(folder: Path) -> Mapping[str, Any]:
+    """What run.json says, its "status" at least. Raises HexapodError when it is missing, damaged or of something else."""
+    facts = read_json(folder / RUN_FILE)
+    if not isinstance(facts, dict) or not isinstance(facts.get("status"), str):
+        raise _damaged(folder / RUN_FILE, "no status", 'a table with "status"')
+    return facts
+
+
+def read_scenario(folder: Path) -> str:
+    """The scenario of a run or a comparison, as TOML. Raises HexapodError when it is missing."""
+    try:
+        return (folder / SCENARIO).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise _damaged(folder / SCENARIO, str(error), "the scenario that was run") from error
+
+
+def _damaged(path: Path, got: str, expected: str) -> HexapodError:
+    return HexapodError("damaged or foreign results", got=got, expected=expected, fix="run the scenario again", where=str(path))
 
 
 def stored(result: Result) -> Stored:

@@ -78,7 +78,7 @@ class Variation:
 class Outputs:
     """What is written."""
 
-    csv: tuple[str, ...] = ("*",)  # patterns of variable names: the columns that are kept, whatever the format
+    csv: tuple[str, ...] = ("*",)  # patterns of variable names: the columns of results.csv; Parquet has all
     formats: tuple[str, ...] = FORMATS
     plots: bool = True
 

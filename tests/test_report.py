@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,9 +23,10 @@ def comparison(after: Mapping[str, float], *, seeds: int = 4, before: Mapping[st
     return compare_runs(_runs("kinematic", before or {}, seeds), _runs("compliant", {**(before or {}), **after}, seeds))
 
 
-def _runs(control: str, metrics: Mapping[str, float], seeds: int) -> Sequence[Summary]:
+def _runs(control: str, metrics: Mapping[str, float], seeds: int, fallen: int = 0) -> Sequence[Summary]:
+    """The first `fallen` of them fell."""
     values = dict.fromkeys(METRICS, 1.0) | dict(metrics)
-    return [Summary(control=control, seed=seed, status=COMPLETED, upright=True, metrics=values) for seed in range(seeds)]
+    return [Summary(control=control, seed=seed, status=COMPLETED, upright=seed >= fallen, metrics=values) for seed in range(seeds)]
 
 
 def sentence(result: Comparison) -> str:
@@ -33,10 +35,10 @@ def sentence(result: Comparison) -> str:
 
 def test_the_headline_tells_gains_and_costs_and_marks_them() -> None:
     result = comparison({"slip_per_metre": 0.25, "torque_rms": 1.5})
-    assert sentence(result) == "Against kinematic control, compliant walks with 75% less slip, and costs 50% more motor torque."
+    assert sentence(result) == "Against kinematic control, compliant walks with 75 % less slip, and costs 50 % more motor torque."
     assert [(part.text, part.verdict) for part in headline(result) if part.verdict] == [
-        ("75% less slip", "better"),
-        ("50% more motor torque", "worse"),
+        ("75 % less slip", "better"),
+        ("50 % more motor torque", "worse"),
     ]
 
 
@@ -44,6 +46,34 @@ def test_the_headline_names_no_gain_where_there_is_none() -> None:
     assert sentence(comparison({"slip_per_metre": 3.0})) == "Against kinematic control, compliant brings 3.0 times the slip."
     assert "changes nothing" in sentence(comparison({}))
     assert "changes nothing" in sentence(comparison({"slip_per_metre": 1.0 + 1e-6}))
+
+
+@pytest.mark.parametrize(
+    ("fallen", "verdicts"),
+    [((8, 0), {"kinematic": "worse", "compliant": "better"}), ((0, 8), {"kinematic": "better", "compliant": "worse"}), ((8, 8), {})],
+)
+def test_the_headline_tells_falls_before_anything_else(fallen: tuple[int, int], verdicts: dict[str, str]) -> None:
+    better = {"slip_per_metre": 0.1}
+    runs = compare_runs(_runs("kinematic", {}, 10, fallen[0]), _runs("compliant", better, 10, fallen[1]))
+    assert sentence(runs).startswith(
+        f"The robot did not walk to the end under kinematic in {fallen[0]} of 10 and under compliant in {fallen[1]} of 10 runs. "
+        "Where both walked, against kinematic control, compliant walks with 90 % less slip"
+    )
+    assert {part.text.split()[0]: part.verdict for part in headline(runs)[:4] if part.verdict} == verdicts
+
+
+@pytest.mark.parametrize("fallen", [(4, 0), (0, 4), (4, 4)])
+def test_the_headline_compares_nothing_where_no_two_walked(fallen: tuple[int, int]) -> None:
+    runs = compare_runs(_runs("kinematic", {}, 4, fallen[0]), _runs("compliant", {"slip_per_metre": 0.1}, 4, fallen[1]))
+    assert "less" not in sentence(runs)
+    assert "changes nothing" not in sentence(runs)
+    assert sentence(runs).endswith("No pair of walks can be compared.")
+
+
+def test_the_headline_tells_what_was_too_short_from_what_is_the_same() -> None:
+    short = comparison(dict.fromkeys(METRICS, math.nan), before=dict.fromkeys(METRICS, math.nan))
+    assert "too short to measure" in sentence(short)
+    assert "none of the main figures, but path_error" in sentence(comparison({"path_error": 9.0}))
 
 
 def test_cards_show_units_that_people_read_and_the_interval() -> None:
@@ -83,3 +113,48 @@ def test_a_page_has_nothing_from_elsewhere_and_forbids_it(call: Call, tmp_path: 
     assert all(link.startswith("plots/") for link in re.findall(r'(?:src|href)="([^"]*)"', markup))
     assert "@import" not in markup
     assert "url(" not in markup
+
+
+def test_a_report_made_again_is_the_same_whatever_columns_the_csv_has(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2", "--set", "outputs.csv=['torso.*']")[0] == 0
+    page = (folder / "report.html").read_bytes()
+    assert (folder / "results.csv").read_text(encoding="utf-8").splitlines()[0].count(",") < 40
+    assert call("report", folder)[0] == 0
+    assert (folder / "report.html").read_bytes() == page
+
+
+def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: Path) -> None:
+    changed = ("--set", "duration=0.2", "--set", "robot=phantomx_mk4", "--set", "friction.mu=0.4")
+    assert call("simulate", "stand", "-o", tmp_path / "out", *changed)[0] == 0
+    title = re.search("<h1>(.*)</h1>", (tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    assert title is not None
+    assert title[1].endswith(", robot=phantomx_mk4, friction.mu=0.4")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("run.json", "[]", "no status"),
+        ("run.json", '{"hello": 1}', "no status"),
+        ("run.json", '{"status": "completed"}', "no title, control"),
+        ("metrics.json", "3", "a table of metrics"),
+        ("scenario.toml", None, "the scenario that was run"),
+        ("results.parquet", "no such thing", "results.parquet"),
+    ],
+)
+def test_a_damaged_folder_is_told_in_a_paragraph_and_left_as_it_is(
+    call: Call, tmp_path: Path, name: str, content: str | None, told: str
+) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2", "--set", "outputs.plots=false")[0] == 0
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_text(content, encoding="utf-8")
+    before = sorted(path.name for path in folder.iterdir())
+    code, out, err = call("report", folder)
+    assert (code, out) == (1, "")
+    assert told in err
+    assert "unexpected" not in err
+    assert len(err.strip().splitlines()) == 1
+    assert sorted(path.name for path in folder.iterdir()) == before

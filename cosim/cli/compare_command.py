@@ -24,6 +24,7 @@ from hexapod_cosim.cosim.cli.running import (
     given_gains,
     run_into,
     show_rows,
+    titled,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, warn
 from hexapod_cosim.cosim.comparison import SEEDS, SEEDS_PARTIAL, Comparison, compare_runs, write_seeds
@@ -71,7 +72,7 @@ def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
     """The scenario; what runs of several seeds differ by is the standard, where it does not say."""
     if not 1 <= seeds <= MAX_SEEDS:
         raise ScenarioError("not a number of runs", got=seeds, expected=f"1 to {MAX_SEEDS}", fix="write --seeds 10", where="--seeds")
-    plan = load_scenario(scenario, overrides=settings)
+    plan = titled(load_scenario(scenario, overrides=settings), settings)
     return replace(plan, variation=STANDARD) if seeds > 1 and plan.variation is None else plan
 
 

@@ -20,12 +20,12 @@ from hexapod_cosim.cosim.cli.running import (
     given_gains,
     run_into,
     show_rows,
+    titled,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
 from hexapod_cosim.cosim.comparison import SEEDS, compare_runs, read_seeds
-from hexapod_cosim.cosim.files import RUN_FILE, read_json
 from hexapod_cosim.cosim.report import REPORT, metric_rows, write_report
-from hexapod_cosim.cosim.results import SCENARIO, read_result, results_folder, stored
+from hexapod_cosim.cosim.results import read_facts, read_result, read_scenario, results_folder, stored
 from hexapod_cosim.cosim.run import Result
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
@@ -42,6 +42,7 @@ def simulate(
 ) -> None:  # fmt: skip
     """Run one co-simulation: results, metrics, plots."""
     plan = load_scenario(scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])])
+    plan = titled(plan, settings or [])
     ready = given_gains(gains)
     with results_folder(output or default_folder(scenario)) as folder:
         command = command_line("simulate", scenario, control=control, settings=settings, fmu=fmu, gains=gains)
@@ -60,12 +61,13 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by `hexapod simulate` or `compare`.")], json: Json = False
 ) -> None:
     """Make the plots and the report of a run or a comparison again."""
-    facts = read_json(folder / RUN_FILE)
+    facts = read_facts(folder)
     if facts.get("kind") == "compare":
         runs = {control: read_result(folder / control) for control in CONTROLS}
         comparison = compare_runs(*(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS))
-        text = (folder / SCENARIO).read_text(encoding="utf-8")
-        files = write_report(runs, folder, tell=warn, comparison=comparison, scenario=text, command=facts.get("command", ""))
+        files = write_report(
+            runs, folder, tell=warn, comparison=comparison, scenario=read_scenario(folder), command=facts.get("command", "")
+        )
     else:
         run = read_result(folder)
         files = write_report({run.facts["control"]: run}, folder, tell=warn)

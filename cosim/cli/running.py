@@ -42,6 +42,9 @@ GainsFile = Annotated[
 ]
 
 
+UNTITLED = ("control=", "seed=", "outputs.", "duration=")  # settings that make no other walk
+
+
 class RunError(HexapodError):
     """A run that started and did not complete."""
 
@@ -54,6 +57,14 @@ def command_line(
     given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
     options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
     return shlex.join(["hexapod", name, scenario, *(word for option in options for word in option)])
+
+
+def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
+    """The scenario with a title that tells what was set, so that no report of another walk bears the plain one's name."""
+    if any(text.startswith("title") for text in settings):
+        return plan
+    told = [text.replace(" ", "") for text in settings if not text.startswith(UNTITLED)]
+    return replace(plan, title=f"{plan.title}, {', '.join(told)}") if told else plan
 
 
 def run_into(

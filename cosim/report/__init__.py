@@ -68,8 +68,11 @@ def write_report(
     missing = [f"{FIGURES[name].title} is not drawn: {reason}" for name, reason in skipped.items()]
     for text in missing:
         tell(text)
+    for name in skipped:  # of an earlier report
+        for kind in ("png", "svg"):
+            (folder / PLOTS / f"{name}.{kind}").unlink(missing_ok=True)
     first = next(iter(runs.values()))
-    content = _one_run(first) if comparison is None else _comparison(comparison)
+    content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     page = render(
         "report.html.jinja",
         title=first.facts["title"],
@@ -102,9 +105,10 @@ def _one_run(run: Stored) -> dict[str, Any]:
     }
 
 
-def _comparison(comparison: Comparison) -> dict[str, Any]:
+def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, Any]:
     rows, notes = comparison_rows(comparison), about(comparison)
-    lead = notes.replace(" of the mean change.", " in brackets.") or "One run of each control."
+    means = notes.replace(" of the mean change.", " in brackets.") or "One run of each control."
+    lead = f"Robot {facts['robot']['name']}. {means}"
     return {"headline": headline(comparison), "cards": cards(comparison), "rows": rows, "about": notes, "losses": comparison.losses,
             "lead": lead}  # fmt: skip
 
@@ -123,6 +127,7 @@ def _told(facts: Mapping[str, Any]) -> str:
 
 
 def _walked(facts: Mapping[str, Any]) -> str:
+    """How long and how fast; without a speed when too short a time to tell."""
     speed = (facts.get("walk") or {}).get("mean_speed")
     return f"{facts['simulated']:.6g} s" + (f" at {1e3 * speed:.3g} mm/s" if speed is not None and math.isfinite(speed) else "")
 
@@ -180,9 +185,13 @@ def number(value: float | None, *, dust: float = 0.0) -> str:
 def _change(change: Change) -> str:
     """Relative, where the first value stands clear of the floor; of a single pair, if it means anything."""
     told = math.isfinite(change.relative) and (change.pairs > 1 or change.verdict != SAME)
-    return f"{change.relative:+.1%}" if told else ""
+    return _share(change.relative) if told else ""
 
 
 def _interval(change: Change) -> str:
     low, high = change.interval
-    return f"{low:+.1%} .. {high:+.1%}" if math.isfinite(low) else ""
+    return f"{_share(low).removesuffix(' %')} to {_share(high)}" if math.isfinite(low) else ""
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:+.1f} %"

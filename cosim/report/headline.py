@@ -43,16 +43,42 @@ class Card:
 
 
 def headline(comparison: Comparison) -> list[Part]:
-    """What the second control gains and what it costs, as far as the runs are sure of it."""
+    """Who did not walk to the end; then what the second control gains and what it costs, as far as the runs are sure of it."""
     first, second = comparison.labels
+    falls = _falls(comparison)
+    if falls and not any(a.walked and b.walked for a, b in zip(comparison.first, comparison.second, strict=True)):
+        return [*falls, Part(". No pair of walks can be compared.")]
+    begin = f"Where both walked, against {first} control, {second}" if falls else f"Against {first} control, {second}"
+    stop = [*falls, Part(". ")] if falls else []
     gains, losses = _of(comparison, BETTER), _of(comparison, WORSE)
-    begin = f"Against {first} control, {second}"
     if not gains and not losses:
-        return [Part(f"{begin} control changes nothing that these runs could tell.")]
-    parts = [Part(begin), Part(" walks with " if gains else " brings "), *_listed(gains[:MOST_GAINS] or losses)]
+        return [*stop, Part(_nothing(comparison, begin))]
+    parts = [*stop, Part(begin), Part(" walks with " if gains else " brings "), *_listed(gains[:MOST_GAINS] or losses)]
     if gains and losses:
         parts += [Part(", and costs "), *_listed(losses)]
     return [*parts, Part(".")]
+
+
+def _falls(comparison: Comparison) -> list[Part]:
+    """How many of whose runs did not come to their end with the robot on its feet; nothing when all did."""
+    count, walked = len(comparison.seeds), comparison.walked
+    lost = {label: count - number for label, number in walked.items()}
+    if not any(lost.values()):
+        return []
+    first, second = comparison.labels
+    verdicts = ("", "") if lost[first] == lost[second] else (WORSE, BETTER) if lost[first] > lost[second] else (BETTER, WORSE)
+    told = [Part(f"{label} in {lost[label]} of {count}", verdict) for label, verdict in zip(comparison.labels, verdicts, strict=True)]
+    return [Part("The robot did not walk to the end under "), told[0], Part(" and under "), told[1], Part(" runs")]
+
+
+def _nothing(comparison: Comparison, begin: str) -> str:
+    """Where no main figure differs: that there is none, that others do, or that none does."""
+    if not any(comparison.changes[name].pairs for name in TOLD):
+        return "The walk was too short to measure: figures are of whole gait cycles after the first two."
+    others = [name for name, change in comparison.changes.items() if change.verdict in {BETTER, WORSE}]
+    if others:
+        return f"{begin} control changes none of the main figures, but {', '.join(others)}."
+    return f"{begin} control changes nothing that these runs could tell."
 
 
 def _of(comparison: Comparison, verdict: str) -> list[Part]:
@@ -66,7 +92,9 @@ def _of(comparison: Comparison, verdict: str) -> list[Part]:
 
 def _less_or_more(what: str, change: Change) -> str:
     share = abs(change.relative)
-    size = f"{1.0 + share:.1f} times the" if change.relative >= 1.0 else f"{share:.0%} {'less' if change.relative < 0.0 else 'more'}"
+    size = (
+        f"{1.0 + share:.1f} times the" if change.relative >= 1.0 else f"{100.0 * share:.0f} % {'less' if change.relative < 0.0 else 'more'}"
+    )
     return f"{size} {what}"
 
 
