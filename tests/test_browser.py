@@ -12,6 +12,7 @@ import pytest
 from browser import FLAGS, FULL, Launcher, Opened, find_chromium, launcher
 
 from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.metrics import robot_weight
 from hexapod_cosim.cosim.results import read_result
 from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
@@ -19,6 +20,9 @@ from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
 DURATION = 60.0 if FULL else 3.0  # s
 LARGEST = 8e6  # bytes of a report of a minute's walk
 PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/65535 of their ranges
+PACKED_FORCE = 1e-3  # body weights    forces in steps of 1/65535 of their ranges, the hardest landing's included
+LEAST_FORCE = 0.01  # body weights that have an arrow
+TICK = 1e-6  # s    of the packed times
 PLOTS = 6 + 7 + 4 + 3 + 4 + 2  # forces, slip, height and attitude, torques, energies, footfall
 SMALLEST_TEXT = 11  # px
 BRIGHT, DIM = 200, 60  # of 255
@@ -82,6 +86,48 @@ def test_the_robots_move(report: Opened) -> None:
         places.append(report.value("['kinematic', 'compliant'].map(label => window.hexapod.feet(label))"))
     assert pictures[0] != pictures[1]
     assert np.abs(np.subtract(places[1], places[0])).max(axis=(1, 2)).min() > 0.005  # m    both of them
+
+
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_arrows_and_lights_tell_what_the_recording_does(report: Opened, folder: Path, control: str) -> None:
+    recording = read_result(folder / control).view.recording
+    forces = recording.foot_vectors("force") / robot_weight(read_result(folder / control).view.parameters)
+    arrows, lights = set(), set()
+    for row in range(0, len(recording.time) - 1, len(recording.time) // 7):
+        share = 0.25  # of the way to the next row, so that rounding does not choose the row
+        report.seek(float((1.0 - share) * recording.time[row] + share * recording.time[row + 1]))
+        shown = report.value(f"window.hexapod.shown('{control}')")
+        assert shown["lit"] == [flag > 0.5 for flag in recording.feet("contact")[row]]
+        for arrow, force in zip(shown["arrows"], (1.0 - share) * forces[row] + share * forces[row + 1], strict=True):
+            if arrow or np.linalg.norm(force) > LEAST_FORCE + PACKED_FORCE:
+                np.testing.assert_allclose(arrow, force, atol=PACKED_FORCE)
+            arrows.add(bool(arrow))
+        lights |= set(shown["lit"])
+    assert arrows == lights == {True, False}  # stepping feet are among them, and standing ones
+
+
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_trails_grow_with_time(report: Opened, control: str) -> None:
+    before = {"prints": 0, "pieces": 0}
+    for time in (0.1, 0.8, 1.5, 2.9):
+        report.seek(time)
+        trails = report.value(f"window.hexapod.shown('{control}').trails")
+        assert trails["latest"] <= time + TICK
+        assert all(trails[kind] >= before[kind] for kind in before)
+        before = {kind: trails[kind] for kind in before}
+    first = report.value("(clock.seek(0.1), window.hexapod.shown('kinematic').trails)")
+    assert before["prints"] > 6  # more than the six of standing there
+    assert report.value("(clock.seek(2.9), window.hexapod.shown('kinematic').trails.pieces)") > first["pieces"]
+
+
+@pytest.mark.parametrize("time", [0.3, 1.5])
+def test_a_report_that_opens_standing_shows_nothing_of_what_is_still_to_come(folder: Path, browser: Any, time: float) -> None:
+    page = Opened(browser, folder / "report.html", address=f"#t={time}")
+    for control in ("kinematic", "compliant"):
+        trails = page.value(f"window.hexapod.shown('{control}').trails")
+        assert trails["prints"] >= 3  # those of the feet that stand
+        assert trails["latest"] <= time + TICK
+    page.close()
 
 
 def test_both_views_show_a_robot(report: Opened) -> None:

@@ -6,7 +6,7 @@ import type { Recording } from "./recording";
 import { RobotModel } from "./robot";
 import type { Stance } from "./stances";
 import type { Colours } from "./theme";
-import { Trails } from "./trails";
+import { type Shown, Trails } from "./trails";
 import type { PackedRun } from "./types";
 
 const LAMP = new Vector3(0.9, 1.3, 2.6); // m    from the robot
@@ -72,6 +72,11 @@ export class Actor {
 
   poseAt(time: number): Pose {
     return poseAt(this.recording, this.run.robot, time);
+  }
+
+  /** What is to be seen now: trails, lit feet, forces [body weights] that arrows show. */
+  shown(): { trails: Shown; lit: boolean[]; arrows: number[][] } {
+    return { trails: this.trails?.shown() ?? { prints: 0, pieces: 0, latest: null }, lit: this.model.lit(), arrows: this.arrows.shown() };
   }
 
   private touching(time: number): boolean[] {

@@ -26,6 +26,17 @@ export class ForceArrows extends Group {
     this.material.color.copy(colour);
   }
 
+  /** The force that each arrow shows [body weights]; none: no arrow. */
+  shown(): number[][] {
+    return this.arrows.map(({ shaft }) => {
+      if (!shaft.visible) return [];
+      return UP.clone()
+        .applyQuaternion(shaft.quaternion)
+        .multiplyScalar(shaft.scale.y / LENGTH)
+        .toArray();
+    });
+  }
+
   /** Forces in body weights, at points on the ground. */
   show(points: readonly Vector3[], forces: readonly Vector3[]): void {
     this.arrows.forEach(({ shaft, head }, k) => {

@@ -20,6 +20,9 @@ import type { Payload } from "./types";
 const LONGEST_FRAME = 0.1; // s    a tab that slept does not leap
 const SHOWN_CYCLES = 3;
 
+/** What whoever asks on the console, or a test, finds as `hexapod`. */
+const offered: Record<string, unknown> = {};
+
 /** Text and tables first, then plots, then the replay, which has to wait for the graphics driver. */
 async function start(): Promise<void> {
   await painted();
@@ -38,7 +41,8 @@ async function start(): Promise<void> {
   theme.listen(() => {
     for (const panel of panels) panel.repaint();
   });
-  Object.assign(window, { hexapod: { clock, feet: (label: string) => feetOf(runs, label, clock) } });
+  Object.assign(offered, { clock, feet: (label: string) => feetOf(runs, label, clock) });
+  Object.assign(window, { hexapod: offered });
   document.documentElement.dataset.opened = "true";
   await painted();
   await raiseCurtain(runs, clock, theme, transport);
@@ -53,12 +57,13 @@ async function raiseCurtain(runs: readonly Run[], clock: Clock, theme: Theme, tr
       stage.paint(readColours());
       stage.show(clock.time);
     };
-    repaint();
     theme.listen(repaint);
     await addTrails(stage);
-    await stage.prepare();
+    repaint(); // with the trails: they are made whole, showing a time cuts off what is still to come
     clock.listen(() => stage.show(clock.time));
+    await stage.prepare();
     transport.attach(stage);
+    offered.shown = (label: string) => stage.actors.find(({ run }) => run.label === label)?.shown();
   }
   begin(clock);
   runForever(clock, stage);

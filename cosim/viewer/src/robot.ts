@@ -43,6 +43,11 @@ export class RobotModel extends Group {
     });
   }
 
+  /** Which feet are lit. */
+  lit(): boolean[] {
+    return this.feet.map(({ material }) => material.emissive.getHex() !== 0);
+  }
+
   private makeTorso(mark: Color): void {
     const [length, width, height] = this.robot.torso.size;
     const corner = 0.22 * Math.min(length, width, height);

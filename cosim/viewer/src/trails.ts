@@ -33,6 +33,13 @@ export function enlargement(stances: readonly Stance[]): number {
   return ENLARGED.filter((times) => times * long <= WISHED).pop() ?? 1;
 }
 
+/** How many footprints and pieces of trails are drawn, and when the latest of them came about [s]. */
+export interface Shown {
+  readonly prints: number;
+  readonly pieces: number;
+  readonly latest: number | null;
+}
+
 /** Footprints where feet touched down, and from there the way they slipped under load, yellow to red by how far. */
 export class Trails extends Group {
   private readonly prints: InstancedMesh;
@@ -60,6 +67,14 @@ export class Trails extends Group {
     const { row } = this.recording.place(time);
     this.prints.count = countUpTo(this.printRows, row);
     this.ribbon.geometry.setDrawRange(0, 6 * countUpTo(this.pieceRows, row));
+  }
+
+  /** What is drawn, as the graphics card is told it. */
+  shown(): Shown {
+    const [prints, pieces] = [this.prints.count, this.ribbon.geometry.drawRange.count / 6];
+    const rows = [...this.printRows.slice(0, prints), ...this.pieceRows.slice(0, pieces)];
+    const latest = rows.length > 0 ? this.recording.time[Math.max(...rows)] : null;
+    return { prints: Math.min(prints, this.printRows.length), pieces: Math.min(pieces, this.pieceRows.length), latest };
   }
 
   paint(print: Color): void {
