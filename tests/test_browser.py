@@ -25,6 +25,7 @@ LEAST_FORCE = 0.01  # body weights that have an arrow
 TICK = 1e-6  # s    of the packed times
 PLOTS = 6 + 7 + 4 + 3 + 4 + 2  # forces, slip, height and attitude, torques, energies, footfall
 SMALLEST_TEXT = 11  # px
+TALLEST_BAR = 90  # px    on a phone
 BRIGHT, DIM = 200, 60  # of 255
 
 
@@ -258,6 +259,10 @@ def test_a_phone_shows_all_of_it_in_the_systems_theme(folder: Path, browser: Any
     )
     assert min(phone.value(sizes)) >= SMALLEST_TEXT
     assert phone.value("getComputedStyle(document.body).colorScheme") == "dark"
+    ends = "[...document.querySelectorAll('tbody td.number')].map(e => e.getBoundingClientRect().right)"
+    assert max(phone.value(ends)) <= 360  # both values, the change and its mark without scrolling sideways
+    assert phone.value("document.querySelector('.bar').offsetHeight") <= TALLEST_BAR
+    assert phone.errors == []
     phone.close()
 
 

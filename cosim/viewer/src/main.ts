@@ -7,7 +7,7 @@ import { listenToKeys } from "./keyboard";
 import { footCentres, poseAt } from "./kinematics";
 import { drawPath } from "./overhead";
 import type { Panel } from "./panel";
-import { panelMakers, type Run } from "./panels";
+import { labelTimes, panelMakers, type Run } from "./panels";
 import { unpack } from "./recording";
 import { Span } from "./span";
 import { Stage } from "./stage";
@@ -138,6 +138,7 @@ async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> 
     await rest();
     panels.push(make());
   }
+  labelTimes();
   drawPath(runs, clock);
   clock.listen(() => cycles.follow(clock.time));
   return panels;

@@ -1,5 +1,6 @@
 import type { Clock } from "./clock";
 import { element } from "./dom";
+import { tick } from "./panel";
 import { hostOf, type Run } from "./panels";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -31,7 +32,9 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
   for (const way of [...planned, ...ways]) drawing.append(svg("polyline", { class: `way ${way.label}`, points: pointsOf(way, frame) }));
   const dots = ways.map((way) => svg("circle", { class: `dot ${way.label}`, r: "7" }));
   drawing.append(...dots);
-  host.append(drawing, element("p", "note", frame.note));
+  const map = element("div", "map");
+  map.append(drawing, ...axes(drawing, frame));
+  host.append(map, element("p", "across", "x [m]"), element("p", "note", `y [mm] upwards. ${frame.note}`));
   const show = () => {
     ways.forEach((way, k) => {
       const row = nearestRow(way.time, clock.time);
@@ -44,7 +47,41 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
   drawing.addEventListener("pointerdown", (event) => clock.seek(timeNear(ways, frame, inside(drawing, event))));
 }
 
+/** Lines and values of both axes; the values beside the drawing, so that they stay as large as text is. */
+function axes(drawing: SVGElement, frame: Frame): HTMLElement[] {
+  const label = (text: string, name: string, place: string, share: number) => {
+    const made = element("span", name, text);
+    made.style.setProperty(place, `${100 * share}%`);
+    return made;
+  };
+  const line = (x1: number, y1: number, x2: number, y2: number) =>
+    drawing.prepend(svg("line", { class: "mesh", x1: String(x1), y1: String(y1), x2: String(x2), y2: String(y2) }));
+  const [stepX, stepY] = [stepOf(frame.ends[0], 6), stepOf(frame.ends[1].map((y) => 1e3 * y) as [number, number], 4)];
+  const across = multiples(frame.ends[0], stepX).map((x) => {
+    line(frame.across(x), 0, frame.across(x), HEIGHT);
+    return label(tick(x, stepX), "along", "left", frame.across(x) / WIDTH);
+  });
+  const upwards = multiples(frame.ends[1].map((y) => 1e3 * y) as [number, number], stepY).map((y) => {
+    line(0, frame.up(1e-3 * y), WIDTH, frame.up(1e-3 * y));
+    return label(tick(y, stepY), "beside", "top", frame.up(1e-3 * y) / HEIGHT);
+  });
+  return [...across, ...upwards];
+}
+
+/** 1, 2 or 5 times a power of ten, so that about as many steps as wished fit. */
+function stepOf([low, high]: readonly [number, number], wished: number): number {
+  const power = 10 ** Math.floor(Math.log10((high - low) / wished));
+  return power * ([1, 2, 5].find((times) => (high - low) / (times * power) <= wished) ?? 10);
+}
+
+function multiples([low, high]: readonly [number, number], step: number): number[] {
+  const first = Math.ceil(low / step);
+  return Array.from({ length: Math.max(Math.floor(high / step) - first + 1, 0) }, (_, k) => (first + k) * step);
+}
+
 interface Frame {
+  /** What the drawing holds of x and of y [m]. */
+  readonly ends: readonly [readonly [number, number], readonly [number, number]];
   across(x: number): number;
   up(y: number): number;
   readonly note: string;
@@ -68,7 +105,9 @@ function frameOf(ways: readonly Way[], planned: Way | undefined): Frame {
   const note = bends
     ? `To scale, ${size}.`
     : `${size}, ${(1e3 * Math.max(high - low, LEAST)).toPrecision(2)} mm from top to bottom: sideways drawn ${Math.round(scales[1] / scales[0])} times larger.`;
-  return { across: (x) => 0.5 * WIDTH + scales[0] * (x - middle), up: (y) => 0.5 * HEIGHT - scales[1] * (y - level), note };
+  const half = [(0.5 * WIDTH) / scales[0], (0.5 * HEIGHT) / scales[1]];
+  const ends = [[middle - half[0], middle + half[0]] as const, [level - half[1], level + half[1]] as const] as const;
+  return { ends, across: (x) => 0.5 * WIDTH + scales[0] * (x - middle), up: (y) => 0.5 * HEIGHT - scales[1] * (y - level), note };
 }
 
 function limits(columns: readonly Float32Array[]): [number, number] {

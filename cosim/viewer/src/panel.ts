@@ -4,6 +4,8 @@ import { element } from "./dom";
 import type { Span } from "./span";
 import { property } from "./theme";
 
+const LEAST = 1e-4; // of a curve's size: less of a range is a constant's round-off
+
 export interface Curve {
   readonly label: string;
   /** Custom property of the page that holds the colour. */
@@ -21,6 +23,8 @@ export interface PanelOptions {
   readonly height: number;
   readonly curves: readonly Curve[];
   readonly host: HTMLElement;
+  /** Least and largest value that it shares with other plots. */
+  readonly limits?: readonly [number, number] | undefined;
   readonly more?: Partial<uPlot.Options>;
 }
 
@@ -71,10 +75,13 @@ export class Panel {
       legend: { show: false },
       cursor: { show: false },
       padding: [6, 8, 0, 0],
-      scales: { x: { time: false, min, max }, y: { range: roomy } },
+      scales: {
+        x: { time: false, min, max },
+        y: { range: (_, low, high) => roomy(...(this.options.limits ?? ([low ?? 0, high ?? 1] as const))) },
+      },
       axes: [
         { ...quiet, size: 22, gap: 3, space: 60 },
-        { ...quiet, size: 46, gap: 4, space: 26 },
+        { ...quiet, size: 46, gap: 4, space: 26, values: (_, splits, __, ___, step) => splits.map((value) => tick(value, step)) },
       ],
       series: [{}, ...this.options.curves.map(seriesOf)],
       ...this.options.more,
@@ -167,10 +174,17 @@ function sameTimes(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
 }
 
 /** Limits with air above and below; a constant gets a range to lie in. */
-function roomy(_: uPlot, low: number | null, high: number | null): uPlot.Range.MinMax {
-  const [from, to] = [low ?? 0, high ?? 1];
-  const air = Math.max(0.07 * (to - from), 1e-6, 1e-4 * Math.abs(to));
+function roomy(from: number, to: number): uPlot.Range.MinMax {
+  const size = Math.max(Math.abs(from), Math.abs(to));
+  const air = to - from > LEAST * size ? Math.max(0.07 * (to - from), 0.5 * LEAST) : Math.max(0.1 * size, 0.5);
   return [from >= 0 && from < 0.3 * (to - from) ? 0 : from - air, to + air];
+}
+
+/** A value of an axis whose values are a step apart: as many digits as the step needs. */
+export function tick(value: number, step: number): string {
+  const digits = [0, 1, 2, 3, 4, 5, 6].find((count) => Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) < 1e-6) ?? 6;
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? (0).toFixed(digits) : text).replace("-", "−");
 }
 
 /** A value for people. */

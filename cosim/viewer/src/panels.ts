@@ -1,4 +1,5 @@
 import type { Clock } from "./clock";
+import { element } from "./dom";
 import { footfallPanel } from "./footfall";
 import { type Curve, Panel, type PanelOptions } from "./panel";
 import type { Recording } from "./recording";
@@ -16,6 +17,7 @@ interface Wanted {
   readonly column: string;
   readonly whole?: boolean;
   readonly height?: number;
+  readonly limits?: readonly [number, number] | undefined;
 }
 
 export interface Spans {
@@ -24,23 +26,31 @@ export interface Spans {
 }
 
 const DASH = [6, 3];
+const SIDES: Record<string, string> = { L: "left", R: "right" };
+const ENDS: Record<string, string> = { F: "front", M: "middle", R: "rear" };
 const BOOKS = [
-  ["actuator_work", "work of motors", "--c1"],
-  ["dissipated", "dissipated", "--c2"],
-  ["potential", "potential", "--c3"],
-  ["kinetic", "kinetic", "--c4"],
-  ["push_work", "work of pushes", "--c5"],
+  ["actuator_work", "work of motors", "--c1", []],
+  ["dissipated", "dissipated", "--c2", [9, 3]],
+  ["potential", "potential", "--c3", [2, 2]],
+  ["kinetic", "kinetic", "--c4", [9, 3, 2, 3]],
+  ["push_work", "work of pushes", "--c5", [5, 5]],
 ] as const;
 
 /** How to make each plot of the page, by the section it belongs to; those whose columns were not recorded are left out. */
 export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (() => Panel)[] {
   const { robot } = runs[0].run;
   const legs = robot.legs.map(({ name }) => name);
+  const [loads, slips] = ["load", "slip"].map((kind) =>
+    limitsOf(
+      runs,
+      legs.map((leg) => `${leg}.${kind}`),
+    ),
+  );
   const compared: Record<string, Wanted[]> = {
-    foot_forces: legs.map((leg) => ({ title: leg, unit: "BW", column: `${leg}.load` })),
+    foot_forces: legs.map((leg) => ({ title: nameOf(leg), unit: "BW", column: `${leg}.load`, limits: loads })),
     slip: [
       { title: "slipped way, all feet", unit: "mm", column: "slip.way", whole: true, height: 150 },
-      ...legs.map((leg) => ({ title: leg, unit: "mm/s", column: `${leg}.slip` })),
+      ...legs.map((leg) => ({ title: nameOf(leg), unit: "mm/s", column: `${leg}.slip`, limits: slips })),
     ],
     posture: [
       { title: "height", unit: "mm", column: "height" },
@@ -60,7 +70,7 @@ function comparedPanel(section: string, item: Wanted, runs: readonly Run[], cloc
   const host = hostOf(section);
   const curves = runs.filter(({ recording }) => recording.has(item.column)).map((run) => curveOf(run, item.column));
   if (!host || curves.length === 0) return [];
-  const options: PanelOptions = { title: item.title, unit: item.unit, height: item.height ?? 130, curves, host };
+  const options: PanelOptions = { title: item.title, unit: item.unit, height: item.height ?? 130, curves, host, limits: item.limits };
   return [() => new Panel(options, clock, span)];
 }
 
@@ -68,7 +78,10 @@ function energyPanels({ run, recording }: Run, clock: Clock, span: Span): (() =>
   const host = hostOf("energy");
   const books = BOOKS.filter(([name]) => recording.has(`energy.${name}`) && moves(recording.column(`energy.${name}`)));
   if (!host || books.length === 0) return [];
-  const curves = books.map(([name, label, colour]) => columnCurve(recording, `energy.${name}`, label, colour));
+  const curves = books.map(([name, label, colour, dash]) => ({
+    ...columnCurve(recording, `energy.${name}`, label, colour),
+    ...(dash.length > 0 ? { dash } : {}),
+  }));
   const residual = [columnCurve(recording, "energy.residual", "residual", "--ink")];
   return [
     () => new Panel({ title: run.label, unit: "J", height: 190, curves, host }, clock, span),
@@ -83,6 +96,30 @@ function curveOf({ run, recording }: Run, column: string): Curve {
 
 function columnCurve(recording: Recording, column: string, label: string, colour: string): Curve {
   return { label, colour, time: recording.time, values: recording.column(column), at: (time) => recording.value(column, time) };
+}
+
+/** Least and largest value of the columns that there are. */
+function limitsOf(runs: readonly Run[], names: readonly string[]): [number, number] | undefined {
+  let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
+  for (const { recording } of runs) {
+    for (const name of names.filter((one) => recording.has(one))) {
+      for (const value of recording.column(name)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    }
+  }
+  return low <= high ? [low, high] : undefined;
+}
+
+/** A leg's short name and what it stands for. */
+function nameOf(leg: string): string {
+  const [side, end] = [SIDES[leg[0]], ENDS[leg[1]]];
+  return leg.length === 2 && side && end ? `${leg} ${side} ${end}` : leg;
+}
+
+/** Says once under each group of plots what lies across. */
+export function labelTimes(): void {
+  for (const host of document.querySelectorAll<HTMLElement>("[data-panels]")) {
+    if (host.querySelector(".playhead")) host.append(element("p", "across", "time [s]"));
+  }
 }
 
 function moves(values: Float32Array): boolean {
