@@ -149,7 +149,7 @@ def test_what_has_no_effect_is_told(call: Call, tmp_path: Path) -> None:
 
 def test_report_skips_figures_whose_columns_were_not_kept(call: Call, tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, *QUICK, "--set", "outputs.csv=['torso.*']")[0] == 0
+    assert call("simulate", "stand", "-o", folder, *QUICK, "--set", "outputs.csv=['torso.*']", "--set", "outputs.formats=['csv']")[0] == 0
     code, _, err = call("report", folder)
     assert code == 0
     assert "Slip is not drawn: " in err

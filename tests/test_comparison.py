@@ -130,14 +130,14 @@ def test_a_single_seed_has_changes_and_no_intervals() -> None:
     rows = comparison_rows(compare_runs(runs("kinematic", [0.3]), runs("compliant", [0.1])))
     assert [row["name"] for row in rows] == list(METRICS)
     slip = row_of(rows, "slip_per_metre")
-    assert (slip["change"], slip["interval"], slip["verdict"]) == ("-66.7%", "", BETTER)
+    assert (slip["change"], slip["interval"], slip["verdict"]) == ("-66.7 %", "", BETTER)
     assert row_of(rows, "yaw_drift")["change"] == ""
 
 
 def test_several_seeds_show_the_interval() -> None:
     rows = comparison_rows(compare_runs(runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.5])))
     slip = row_of(rows, "slip_per_metre")
-    assert (slip["change"], slip["interval"]) == ("-50.0%", "-50.0% .. -50.0%")
+    assert (slip["change"], slip["interval"]) == ("-50.0 %", "-50.0 to -50.0 %")
 
 
 def test_runs_of_other_seeds_are_not_compared() -> None:
