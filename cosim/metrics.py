@@ -134,7 +134,7 @@ def _held_integral(time: Array, rate: Array) -> Array:
 
 def _slip(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
     part = walk.recording
-    loaded = part.feet("normal_force") > CONTACT_SHARE * walk.weight
+    loaded = bearing_load(part, parameters)
     slips = {"slip_per_metre": part.feet("slip_speed"), "slip_net_per_metre": _net_slip(part, parameters, loaded)}
     return {name: _integral(part.time, np.where(loaded, value, 0.0)) / walk.distance for name, value in slips.items()}
 
@@ -148,6 +148,23 @@ def _net_slip(part: Recording, parameters: Mapping[str, float], loaded: NDArray[
     share = np.divide(part.feet("tangential_force"), mu * normal, out=np.zeros_like(normal), where=loaded & (mu > 0.0))
     creep = np.arctanh(np.minimum(share, TANH_LIMIT)) / parameters["friction.slope"]
     return np.maximum(speed - creep, 0.0)
+
+
+def bearing_load(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.bool_]:
+    """(rows, 6) whether a foot bears more than CONTACT_SHARE of the robot's weight: only then can it slip."""
+    return np.asarray(recording.feet("normal_force") > CONTACT_SHARE * robot_weight(parameters))
+
+
+def slip_under_load(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows, 6) speed along the ground [m/s], 0 of a foot that bears no load."""
+    return np.where(bearing_load(recording, parameters), recording.feet("slip_speed"), 0.0)
+
+
+def running_integral(time: Array, values: Array) -> Array:
+    """Of values (rows, ...) over time, 0 at the first row; the trapezoidal rule."""
+    steps = 0.5 * (values[1:] + values[:-1])
+    width = np.diff(time).reshape(-1, *(1 for _ in values.shape[1:]))
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps * width, axis=0)])
 
 
 def _integral(time: Array, values: Array) -> float:

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.files import atomic_path
-from hexapod_cosim.cosim.metrics import CONTACT_SHARE, Array, View, body_height, commanded_path, robot_weight
+from hexapod_cosim.cosim.metrics import Array, View, body_height, commanded_path, robot_weight, running_integral, slip_under_load
 from hexapod_cosim.cosim.recorder import ColumnError
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
@@ -54,23 +54,17 @@ def slip(views: Views) -> Figure:
     top = figure.add_subplot(grid[0, :])
     axes = np.ravel(grid[1:, :].subgridspec(2, 3).subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
     for label, view in views.items():
-        time, speed = view.recording.time, _loaded_slip(view)
-        way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]).sum(axis=1) * np.diff(time))])
-        top.plot(time, 1e3 * way, label=label, **STYLES[label])
-        end = view.last_cycles()
+        time, speed = view.recording.time, slip_under_load(view.recording, view.parameters)
+        top.plot(time, 1e3 * running_integral(time, speed.sum(axis=1)), label=label, **STYLES[label])
+        last = slice(-len(view.last_cycles().recording.time), None)
         for leg, axis in enumerate(axes):
-            axis.plot(end.recording.time, 1e3 * _loaded_slip(end)[:, leg], **STYLES[label])
+            axis.plot(time[last], 1e3 * speed[last, leg], **STYLES[label])
             axis.set_title(leg_title(leg))
     top.set_xlabel("time [s]")
     top.set_ylabel("slipped way [mm]")
     _label(axes[3:], "time [s]", axes[::3], "slip speed [mm/s]")
     _legend(figure, top)
     return figure
-
-
-def _loaded_slip(view: View) -> Array:
-    loaded = view.recording.feet("normal_force") > CONTACT_SHARE * robot_weight(view.parameters)
-    return np.where(loaded, view.recording.feet("slip_speed"), 0.0)
 
 
 def posture(views: Views) -> Figure:
@@ -233,7 +227,9 @@ FIGURES: dict[str, Drawing] = {
 
 
 def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]]:
-    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that lacks its columns is not drawn."""
+    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that lacks its columns is not drawn; one
+    of that name from an earlier report is taken away.
+    """
     folder.mkdir(exist_ok=True)
     saved: list[Path] = []
     skipped: dict[str, str] = {}
@@ -243,6 +239,8 @@ def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]
                 figure = item.draw(views)
             except ColumnError as error:
                 skipped[name] = f"{error.got} was not recorded"
+                for kind in UNDATED:
+                    (folder / f"{name}.{kind}").unlink(missing_ok=True)
                 continue
             for kind, metadata in UNDATED.items():
                 saved.append(folder / f"{name}.{kind}")

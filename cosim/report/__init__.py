@@ -68,9 +68,6 @@ def write_report(
     missing = [f"{FIGURES[name].title} is not drawn: {reason}" for name, reason in skipped.items()]
     for text in missing:
         tell(text)
-    for name in skipped:  # of an earlier report
-        for kind in ("png", "svg"):
-            (folder / PLOTS / f"{name}.{kind}").unlink(missing_ok=True)
     first = next(iter(runs.values()))
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     page = render(
@@ -81,7 +78,7 @@ def write_report(
         told={label: _told(run.facts) for label, run in runs.items()},
         walked={label: _walked(run.facts) for label, run in runs.items()},
         warnings=[f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]] + content.pop("losses"),
-        sections=[section._asdict() | {"drawn": section.name not in skipped} for section in SECTIONS if section.name not in skipped],
+        sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
         scenario=first.scenario if scenario is None else scenario,
         command=first.facts.get("command", "") if command is None else command,

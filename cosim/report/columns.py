@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.metrics import CONTACT_SHARE, View, body_height, commanded_path, robot_weight
+from hexapod_cosim.cosim.metrics import View, bearing_load, body_height, commanded_path, robot_weight, running_integral, slip_under_load
 from hexapod_cosim.cosim.recorder import ColumnError
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
@@ -101,8 +101,9 @@ def _swings(view: View) -> Iterator[tuple[str, Array]]:
 def _slipped(view: View) -> Iterator[tuple[str, Array]]:
     """Way [m] that each foot has slipped since the start, world x and y: what its velocity under load sums up to."""
     time = view.recording.time
-    velocity = np.where(_loaded(view)[:, :, None], view.recording.foot_vectors("velocity"), 0.0)[:, :, :2]
-    way = _running_integral(time, velocity.reshape(len(time), -1))
+    loaded = bearing_load(view.recording, view.parameters)
+    velocity = np.where(loaded[:, :, None], view.recording.foot_vectors("velocity"), 0.0)[:, :, :2]
+    way = running_integral(time, velocity.reshape(len(time), -1))
     yield from _split([f"{leg}.slipped.{axis}" for leg in LEG_NAMES for axis in "xy"], way)
 
 
@@ -117,9 +118,9 @@ def _normal_forces(view: View) -> Iterator[tuple[str, Array]]:
 
 def _slip(view: View) -> Iterator[tuple[str, Array]]:
     """Speed of loaded feet along the ground [mm/s], and the way [mm] slipped by all feet since the start."""
-    speed = 1e3 * np.where(_loaded(view), view.recording.feet("slip_speed"), 0.0)
+    speed = 1e3 * slip_under_load(view.recording, view.parameters)
     yield from _split([f"{leg}.slip" for leg in LEG_NAMES], speed)
-    yield "slip.way", _running_integral(view.recording.time, speed.sum(axis=1))
+    yield "slip.way", running_integral(view.recording.time, speed.sum(axis=1))
 
 
 def _height(view: View) -> Iterator[tuple[str, Array]]:
@@ -151,17 +152,5 @@ DRAWN: dict[str, Maker] = {
 }  # fmt: skip
 
 
-def _loaded(view: View) -> NDArray[np.bool_]:
-    """(rows, 6) whether a foot bears a load, as the metrics judge it."""
-    return np.asarray(view.recording.feet("normal_force") > CONTACT_SHARE * robot_weight(view.parameters))
-
-
 def _split(names: list[str] | tuple[str, ...], table: Array) -> Iterator[tuple[str, Array]]:
     return zip(names, table.T, strict=True)
-
-
-def _running_integral(time: Array, values: Array) -> Array:
-    """Of values (rows, ...) over time, 0 at the first row; the trapezoidal rule."""
-    steps = 0.5 * (values[1:] + values[:-1])
-    width = np.diff(time).reshape(-1, *(1 for _ in values.shape[1:]))
-    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps * width, axis=0)])

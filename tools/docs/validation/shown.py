@@ -10,13 +10,13 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from hexapod_cosim.controller.figure_style import SETTINGS
+from hexapod_cosim.controller import figure_style
 
 THEMES: Mapping[str, Mapping[str, Any]] = {
     "light": {"text.color": "#1f2430", "grid.color": "#9aa4b2", "axes.edgecolor": "#5b6472"},
     "dark": {"text.color": "#cfd6e4", "grid.color": "#6b7688", "axes.edgecolor": "#8791a3"},
 }
-PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9")  # Okabe and Ito: told apart on either ground
+PALETTE = (*figure_style.PALETTE[:5], "#56B4E9")  # black would not be seen on a dark page
 MARKERS = "osD^vP"
 
 
@@ -45,7 +45,9 @@ class Shown:
     def _save(self, path: Path, theme: str) -> None:
         colours = dict(THEMES[theme])
         same = dict.fromkeys(("axes.labelcolor", "xtick.color", "ytick.color", "axes.titlecolor"), colours["text.color"])
-        with rc_context({**SETTINGS, **colours, **same, "axes.facecolor": "none", "svg.hashsalt": path.name, "svg.fonttype": "path"}):
+        with rc_context(
+            {**figure_style.SETTINGS, **colours, **same, "axes.facecolor": "none", "svg.hashsalt": path.name, "svg.fonttype": "path"}
+        ):
             figure = Figure(figsize=self.size)
             assert self.draw is not None
             self.draw(figure)
