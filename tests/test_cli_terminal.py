@@ -16,6 +16,7 @@ from typer.main import get_command
 
 from hexapod_cosim.cosim.cli.app import app
 from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
+from hexapod_cosim.cosim.results import NEEDED
 
 ESCAPE = "\x1b"
 COMMANDS = {name: command for name, command in get_command(app).commands.items() if not command.hidden}  # type: ignore[attr-defined]
@@ -150,6 +151,7 @@ def test_json_is_all_that_is_printed(call: Call, tmp_path: Path, monkeypatch: py
         (["report", "file"], ["not a results folder", "got 'file'"]),
         (["report", "broken"], ["run.json: damaged file", "expected JSON", "run the scenario again"]),
         (["report", "failed"], ["failed: ", "did not complete", "got 'failed: it fell'", "run it again"]),
+        (["report", "foreign"], ["damaged or foreign results", "got 'no title", "all facts of a run", "run the scenario again"]),
         (["report", "bare"], ["no recording", "got 'bare'", "results.parquet or results.csv", "hexapod simulate"]),
         (["validate", "file"], ["not an FMU", "ZIP"]),
         (["simulate", "--gains", "file"], ["not a TOML file", "TOML 1.0"]),
@@ -162,10 +164,12 @@ def test_a_misuse_is_told_in_one_paragraph_of_what_got_expected_and_fix(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("root:x:0", encoding="utf-8")
-    facts = {"broken": "{", "failed": '{"status": "failed", "reason": "it fell"}', "bare": '{"status": "completed"}'}
+    bare = json.dumps(dict.fromkeys(NEEDED, "") | {"status": "completed"})
+    facts = {"broken": "{", "failed": '{"status": "failed", "reason": "it fell"}', "foreign": '{"status": "completed"}', "bare": bare}
     for name, text in facts.items():
         (tmp_path / name).mkdir()
         (tmp_path / name / "run.json").write_text(text, encoding="utf-8")
+        (tmp_path / name / "metrics.json").write_text("{}", encoding="utf-8")
     outcome = call(*arguments)
     assert_refused(outcome, *parts, "got ", "expected ")
     assert outcome[2].rpartition("; ")[2].strip()  # the fix
