@@ -7,8 +7,8 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
 TYPING := build/typing/hexapod_cosim
-SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
+SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*)
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 SANITIZED := tests/test_fmi.py tests/test_fmi3.py tests/test_fmi3_order.py tests/test_plant_events.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_fmi_importers.py tests/test_fmi_exchange.py tests/test_plant_coordinates.py tests/test_plant_misuse.py tests/test_endurance.py
 
 .PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-opening control format generate fmu typing clean docs

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import os
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
+from functools import cache
 from multiprocessing.connection import wait
 from multiprocessing.synchronize import Event
+from multiprocessing.util import Finalize
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Thread
@@ -19,34 +21,17 @@ from threading import Thread
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
-from hexapod_cosim.cosim.master import COMPLETED, INTERRUPTED
-from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.run import Result, chosen_gains, known_robot, simulate
+from hexapod_cosim.cosim.master import INTERRUPTED
+from hexapod_cosim.cosim.run import chosen_gains, known_robot, simulate
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import REFUSED, Summary, refused, summarise
+from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.models import HexapodError, load_robot
 
-REFUSED = "refused"  # beside the master's ways to end: the run did not begin
+__all__ = ["REFUSED", "Summary", "processors", "run_batch", "summarise"]
+
+QUEUED = 8  # runs that wait for each worker
 METHOD = "spawn"  # a fork would copy the threads' locks of this process, and numpy's
-NO_FIGURES = dict.fromkeys(METRICS, math.nan)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    """What a run came to."""
-
-    control: str
-    seed: int
-    status: str  # COMPLETED, FAILED or REFUSED
-    reason: str = ""  # in words, "" when completed
-    upright: bool = False  # to the end
-    fallback: float | None = None  # share of time in which the controller fell back to kinematic control; None: it does not say
-    warnings: tuple[str, ...] = ()
-    metrics: Mapping[str, float]  # NaN where there is none; all of them unless completed
-
-    @property
-    def walked(self) -> bool:
-        """Whether the run came to its end with the robot on its feet."""
-        return self.status == COMPLETED and self.upright
 
 
 @dataclass(frozen=True)
@@ -56,18 +41,13 @@ class _Task:
     gains: Gains | None
 
 
-def summarise(result: Result) -> Summary:
-    """A run without its recording."""
-    scenario, walk = result.scenario, result.facts["walk"]
-    return Summary(
-        control=scenario.control, seed=scenario.seed, status=result.outcome.status, reason=result.outcome.reason, upright=walk["upright"],
-        fallback=walk.get("fallback"), warnings=tuple(result.facts["warnings"]),
-        metrics=dict(result.metrics) if result.completed else NO_FIGURES,
-    )  # fmt: skip
-
-
 def run_batch(
-    scenarios: Sequence[Scenario], *, fmu: Path | None = None, gains: Gains | None = None, workers: int | None = None
+    scenarios: Sequence[Scenario],
+    *,
+    fmu: Path | None = None,
+    gains: Gains | None = None,
+    workers: int | None = None,
+    compiled: bool = False,
 ) -> Generator[Summary, None, None]:
     """Runs scenarios and yields what each came to, in their order.
 
@@ -78,11 +58,12 @@ def run_batch(
         fmu: the FMU of all runs; by default one is exported for each robot, and holds for every setting.
         gains: of all compliant runs; by default designed, once for each robot and macro-step.
         workers: processes; by default one for each processor, and 1 runs everything in this one.
+        compiled: with the controller's FMU instead of the Python controller: some ten times as fast, figures equal to its last digits.
     """
     with TemporaryDirectory(prefix="hexapod-batch-") as folder:
         tasks = _prepare(scenarios, Path(folder), fmu=fmu, gains=gains)
         count = min(processors() if workers is None else workers, len(tasks))
-        yield from map(_run_here, tasks) if count <= 1 else _run_in_processes(tasks, count)
+        yield from _run_here(tasks, compiled=compiled) if count <= 1 else _run_in_processes(tasks, count, compiled=compiled)
 
 
 def processors() -> int:
@@ -103,39 +84,56 @@ def _prepare(scenarios: Sequence[Scenario], folder: Path, *, fmu: Path | None, g
             if fmu is None and scenario.robot not in fmus:
                 fmus[scenario.robot] = export_fmu(load_robot(scenario.robot), folder / f"{len(fmus)}.fmu")
         except HexapodError as error:
-            tasks.append(_refused(scenario, error))
+            tasks.append(refused(scenario, error))
         else:
             tasks.append(_Task(scenario, fmus[scenario.robot] if fmu is None else fmu, designs[key]))
     return tasks
 
 
-def _refused(scenario: Scenario, error: HexapodError) -> Summary:
-    return Summary(control=scenario.control, seed=scenario.seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES)
-
-
-def _run(task: _Task | Summary) -> Summary:
+def _run(task: _Task | Summary, walker: Walker | None) -> Summary:
     """A run in whatever process; an interrupted one says so by its status."""
     if isinstance(task, Summary):
         return task
+    if walker is not None:
+        return walker.summary(task.scenario, fmu=task.fmu, gains=task.gains, progress=_stop_if_told)
     try:
         return summarise(simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=_stop_if_told))
     except HexapodError as error:
-        return _refused(task.scenario, error)
+        return refused(task.scenario, error)
 
 
-def _run_here(task: _Task | Summary) -> Summary:
-    summary = _run(task)
-    if summary.status == INTERRUPTED:
-        raise KeyboardInterrupt
-    return summary
+def _run_here(tasks: Sequence[_Task | Summary], *, compiled: bool) -> Iterator[Summary]:
+    with Walker() if compiled else nullcontext() as walker:
+        for task in tasks:
+            summary = _run(task, walker)
+            if summary.status == INTERRUPTED:
+                raise KeyboardInterrupt
+            yield summary
 
 
-def _run_in_processes(tasks: Sequence[_Task | Summary], count: int) -> Iterator[Summary]:
+def _run_in_processes(tasks: Sequence[_Task | Summary], count: int, *, compiled: bool) -> Iterator[Summary]:
     with _pool(count) as pool:
-        with deaf_to_interrupts():  # the workers; they are told by us, and begin when a run is handed in
-            futures = [pool.submit(_run, task) for task in tasks]
-        for future in futures:
-            yield _result(future)
+        waiting: deque[Future[Summary]] = deque()
+        for task in tasks:
+            with deaf_to_interrupts():  # the workers; they are told by us, and begin when a run is handed in
+                waiting.append(pool.submit(_work, task, compiled))
+            if len(waiting) > QUEUED * count:
+                yield _result(waiting.popleft())
+        while waiting:
+            yield _result(waiting.popleft())
+
+
+def _work(task: _Task | Summary, compiled: bool) -> Summary:
+    """A run in a worker."""
+    return _run(task, _own_walker() if compiled else None)
+
+
+@cache
+def _own_walker() -> Walker:
+    """This worker's, freed when it ends."""
+    walker = Walker()
+    Finalize(walker, walker.close, exitpriority=1)
+    return walker
 
 
 @contextmanager

@@ -42,6 +42,12 @@ def load_controller_interface(setup: ControllerSetup) -> Interface:
     return expand_interface(CONTROLLER, setup.robot, roots)
 
 
+def controller_parameters(setup: ControllerSetup) -> dict[str, float]:
+    """All parameters of the FMU of a set-up. Raises as `load_controller_interface`."""
+    variables = load_controller_interface(setup).of_causality("parameter")
+    return {variable.name: variable.start for variable in variables if variable.start is not None}
+
+
 def passive_gains(robot: Robot) -> SimpleNamespace:
     """What the gains' parameters start with under kinematic control, which has none: a law against slip that answers nothing, and
     what requirements alone say of the rest.

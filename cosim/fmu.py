@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
 from functools import partial
@@ -17,16 +16,16 @@ from types import TracebackType
 from typing import Any, Protocol, Self
 
 import numpy as np
-from fmpy import extract, read_model_description
+from fmpy import extract
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.descriptions import read_description
 from hexapod_cosim.cosim.fmu_log import STATUS, WARNING, FmuLog
 from hexapod_cosim.cosim.plant_files import packed_binary
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
-FIX = "make one with `hexapod export -o FILE.fmu`"
 SUFFIX = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}  # of fmi2Get..., fmi2Set...
 
 
@@ -138,6 +137,15 @@ class Fmu:
         fix = "export it again on this machine with `hexapod export`"
         return FmuError("the FMU cannot be loaded", got=said, fix=fix, where=str(self.path))
 
+    @property
+    def component(self) -> int:
+        """The instance, as C has it."""
+        return int(self._slave.component)
+
+    def address(self, name: str) -> int:
+        """Where a C function of the FMU is."""
+        return int(ctypes.cast(getattr(self._slave.dll, name), ctypes.c_void_p).value or 0)
+
     def bind(self, name: str, *arguments: Any) -> Callable[[], int]:
         """A C function of the FMU with its arguments, as C has them, in place: called, it returns the status.
 
@@ -158,15 +166,20 @@ class Fmu:
         """Names of all variables of a causality and an FMI type, in the order of the model description."""
         return [name for name, variable in self.variables.items() if variable.causality == causality and variable.type == kind]
 
-    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FmuBlock:
-        """The named variables, all of one type, as a block, its values in `buffer` if given. Raises FmuError for a name the FMU lacks."""
+    def references(self, names: Sequence[str]) -> list[int]:
+        """Value references by name. Raises FmuError for a name the FMU lacks."""
         for name in names:
             if name not in self.variables:
                 raise self._unknown(name)
+        return [self.variables[name].valueReference for name in names]
+
+    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FmuBlock:
+        """The named variables, all of one type, as a block, its values in `buffer` if given. Raises FmuError for a name the FMU lacks."""
+        references = self.references(names)
         kinds = {self.variables[name].type for name in names} or {"Real"}
         if len(kinds) != 1:
             raise FmuError("a block holds variables of one type", got=sorted(kinds), where=str(self.path))
-        return FmuBlock(self, names, kinds.pop(), [self.variables[name].valueReference for name in names], buffer)
+        return FmuBlock(self, names, kinds.pop(), references, buffer)
 
     def parameters(self) -> dict[str, float]:
         """All parameters with the values that hold now; an enumeration's is the number of its item."""
@@ -180,14 +193,26 @@ class Fmu:
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Sets parameters by name, enumerations by the name of their item. Before `initialise`. Raises FmuError, naming the parameter."""
-        for name, value in values.items():
-            block = self.block([self._parameter(name)])
-            block.values[0] = self._number(name, value)
+        numbers = {self._parameter(name): self._number(name, value) for name, value in values.items()}
+        kinds = {SUFFIX[self.variables[name].type] for name in numbers}
+        if all(
+            self._take({name: number for name, number in numbers.items() if SUFFIX[self.variables[name].type] == kind}) for kind in kinds
+        ):
+            return
+        for name, value in numbers.items():  # one by one, to name the one that is refused
+            block = self.block([name])
+            block.values[0] = value
             status = block.put()
             if status > WARNING and self._log:
                 raise FmuError(self._said(status), where=self.path.name)  # its sentence has name, value and range
             if status > WARNING:
                 raise FmuError(f"{name}: the FMU refuses the value", got=value, where=self.path.name)
+
+    def _take(self, numbers: Mapping[str, float]) -> bool:
+        """Sets parameters of one kind in one call; whether the FMU took them."""
+        block = self.block(list(numbers))
+        block.values[:] = list(numbers.values())
+        return block.put() <= WARNING
 
     def _parameter(self, name: str) -> str:
         if name not in self.variables:
@@ -243,8 +268,12 @@ class Fmu:
         self._begin.value, self._length.value = t, h
         status = self._do_step()
         if status > WARNING:
-            said, reached = self._said(status), self._reached(status)
-            raise StepError(f"the FMU {STATUS[status]}s the step from {t:.6g} s", reached=reached, got=said, where=self.path.name)
+            raise self.step_failure(t, status)
+
+    def step_failure(self, t: float, status: int) -> StepError:
+        """The error for a step from t [s] that came back with `status`."""
+        said, reached = self._said(status), self._reached(status)
+        return StepError(f"the FMU {STATUS[status]}s the step from {t:.6g} s", reached=reached, got=said, where=self.path.name)
 
     def _reached(self, status: int) -> float:
         if STATUS[status] != "discard":
@@ -268,29 +297,3 @@ class Fmu:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
-
-
-def read_description(path: Path) -> Any:
-    """Model description, as fmpy reads it, of an FMI 2.0 co-simulation FMU. Raises FmuError for anything else."""
-    description = open_description(path)
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
-        kind = "co-simulation" if description.coSimulation else "model exchange only"
-        raise FmuError(
-            "wrong kind of FMU", got=f"FMI {description.fmiVersion}, {kind}", expected="FMI 2.0 for co-simulation", fix=FIX, where=str(path)
-        )
-    return description
-
-
-def open_description(path: Path) -> Any:
-    """Model description, as fmpy reads it, of an FMU of any version. Raises FmuError when it is none."""
-    if not path.is_file():
-        raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)
-    try:
-        description = read_model_description(path, validate=False)
-    except (zipfile.BadZipFile, KeyError) as error:
-        raise FmuError(
-            "not an FMU", got=error.args[0], expected="a ZIP file with a modelDescription.xml", fix=FIX, where=str(path)
-        ) from error
-    except Exception as error:
-        raise FmuError("the FMU's modelDescription.xml cannot be read", got=str(error), fix=FIX, where=str(path)) from error
-    return description

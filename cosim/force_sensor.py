@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,23 +13,34 @@ from hexapod_cosim.models import LEG_NAMES
 DEAD, STUCK = (FAULTS.index(name) + 1 for name in ("dead", "stuck"))
 
 
+@dataclass(frozen=True, kw_only=True)
+class SensorSettings:
+    """All that is wrong with the feet's force sensors. A fault is what comes out last, after noise and delay."""
+
+    noise: float = 0.0  # 1    standard deviation, as a share of the force
+    seed: int = 0  # of the noise
+    delay: int = 0  # whole macro-steps by which readings are late; before them the first one holds
+    faults: NDArray[np.int8] | None = None  # (steps + 1, 6) numbers of FAULTS from 1, 0 none, step by step
+
+
+def noise_factors(settings: SensorSettings, count: int) -> NDArray[np.float64] | None:
+    """(count, 6, 3) what the forces of so many macro-steps are multiplied by, as `ForceSensor` draws it; None without noise."""
+    if not settings.noise:
+        return None
+    return 1.0 + settings.noise * np.random.default_rng(settings.seed).standard_normal((count, len(LEG_NAMES), 3))
+
+
 class ForceSensor:
     """Turns true forces and contacts into readings, once a macro-step.
-
-    Args:
-        noise: standard deviation, as a share of the force.
-        seed: of the noise.
-        delay: whole macro-steps by which readings are late; before them the first one holds.
-        faults: (steps + 1, 6) numbers of FAULTS from 1, 0 none, step by step; a fault is what comes out last, after noise and delay.
 
     Attributes: force: (6, 3) [N] ground on foot, world axes;  contact: (6,). Both are brought up to date by `read`.
     """
 
-    def __init__(self, *, noise: float = 0.0, seed: int = 0, delay: int = 0, faults: NDArray[np.int8] | None = None) -> None:
-        legs = len(LEG_NAMES)
+    def __init__(self, settings: SensorSettings) -> None:
+        delay, legs = settings.delay, len(LEG_NAMES)
         self.force, self.contact = np.zeros((legs, 3)), np.zeros(legs, dtype=np.bool_)
         self._forces, self._contacts = np.zeros((delay + 1, legs, 3)), np.zeros((delay + 1, legs), dtype=np.bool_)
-        self._noise, self._generator, self._faults = noise, np.random.default_rng(seed), faults
+        self._noise, self._generator, self._faults = settings.noise, np.random.default_rng(settings.seed), settings.faults
         self._count = 0
 
     def read(self, force: NDArray[np.float64], contact: NDArray[np.int32]) -> None:

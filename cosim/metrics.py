@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.signals import vector_names
+from hexapod_cosim.cosim.signals import foot_names, foot_vector_names, joint_names, vector_names
 from hexapod_cosim.cosim.support import stability_margins
-from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS
 from hexapod_cosim.models.contact import sliding_velocity
 
 Array = NDArray[np.float64]
@@ -46,6 +46,15 @@ METRICS: dict[str, tuple[str, bool | None, str]] = {
     "stability_margin": ("m", False, "least distance of the centre of mass from the support polygon's edge"),
     "realtime_factor": ("1", None, "simulated over wall time of the whole loop"),
 }
+
+# what all this and the warnings of a run look at; of controllers, those that tell
+JUDGED = (
+    *vector_names("torso.position"), *vector_names("torso.quaternion", 4), "torso.roll", "torso.pitch", "torso.yaw",
+    *(name for quantity in ("angle", "speed", "torque") for name in joint_names(quantity)),
+    *(name for quantity in ("normal_force", "tangential_force", "slip_speed", "contact") for name in foot_names(quantity)),
+    *(name for quantity in ("position", "velocity", "bristle") for name in foot_vector_names(quantity)),
+    *(f"controller.{leg}.{flag}" for flag in ("unreachable", "fallback") for leg in LEG_NAMES),
+)  # fmt: skip
 
 # name -> the least change, in the metric's unit, that means anything: less than this no one could measure on the robot
 # (a tenth of a millimetre, a tenth of a milliradian, the resolution of its force and torque sensing), so it reads "same"

@@ -111,6 +111,14 @@ def binary(fmi_platform: str, component: Component = PLANT) -> Path:
     return newest
 
 
+def shared_library(name: str) -> Path:
+    """A shared library for this machine's own programs, the newest at hand. Raises FmuError when there is none."""
+    found = [path for folder in plant_folders() for path in (folder / "lib").glob(f"{name}.[sd]*")]
+    if not found:
+        raise FmuError("a library is missing", got=f"no {name}", expected="a built one", fix=BUILD)
+    return max(found, key=lambda path: path.stat().st_mtime)
+
+
 def installed_platforms() -> list[str]:
     """Platforms whose binary is at hand."""
     return sorted({path.name for folder in plant_folders() for path in (folder / "binaries").glob("*") if path.is_dir()})

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import Controller, Gains, make_gait
+from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.force_sensor import ForceSensor
+from hexapod_cosim.cosim.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.interface import load_interface
 from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
 from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
@@ -31,7 +32,7 @@ from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.signals import Signals, joint_names
-from hexapod_cosim.cosim.variation import delayed, draw, initial_values
+from hexapod_cosim.cosim.variation import Drawn, delayed, draw, initial_values
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, load_robot
 
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
@@ -69,33 +70,66 @@ def simulate(
     `begin` is called once nothing can be refused any more, before the first step. Raises HexapodError for anything that keeps the run
     from starting; how a run that started ended is in the result.
     """
-    robot = known_robot(scenario)
-    gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
-    check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
-    gains = chosen_gains(scenario, gains)
-    controller = Controller(robot, period=scenario.macro_step, gait=gait, gains=gains, parts=scenario.compliance)
-    drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
-    schedule = make_schedule(scenario if drawn is None else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay)))
+    plan = make_plan(scenario, gains=gains)
+    setup = plan.controller
+    controller = Controller(setup.robot, period=setup.period, gait=setup.gait, gains=setup.gains, parts=setup.parts)
     with open_plant(scenario, fmu) as plant:
-        plant.set_parameters(scenario.parameters)
-        if drawn is not None:
-            plant.set_parameters(initial_values(scenario_robot(scenario), plant.parameters(), drawn))
-        plant.initialise(scenario.start, scenario.start + scenario.duration)
-        parameters = plant.parameters()
-        signals = Signals(plant, sensor=make_sensor(scenario, schedule))
-        recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
+        parameters = initialise_plant(plant, plan)
+        signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
+        recorder = Recorder(signals, plan.schedule.times, plan.schedule.rows, extra=insides(controller))
         chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")  # told before the run, not after it
         if begin is not None:
             begin()
-        outcome = run(plant, signals, controller, schedule, recorder, h=scenario.macro_step, progress=progress)
-        facts = describe(robot, plant, gait.period)
-    view = View(outcome.recording, parameters, gait.period)
-    facts["warnings"] = [*controller.warnings, *idle_settings(scenario, robot), *doubts(view, robot)]
+        outcome = run(plant, signals, controller, plan.schedule, recorder, h=scenario.macro_step, progress=progress)
+        facts = describe(setup.robot, plant, setup.gait.period)
+    return judge(plan, outcome, parameters, facts | {"warnings": controller.warnings})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is known of a run before there is a plant."""
+
+    scenario: Scenario
+    controller: ControllerSetup
+    schedule: Schedule
+    drawn: Drawn | None  # None: nothing varies
+
+
+def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
+    """The plan of a scenario. Raises HexapodError for commands that the legs do not reach, and where no gains can be designed."""
+    robot = known_robot(scenario)
+    gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
+    check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
+    setup = ControllerSetup(
+        robot=robot, gait=gait, period=scenario.macro_step, gains=chosen_gains(scenario, gains), parts=scenario.compliance
+    )
+    drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
+    schedule = make_schedule(scenario if drawn is None else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay)))
+    return Plan(scenario=scenario, controller=setup, schedule=schedule, drawn=drawn)
+
+
+def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
+    """Puts the scenario's parameters and what was drawn over those of its robot; returns all of them, as they hold."""
+    scenario = plan.scenario
+    plant.set_parameters(scenario.parameters)
+    if plan.drawn is not None:
+        plant.set_parameters(initial_values(scenario_robot(scenario), plant.parameters(), plan.drawn))
+    plant.initialise(scenario.start, scenario.start + scenario.duration)
+    return plant.parameters()
+
+
+def judge(plan: Plan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]) -> Result:
+    """What came of a run; `facts` are those of `describe` and the controller's warnings."""
+    scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
+    view = View(outcome.recording, parameters, setup.gait.period)
+    found = {
+        "warnings": [*facts["warnings"], *idle_settings(scenario, setup.robot), *doubts(view, setup.robot)],
+        "gains": None if setup.gains is None else asdict(setup.gains),
+        "walk": describe_walk(view, setup.robot),
+        "drawn": None if drawn is None else drawn.as_facts(),
+    }
     metrics = compute_metrics(view, realtime_factor=outcome.realtime_factor)
-    facts["gains"] = None if gains is None else asdict(gains)
-    facts["walk"] = describe_walk(view, robot)
-    facts["drawn"] = None if drawn is None else drawn.as_facts()
-    return Result(scenario=scenario, outcome=outcome, metrics=metrics, parameters=parameters, facts=facts)
+    return Result(scenario=scenario, outcome=outcome, metrics=metrics, parameters=parameters, facts={**facts, **found})
 
 
 def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None:
@@ -112,12 +146,18 @@ def known_robot(scenario: Scenario) -> Robot:
     return replace(load_robot(scenario.robot), servo=scenario_robot(scenario).servo)
 
 
-def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
-    """The feet's force sensors with all that is wrong with them; None when nothing is."""
+def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
+    """What is wrong with the feet's force sensors; None when nothing is."""
     noise, delay = scenario.sensors.foot_force_noise, math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - WHOLE)
     if not noise and not delay and schedule.faults is None:
         return None
-    return ForceSensor(noise=noise, seed=scenario.seed, delay=delay, faults=schedule.faults)
+    return SensorSettings(noise=noise, seed=scenario.seed, delay=delay, faults=schedule.faults)
+
+
+def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
+    """The feet's force sensors with all that is wrong with them; None when nothing is."""
+    settings = sensor_settings(scenario, schedule)
+    return None if settings is None else ForceSensor(settings)
 
 
 @contextmanager

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,16 @@ class Schedule:
     """What is commanded and what pushes, step by step."""
 
     times: NDArray[np.float64]  # s    (steps + 1,) start + k h, never a running sum
-    commands: tuple[BodyCommand, ...]  # (steps,)
     rows: NDArray[np.float64]  # (steps + 1, 6) the same, the last one twice: vx vy yaw_rate height roll pitch
     pushes: NDArray[np.float64] | None  # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: never any
     faults: NDArray[np.int8] | None  # (steps + 1, 6) of the force sensors: 0 none, else the number in FAULTS, from 1; None: never any
+
+    @cached_property
+    def commands(self) -> tuple[BodyCommand, ...]:
+        """(steps,) the rows as commands, equal ones the same object."""
+        rows = list(map(tuple, self.rows[:-1].tolist()))
+        distinct = {row: BodyCommand(*row) for row in set(rows)}
+        return tuple(distinct[row] for row in rows)
 
 
 def make_schedule(scenario: Scenario) -> Schedule:
@@ -32,18 +38,16 @@ def make_schedule(scenario: Scenario) -> Schedule:
     times = scenario.macro_step * np.arange(scenario.steps + 1, dtype=np.float64)
     begins, h = times[:-1], scenario.macro_step
     rows = command_rows(scenario.commands, begins)
-    distinct = {row: BodyCommand(*row) for row in set(map(tuple, rows.tolist()))}
-    commands = tuple(distinct[row] for row in map(tuple, rows.tolist()))
     pushes = push_rows(scenario.pushes, begins, h) if scenario.pushes else None
     faults = fault_rows(scenario.faults, times) if scenario.faults else None
-    return Schedule(scenario.start + times, commands, np.vstack([rows, rows[-1:]]), pushes, faults)
+    return Schedule(scenario.start + times, np.vstack([rows, rows[-1:]]), pushes, faults)
 
 
 def command_rows(commands: Sequence[Command], times: NDArray[np.float64]) -> NDArray[np.float64]:
     """(steps, 6) the command in force at each time [s] from the start: the last one that has begun, but for round-off."""
     begins = [command.time for command in commands]
     values = np.array([astuple(command)[1:] for command in commands])
-    return values[[max(bisect_right(begins, t + ROUND_OFF) - 1, 0) for t in times]]
+    return np.asarray(values[np.maximum(np.searchsorted(begins, times + ROUND_OFF, side="right") - 1, 0)])
 
 
 def push_rows(events: Sequence[Push], times: NDArray[np.float64], h: float) -> NDArray[np.float64]:

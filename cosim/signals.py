@@ -61,7 +61,7 @@ class Signals:
 
     def __init__(self, plant: Plant, *, sensor: ForceSensor | None = None) -> None:
         outputs, inputs, flags = plant.names("output"), plant.names("input"), plant.names("output", "Boolean")
-        _refuse_foreign(outputs, inputs, flags)
+        refuse_foreign(outputs, inputs, flags)
         seen = _first([name for names in MEASURED.values() for name in names], outputs)
         flagged = _first(CONTACT, flags)
         written = [*(name for names in COMMANDED.values() for name in names), *PUSH]
@@ -114,7 +114,7 @@ def _first(names: Sequence[str], among: Sequence[str]) -> list[str]:
     return [*names, *(name for name in among if name not in set(names))]
 
 
-def _refuse_foreign(outputs: list[str], inputs: list[str], flags: list[str]) -> None:
+def refuse_foreign(outputs: Sequence[str], inputs: Sequence[str], flags: Sequence[str]) -> None:
     """Raises FmuError when the plant lacks a variable that every hexapod FMU has."""
     have = {*outputs, *inputs, *flags}
     need = [name for names in (*MEASURED.values(), *COMMANDED.values(), PUSH, CONTACT) for name in names]

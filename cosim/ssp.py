@@ -15,8 +15,8 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from hexapod_cosim.cosim.descriptions import read_description
 from hexapod_cosim.cosim.export import write_archive
-from hexapod_cosim.cosim.fmu import read_description
 from hexapod_cosim.cosim.plant_files import DISTRIBUTION, package_version
 from hexapod_cosim.models.errors import FmuError, nearest_name
 

@@ -17,7 +17,8 @@ from hexapod_cosim.cosim.archive_check import DESCRIPTION, archive_problems
 from hexapod_cosim.cosim.components import CONTROLLER
 from hexapod_cosim.cosim.description3_check import description_problems3
 from hexapod_cosim.cosim.description_check import description_problems, schema_problems
-from hexapod_cosim.cosim.fmu import Fmu, open_description, read_description
+from hexapod_cosim.cosim.descriptions import open_description, read_description
+from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.plant_files import fmi2_platform, packed_binary
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.cosim.start_value_check import START_VALUES, start_value_problems

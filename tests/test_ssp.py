@@ -14,7 +14,7 @@ import pytest
 from feed_through import FOOT, JOINT, make_feed_through
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from hexapod_cosim.cosim.fmu import read_description
+from hexapod_cosim.cosim.descriptions import read_description
 from hexapod_cosim.cosim.plant_files import fmi2_platform
 from hexapod_cosim.cosim.ssp import KINDS, PREFIXES, Experiment, export_ssp
 from hexapod_cosim.models.errors import FmuError, HexapodError

@@ -10,8 +10,9 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.descriptions import read_description
 from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.fmu import Fmu, read_description
+from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.run import simulate

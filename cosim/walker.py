@@ -1,0 +1,120 @@
+"""Run after run in one process on the compiled controller: FMUs are opened once, robots and designs are made once, the loop is C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import Self
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.controller_export import export_controller
+from hexapod_cosim.cosim.controller_interface import controller_parameters
+from hexapod_cosim.cosim.export import export_fmu
+from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.master import Progress
+from hexapod_cosim.cosim.metrics import JUDGED
+from hexapod_cosim.cosim.native_master import NativeMaster
+from hexapod_cosim.cosim.run import (
+    Plan,
+    Result,
+    adopt_settings,
+    chosen_gains,
+    describe,
+    initialise_plant,
+    judge,
+    known_robot,
+    make_plan,
+    sensor_settings,
+)
+from hexapod_cosim.cosim.scenario import scenario_robot
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import Summary, refused, summarise
+from hexapod_cosim.models import HexapodError, load_robot
+
+
+class Walker:
+    """Walks scenarios one after the other as `simulate` does, with the controller's FMU in place of the Python controller.
+
+    A context manager, for one thread: threads and processes have one each. Results do not depend on what it walked before.
+
+    Args:
+        fmu: the plant's FMU for all runs; by default one is exported for each robot.
+        controller: a controller's FMU, whose parameters every run sets as its scenario says; by default one is exported.
+        columns: what is recorded; by default what metrics and warnings look at. None: all signals.
+    """
+
+    def __init__(self, *, fmu: Path | None = None, controller: Path | None = None, columns: Sequence[str] | None = JUDGED) -> None:
+        self._given, self._given_controller, self._columns = fmu, controller, columns
+        self._open = ExitStack()
+        self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
+        self._masters: dict[str | Path, tuple[Fmu, NativeMaster]] = {}  # by robot, or by the FMU given
+        self._controller: Fmu | None = None
+        self._designs: dict[tuple[str, float], Gains | None] = {}
+
+    def simulate(
+        self, scenario: Scenario, *, fmu: Path | None = None, gains: Gains | None = None, progress: Progress | None = None
+    ) -> Result:
+        """A scenario's run and what came of it, on the plant `fmu` if given. Raises HexapodError for what keeps it from starting."""
+        plan = make_plan(scenario, gains=self._gains(scenario, gains))
+        controller = self._told_controller(plan)
+        plant, master = self._plant(scenario, controller, fmu or self._given)
+        plant.reset()
+        adopt_settings(plant, scenario_robot(scenario))
+        parameters = initialise_plant(plant, plan)
+        controller.initialise(scenario.start, scenario.start + scenario.duration)
+        sensor = sensor_settings(scenario, plan.schedule)
+        outcome = master.run(plan.schedule, h=scenario.macro_step, sensor=sensor, progress=progress)
+        facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
+        return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.build().warnings})
+
+    def summary(
+        self, scenario: Scenario, *, fmu: Path | None = None, gains: Gains | None = None, progress: Progress | None = None
+    ) -> Summary:
+        """What a scenario's run came to, a refusal to begin included."""
+        try:
+            return summarise(self.simulate(scenario, fmu=fmu, gains=gains, progress=progress))
+        except HexapodError as error:
+            return refused(scenario, error)
+
+    def _gains(self, scenario: Scenario, gains: Gains | None) -> Gains | None:
+        """As `chosen_gains`, designed once for a robot and a macro-step."""
+        if gains is not None or scenario.control == "kinematic":
+            return gains
+        key = (known_robot(scenario).hash, scenario.macro_step)
+        if key not in self._designs:
+            self._designs[key] = chosen_gains(scenario)
+        return self._designs[key]
+
+    def _plant(self, scenario: Scenario, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
+        """A given FMU or that of the scenario's robot, wired to the controller."""
+        key = scenario.robot if fmu is None else fmu
+        if key not in self._masters:
+            path = fmu or export_fmu(load_robot(scenario.robot), self._folder / f"{len(self._masters)}.fmu")
+            plant = self._open.enter_context(Fmu(path))
+            self._masters[key] = plant, NativeMaster(plant, controller, columns=self._columns)
+        return self._masters[key]
+
+    def _told_controller(self, plan: Plan) -> Fmu:
+        """The controller FMU with the parameters of the plan's."""
+        setup = plan.controller
+        if self._controller is None:
+            path = self._given_controller or export_controller(setup, self._folder / "controller.fmu")
+            self._controller = self._open.enter_context(Fmu(path, name="controller"))
+        self._controller.reset()
+        self._controller.set_parameters(controller_parameters(setup))
+        return self._controller
+
+    def close(self) -> None:
+        """Frees the FMUs; harmless when called twice."""
+        self._masters.clear()
+        self._controller = None
+        self._open.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()

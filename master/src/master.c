@@ -1,0 +1,126 @@
+#include "hexapod/master.h"
+
+#include <string.h>
+
+/* notes a refusal; returns whether there was none */
+static int accept(hxMaster *master, hxMasterCall call, fmi2Status status) {
+  if (status <= fmi2Warning) return 1;
+  master->call = call;
+  master->status = status;
+  return 0;
+}
+
+/* ---------------------------------------------------------------------------------------------- values */
+
+static int get_reals(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlock *block, hxMasterCall call) {
+  double *value = master->value + block->place;
+  return !block->count || accept(master, call, fmu->get_real(fmu->instance, block->reference, block->count, value));
+}
+
+static int get_flags(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlock *block, hxMasterCall call) {
+  double *value = master->value + block->place;
+  if (!block->count) return 1;
+  if (!accept(master, call, fmu->get_boolean(fmu->instance, block->reference, block->count, master->flag))) return 0;
+  for (size_t i = 0; i < block->count; ++i) value[i] = master->flag[i] ? 1.0 : 0.0;
+  return 1;
+}
+
+/* ---------------------------------------------------------------------------------------------- sensors */
+
+/* of one foot: what is shown instead of its delayed reading, or that */
+static void show_foot(const hxMasterSensor *sensor, int fault, size_t moment, const double *delayed, double *reading) {
+  const size_t size = sensor->forces / sensor->feet * sizeof *reading;
+  if (fault == HX_FAULT_DEAD)
+    memset(reading, 0, size);
+  else if (fault != HX_FAULT_STUCK || moment == 0)
+    memcpy(reading, delayed, size);
+}
+
+/* the readings of a moment, from what is true now */
+static void read_sensor(const hxMasterSensor *sensor, size_t moment, double *value) {
+  const size_t n = sensor->forces, each = n / sensor->feet, slots = sensor->delay + 1;
+  double *newest = sensor->memory + moment % slots * n;
+  const double *oldest = sensor->memory + (moment + 1) % slots * n;
+  for (size_t i = 0; i < n; ++i) newest[i] = value[sensor->place + i];
+  if (sensor->factor)
+    for (size_t i = 0; i < n; ++i) newest[i] *= sensor->factor[moment * n + i];
+  /* before there is a reading so old, the first one holds */
+  for (size_t slot = 1; slot < slots && moment == 0; ++slot) memcpy(sensor->memory + slot * n, newest, n * sizeof *newest);
+  for (size_t foot = 0; foot < sensor->feet; ++foot) {
+    const int fault = sensor->fault ? sensor->fault[moment * sensor->feet + foot] : HX_FAULT_NONE;
+    show_foot(sensor, fault, moment, oldest + foot * each, value + sensor->reading + foot * each);
+  }
+}
+
+/* ---------------------------------------------------------------------------------------------- a macro-step */
+
+static int read_plant(hxMaster *master, size_t moment) {
+  const hxMasterFmu *plant = &master->plant;
+  if (!get_reals(master, plant, &master->plant_output, HX_CALL_PLANT_GET)) return 0;
+  if (!get_flags(master, plant, &master->plant_flag, HX_CALL_PLANT_GET)) return 0;
+  if (master->sensor.memory) read_sensor(&master->sensor, moment, master->value);
+  return 1;
+}
+
+/* the controller's inputs: the command in force and what the robot senses */
+static void sense(const hxMaster *master, double *input) {
+  memcpy(input, master->command + master->step * master->command_count, master->command_count * sizeof *input);
+  input += master->command_count;
+  for (size_t i = 0; i < master->sensed_count; ++i) input[i] = master->value[master->sensed[i]];
+}
+
+/* joint commands for the macro-step, and the controller over it */
+static int control(hxMaster *master) {
+  const hxMasterFmu *controller = &master->controller;
+  const size_t inputs = master->command_count + master->sensed_count;
+  sense(master, master->controller_value);
+  return accept(master, HX_CALL_CONTROLLER_SET,
+                controller->set_real(controller->instance, master->controller_input, inputs, master->controller_value)) &&
+         get_reals(master, controller, &master->controller_output, HX_CALL_CONTROLLER_GET) &&
+         get_flags(master, controller, &master->controller_flag, HX_CALL_CONTROLLER_GET) &&
+         accept(master, HX_CALL_CONTROLLER_STEP,
+                controller->do_step(controller->instance, master->time[master->step], master->h, fmi2True));
+}
+
+static int write_plant(hxMaster *master) {
+  const hxMasterBlock *input = &master->plant_input;
+  return accept(master, HX_CALL_PLANT_SET,
+                master->plant.set_real(master->plant.instance, input->reference, input->count, master->value + input->place));
+}
+
+static int step_plant(hxMaster *master) {
+  return accept(master, HX_CALL_PLANT_STEP, master->plant.do_step(master->plant.instance, master->time[master->step], master->h, fmi2True));
+}
+
+void hx_master_record(hxMaster *master) {
+  double *row = master->row + master->rows * master->stride;
+  for (size_t j = 0; j < master->columns; ++j) row[j] = master->value[master->column[j]];
+  ++master->rows;
+}
+
+static int macro_step(hxMaster *master) {
+  if (master->push)
+    memcpy(master->value + master->push_place, master->push + master->step * master->push_count, master->push_count * sizeof(double));
+  if (!control(master) || !write_plant(master)) return 0;
+  hx_master_record(master);
+  if (!step_plant(master)) return 0;
+  ++master->step;
+  return read_plant(master, master->step);
+}
+
+/* ---------------------------------------------------------------------------------------------- runs */
+
+size_t hx_master_size(void) { return sizeof(hxMaster); }
+
+int hx_master_begin(hxMaster *master) {
+  master->step = master->rows = 0;
+  master->call = HX_CALL_NONE;
+  master->status = fmi2OK;
+  return read_plant(master, 0);
+}
+
+int hx_master_run(hxMaster *master, size_t end) {
+  while (master->step < end)
+    if (!macro_step(master)) return 0;
+  return 1;
+}
