@@ -74,6 +74,12 @@ class Diagnostics:
     fallback: Mask  # walks without feedback: its foot's sensor is not believed, or the robot slides or outruns its joints
 
 
+def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
+    """Whether gains are of another robot or period [s]."""
+    mismatch = None if gains is None else gains.mismatch(robot, period=period)
+    return () if mismatch is None else (mismatch,)
+
+
 class Controller:
     """Walks a robot. `gains` None: kinematic control; else compliant control with these gains.
 
@@ -96,8 +102,7 @@ class Controller:
         self.stance = robot.stance
         self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
         self.compliant = None if gains is None else Compliant(robot, gait, gains, parts, legs=self.legs, period=period)
-        mismatch = None if gains is None else gains.mismatch(robot, period=period)
-        self.warnings: tuple[str, ...] = () if mismatch is None else (mismatch,)
+        self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
         self.diagnostics = self._make_diagnostics()
         self.reset()

@@ -8,9 +8,11 @@ from functools import lru_cache
 from types import SimpleNamespace
 
 from hexapod_cosim.controller import Controller, Gains, Gait, Parts, Requirements
+from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, HoldGains, LimitGains, SlipGains, SupportGains, SuspensionGains
 from hexapod_cosim.cosim.components import CONTROLLER
 from hexapod_cosim.cosim.interface import Interface, expand_interface
+from hexapod_cosim.cosim.start_values import parameter_values
 from hexapod_cosim.models import Robot
 
 ALL_PARTS = Parts()
@@ -27,6 +29,11 @@ class ControllerSetup:
     gains: Gains | None = None
     parts: Parts = ALL_PARTS
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about it: those of the Python controller."""
+        return gains_warnings(self.robot, self.gains, self.period)
+
     def build(self) -> Controller:
         """The Python controller of this set-up. Raises RobotError, ControllerError for one that cannot be."""
         return Controller(self.robot, period=self.period, gait=self.gait, gains=self.gains, parts=self.parts)
@@ -36,16 +43,26 @@ class ControllerSetup:
 def load_controller_interface(setup: ControllerSetup) -> Interface:
     """The interface of a controller's FMU. Raises what `Controller` raises, HexapodError when a value does not fit its variable."""
     setup.build()  # refuses what the C, which takes joint axes and gaits for granted, could not
+    return expand_interface(CONTROLLER, setup.robot, controller_roots(setup))
+
+
+def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
+    """What the path of a start value of the controller may begin with."""
     settings = SimpleNamespace(control="kinematic" if setup.gains is None else "compliant", period=setup.period, upright=UPRIGHT)
     gains = passive_gains(setup.robot) if setup.gains is None else setup.gains
-    roots = SimpleNamespace(robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings)
-    return expand_interface(CONTROLLER, setup.robot, roots)
+    return SimpleNamespace(robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings)
 
 
 def controller_parameters(setup: ControllerSetup) -> dict[str, float]:
-    """All parameters of the FMU of a set-up. Raises as `load_controller_interface`."""
-    variables = load_controller_interface(setup).of_causality("parameter")
-    return {variable.name: variable.start for variable in variables if variable.start is not None}
+    """All parameters of the FMU of a set-up. Raises what `Controller` raises."""
+    _build_kinematic(setup.robot, setup.gait, setup.period)
+    return parameter_values(CONTROLLER, controller_roots(setup))
+
+
+@lru_cache(maxsize=64)
+def _build_kinematic(robot: Robot, gait: Gait, period: float) -> None:
+    """Refuses what no gains change."""
+    ControllerSetup(robot=robot, gait=gait, period=period).build()
 
 
 def passive_gains(robot: Robot) -> SimpleNamespace:

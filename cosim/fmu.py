@@ -6,10 +6,11 @@ The master needs only what the protocols `Plant` and `Block` say, so anything th
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -137,6 +138,11 @@ class Fmu:
         fix = "export it again on this machine with `hexapod export`"
         return FmuError("the FMU cannot be loaded", got=said, fix=fix, where=str(self.path))
 
+    @cached_property
+    def sha256(self) -> str:
+        """Of the file, in hex."""
+        return hashlib.sha256(self.path.read_bytes()).hexdigest()
+
     @property
     def component(self) -> int:
         """The instance, as C has it."""
@@ -184,12 +190,15 @@ class Fmu:
     def parameters(self) -> dict[str, float]:
         """All parameters with the values that hold now; an enumeration's is the number of its item."""
         found: dict[str, float] = {}
-        for kind in ("Real", "Integer", "Enumeration", "Boolean"):
-            block = self.block(self.names("parameter", kind))
-            if block.names:
-                block.get()
-                found |= dict(zip(block.names, block.values.tolist(), strict=True))
+        for block in self._parameter_blocks:
+            block.get()
+            found |= dict(zip(block.names, block.values.tolist(), strict=True))
         return found
+
+    @cached_property
+    def _parameter_blocks(self) -> list[FmuBlock]:
+        names = (self.names("parameter", kind) for kind in ("Real", "Integer", "Enumeration", "Boolean"))
+        return [self.block(some) for some in names if some]
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Sets parameters by name, enumerations by the name of their item. Before `initialise`. Raises FmuError, naming the parameter."""

@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.patterns import expand, expand_names, labelled, own_axe
 from hexapod_cosim.cosim.plant_files import interface_file, package_version
 from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.statics import settled
+from hexapod_cosim.models.statics import settled, standing_part
 
 Causality = Literal["input", "output", "parameter", "local"]
 Type = Literal["Real", "Boolean", "Enumeration"]
@@ -170,13 +170,13 @@ class Interface:
 @lru_cache(maxsize=16)
 def load_interface(robot: Robot) -> Interface:
     """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit its variable."""
-    return expand_interface(PLANT, robot, _roots(robot))
+    return expand_interface(PLANT, robot, plant_roots(robot))
 
 
 def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace) -> Interface:
     """A component's interface, with start values from the attributes of `roots`. Raises HexapodError when one does not fit its variable."""
     table = read_table(component)
-    enumerations = {name: _enumeration(name, entry) for name, entry in table["enumeration"].items()}
+    enumerations = enumerations_of(component)
     variables = tuple(_expand_all(table, enumerations, roots))
     return Interface(
         component=component,
@@ -202,11 +202,21 @@ def read_table(component: Component) -> dict[str, Any]:
     return tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
 
 
-def _roots(robot: Robot) -> SimpleNamespace:
-    """What a start value's path may begin with."""
+@cache
+def enumerations_of(component: Component) -> Mapping[str, Enumeration]:
+    """A component's choices by name."""
+    return {name: _enumeration(name, entry) for name, entry in read_table(component)["enumeration"].items()}
+
+
+def plant_roots(robot: Robot) -> SimpleNamespace:
+    """What the path of a start value of the plant may begin with."""
+    return SimpleNamespace(robot=robot, settled=_settled_pose(standing_part(robot)))
+
+
+@lru_cache(maxsize=64)
+def _settled_pose(robot: Robot) -> SimpleNamespace:
     position, quaternion, angle = settled(robot)
-    pose = SimpleNamespace(position=_rounded(position), quaternion=_rounded(quaternion), angle=[_rounded(leg) for leg in angle])
-    return SimpleNamespace(robot=robot, settled=pose)
+    return SimpleNamespace(position=_rounded(position), quaternion=_rounded(quaternion), angle=[_rounded(leg) for leg in angle])
 
 
 def _rounded(values: Iterable[float]) -> list[float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,14 @@ def check_commands(commands: Sequence[Command], robot: Robot, gait: Gait, *, whe
     """
     for command in commands:
         wanted = np.array(astuple(command)[1:])
-        if not _walks(wanted, robot, gait):
+        if not _walks_once(tuple(wanted.tolist()), robot, gait):
             raise _refusal(wanted, robot, gait, f"{where} at time = {command.time:g} s" if len(commands) > 1 else where)
+
+
+@lru_cache(maxsize=256)
+def _walks_once(values: tuple[float, ...], robot: Robot, gait: Gait) -> bool:
+    """`_walks`, remembered."""
+    return _walks(np.array(values), robot, gait)
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import platform
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import Controller, Gains, make_gait
+from hexapod_cosim.cosim.components import PLANT
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.force_sensor import ForceSensor, SensorSettings
-from hexapod_cosim.cosim.interface import load_interface
+from hexapod_cosim.cosim.interface import plant_roots
 from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
 from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
 from hexapod_cosim.cosim.plant_files import package_version
@@ -32,8 +33,9 @@ from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.signals import Signals, joint_names
+from hexapod_cosim.cosim.start_values import parameter_values
 from hexapod_cosim.cosim.variation import Drawn, delayed, draw, initial_values
-from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, load_robot
+from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
 
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
 WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
@@ -143,7 +145,12 @@ def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None
 
 def known_robot(scenario: Scenario) -> Robot:
     """The robot as its controller knows it: its own file with the scenario's servos. Ground, contact and payload it has to find out."""
-    return replace(load_robot(scenario.robot), servo=scenario_robot(scenario).servo)
+    return _with_servo(load_robot(scenario.robot), scenario_robot(scenario).servo)
+
+
+@lru_cache(maxsize=64)
+def _with_servo(robot: Robot, servo: Servo) -> Robot:
+    return robot if robot.servo == servo else replace(robot, servo=servo)
 
 
 def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
@@ -178,9 +185,7 @@ def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
 
 def adopt_settings(plant: Fmu, robot: Robot) -> None:
     """Sets the laws and settings of a given FMU to those of the robot. Raises FmuError when the FMU holds another robot."""
-    wanted = {
-        entry.name: entry.start for entry in load_interface(robot).variables if entry.causality == "parameter" and entry.start is not None
-    }
+    wanted = parameter_values(PLANT, plant_roots(robot))
     present = plant.parameters()
     changes = {
         name: value
@@ -197,14 +202,19 @@ def adopt_settings(plant: Fmu, robot: Robot) -> None:
 
 def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
     """What is needed to say which robot, FMU and software made a run."""
-    names = ("fmpy", "numpy", "scipy", "control")
     return {
         "robot": {"name": robot.name, "hash": robot.hash},
         "gait_period": period,
-        "fmu": {"file": plant.path.name, "guid": plant.description.guid, "sha256": hashlib.sha256(plant.path.read_bytes()).hexdigest()},
-        "versions": {"hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names}},
+        "fmu": {"file": plant.path.name, "guid": plant.description.guid, "sha256": plant.sha256},
+        "versions": dict(_versions()),
         "platform": f"{sys.platform} {platform.machine()}",
     }
+
+
+@cache
+def _versions() -> Mapping[str, str]:
+    names = ("fmpy", "numpy", "scipy", "control")
+    return {"hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names}}
 
 
 def describe_walk(view: View, robot: Robot) -> dict[str, Any]:

@@ -32,8 +32,9 @@ from hexapod_cosim.cosim.scenario_records import (
     Sensors,
     Variation,
 )
-from hexapod_cosim.models import Robot, RobotError, ScenarioError, check_robot, load_robot, unknown_name
+from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
 from hexapod_cosim.models.schema import expect_table, read_given, refuse_unknown_keys, require, specs
+from hexapod_cosim.models.validation import check_settings
 
 
 def list_scenarios() -> dict[str, Path]:
@@ -229,11 +230,13 @@ def scenario_robot(scenario: Scenario) -> Robot:
 
     Raises RobotError when they do not fit together.
     """
-    robot = load_robot(scenario.robot)
-    changes = {name: replace(getattr(robot, name), **dict(values)) for name, values in scenario.settings.items() if name != "gait"}
+    own = load_robot(scenario.robot)
+    changes = {name: replace(getattr(own, name), **dict(values)) for name, values in scenario.settings.items() if name != "gait"}
     if "friction" in changes and "mu_static" not in scenario.settings["friction"]:
         friction = changes["friction"]
         changes["friction"] = replace(friction, mu_static=max(friction.mu_static, friction.mu))  # static is never below kinetic
-    robot = replace(robot, **changes)
-    check_robot(robot, where=f"{scenario.where} with robot {robot.name}")
+    robot = replace(own, **changes)
+    if robot == own:
+        return own
+    check_settings(robot, where=f"{scenario.where} with robot {robot.name}")
     return robot

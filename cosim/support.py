@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import permutations
 
 import numpy as np
@@ -14,7 +14,6 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-PAIRS = np.array(list(permutations(range(len(LEG_NAMES)), 2)))  # (30, 2) directed edges between feet
 ROWS_AT_ONCE = 4096  # bounds the memory of the pairs of feet
 COINCIDENT = 1e-9  # m    feet closer than this make no edge
 
@@ -42,49 +41,71 @@ def _plane_axes(gravity: Array) -> Array:
 
 def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
     """Signed distances of points (rows, 2) from the convex hulls of the standing ones among feet (rows, 6, 2); positive inside."""
-    begin, end = feet[:, PAIRS[:, 0]], feet[:, PAIRS[:, 1]]
-    edge = end - begin  # (rows, 30, 2)
-    length = np.linalg.norm(edge, axis=-1)
-    left = np.stack([-edge[..., 1], edge[..., 0]], axis=-1) / np.maximum(length, COINCIDENT)[..., None]
-    # a directed edge is one of the hull's when no standing foot lies to its right
-    beside = np.einsum("rek,refk->ref", left, feet[:, None] - begin[:, :, None])  # (rows, 30, 6)
-    clear = np.where(standing[:, None], beside, 0.0).min(axis=-1) >= -COINCIDENT
-    hull = clear & standing[:, PAIRS[:, 0]] & standing[:, PAIRS[:, 1]] & (length > COINCIDENT)
-    distance = np.einsum("rek,rek->re", left, centre[:, None] - begin)
-    margin = np.where(hull, distance, np.inf).min(axis=-1)
+    margin = np.full(len(centre), np.nan)
+    patterns, pattern_of = np.unique(standing @ (1 << np.arange(standing.shape[1])), return_inverse=True)
+    for number, pattern in enumerate(patterns.tolist()):
+        rows, legs = np.flatnonzero(pattern_of == number), [leg for leg in range(standing.shape[1]) if pattern >> leg & 1]
+        if len(legs) > 1:
+            margin[rows] = _hull_margins(feet[rows][:, legs].T, centre[rows].T)
+    return margin
+
+
+def _hull_margins(feet: Array, centre: Array) -> Array:
+    """(rows,) the same for feet (2, n, rows) that all stand, and points (2, rows)."""
+    pairs = np.array(list(permutations(range(feet.shape[1]), 2)))
+    begin = feet[:, pairs[:, 0]]
+    edge = feet[:, pairs[:, 1]] - begin  # (2, pairs, rows)
+    length = np.sqrt(edge[0] * edge[0] + edge[1] * edge[1])
+    left = np.stack([-edge[1], edge[0]]) / np.maximum(length, COINCIDENT)
+    # a directed edge is one of the hull's when no foot lies to its right
+    hull = length > COINCIDENT
+    for foot in range(feet.shape[1]):
+        hull &= _along(left, feet[:, foot, None] - begin) >= -COINCIDENT
+    margin = np.where(hull, _along(left, centre[:, None] - begin), np.inf).min(axis=0)
     return np.where(np.isfinite(margin), margin, np.nan)
+
+
+def _along(left: Array, way: Array) -> Array:
+    """Scalar products of vectors (2, ...)."""
+    return np.asarray(left[0] * way[0] + left[1] * way[1])
 
 
 def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Array:
     """(rows, 3) centre of mass of the whole robot [m], world axes, from joint angles, torso pose and the FMU's own parameters."""
-    angle = recording.joints("angle")
-    total, moment = parameters["torso.mass"], np.zeros((len(angle), 3))  # moment about the torso's centre of mass, torso axes
-    offset = _vector(parameters, "torso.com")
-    for number, leg in enumerate(LEG_NAMES):
-        turned = np.broadcast_to(_about((0.0, 0.0, 1.0), np.array([parameters[f"{leg}.hip_yaw"]])), (len(angle), 3, 3))
-        joint = np.broadcast_to(_vector(parameters, f"{leg}.hip_position") - offset, (len(angle), 3))
-        for k, name in enumerate(JOINT_NAMES):
-            link = f"{leg}.{name}"
-            turned = turned @ _about(tuple(_vector(parameters, f"{link}.axis")), angle[:, number, k])
-            mass = parameters[f"{link}.mass"]
-            moment += mass * (joint + turned @ _vector(parameters, f"{link}.com"))
-            total += mass
-            joint = joint + turned @ np.array([parameters[f"{link}.{part}"] for part in ("length", "offset_y", "offset_z")])
+    angle = recording.joints("angle").transpose(1, 2, 0)  # (6, 3, rows)
+    borne, moment = np.zeros(len(LEG_NAMES)), np.zeros((len(LEG_NAMES), 3, 1))  # kg, kg m  of the links from here on, about their joint
+    for k, joint in reversed(list(enumerate(JOINT_NAMES))):
+        links = [f"{leg}.{joint}" for leg in LEG_NAMES]
+        mass, com, axis = (_of_links(parameters, links, part) for part in (("mass",), vector_names("com"), vector_names("axis")))
+        tip = _of_links(parameters, links, ("length", "offset_y", "offset_z"))
+        moment = _turned(axis, angle[:, k], moment + (mass * com + borne[:, None] * tip)[..., None])
+        borne = borne + mass[:, 0]
+    hips = [f"{leg}.hip_position" for leg in LEG_NAMES]
+    yaw, offset = np.array([parameters[f"{leg}.hip_yaw"] for leg in LEG_NAMES]), _vector(parameters, "torso.com")
+    moment = _turned(np.tile([0.0, 0.0, 1.0], (len(LEG_NAMES), 1)), yaw[:, None], moment)
+    from_torso = np.array([_vector(parameters, hip) - offset for hip in hips])
+    total = parameters["torso.mass"] + borne.sum()
+    own = (moment + (borne[:, None] * from_torso)[..., None]).sum(axis=0) / total  # (3, rows) torso axes, from its centre of mass
     rotation = rotation_matrices(recording.vector("torso.quaternion", 4))
-    offset_world: Array = np.einsum("rij,rj->ri", rotation, moment / total)
-    return recording.vector("torso.position") + offset_world
+    return np.asarray(recording.vector("torso.position") + np.einsum("rij,jr->ri", rotation, own))
+
+
+def _of_links(parameters: Mapping[str, float], links: Sequence[str], parts: Sequence[str]) -> Array:
+    """(links, parts)"""
+    return np.array([[parameters[f"{link}.{part}"] for part in parts] for link in links])
+
+
+def _turned(axis: Array, angle: Array, vector: Array) -> Array:
+    """(legs, 3, rows) vectors turned about axes (legs, 3) by angles (legs, rows): Rodrigues."""
+    x, y, z = (axis / np.linalg.norm(axis, axis=1, keepdims=True)).T
+    zero = np.zeros_like(x)
+    skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    across = skew @ vector
+    return np.asarray(vector + np.sin(angle)[:, None] * across + (1.0 - np.cos(angle))[:, None] * (skew @ across))
 
 
 def _vector(parameters: Mapping[str, float], stem: str) -> Array:
     return np.array([parameters[name] for name in vector_names(stem)])
-
-
-def _about(axis: tuple[float, ...], angle: Array) -> Array:
-    """(rows, 3, 3) rotations about an axis by angles (rows,): Rodrigues."""
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn: Array = np.eye(3) + np.sin(angle)[:, None, None] * skew + (1.0 - np.cos(angle))[:, None, None] * (skew @ skew)
-    return turn
 
 
 def rotation_matrices(quaternion: Array) -> Array:

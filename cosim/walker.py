@@ -68,7 +68,7 @@ class Walker:
         sensor = sensor_settings(scenario, plan.schedule)
         outcome = master.run(plan.schedule, h=scenario.macro_step, sensor=sensor, progress=progress)
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.build().warnings})
+        return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.warnings})
 
     def summary(
         self, scenario: Scenario, *, fmu: Path | None = None, gains: Gains | None = None, progress: Progress | None = None

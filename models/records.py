@@ -11,6 +11,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -187,7 +188,7 @@ class Robot:
         """(6, 3) upper joint limits [rad]."""
         return np.array([[link.angle_max for link in leg.links] for leg in self.legs])
 
-    @property
+    @cached_property
     def hash(self) -> str:
         """sha256 of everything but the provenance texts, in hex: equal robots, equal hash."""
         content = asdict(self)

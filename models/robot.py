@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,8 @@ def load_robot(path_or_name: str | Path) -> Robot:
     if path.suffix.lower() == ".urdf":
         return _robot_from_urdf(urdf_table(path), str(path))
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        alone = _robot_from_text(text, str(path))
     except OSError as error:
         fix = "give the path of a robot file, or one of: " + ", ".join(list_robots())
         raise RobotError("cannot read the robot file", got=error.strerror, fix=fix, where=str(path)) from error
@@ -76,9 +78,16 @@ def load_robot(path_or_name: str | Path) -> Robot:
         raise RobotError(
             "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
         ) from error
-    if "urdf" in table:
-        return _robot_from_urdf(side_table(table, path.parent, str(path)), str(path))
-    return robot_from_table(table, where=str(path))
+    if alone is None:
+        return _robot_from_urdf(side_table(tomllib.loads(text), path.parent, str(path)), str(path))
+    return alone
+
+
+@lru_cache(maxsize=64)
+def _robot_from_text(text: str, where: str) -> Robot | None:
+    """The robot of a file's text, read once; None if it names a URDF, which may change without it."""
+    table = tomllib.loads(text)
+    return None if "urdf" in table else robot_from_table(table, where=where)
 
 
 def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:

@@ -26,7 +26,7 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.records import Array, Baumgarte, Gait, Robot, Solver
 from hexapod_cosim.models.terrain import ground_normal
 
 RESIDUAL = 1e-9  # N and N m: some 1e4 times the rounding of forces of this size
@@ -45,6 +45,17 @@ class Standing:
     velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground and under the bristle law
     foot_force: Array  # (6, 3) N  ground on foot
     bristle: Array  # (6, 3) m  what the feet have given way, 0 but on a slope under the bristle law
+
+
+def standing_part(robot: Robot) -> Robot:
+    """The robot with one and the same of all that does not matter to how it stands: how motion is integrated, how it walks, and on level
+    ground how strong its friction is, since it has nothing to hold.
+    """
+    friction, calm = robot.friction, Solver(method="rosw3", step=0.0, tolerance=1e-4, step_max=1.0, projection="none")
+    if robot.friction.law == "tanh" and robot.friction.mu > 0.0 and (robot.terrain.kind == "flat" or robot.terrain.incline == 0.0):
+        friction = replace(friction, mu=1.0, mu_static=1.0)
+    still = Gait(name="tripod", period=1.0, duty=0.5, stride=0.0, step_height=1.0)
+    return replace(robot, solver=calm, gait=still, friction=friction, baumgarte=Baumgarte(alpha=0.0, beta=0.0))
 
 
 def settled(robot: Robot) -> tuple[Array, Array, Array]:

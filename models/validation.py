@@ -23,6 +23,7 @@ GYRATION_PER_DIAGONAL = 1.0
 # largest distance of a stance foot from the plane through all six: a leg's sag under load is of this size
 STANCE_PLANE_TOLERANCE = 0.01
 AXIS_TOLERANCE = 1e-6
+SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain")  # what changes without another body
 DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
 
 
@@ -30,8 +31,9 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
     """Raises RobotError on the first rule that the robot breaks; `where` names its file in the message."""
     at = f"{where or robot.name}: "
     Vector("m/s2", 3).read(robot.gravity, at + "gravity")
-    for name in ("torso", "foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "gait"):
+    for name in ("torso", "foot", "gait"):
         check_record(getattr(robot, name), at + name)
+    check_settings(robot, where=where)
     check_inertia(robot.torso.mass, robot.torso.inertia, GYRATION_PER_DIAGONAL * math.hypot(*robot.torso.size), at + "torso")
     _check_com(robot.torso.com, math.hypot(*robot.torso.size), at + "torso")
     if tuple(leg.name for leg in robot.legs) != LEG_NAMES:
@@ -41,8 +43,15 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
         )
     for leg in robot.legs:
         _check_leg(leg, f"{at}legs.{leg.name}")
-    _check_laws(robot, at)
     _check_stance(robot, at)
+
+
+def check_settings(robot: Robot, *, where: str | None = None) -> None:
+    """The same of its laws and settings alone, for a robot of checked bodies."""
+    at = f"{where or robot.name}: "
+    for name in SETTINGS:
+        check_record(getattr(robot, name), at + name)
+    _check_laws(robot, at)
 
 
 def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where: str) -> None:
