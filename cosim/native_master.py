@@ -109,6 +109,9 @@ class NativeMaster:
         self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
         seen, flagged = plant.names("output"), plant.names("output", "Boolean")
         refuse_foreign(seen, plant.names("input"), flagged)
+        if columns is not None:  # what nobody looks at is not read
+            wanted = {*columns, *(name for key in SENSED for name in MEASURED[key])}
+            seen, flagged = ([name for name in names if name in wanted] for names in (seen, flagged))
         shown = (f"controller.{name}" for name in (*INSIDES, *CONTROLLER_FLAGS))
         self._places = {name: place for place, name in enumerate((*seen, *flagged, *PUSH, *JOINT_COMMANDS, *shown))}
         self._reading = len(self._places)  # the sensors' readings come last, and are not recorded

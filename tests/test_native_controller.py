@@ -241,6 +241,28 @@ def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
     assert native.save() == saved
 
 
+@pytest.mark.parametrize("between", ["nothing", "another input", "a restored state", "a reset"])
+def test_a_step_after_a_look_is_the_step_without(controller_core: ct.CDLL, between: str) -> None:
+    """A look keeps its tick for the step that follows: only for the same state under the same input."""
+    native, plain = (NativeController(controller_core, setup_of()) for _ in range(2))
+    stepped(native, 0, 50)
+    earlier = native.save()
+    stepped(native, 50, 7)
+    native.input.foot_force[0][2] = 50.0
+    native.output()
+    if between == "another input":
+        native.input.foot_force[0][2] = 40.0
+    if between == "a restored state":
+        native.restore(earlier)
+    if between == "a reset":
+        native.reset()
+    plain.restore(native.save())
+    ct.memmove(ct.byref(plain.input), ct.byref(native.input), ct.sizeof(native.input))
+    for one in (native, plain):
+        one.go(one.time + 3 * PERIOD)
+    assert native.save() == plain.save()
+
+
 def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CDLL) -> None:
     """Steps of two periods do both ticks under the same input; half a step holds the commands of the last tick."""
     setup, force = setup_of(), np.tile([0.2, 0.0, 9.0], (6, 1))

@@ -26,7 +26,7 @@ hxStatus hx_component_step(hxComponent *component, const struct hxVariables *var
 }
 
 void hx_component_output(hxComponent *component, struct hxVariables *variables) {
-  hx_controller_output(const_controller(component), &variables->input, &variables->output);
+  hx_controller_output(controller_of(component), &variables->input, &variables->output);
 }
 
 double hx_component_time(const hxComponent *component) { return hx_controller_time(const_controller(component)); }

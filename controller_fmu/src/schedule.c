@@ -47,6 +47,7 @@ hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinit
   if (status != HX_OK) return refuse(controller, status, message);
   hx_controller_compile(definition, &controller->model);
   hx_controller_begin(&controller->model, t, &controller->state);
+  controller->ahead.known = 0;
   controller->message[0] = '\0';
   return HX_OK;
 }
@@ -63,16 +64,35 @@ static int is_finite(const hxControllerOutput *output) {
   return sum == 0.0;
 }
 
-void hx_controller_output(const hxController *controller, const hxControllerInput *input, hxControllerOutput *output) {
-  if (next_tick(controller) - controller->state.time <= clock_tolerance * controller->model.period) {
-    hxControllerState ahead = controller->state; /* the tick is done for show, and done again when time goes on */
-    hx_controller_tick(&controller->model, input, &ahead);
-    *output = ahead.output;
-  } else
-    *output = controller->state.output;
+/* whether the next tick under this input has been done; inputs are doubles through and through */
+static int is_ahead(const hxController *controller, const hxControllerInput *input) {
+  return controller->ahead.known && memcmp(&controller->ahead.input, input, sizeof *input) == 0;
 }
 
-/* The input a while after it was given, changing at a rate. Both are doubles through and through. */
+void hx_controller_output(hxController *controller, const hxControllerInput *input, hxControllerOutput *output) {
+  hxAhead *ahead = &controller->ahead;
+  if (next_tick(controller) - controller->state.time > clock_tolerance * controller->model.period) {
+    *output = controller->state.output;
+    return;
+  }
+  if (!is_ahead(controller, input)) {
+    ahead->known = 1;
+    ahead->input = *input;
+    ahead->state = controller->state;
+    hx_controller_tick(&controller->model, input, &ahead->state);
+  }
+  *output = ahead->state.output;
+}
+
+static void tick(hxController *controller, const hxControllerInput *input) {
+  if (is_ahead(controller, input))
+    controller->state = controller->ahead.state;
+  else
+    hx_controller_tick(&controller->model, input, &controller->state);
+  controller->ahead.known = 0;
+}
+
+/* The input a while after it was given, changing at a rate. */
 static void ramp_input(const hxControllerInput *input, const hxControllerInput *rate, double time, hxControllerInput *now) {
   double value[sizeof *now / sizeof(double)], slope[sizeof *now / sizeof(double)];
   memcpy(value, input, sizeof value);
@@ -93,7 +113,7 @@ hxStatus hx_controller_step(hxController *controller, const hxControllerInput *i
   if (status != HX_OK) return status;
   while (t_end - next_tick(controller) > clock_tolerance * controller->model.period) {
     if (rate) ramp_input(input, rate, fmax(next_tick(controller) - before.time, 0.0), &now);
-    hx_controller_tick(&controller->model, &now, &controller->state);
+    tick(controller, &now);
     if (is_finite(&controller->state.output)) continue;
     controller->state = before;
     return refuse(controller, HX_NOT_FINITE, "joint commands: got numbers that are not finite, expected a command that legs can follow");
@@ -127,5 +147,6 @@ hxStatus hx_controller_set_state(hxController *controller, const void *bytes, si
     return refuse(controller, HX_BAD_STATE, "saved state: damaged, its checksum does not match; save it again");
   memcpy(&controller->model, &saved.model, sizeof saved.model);
   memcpy(&controller->state, &saved.state, sizeof saved.state);
+  controller->ahead.known = 0;
   return HX_OK;
 }

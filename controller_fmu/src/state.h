@@ -45,9 +45,17 @@ typedef struct hxControllerState {
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
+/* The next tick, done for show: it is the same when time goes on under the same input. Not part of the state. */
+typedef struct hxAhead {
+  int known;
+  hxControllerInput input;
+  hxControllerState state;
+} hxAhead;
+
 struct hxController {
   hxControllerModel model;
   hxControllerState state;
+  hxAhead ahead;
   char message[HX_MESSAGE_SIZE];
 };
 

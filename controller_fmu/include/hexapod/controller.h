@@ -159,8 +159,9 @@ HX_API void hx_controller_destroy(hxController *controller);
 /* Standing in the stance, all memory cleared, the first tick at time t. On failure nothing changes but the message. */
 HX_API hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinition *definition, double t);
 
-/* The joint commands at the present time: of this input when a tick is due, else those of the last tick. Nothing is remembered of it. */
-HX_API void hx_controller_output(const hxController *controller, const hxControllerInput *input, hxControllerOutput *output);
+/* The joint commands at the present time: of this input when a tick is due, else those of the last tick. Changes nothing that
+ * counts: what was calculated is only kept for the step that follows under the same input. */
+HX_API void hx_controller_output(hxController *controller, const hxControllerInput *input, hxControllerOutput *output);
 
 /* Goes on to t_end >= time under this input, which changes at a rate (1/s; NULL: is held): all ticks before t_end are done. On failure
  * nothing changes but the message. */
