@@ -1,6 +1,6 @@
 """A co-simulation FMU opened through fmpy: parameters by name, variables in blocks whose arrays are made once.
 
-The master needs only what the protocols `Plant` and `Block` say, so anything that can do the same may stand in for an FMU.
+The master needs only what protocols.py says of a plant.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 from fmpy import extract
@@ -28,28 +28,6 @@ from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
 SUFFIX = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}  # of fmi2Get..., fmi2Set...
-
-
-class Block(Protocol):
-    """Variables of one type, moved in one call."""
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def values(self) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer the calls fill and read
-    def get(self) -> None: ...
-    def set(self) -> None: ...
-
-
-class Plant(Protocol):
-    """What the master asks of a plant. Times in s."""
-
-    def names(self, causality: str, kind: str = "Real") -> list[str]: ...
-    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> Block: ...
-    def parameters(self) -> dict[str, float]: ...
-    def set_parameters(self, values: Mapping[str, Any]) -> None: ...
-    def initialise(self, start: float, stop: float) -> None: ...
-    def step(self, t: float, h: float) -> None: ...
 
 
 class StepError(FmuError):
@@ -202,13 +180,27 @@ class Fmu:
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Sets parameters by name, enumerations by the name of their item. Before `initialise`. Raises FmuError, naming the parameter."""
-        numbers = {self._parameter(name): self._number(name, value) for name, value in values.items()}
-        kinds = {SUFFIX[self.variables[name].type] for name in numbers}
-        if all(
-            self._take({name: number for name, number in numbers.items() if SUFFIX[self.variables[name].type] == kind}) for kind in kinds
-        ):
-            return
-        for name, value in numbers.items():  # one by one, to name the one that is refused
+        self.set_blocks(self.parameter_blocks(values))
+
+    def parameter_blocks(self, values: Mapping[str, Any]) -> list[FmuBlock]:
+        """Blocks that hold these parameters, to be set again and again. Raises FmuError for what is no parameter or no value of it."""
+        kinds: dict[str, dict[str, float]] = {}
+        for name, value in values.items():
+            kinds.setdefault(self.variables[self._parameter(name)].type, {})[name] = self._number(name, value)
+        blocks = [self.block(list(numbers)) for numbers in kinds.values()]
+        for block, numbers in zip(blocks, kinds.values(), strict=True):
+            block.values[:] = list(numbers.values())
+        return blocks
+
+    def set_blocks(self, blocks: Sequence[FmuBlock]) -> None:
+        """Sets parameters. Before `initialise`. Raises FmuError, naming the parameter."""
+        for whole in blocks:
+            if whole.put() > WARNING:
+                self._set_one_by_one(dict(zip(whole.names, whole.values.tolist(), strict=True)))
+
+    def _set_one_by_one(self, numbers: Mapping[str, float]) -> None:
+        """To name the one that is refused."""
+        for name, value in numbers.items():
             block = self.block([name])
             block.values[0] = value
             status = block.put()
@@ -216,12 +208,6 @@ class Fmu:
                 raise FmuError(self._said(status), where=self.path.name)  # its sentence has name, value and range
             if status > WARNING:
                 raise FmuError(f"{name}: the FMU refuses the value", got=value, where=self.path.name)
-
-    def _take(self, numbers: Mapping[str, float]) -> bool:
-        """Sets parameters of one kind in one call; whether the FMU took them."""
-        block = self.block(list(numbers))
-        block.values[:] = list(numbers.values())
-        return block.put() <= WARNING
 
     def _parameter(self, name: str) -> str:
         if name not in self.variables:

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
-from hexapod_cosim.cosim.fmu import Plant
 from hexapod_cosim.cosim.interrupts import interruptible
+from hexapod_cosim.cosim.protocols import Plant
 from hexapod_cosim.cosim.recorder import Recorder, Recording
 from hexapod_cosim.cosim.schedule import Schedule
 from hexapod_cosim.cosim.signals import Signals, vector_names

@@ -14,25 +14,23 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hexapod_cosim.controller import Controller, Gains, make_gait
 from hexapod_cosim.cosim.components import PLANT
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.doubts import describe_walk, doubts, idle_settings
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.interface import plant_roots
 from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
-from hexapod_cosim.cosim.metrics import View, body_height, compute_metrics, cut_walk
+from hexapod_cosim.cosim.metrics import View, compute_metrics
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.reach import check_commands
-from hexapod_cosim.cosim.recorder import Recorder, Recording, chosen_columns
+from hexapod_cosim.cosim.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import Schedule, make_schedule
-from hexapod_cosim.cosim.signals import Signals, joint_names
+from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.cosim.start_values import parameter_values
 from hexapod_cosim.cosim.variation import Drawn, delayed, draw, initial_values
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
@@ -40,8 +38,6 @@ from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
 WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
 SAME = 1e-9  # relative, of a parameter printed and read again
-UPRIGHT = 0.6  # rad    of roll or pitch: beyond it the robot has fallen
-SUNK = 0.5  # of the height it is commanded to hold: below it the robot has fallen too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +88,7 @@ class Plan:
     """What is known of a run before there is a plant."""
 
     scenario: Scenario
+    robot: Robot  # the plant's
     controller: ControllerSetup
     schedule: Schedule
     drawn: Drawn | None  # None: nothing varies
@@ -99,7 +96,8 @@ class Plan:
 
 def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
     """The plan of a scenario. Raises HexapodError for commands that the legs do not reach, and where no gains can be designed."""
-    robot = known_robot(scenario)
+    own = scenario_robot(scenario)
+    robot = known_robot(scenario, own)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
     check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     setup = ControllerSetup(
@@ -107,7 +105,7 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
     )
     drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
     schedule = make_schedule(scenario if drawn is None else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay)))
-    return Plan(scenario=scenario, controller=setup, schedule=schedule, drawn=drawn)
+    return Plan(scenario=scenario, robot=own, controller=setup, schedule=schedule, drawn=drawn)
 
 
 def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
@@ -115,7 +113,7 @@ def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
     scenario = plan.scenario
     plant.set_parameters(scenario.parameters)
     if plan.drawn is not None:
-        plant.set_parameters(initial_values(scenario_robot(scenario), plant.parameters(), plan.drawn))
+        plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
     plant.initialise(scenario.start, scenario.start + scenario.duration)
     return plant.parameters()
 
@@ -143,9 +141,12 @@ def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None
     return design_for(known_robot(scenario), scenario.macro_step)
 
 
-def known_robot(scenario: Scenario) -> Robot:
-    """The robot as its controller knows it: its own file with the scenario's servos. Ground, contact and payload it has to find out."""
-    return _with_servo(load_robot(scenario.robot), scenario_robot(scenario).servo)
+def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
+    """The robot as its controller knows it: its own file with the scenario's servos. Ground, contact and payload it has to find out.
+
+    own: the scenario's robot, if it is at hand.
+    """
+    return _with_servo(load_robot(scenario.robot), (own or scenario_robot(scenario)).servo)
 
 
 @lru_cache(maxsize=64)
@@ -185,6 +186,11 @@ def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
 
 def adopt_settings(plant: Fmu, robot: Robot) -> None:
     """Sets the laws and settings of a given FMU to those of the robot. Raises FmuError when the FMU holds another robot."""
+    plant.set_parameters(foreign_settings(plant, robot))
+
+
+def foreign_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
+    """The laws and settings of a robot that an FMU does not have. Raises FmuError when the FMU holds another robot."""
     wanted = parameter_values(PLANT, plant_roots(robot))
     present = plant.parameters()
     changes = {
@@ -197,7 +203,7 @@ def adopt_settings(plant: Fmu, robot: Robot) -> None:
             fix = "export one of this robot with `hexapod export --robot`, or name the FMU's robot in the scenario"
             expected = f"{value:g}, as robot {robot.name!r} has"
             raise FmuError(f"the FMU holds another robot: {name}", got=present[name], expected=expected, fix=fix, where=str(plant.path))
-    plant.set_parameters(changes)
+    return changes
 
 
 def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
@@ -215,89 +221,3 @@ def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
 def _versions() -> Mapping[str, str]:
     names = ("fmpy", "numpy", "scipy", "control")
     return {"hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names}}
-
-
-def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
-    """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), whether the robot stayed upright, and the
-    share of time in which the controller fell back to kinematic control, if it tells.
-    """
-    walk = cut_walk(view)
-    distance = walk.distance if walk else math.nan
-    lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
-    doubted = fallback_columns(view.recording)
-    fallback = {"fallback": float(np.mean(doubted.any(axis=1)))} if len(doubted) else {}
-    return {"distance": distance, "mean_speed": distance / lasted, "upright": not fall(view, robot)} | fallback
-
-
-def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
-    """(rows, 6) when each leg walked without feedback; no rows when the controller does not tell."""
-    names = [f"controller.{leg}.fallback" for leg in LEG_NAMES]
-    return recording.columns(names) > 0.5 if set(names) <= set(recording.names) else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
-
-
-def fallen_back(recording: Recording) -> list[str]:
-    """For how long which legs walked without feedback."""
-    doubted = fallback_columns(recording)
-    if not doubted.any():
-        return []
-    together = float(doubted.all(axis=1).mean())
-    legs = {leg: float(share) - together for leg, share in zip(LEG_NAMES, doubted.mean(axis=0), strict=True)}
-    found = [f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan"
-             for leg, share in legs.items() if share]  # fmt: skip
-    slid = (
-        f"all legs walked without feedback for {together:.0%} of the time: "
-        "the robot slid, its joints could not follow, or too many sensors failed"
-    )
-    return [slid, *found] if together else found
-
-
-def fall(view: View, robot: Robot) -> str:
-    """When and how the robot fell, "" when it stayed upright: roll and pitch within bounds, the torso off the ground and not sunk."""
-    recording = view.recording
-    if not len(recording.time):
-        return ""
-    height = body_height(recording, view.parameters)
-    commanded = height[0] + recording.column("command.height")
-    tilted = np.abs(recording.columns(["torso.roll", "torso.pitch"])).max(axis=1) >= UPRIGHT
-    low = (height < SUNK * commanded) | (height < 0.5 * robot.torso.size[2])
-    fallen = tilted | low
-    if not fallen.any():
-        return ""
-    k = int(np.argmax(fallen))
-    how = f"roll or pitch beyond {UPRIGHT} rad" if tilted[k] else f"the torso only {height[k]:.3g} m above the ground"
-    return f"the robot fell at {recording.time[k]:.3f} s: {how}"
-
-
-def idle_settings(scenario: Scenario, robot: Robot) -> list[str]:
-    """Settings that this run does not use."""
-    late = [event.time for event in scenario.events if event.time >= scenario.duration]
-    found = [f"the event at {time:g} s does nothing: the run ends at {scenario.duration:g} s" for time in late]
-    late = [command.time for command in scenario.commands if command.time >= scenario.duration]
-    found += [f"the command at {time:g} s does nothing: the run ends at {scenario.duration:g} s" for time in late]
-    terrain = replace(robot.terrain, **scenario.settings.get("terrain", {}))
-    given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
-    sloped = [key for key in ("incline", "heading") if given.get(key) or given.get(f"terrain.{key}")]
-    if terrain.kind == "flat":
-        found += [f"terrain.{key} does nothing on flat ground; set terrain.kind=slope" for key in sloped]
-    return found
-
-
-def doubts(view: View, robot: Robot) -> list[str]:
-    """What a reader of the results should know: a fall, legs out of reach, servos hotter than they may be for long."""
-    recording, fell = view.recording, fall(view, robot)
-    found = [fell] if fell else []
-    unreachable = [f"controller.{leg}.unreachable" for leg in LEG_NAMES]
-    if len(recording.time) and set(unreachable) <= set(recording.names):
-        share = float(np.mean(recording.columns(unreachable).max(axis=1)))
-        found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
-    found += fallen_back(recording)
-    if len(recording.time):
-        torque = np.sqrt(np.mean(recording.columns(joint_names("torque")) ** 2, axis=0))
-        worst, limit = int(np.argmax(torque)), robot.servo.torque_continuous
-        name = joint_names("torque")[worst].removesuffix(".torque")
-        found += (
-            [f"servo {name} works at {torque[worst]:.2f} N m RMS, above the {limit:g} N m it bears for long"]
-            if torque[worst] > limit
-            else []
-        )
-    return found

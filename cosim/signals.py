@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import JointCommand, Measurement
-from hexapod_cosim.cosim.fmu import Plant
 from hexapod_cosim.cosim.force_sensor import ForceSensor
+from hexapod_cosim.cosim.protocols import Plant
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
 
 LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -69,10 +70,17 @@ def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) 
     turn = np.array([1.0, *(0.5 * drawn.rotation)])
     turned = quaternion_product(turn / np.linalg.norm(turn), quaternion)
     bent = angle + drawn.angle.ravel()
-    deeper = _depths(robot, position, turned, bent) - _depths(robot, position, quaternion, angle)
+    deeper = _depths(robot, position, turned, bent) - _depths_at_rest(robot, tuple(position), tuple(quaternion), tuple(angle))
     raised = position + np.array([0.0, 0.0, max(float(deeper.max()), 0.0) + drawn.height])
     pairs = ((POSITION, raised), (QUATERNION, turned), (ANGLE, bent))
     return {name: value for names, values in pairs for name, value in zip(names, values.tolist(), strict=True)}
+
+
+@lru_cache(maxsize=64)
+def _depths_at_rest(robot: Robot, *pose: tuple[float, ...]) -> Array:
+    """The same, remembered: runs of one robot begin from one pose."""
+    position, quaternion, angle = map(np.array, pose)
+    return _depths(robot, position, quaternion, angle)
 
 
 def _depths(robot: Robot, position: Array, quaternion: Array, angle: Array) -> Array:

@@ -6,33 +6,35 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import thread_time
 from types import TracebackType
 from typing import Self
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.controller_export import export_controller
-from hexapod_cosim.cosim.controller_interface import controller_parameters
+from hexapod_cosim.cosim.controller_interface import ControllerSetup, controller_parameters
 from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master import Progress
 from hexapod_cosim.cosim.metrics import JUDGED
 from hexapod_cosim.cosim.native_master import NativeMaster
 from hexapod_cosim.cosim.run import (
     Plan,
     Result,
-    adopt_settings,
     chosen_gains,
     describe,
+    foreign_settings,
     initialise_plant,
     judge,
     known_robot,
     make_plan,
     sensor_settings,
 )
-from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.summary import Summary, refused, summarise
-from hexapod_cosim.models import HexapodError, load_robot
+from hexapod_cosim.models import HexapodError, Robot, load_robot
+
+REMEMBERED = 64  # robots
 
 
 class Walker:
@@ -52,6 +54,9 @@ class Walker:
         self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
         self._masters: dict[str | Path, tuple[Fmu, NativeMaster]] = {}  # by robot, or by the FMU given
         self._controller: Fmu | None = None
+        self.loop_time = 0.0  # s  of the processor, the last run's loop alone
+        self._told: tuple[ControllerSetup, list[FmuBlock]] | None = None  # the controller's latest set-up and the blocks that set it
+        self._changes: dict[tuple[Path, Robot], dict[str, float]] = {}
         self._designs: dict[tuple[str, float], Gains | None] = {}
 
     def simulate(
@@ -62,11 +67,13 @@ class Walker:
         controller = self._told_controller(plan)
         plant, master = self._plant(scenario, controller, fmu or self._given)
         plant.reset()
-        adopt_settings(plant, scenario_robot(scenario))
+        plant.set_parameters(self._settings(plant, plan.robot))
         parameters = initialise_plant(plant, plan)
         controller.initialise(scenario.start, scenario.start + scenario.duration)
         sensor = sensor_settings(scenario, plan.schedule)
+        begin = thread_time()
         outcome = master.run(plan.schedule, h=scenario.macro_step, sensor=sensor, progress=progress)
+        self.loop_time = thread_time() - begin
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
         return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.warnings})
 
@@ -104,12 +111,24 @@ class Walker:
             path = self._given_controller or export_controller(setup, self._folder / "controller.fmu")
             self._controller = self._open.enter_context(Fmu(path, name="controller"))
         self._controller.reset()
-        self._controller.set_parameters(controller_parameters(setup))
+        if self._told is None or self._told[0] != setup:
+            self._told = setup, self._controller.parameter_blocks(controller_parameters(setup))
+        self._controller.set_blocks(self._told[1])
         return self._controller
+
+    def _settings(self, plant: Fmu, robot: Robot) -> dict[str, float]:
+        """What the plant, just reset, has to be told to be this robot; remembered for some."""
+        key = plant.path, robot
+        if key not in self._changes:
+            if len(self._changes) >= REMEMBERED:
+                self._changes.clear()
+            self._changes[key] = foreign_settings(plant, robot)
+        return self._changes[key]
 
     def close(self) -> None:
         """Frees the FMUs; harmless when called twice."""
         self._masters.clear()
+        self._told = None
         self._controller = None
         self._open.close()
 

@@ -11,12 +11,13 @@ import pytest
 from fake_plant import SPEED, FakeController, FakePlant
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.cosim.doubts import describe_walk
 from hexapod_cosim.cosim.fmu import Fmu, StepError
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, insides, run
 from hexapod_cosim.cosim.metrics import View
 from hexapod_cosim.cosim.recorder import Recorder, Recording
 from hexapod_cosim.cosim.recordings import read_csv, write_csv
-from hexapod_cosim.cosim.run import Result, adopt_settings, describe_walk, make_sensor, simulate
+from hexapod_cosim.cosim.run import Result, adopt_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario_records import Push, Scenario
 from hexapod_cosim.cosim.schedule import make_schedule, push_rows

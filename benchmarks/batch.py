@@ -1,0 +1,131 @@
+"""How many walks a minute: the compiled controller and the Python one, on one process and on all, and what a run costs beside its loop.
+
+usage: python -m benchmarks.batch [--walks N] [--memory-runs N]
+
+Walks are `walk_flat`, 10 s, each with variations of its own. Prints a table and writes benchmarks/results/<machine>/batch.csv. Nothing is
+asserted: machines are noisy, and what else runs on this one is in every wall time; processor time tells less of that.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import pickle
+import statistics
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from typing import Any
+
+from benchmarks.run import RESULTS, machine
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.batch import processors, run_batch
+from hexapod_cosim.cosim.run import chosen_gains
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.variation import STANDARD
+from hexapod_cosim.cosim.walker import Walker
+
+FAST = ("solver.method=ros2", "solver.tolerance=0.1")
+SETTINGS: dict[str, tuple[str, ...]] = {"default solver": (), "fast solver": FAST}
+CONTROLS = ("compliant", "kinematic")
+WARM = 4  # walks after which everything that is made once has been made
+PYTHON_WALKS = 8  # are enough of these
+ONCE = 1e6  # bytes in a MB
+
+
+def scenarios(control: str, settings: Sequence[str], count: int) -> list[Scenario]:
+    """So many walks that differ by their seeds."""
+    scenario = load_scenario("walk_flat", overrides=[f"control={control}", *settings])
+    return [replace(scenario, seed=seed, variation=STANDARD) for seed in range(count)]
+
+
+def per_minute(plans: Sequence[Scenario], gains: Gains | None, *, workers: int, compiled: bool) -> float:
+    """Walks a minute once all workers are at work: from the first result on."""
+    times = []
+    with closing(run_batch(plans, gains=gains, workers=workers, compiled=compiled)) as runs:
+        for summary in runs:
+            assert summary.walked, summary.reason
+            times.append(time.perf_counter())
+    late = times[max(WARM, 2 * workers) :]
+    return 60.0 * (len(late) - 1) / (late[-1] - late[0])
+
+
+def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
+    """Medians of one process' runs [ms of processor time], the loop's and what is beside it; bytes of what a run sends back."""
+    totals, loops = [], []
+    with Walker() as walker:
+        for plan in plans:
+            begin = time.process_time()
+            summary = walker.summary(plan, gains=gains)
+            totals.append(1e3 * (time.process_time() - begin))
+            loops.append(1e3 * walker.loop_time)
+    overheads = [total - loop for total, loop in zip(totals, loops, strict=True)][WARM:]
+    found = {"run": totals[WARM:], "loop": loops[WARM:], "overhead": overheads}
+    told: dict[str, float] = {f"{name}_ms": round(statistics.median(values), 2) for name, values in found.items()}
+    return told | {"best_run_ms": round(min(totals), 2), "best_overhead_ms": round(min(overheads), 2), "bytes": len(pickle.dumps(summary))}
+
+
+def measured(count: int) -> Iterator[dict[str, Any]]:
+    """A row for each control and setting of the solver, one for each control in Python."""
+    most = processors()
+    for control in CONTROLS:
+        gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
+        for setting, changes in SETTINGS.items():
+            plans = scenarios(control, changes, count)
+            alone, together = (round(per_minute(plans, gains, workers=workers, compiled=True)) for workers in (1, most))
+            yield {
+                "controller": "compiled", "control": control, "setting": setting, "one_process": alone, "processes": most, "all": together,
+                "of_ideal": round(together / alone / most, 3), **costs(plans, gains),
+            }  # fmt: skip
+        few = scenarios(control, (), PYTHON_WALKS + max(WARM, 2 * most))
+        alone, together = (round(per_minute(few, gains, workers=workers, compiled=False)) for workers in (1, most))
+        shown = {"one_process": alone, "processes": most, "all": together, "of_ideal": round(together / alone / most, 3)}
+        yield {"controller": "Python", "control": control, "setting": "default solver", **shown}
+
+
+def growth(count: int) -> tuple[float, float]:
+    """MB that this process holds after a tenth of so many runs, and after all of them."""
+    plans = scenarios("kinematic", (*FAST, "duration=1"), count)
+    marks = []
+    with Walker() as walker:
+        for k, plan in enumerate(plans, start=1):
+            walker.summary(plan)
+            if k in (count // 10, count):
+                marks.append(resident() / ONCE)
+    return marks[0], marks[-1]
+
+
+def resident() -> int:
+    """Bytes of this process in memory."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def main() -> int:
+    """Measures and prints; returns the exit code."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--walks", type=int, default=100, help="of each kind")
+    parser.add_argument("--memory-runs", type=int, default=1000, help="short ones, one after the other in one process")
+    given = parser.parse_args()
+    rows = []
+    for row in measured(given.walks):
+        rows.append(row)
+        print("  ".join(f"{key} {value}" for key, value in row.items()), flush=True)
+    folder = RESULTS / machine()
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "batch.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+    if given.memory_runs:
+        begin, end = growth(given.memory_runs)
+        print(f"memory after {given.memory_runs // 10} runs {begin:.1f} MB, after {given.memory_runs} {end:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
