@@ -94,6 +94,15 @@ def test_the_fmi_layer_includes_no_core(component: str) -> None:
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
+def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() -> None:
+    files = c_files("src", "include/hexapod", component="master")
+    assert files
+    for path in files:
+        included = set(INCLUDE.findall(path.read_text(encoding="utf-8")))
+        foreign = included - {"hexapod/master.h", "hexapod/status.h", "fmi2FunctionTypes.h"} - STANDARD_C
+        assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
+
+
 @pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
 def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
     for path in c_files("src", "src/lanes", "include/hexapod", component=component):
