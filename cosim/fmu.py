@@ -186,7 +186,8 @@ class Fmu:
         """Blocks that hold these parameters, to be set again and again. Raises FmuError for what is no parameter or no value of it."""
         kinds: dict[str, dict[str, float]] = {}
         for name, value in values.items():
-            kinds.setdefault(self.variables[self._parameter(name)].type, {})[name] = self._number(name, value)
+            kind = self.variables[self._parameter(name)].type
+            kinds.setdefault(kind, {})[name] = self._number(name, value)
         blocks = [self.block(list(numbers)) for numbers in kinds.values()]
         for block, numbers in zip(blocks, kinds.values(), strict=True):
             block.values[:] = list(numbers.values())
