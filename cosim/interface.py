@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.patterns import expand, expand_names, labelled, own_axe
 from hexapod_cosim.cosim.plant_files import interface_file, package_version
 from hexapod_cosim.models.errors import HexapodError, unknown_name
 from hexapod_cosim.models.records import Robot
-from hexapod_cosim.models.statics import settled, standing_part
+from hexapod_cosim.models.statics import settled
 
 Causality = Literal["input", "output", "parameter", "local"]
 Type = Literal["Real", "Boolean", "Enumeration"]
@@ -210,10 +210,9 @@ def enumerations_of(component: Component) -> Mapping[str, Enumeration]:
 
 def plant_roots(robot: Robot) -> SimpleNamespace:
     """What the path of a start value of the plant may begin with."""
-    return SimpleNamespace(robot=robot, settled=_settled_pose(standing_part(robot)))
+    return SimpleNamespace(robot=robot, settled=_settled_pose(robot))
 
 
-@lru_cache(maxsize=64)
 def _settled_pose(robot: Robot) -> SimpleNamespace:
     position, quaternion, angle = settled(robot)
     return SimpleNamespace(position=_rounded(position), quaternion=_rounded(quaternion), angle=[_rounded(leg) for leg in angle])

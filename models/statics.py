@@ -47,7 +47,7 @@ class Standing:
     bristle: Array  # (6, 3) m  what the feet have given way, 0 but on a slope under the bristle law
 
 
-def standing_part(robot: Robot) -> Robot:
+def _standing_part(robot: Robot) -> Robot:
     """The robot with one and the same of all that does not matter to how it stands: how motion is integrated, how it walks, and on level
     ground how strong its friction is, since it has nothing to hold.
     """
@@ -64,7 +64,6 @@ def settled(robot: Robot) -> tuple[Array, Array, Array]:
     return pose.position, pose.quaternion, pose.angle
 
 
-@lru_cache(maxsize=64)
 def standing(robot: Robot) -> Standing:
     """Static equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has given way) and joint angles.
 
@@ -72,6 +71,11 @@ def standing(robot: Robot) -> Standing:
     Looked up when it was asked for before: the interface and every picture of a robot need it, and it is most of an export's time. Its
     arrays are read-only. Raises RobotError when there is no such pose: servos too weak or soft, or a slope without friction.
     """
+    return _found(_standing_part(robot))
+
+
+@lru_cache(maxsize=64)
+def _found(robot: Robot) -> Standing:
     x = _start(robot)
     residual = _residual(robot, x)
     for _ in range(ITERATIONS):
