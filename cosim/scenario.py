@@ -44,6 +44,13 @@ def list_scenarios() -> dict[str, Path]:
 
 def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:
     """Reads a scenario file, or a bundled one by name, with `overrides` "NAME=VALUE" put over it. Raises ScenarioError."""
+    table, where = read_tables(path_or_name)
+    given = [text.partition("=")[0].strip() for text in overrides]
+    return scenario_from_table(with_overrides(table, overrides), where=where, given=given)
+
+
+def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
+    """The tables of a scenario file, or of a bundled one by name, not yet judged; what messages call it. Raises ScenarioError."""
     path = _scenario_path(path_or_name)
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -56,9 +63,7 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
         ) from error
     if "robot" in table and (path.parent / str(table["robot"])).is_file():
         table["robot"] = str((path.parent / table["robot"]).resolve())  # a robot file beside the scenario
-    where = path.name if path in list_scenarios().values() else str(path)
-    given = [text.partition("=")[0].strip() for text in overrides]
-    return scenario_from_table(with_overrides(table, overrides), where=where, given=given)
+    return table, path.name if path in list_scenarios().values() else str(path)
 
 
 def _scenario_path(path_or_name: str | Path) -> Path:
@@ -72,13 +77,21 @@ def _scenario_path(path_or_name: str | Path) -> Path:
 
 def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
     """A copy of the tables with each "NAME=VALUE" set: a scenario's key, or else an FMU parameter. Raises ScenarioError."""
-    changed = deepcopy(dict(table))
+    values: dict[str, Any] = {}
     for text in overrides:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
             fix = "write --set gait.period=0.8"
             raise ScenarioError("not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set")
-        _set(changed, name, _parse(value))
+        values[name] = _parse(value)
+    return with_values(table, values)
+
+
+def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of the tables with each value set by its name, as --set does. Raises ScenarioError."""
+    changed = deepcopy(dict(table))
+    for name, value in values.items():
+        _set(changed, name, value)
     return changed
 
 
