@@ -11,12 +11,9 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
-from multiprocessing.connection import wait
-from multiprocessing.synchronize import Event
 from multiprocessing.util import Finalize
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Thread
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export import export_fmu
@@ -26,12 +23,12 @@ from hexapod_cosim.cosim.run import chosen_gains, known_robot, simulate
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.summary import REFUSED, Summary, refused, summarise
 from hexapod_cosim.cosim.walker import Walker
+from hexapod_cosim.cosim.workers import METHOD, begin_worker, stop_if_told
 from hexapod_cosim.models import HexapodError, load_robot
 
 __all__ = ["REFUSED", "Summary", "processors", "run_batch", "summarise"]
 
 QUEUED = 8  # runs that wait for each worker
-METHOD = "spawn"  # a fork would copy the threads' locks of this process, and numpy's
 
 
 @dataclass(frozen=True)
@@ -95,9 +92,9 @@ def _run(task: _Task | Summary, walker: Walker | None) -> Summary:
     if isinstance(task, Summary):
         return task
     if walker is not None:
-        return walker.summary(task.scenario, fmu=task.fmu, gains=task.gains, progress=_stop_if_told)
+        return walker.summary(task.scenario, fmu=task.fmu, gains=task.gains, progress=stop_if_told)
     try:
-        return summarise(simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=_stop_if_told))
+        return summarise(simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=stop_if_told))
     except HexapodError as error:
         return refused(task.scenario, error)
 
@@ -141,7 +138,7 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """Worker processes that are gone when the block ends, however it ends."""
     context = multiprocessing.get_context(METHOD)
     stop = context.Event()
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin_worker, initargs=(stop,))
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker, initargs=(stop,))
     try:
         yield pool
     finally:
@@ -155,26 +152,3 @@ def _result(future: Future[Summary]) -> Summary:
     except BrokenProcessPool as error:
         fix = "look for what ended it (memory?), or run fewer at once"
         raise HexapodError("a worker process of the batch ended by itself", fix=fix) from error
-
-
-_stop: Event | None = None  # of this process, when it is a worker
-
-
-def _begin_worker(stop: Event) -> None:
-    global _stop  # noqa: PLW0603  the one thing a worker is told beside its tasks
-    _stop = stop
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """A worker whose parent is killed would wait for work for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
-
-
-def _stop_if_told(_done: float) -> None:
-    """Ends the run under way; called by the master every few steps."""
-    if _stop is not None and _stop.is_set():
-        raise KeyboardInterrupt

@@ -1,0 +1,34 @@
+"""Processes that work for this one: begun anew rather than forked, told when to stop, gone when this one is."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from multiprocessing.connection import wait
+from multiprocessing.synchronize import Event
+from threading import Thread
+
+METHOD = "spawn"  # a fork would copy the threads' locks of this process, and numpy's
+
+_stop: Event | None = None  # of this process, when it is a worker
+
+
+def begin_worker(stop: Event) -> None:
+    """Makes this process a worker that ends its run when `stop` is set, and itself when its parent is gone."""
+    global _stop  # noqa: PLW0603  the one thing a worker is told beside its tasks
+    _stop = stop
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent is killed would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def stop_if_told(_done: float) -> None:
+    """Ends the run under way; called by the master every few steps."""
+    if _stop is not None and _stop.is_set():
+        raise KeyboardInterrupt
