@@ -6,13 +6,14 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli import compare_command, fmu_commands, listing, run_commands
+from hexapod_cosim.cosim.cli import compare_command, fmu_commands, listing, run_commands, study_command
 from hexapod_cosim.cosim.plant_files import package_version
 
 app = typer.Typer(name="hexapod", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
 app.command("export")(fmu_commands.export)
 app.command("simulate")(run_commands.simulate)
 app.command("compare")(compare_command.compare)
+app.command("study")(study_command.study)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.command("validate")(fmu_commands.validate)

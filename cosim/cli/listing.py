@@ -12,6 +12,7 @@ from hexapod_cosim.controller import PATTERNS
 from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table
 from hexapod_cosim.cosim.interface import load_interface
 from hexapod_cosim.cosim.scenario import list_scenarios
+from hexapod_cosim.cosim.study.reading import list_studies
 from hexapod_cosim.models import LEG_NAMES, list_robots, load_robot, unknown_name
 
 Rows = list[dict[str, Any]]
@@ -28,6 +29,14 @@ def scenarios() -> Rows:
     return [
         {"name": name, "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))}
         for name, path in list_scenarios().items()
+    ]
+
+
+def studies() -> Rows:
+    """The studies that come with the package."""
+    return [
+        {"name": name, "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))}
+        for name, path in list_studies().items()
     ]
 
 
@@ -52,7 +61,14 @@ def _choices(enumeration: str) -> Rows:
     return [{"name": name, "about": text} for name, text in interface.enumerations[enumeration].items]
 
 
-LISTS: dict[str, Callable[[], Rows]] = {"robots": robots, "scenarios": scenarios, "gaits": gaits, "terrains": terrains, "laws": laws}
+LISTS: dict[str, Callable[[], Rows]] = {
+    "robots": robots,
+    "scenarios": scenarios,
+    "studies": studies,
+    "gaits": gaits,
+    "terrains": terrains,
+    "laws": laws,
+}
 
 
 What = Annotated[
@@ -66,7 +82,7 @@ What = Annotated[
 
 
 def list_what(what: What, json: Json = False) -> None:
-    """List robots, scenarios, gaits, terrains or laws."""
+    """List robots, scenarios, studies, gaits, terrains or laws."""
     if what not in LISTS:
         raise unknown_name("list", what, LISTS)
     rows = LISTS[what]()

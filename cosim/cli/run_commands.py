@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.cli.running import (
     show_rows,
     titled,
 )
+from hexapod_cosim.cosim.cli.study_command import report_on
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
 from hexapod_cosim.cosim.comparison import SEEDS, compare_runs, read_seeds
 from hexapod_cosim.cosim.report import REPORT, metric_rows, write_report
@@ -29,6 +30,7 @@ from hexapod_cosim.cosim.results import read_facts, read_result, read_scenario, 
 from hexapod_cosim.cosim.run import Result
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
+from hexapod_cosim.cosim.study.manifest import KIND
 
 Control = Annotated[
     str | None,
@@ -58,11 +60,14 @@ def simulate(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by `hexapod simulate` or `compare`.")], json: Json = False
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by `hexapod simulate`, `compare` or `study`.")],
+    json: Json = False,
 ) -> None:
-    """Make the plots and the report of a run or a comparison again."""
+    """Make the plots and the report of a run, a comparison or a study again."""
     facts = read_facts(folder)
-    if facts.get("kind") == "compare":
+    if facts.get("kind") == KIND:
+        files = report_on(folder)[1]
+    elif facts.get("kind") == "compare":
         runs = {control: read_result(folder / control) for control in CONTROLS}
         comparison = compare_runs(*(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS))
         files = write_report(

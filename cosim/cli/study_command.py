@@ -1,0 +1,118 @@
+"""`hexapod study`: many runs."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hexapod_cosim.cosim.cli.running import FmuFile, GainsFile, given_gains
+from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, study_bar, warn
+from hexapod_cosim.cosim.master import COMPLETED
+from hexapod_cosim.cosim.study.conduct import Tell
+from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE, ENGINES
+from hexapod_cosim.cosim.study.manifest import TIMES
+from hexapod_cosim.cosim.study.reading import load_study
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.results import Results, read_results, summary_of
+from hexapod_cosim.cosim.study.study import Begun, Options, run_study
+from hexapod_cosim.models import unknown_name
+
+MAX_WORKERS, MOST_REASONS = 4096, 10
+Workers = Annotated[int | None, typer.Option("--workers", metavar="N", help="Processes on this machine; default: one for each processor.")]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler: tcp://HOST:8786.")
+]
+StudyFolder = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write, or to go on; default out/STUDY.")]
+EngineName = Annotated[str, typer.Option("--engine", metavar="|".join(ENGINES), help="How figures are made.")]
+
+
+def study(
+    file: Annotated[str, typer.Argument(metavar="STUDY", help="A study file, or a name of `hexapod list studies`.")],
+    output: StudyFolder = None, workers: Workers = None, scheduler: Scheduler = None, engine: EngineName = DEFAULT_ENGINE,
+    fmu: FmuFile = None, gains: GainsFile = None, json: Json = False,
+) -> None:  # fmt: skip
+    """Run a study: sweeps, Monte Carlo, tuning. Stopped at any point and started again, it goes on where it was."""
+    plan = load_study(file)
+    folder = output or Path("out") / Path(file).stem
+    options = Options(
+        engine=_known_engine(engine), fmu=fmu, gains=given_gains(gains), workers=_checked_workers(workers), scheduler=scheduler,
+        command=_command_line(file, {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains}),
+    )  # fmt: skip
+    try:
+        with progress() as begun:
+            results = run_study(plan, folder, options=options, begun=begun)
+    except KeyboardInterrupt:
+        warn(f"stopped; what was run is in {folder}, and the same command goes on from there")
+        raise
+    found, files = report_on(folder)
+    if json:
+        show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
+        return
+    show_study(found)
+    show_files([results, folder / TIMES, *files])
+    print(f"report: {files[-1]}")
+
+
+def report_on(folder: Path) -> tuple[Results, list[Path]]:
+    """Reads a study's folder and writes its tables and report."""
+    from hexapod_cosim.cosim.study.report import write_study_report  # noqa: PLC0415  matplotlib is slow to import
+
+    found = read_results(folder)
+    return found, write_study_report(found, folder)
+
+
+def _known_engine(name: str) -> str:
+    if name not in ENGINES:
+        raise unknown_name("engine", name, ENGINES, where="--engine", error=StudyError)
+    return name
+
+
+def _checked_workers(count: int | None) -> int | None:
+    if count is not None and not 1 <= count <= MAX_WORKERS:
+        raise StudyError("not a number of workers", got=count, expected=f"1 to {MAX_WORKERS}", fix="write --workers 2", where="--workers")
+    return count
+
+
+def _command_line(file: str, options: Mapping[str, object]) -> str:
+    words = [word for name, value in options.items() if value is not None for word in (f"--{name}", str(value))]
+    return shlex.join(["hexapod", "study", file, *words])
+
+
+@contextmanager
+def progress() -> Iterator[Begun]:
+    """A bar with rate and estimate on a terminal, from when it is known how many runs there are; silent elsewhere."""
+    with ExitStack() as shown:
+
+        def begun(total: int, done: int) -> Tell:
+            if done:
+                print(f"goes on: {done} of {total} runs are there already", file=sys.stderr)
+            return shown.enter_context(study_bar(total, done))
+
+        yield begun
+
+
+def show_study(found: Results) -> None:
+    """Totals, the table of all runs, the optimum, failures by reason."""
+    from hexapod_cosim.cosim.study.report import optimum_rows, overall_rows  # noqa: PLC0415  matplotlib is slow to import
+
+    overall, controls = found.overall, found.study.run_controls
+    rows = overall_rows(found)
+    columns = ["metric", "unit", *controls, *(["change", "95 % interval", ""] if len(controls) == 2 else [])]
+    texts = [
+        [row["name"], row["unit"], *row["values"], *([row["change"], row["interval"], row["verdict"]] if len(controls) == 2 else [])]
+        for row in rows
+    ]
+    show_table(columns, texts, right=[k for k, name in enumerate(columns) if name not in ("metric", "unit", "")])
+    walked = ", ".join(f"{control} {overall.walked.get(control, 0)} of {overall.total.get(control, 0)}" for control in controls)
+    print(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
+    for (control, status, reason), count in list(overall.failures.items())[:MOST_REASONS]:
+        print(f"{count:6d} x {control} {'fell' if status == COMPLETED else status}: {reason}")
+    for row in optimum_rows(found):
+        settings = ", ".join(f"{name} {text}" for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True))
+        print(f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}")

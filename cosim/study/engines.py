@@ -1,0 +1,47 @@
+"""How one run's figures are made, behind one small protocol: whatever turns a scenario into a Summary can take part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary, summarise
+from hexapod_cosim.cosim.master import Progress
+from hexapod_cosim.cosim.run import simulate
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.models import HexapodError
+
+
+class Engine(Protocol):
+    """Runs scenarios of one robot's FMU."""
+
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
+        """What a run came to; never raises HexapodError. A KeyboardInterrupt that `progress` raises ends it as INTERRUPTED."""
+        ...
+
+    def close(self) -> None:
+        """Frees what it holds."""
+        ...
+
+
+class PythonEngine:
+    """The master in Python: the walk that `hexapod simulate` walks."""
+
+    def __init__(self, fmu: Path) -> None:
+        self._fmu = fmu
+
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
+        """As Engine says."""
+        try:
+            return summarise(simulate(scenario, fmu=self._fmu, gains=gains, progress=progress))
+        except HexapodError as error:
+            return Summary(control=scenario.control, seed=scenario.seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES)
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+
+ENGINES: dict[str, Callable[[Path], Engine]] = {"python": PythonEngine}
+DEFAULT_ENGINE = "python"

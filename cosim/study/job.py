@@ -1,0 +1,130 @@
+"""What workers need, made once and sent to each as it is: scenarios, FMUs and robot files as bytes, gains, how figures are made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.export import export_fmu
+from hexapod_cosim.cosim.plant_files import package_version
+from hexapod_cosim.cosim.run import chosen_gains, known_robot
+from hexapod_cosim.cosim.scenario import scenario_from_table
+from hexapod_cosim.cosim.study.records import Case, Factor, Order, Study, Value
+from hexapod_cosim.models import HexapodError, list_robots, load_robot
+
+PACKAGES = ("fmpy", "numpy", "scipy", "control", "pyarrow")
+OF_DESIGN = ("robot", "macro_step", "servo.")  # factors that gains are designed anew for
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """Everything but the orders. Its hash names it."""
+
+    cases: Mapping[str, Case]
+    factors: tuple[Factor, ...]
+    fmus: Mapping[str, bytes]  # by robot, as scenarios name it
+    robots: Mapping[str, bytes]  # files of robots that do not come with the package, by their path
+    gains: Gains | None  # of all compliant runs; None: designed by the worker, for each robot and macro-step
+    engine: str
+    environment: Mapping[str, str]
+    hash: str = field(default="")
+
+
+def make_job(study: Study, *, engine: str, fmu: Path | None = None, gains: Gains | None = None) -> Job:
+    """Exports the FMUs and designs the gains that all runs share. Raises HexapodError.
+
+    Args:
+        engine: name of the way figures are made.
+        fmu: of all runs; by default one is exported for each robot.
+        gains: of all compliant runs; by default designed.
+    """
+    names = _robots(study)
+    fmus = {name: _fmu(name) if fmu is None else _bytes(fmu) for name in names}
+    files = {name: _bytes(Path(name)) for name in names if name not in list_robots()}
+    job = Job(
+        cases=study.cases, factors=study.factors, fmus=fmus, robots=files, gains=_gains(study, gains), engine=engine,
+        environment=environment(study),
+    )  # fmt: skip
+    return Job(**{**_plain(job), "hash": _hash(job)})
+
+
+def _plain(job: Job) -> dict[str, Any]:
+    return {name: getattr(job, name) for name in Job.__dataclass_fields__}
+
+
+def _robots(study: Study) -> list[str]:
+    """All that its scenarios name."""
+    swept = [str(value) for factor in study.factors if factor.name == "robot" for value in factor.values]
+    own = [str(case.table.get("robot", "athena")) for case in study.cases.values()]
+    return list(dict.fromkeys(swept or own))
+
+
+def _fmu(robot: str) -> bytes:
+    with TemporaryDirectory(prefix="hexapod-study-") as folder:
+        return export_fmu(load_robot(robot), Path(folder) / "robot.fmu").read_bytes()
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise HexapodError("cannot read", got=error.strerror, expected="a file", where=str(path)) from error
+
+
+def _gains(study: Study, given: Gains | None) -> Gains | None:
+    """Designed here when one set does for all runs."""
+    if "compliant" not in study.run_controls or given is not None:
+        return given
+    plans = [scenario_from_table({**case.table, "control": "compliant"}, where=case.where) for case in study.cases.values()]
+    kinds = {(known_robot(plan).hash, plan.macro_step) for plan in plans}
+    if len(kinds) > 1 or any(factor.name.startswith(OF_DESIGN) for factor in study.factors):
+        return None
+    return chosen_gains(plans[0])
+
+
+def environment(study: Study | None = None) -> dict[str, str]:
+    """What figures may depend on beside the job: every worker's must be the same."""
+    names = PACKAGES if study is None or study.optimise is None else (*PACKAGES, "optuna")
+    return {
+        "hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names},
+        "platform": f"{sys.platform} {platform.machine()}",
+    }  # fmt: skip
+
+
+def _hash(job: Job) -> str:
+    digest = hashlib.sha256()
+    for part in (_cases(job.cases), [asdict(item) for item in job.factors], None if job.gains is None else asdict(job.gains), job.engine):
+        digest.update(canonical(part))
+    for files in (job.fmus, job.robots):
+        for name, content in files.items():
+            digest.update(name.encode() + hashlib.sha256(content).digest())
+    return digest.hexdigest()
+
+
+def _cases(cases: Mapping[str, Case]) -> dict[str, Any]:
+    return {name: case.table for name, case in cases.items()}
+
+
+def canonical(content: Any) -> bytes:
+    """JSON whose bytes are the content's alone."""
+    return json.dumps(content, sort_keys=True, default=str).encode()
+
+
+def identity(order: Order, factors: Sequence[Factor]) -> str:
+    """A hash of a run's settings, whatever its number."""
+    settings = {factor.name: value for factor, value in zip(factors, order.values, strict=True)}
+    return hashlib.sha256(canonical([order.case, settings, order.seed, order.control])).hexdigest()[:16]
+
+
+def settings_of(order: Order, factors: Sequence[Factor]) -> list[tuple[Factor, Value]]:
+    """Each factor that is set, with its value."""
+    return [(factor, value) for factor, value in zip(factors, order.values, strict=True) if value is not None]

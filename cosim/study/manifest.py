@@ -1,0 +1,115 @@
+"""What a study's folder says of itself: enough to run it again, and to refuse going on with anything else."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.cosim.files import RUN_FILE, not_writable, read_json, to_json
+from hexapod_cosim.cosim.study.job import Job
+from hexapod_cosim.cosim.study.records import Study, StudyError
+from hexapod_cosim.cosim.study.store import write_durably
+
+MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "results.parquet", "times.parquet"
+KIND, RUNNING, COMPLETED = "study", "running", "completed"
+FORMAT = 1
+MOST_NAMED = 6  # differences in a message
+
+
+def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
+    """The study as its tables, the scenarios in full, seeds, versions, hashes of the FMUs, gains."""
+    return {
+        "format": FORMAT,
+        "title": study.title,
+        "study": study.source,
+        "runs": runs,
+        "seeds": [study.seeds[0], study.seeds[-1], len(study.seeds)] if study.optimise is None else _judged(study),
+        "scenarios": {name: case.table for name, case in study.cases.items()},
+        "engine": job.engine,
+        "environment": job.environment,
+        "fmus": {name: hashlib.sha256(content).hexdigest() for name, content in job.fmus.items()},
+        "robots": {name: hashlib.sha256(content).hexdigest() for name, content in job.robots.items()},
+        "gains": None if job.gains is None else asdict(job.gains),
+    }
+
+
+def _judged(study: Study) -> dict[str, list[int]]:
+    assert study.optimise is not None
+    return {"training": list(study.optimise.training.seeds), "held_out": list(study.optimise.held_out.seeds)}
+
+
+def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> None:
+    """Makes the folder the study's, or sees that it is: the same study, FMU, gains and versions. Raises StudyError, HexapodError."""
+    if (folder / MANIFEST).exists():
+        _compare(read_json(folder / MANIFEST), json.loads(to_json(manifest)), folder)
+        return
+    try:
+        entries = sorted(entry.name for entry in folder.iterdir() if entry.name not in (LOCK, f".{MANIFEST}.new", f".{RUN_FILE}.new"))
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    if entries and entries != [RUN_FILE]:
+        expected = f"a new or empty folder, or this study's (it has {MANIFEST})"
+        raise StudyError("the folder holds other files", got=entries[0], expected=expected, fix="choose another with -o", where=str(folder))
+    write_durably(folder / RUN_FILE, _text({"kind": KIND, "status": RUNNING, "title": manifest["title"], "command": command}))
+    write_durably(folder / MANIFEST, _text(manifest))
+
+
+def finish_folder(folder: Path) -> None:
+    """Says that all is there."""
+    write_durably(folder / RUN_FILE, _text({**read_json(folder / RUN_FILE), "status": COMPLETED}))
+
+
+def _text(content: Mapping[str, Any]) -> bytes:
+    return (to_json(content) + "\n").encode()
+
+
+def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
+    found = list(differences(stored, now))
+    if found:
+        more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+        fix = "choose another folder with -o, or put back what changed"
+        raise StudyError(
+            "the folder holds another study's runs", got="; ".join(found[:MOST_NAMED]) + more, expected="what they were begun with",
+            fix=fix, where=str(folder),
+        )  # fmt: skip
+
+
+def differences(stored: Any, now: Any, name: str = "") -> Iterator[str]:
+    """In words, where two manifests differ."""
+    if isinstance(stored, Mapping) and isinstance(now, Mapping):
+        for key in dict.fromkeys([*stored, *now]):
+            yield from differences(stored.get(key), now.get(key), f"{name}.{key}" if name else key)
+    elif stored != now:
+        yield f"{name} was {_short(stored)}, is {_short(now)}"
+
+
+def _short(value: Any) -> str:
+    text = "not there" if value is None else json.dumps(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Makes the folder if need be; no other process runs a study into it meanwhile. Raises StudyError, HexapodError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / LOCK).open("w")
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    with file:
+        try:
+            import fcntl  # noqa: PLC0415  not on Windows, where nothing is locked
+        except ImportError:
+            pass
+        else:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                fix = "wait for it, or choose another with -o"
+                raise StudyError("another process runs a study into this folder", fix=fix, where=str(folder)) from error
+        yield

@@ -1,0 +1,219 @@
+"""Settings that an optimiser proposes, judged on training runs; its best, and what it began from, judged on runs it never saw.
+
+Optuna's samplers are seeded and asked for a batch at a time, so the same answers bring the same questions: a study that goes on after a
+kill asks again from the first trial, and finds the answers in the store. Held-out runs are numbered after all of training, and made from
+scenarios and seeds that the loop around the optimiser does not have.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.cosim.files import to_json
+from hexapod_cosim.cosim.metrics import METRICS
+from hexapod_cosim.cosim.study.conduct import Desk, conduct
+from hexapod_cosim.cosim.study.crew import Crew
+from hexapod_cosim.cosim.study.job import identity
+from hexapod_cosim.cosim.study.objective import WALKED
+from hexapod_cosim.cosim.study.records import INTEGERS, LOGUNIFORM, VALUES, Factor, Judging, Optimise, Order, Study, StudyError, Value
+from hexapod_cosim.cosim.study.store import write_durably
+from hexapod_cosim.cosim.study.table import Point
+
+OPTIMUM = "optimum.json"
+FRONT = 8  # members of a front that are tried on the held-out runs
+WORST = 1e9  # what a trial without a figure gets; the samplers take no infinities as constraints
+EXTRA = "pip install 'hexapod-cosim[optimise]'"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """Settings and what they came to on the training runs."""
+
+    number: int
+    values: tuple[Value, ...]
+    means: Mapping[str, float]  # of the metrics and bounds
+    feasible: bool
+
+
+class Optimisation:
+    """The numbers of all its runs: trials, the beginning (no setting at all), then the held-out runs."""
+
+    def __init__(self, study: Study) -> None:
+        assert study.optimise is not None
+        self.study, self.asked = study, study.optimise
+        self.trained = (self.asked.trials + 1) * self.asked.training.runs
+        self.most = self.trained + (1 + chosen_most(self.asked)) * self.asked.held_out.runs
+
+    def training(self, point: int, values: tuple[Value | None, ...]) -> list[Order]:
+        """The training runs of a trial."""
+        return self._orders(self.asked.training, point * self.asked.training.runs, point, values)
+
+    def held_out(self, place: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
+        """The held-out runs of the `place`-th of what is tried in the end."""
+        return self._orders(self.asked.held_out, self.trained + place * self.asked.held_out.runs, point, values)
+
+    def _orders(self, judging: Judging, first: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
+        pairs = enumerate(product(judging.cases, judging.seeds))
+        return [
+            Order(run=first + k, point=point, case=case, values=values, seed=seed, control=self.asked.control) for k, (case, seed) in pairs
+        ]
+
+    @property
+    def unset(self) -> tuple[None, ...]:
+        """The values that leave all as it is without the study."""
+        return (None,) * len(self.study.factors)
+
+
+def chosen_most(asked: Optimise) -> int:
+    """How many trials are tried on the held-out runs, at most."""
+    return 1 if len(asked.metrics) == 1 else FRONT
+
+
+def optimise(desk: Desk, crew: Crew, folder: Path) -> None:
+    """Asks, runs and tells until all trials are known; then the held-out runs. Writes optimum.json."""
+    plan = Optimisation(desk.study)
+    trials = list(_search(plan, desk, crew))
+    begin = _judge(desk, crew, [plan.training(plan.asked.trials, plan.unset)])
+    chosen = best_of(trials, plan.asked)
+    picked = [plan.unset, *(trial.values for trial in chosen)]
+    points = [plan.asked.trials, *(trial.number for trial in chosen)]
+    sets = [plan.held_out(place, *pair) for place, pair in enumerate(zip(points, picked, strict=True))]
+    held = [_means(rows, plan.asked) for rows in _judge(desk, crew, sets)]
+    content = {
+        "metrics": list(plan.asked.metrics),
+        "variables": [factor.name for factor in plan.study.factors],
+        "before": {"training": _means(begin[0], plan.asked), "held_out": held[0]},
+        "best": [
+            {"trial": trial.number, "values": dict(zip((item.name for item in plan.study.factors), trial.values, strict=True)),
+             "feasible": trial.feasible, "training": dict(trial.means), "held_out": after}
+            for trial, after in zip(chosen, held[1:], strict=True)
+        ],
+    }  # fmt: skip
+    write_durably(folder / OPTIMUM, (to_json(content) + "\n").encode())
+
+
+def _search(plan: Optimisation, desk: Desk, crew: Crew) -> Iterator[Trial]:
+    """All trials, a batch at a time."""
+    study, number = make_sampler(plan.study), 0
+    while number < plan.asked.trials:
+        asked = [study.ask(distributions(plan.study.factors)) for _ in range(min(plan.asked.batch, plan.asked.trials - number))]
+        values = [tuple(trial.params[factor.name] for factor in plan.study.factors) for trial in asked]
+        sets = [plan.training(number + k, item) for k, item in enumerate(values)]
+        for trial, item, rows in zip(asked, values, _judge(desk, crew, sets), strict=True):
+            means = _means(rows, plan.asked)
+            yield _told(study, trial, Trial(number=number, values=item, means=means, feasible=_feasible(means, plan.asked)), plan.asked)
+            number += 1
+
+
+def make_sampler(study: Study) -> Any:
+    """Optuna's study: seeded, in memory. Raises StudyError when Optuna is not installed."""
+    try:
+        import optuna  # noqa: PLC0415  an extra, and slow to import
+    except ImportError as error:
+        raise StudyError("Optuna is not installed", fix=EXTRA, where=f"{study.where}: optimise") from error
+    asked = study.optimise
+    assert asked is not None
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    samplers: dict[str, Any] = {
+        "tpe": lambda: optuna.samplers.TPESampler(seed=study.seed, constant_liar=True),
+        "nsga2": lambda: optuna.samplers.NSGAIISampler(seed=study.seed, population_size=max(asked.batch, 8)),
+        "random": lambda: optuna.samplers.RandomSampler(seed=study.seed),
+    }
+    directions: list[Any] = ["minimize" if METRICS[name][1] else "maximize" for name in asked.metrics]
+    return optuna.create_study(sampler=samplers[asked.sampler](), directions=directions)
+
+
+def distributions(variables: Sequence[Factor]) -> dict[str, Any]:
+    """The variables as Optuna has them."""
+    from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution  # noqa: PLC0415
+
+    found: dict[str, Any] = {}
+    for factor in variables:
+        if factor.kind == VALUES:
+            found[factor.name] = CategoricalDistribution(factor.values)
+        elif factor.kind == INTEGERS:
+            found[factor.name] = IntDistribution(int(factor.low), int(factor.high))
+        else:
+            found[factor.name] = FloatDistribution(factor.low, factor.high, log=factor.kind == LOGUNIFORM)
+    return found
+
+
+def _told(study: Any, asked: Any, trial: Trial, question: Optimise) -> Trial:
+    for bound in question.constraints:
+        asked.set_constraint(bound.metric, min(bound.excess(trial.means[bound.metric]), WORST))
+    worst = [WORST if METRICS[name][1] else -WORST for name in question.metrics]
+    values = [trial.means[name] for name in question.metrics]
+    study.tell(asked, [bad if math.isnan(value) else value for value, bad in zip(values, worst, strict=True)])
+    return trial
+
+
+def _judge(desk: Desk, crew: Crew, sets: Sequence[list[Order]]) -> list[list[dict[str, Any]]]:
+    """The stored rows of sets of orders, after running those that are not stored."""
+    orders = [order for part in sets for order in part]
+    stored = desk.store.rows([order.run for order in orders])
+    for order in orders:
+        if order.run in stored and stored[order.run]["identity"] != identity(order, desk.study.factors):
+            fix = "choose another folder with -o"
+            raise StudyError("the optimiser asks something else than before", got=f"run {order.run}", fix=fix, where=desk.study.where)
+    wanted = [order for order in orders if order.run not in stored]
+    with closing(conduct(desk, crew, wanted)) as results:
+        for _ in results:
+            pass
+    stored |= desk.store.rows([order.run for order in wanted])
+    return [[stored[order.run] for order in part] for part in sets]
+
+
+def _means(rows: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, float]:
+    """Of every metric that counts; NaN where a run has none."""
+    names = dict.fromkeys([*asked.metrics, *(bound.metric for bound in asked.constraints)])
+    values = {name: [math.nan if row[name] is None else float(row[name]) for row in rows] for name in names}
+    return {name: float(np.mean(items)) for name, items in values.items()}
+
+
+def _feasible(means: Mapping[str, float], asked: Optimise) -> bool:
+    return all(bound.excess(means[bound.metric]) <= 0.0 for bound in asked.constraints)
+
+
+def best_of(trials: Sequence[Trial], asked: Optimise) -> list[Trial]:
+    """The best trial, or up to FRONT evenly chosen of those that no other is better than in all metrics; none that breaks a constraint
+    where there is one that does not.
+    """
+    able = [trial for trial in trials if trial.feasible] or list(trials)
+    front = sorted(
+        (trial for trial in able if not any(_beats(other, trial, asked) for other in able)), key=lambda trial: _costs(trial, asked)
+    )
+    most = chosen_most(asked)
+    places = np.unique(np.linspace(0, len(front) - 1, min(most, len(front))).round().astype(int))
+    return [front[place] for place in places.tolist()]
+
+
+def trials_of(plan: Optimisation, points: Sequence[Point]) -> list[Trial]:
+    """Trials from the points of their runs, for people to look at; those that are whole."""
+    found = []
+    for point in points:
+        if point.held_out or point.number >= plan.asked.trials or point.runs[plan.asked.control] < plan.asked.training.runs:
+            continue
+        means = {name: item.value for name, item in point.means[plan.asked.control].items()}
+        means[WALKED] = point.walked[plan.asked.control] / point.runs[plan.asked.control]
+        values = tuple(point.values[factor.name] for factor in plan.study.factors)
+        found.append(Trial(number=point.number, values=values, means=means, feasible=_feasible(means, plan.asked)))
+    return found
+
+
+def _costs(trial: Trial, asked: Optimise) -> tuple[float, ...]:
+    """Less is better."""
+    signed = (trial.means[name] * (1.0 if METRICS[name][1] else -1.0) for name in asked.metrics)
+    return (*(math.inf if math.isnan(value) else value for value in signed), float(trial.number))
+
+
+def _beats(other: Trial, trial: Trial, asked: Optimise) -> bool:
+    pairs = list(zip(_costs(other, asked)[:-1], _costs(trial, asked)[:-1], strict=True))
+    return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)

@@ -1,0 +1,114 @@
+"""Workers on this machine: processes begun anew, each fed by itself, so that when one dies it is known on which chunk."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.synchronize import Event
+
+from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
+from hexapod_cosim.cosim.study.crew import Chunk, Returned
+from hexapod_cosim.cosim.study.job import Job
+from hexapod_cosim.cosim.study.worker import Done, close_workshop, open_workshop, work
+from hexapod_cosim.cosim.workers import METHOD, begin_worker, stop_if_told
+
+DIED = "its worker process ended by itself (killed, or out of memory)"
+
+
+class _Lane:
+    """One worker process and the chunks it was given, the first of which it is at."""
+
+    def __init__(self, job: Job, stop: Event) -> None:
+        self._job, self._stop = job, stop
+        self.chunks: deque[tuple[Future[list[Done]], Chunk]] = deque()
+        self._begin()
+
+    def _begin(self) -> None:
+        context = multiprocessing.get_context(METHOD)
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(self._stop, self._job))
+
+    def hand_in(self, chunk: Chunk) -> None:
+        try:
+            with deaf_to_interrupts():  # the process, which may begin now
+                future = self._pool.submit(_work, chunk)
+        except BrokenProcessPool as error:  # it died since; told when what it had is taken
+            future = Future()
+            future.set_exception(error)
+        self.chunks.append((future, chunk))
+
+    def taken(self) -> Iterator[Returned]:
+        """What is back."""
+        while self.chunks and self.chunks[0][0].done():
+            future, chunk = self.chunks.popleft()
+            try:
+                yield Returned(chunk, future.result())
+            except BrokenProcessPool:
+                yield from self._dead(chunk)
+                return
+
+    def _dead(self, chunk: Chunk) -> Iterator[Returned]:
+        """The chunk it was at, and those it had not begun: as if never handed in, for another process."""
+        waiting = [other for _, other in self.chunks]
+        self.chunks.clear()
+        self._pool.shutdown(wait=False)
+        self._begin()
+        yield Returned(chunk, [], died=DIED)
+        for other in waiting:
+            self.hand_in(other)
+
+    def close(self) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+class Pool:
+    """Worker processes of this machine."""
+
+    def __init__(self, job: Job, size: int, stop: Event) -> None:
+        self.size = size
+        self._lanes = [_Lane(job, stop) for _ in range(size)]
+
+    def hand_in(self, chunk: Chunk) -> None:
+        """To the one with the least to do."""
+        min(self._lanes, key=lambda lane: len(lane.chunks)).hand_in(chunk)
+
+    def take(self) -> list[Returned]:
+        """Waits until a chunk is back."""
+        wait([lane.chunks[0][0] for lane in self._lanes if lane.chunks], return_when=FIRST_COMPLETED)
+        return [returned for lane in self._lanes for returned in lane.taken()]
+
+    def close(self) -> None:
+        """Waits for all processes to end."""
+        for lane in self._lanes:
+            lane.close()
+
+
+@contextmanager
+def local_crew(job: Job, workers: int) -> Iterator[Pool]:
+    """Worker processes that are gone when the block ends, however it ends."""
+    stop = multiprocessing.get_context(METHOD).Event()
+    pool = Pool(job, workers, stop)
+    try:
+        yield pool
+    finally:
+        stop.set()
+        pool.close()
+
+
+_job: Job | None = None  # of this process, when it is a worker
+
+
+def _begin(stop: Event, job: Job) -> None:
+    global _job  # noqa: PLW0603  the one thing a worker is told beside its orders
+    begin_worker(stop)
+    _job = job
+    multiprocessing.util.Finalize(None, close_workshop, exitpriority=10)
+    open_workshop(job)
+
+
+def _work(chunk: Chunk) -> list[Done]:
+    assert _job is not None  # _begin came first
+    return work(_job, chunk.orders, stop_if_told)

@@ -1,0 +1,138 @@
+"""report.html of a study: one file with everything in it, made from the folder alone, also of a study that is not done."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from hexapod_cosim.cosim.comparison import Change
+from hexapod_cosim.cosim.files import write_text
+from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS
+from hexapod_cosim.cosim.study.columns import FIGURES
+from hexapod_cosim.cosim.study.figures import drawings, save
+from hexapod_cosim.cosim.study.results import POINTS, SUMMARY, Results
+from hexapod_cosim.cosim.study.table import Mean, Point
+from hexapod_cosim.cosim.toml_text import to_toml
+
+REPORT, FIGURES_FOLDER = "report.html", "plots"
+SHOWN_POINTS = 100  # rows of the table; points.parquet has all
+OF_POINTS = ("slip_per_metre", "cost_of_transport", "peak_force", "torque_rms")  # metrics in that table
+
+
+def write_study_report(results: Results, folder: Path) -> list[Path]:
+    """Draws the figures and writes the page. Returns the files, the page last."""
+    before = math.nan
+    if results.optimum is not None and results.study.optimise is not None:
+        before = _number(results.optimum["before"]["training"][results.study.optimise.metrics[0]])
+    found = drawings(results.study, results.points, results.trials, before=before) if results.points else {}
+    files = save(found, folder / FIGURES_FOLDER) if found else []
+    pictures = [(item.title, item.caption, _embedded(folder / FIGURES_FOLDER / f"{name}.svg")) for name, item in found.items()]
+    environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "study"), autoescape=True, undefined=StrictUndefined)
+    page = environment.get_template("study.html.jinja").render(
+        results=results, overall=overall_rows(results), points=point_rows(results), figures=pictures, optimum=optimum_rows(results),
+        failures=[(*key, count) for key, count in results.overall.failures.items()], toml=_toml(results), shown=SHOWN_POINTS,
+    )  # fmt: skip
+    write_text(folder / REPORT, page)
+    return [folder / POINTS, folder / SUMMARY, *files, folder / REPORT]
+
+
+def _embedded(svg: Path) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.read_bytes()).decode("ascii")
+
+
+def _toml(results: Results) -> dict[str, str]:
+    """What it takes to run it again, as files."""
+    gains = results.manifest["gains"]
+    texts = {"The study": to_toml(results.manifest["study"])}
+    texts |= {f"Scenario {name}": to_toml(table) for name, table in results.manifest["scenarios"].items()}
+    return texts | ({} if gains is None else {"Gains": to_toml(_known(gains))})
+
+
+def _known(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Without what JSON could not hold."""
+    return {key: _known(value) if isinstance(value, Mapping) else value for key, value in table.items() if value is not None}
+
+
+def overall_rows(results: Results) -> list[dict[str, Any]]:
+    """A row per metric: mean of all runs that walked by control, change over all pairs."""
+    overall, rows = results.overall, []
+    for name in FIGURES:
+        unit, _, meaning = METRICS[name]
+        values = [shown_mean(name, overall.means[control][name]) for control in results.study.run_controls]
+        change = overall.changes.get(name)
+        rows.append({"name": name, "unit": unit, "meaning": meaning, "values": values, **shown_change(change)})
+    return rows
+
+
+def point_rows(results: Results) -> list[dict[str, Any]]:
+    """A row per point, of some evenly chosen ones when there are many: settings, walked, a few metrics."""
+    points = [point for point in results.points if not point.held_out] if results.study.optimise is None else results.points
+    step = max(math.ceil(len(points) / SHOWN_POINTS), 1)
+    return [_point_row(point, results) for point in points[::step]]
+
+
+def _point_row(point: Point, results: Results) -> dict[str, Any]:
+    controls = [control for control in results.study.run_controls if control in point.means]
+    cells = [
+        {"values": [shown_mean(name, point.means[control][name]) for control in controls], **shown_change(point.changes.get(name))}
+        for name in OF_POINTS
+    ]
+    return {
+        "number": point.number, "settings": [shown_value(value) for value in point.values.values()], "held_out": point.held_out,
+        "walked": [f"{point.walked[control]}/{point.runs[control]}" for control in controls], "cells": cells,
+    }  # fmt: skip
+
+
+def shown_value(value: Any) -> str:
+    """A setting for people."""
+    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def shown_mean(name: str, item: Mean) -> str:
+    """A mean with half its interval, for people."""
+    if not math.isfinite(item.value):
+        return "-"
+    value = 0.0 if abs(item.value) < DUST * FLOORS[name] else item.value
+    half = f" ± {item.half_width:.1g}" if math.isfinite(item.half_width) and item.half_width >= DUST * FLOORS[name] else ""
+    return f"{value:.3g}{half}"
+
+
+def shown_change(change: Change | None) -> dict[str, str]:
+    """A change relative to the first control's mean, where that has a meaning, and its interval."""
+    if change is None or not change.pairs or not math.isfinite(change.relative):
+        return {"change": "", "interval": "", "verdict": "" if change is None else change.verdict}
+    low, high = change.interval
+    interval = f"{low:+.1%} .. {high:+.1%}" if math.isfinite(low) else ""
+    return {"change": f"{change.relative:+.0%}", "interval": interval, "verdict": change.verdict}
+
+
+def optimum_rows(results: Results) -> list[dict[str, Any]]:
+    """What the optimiser began from and what it found: settings, training, held out."""
+    optimum = results.optimum
+    if optimum is None:
+        return []
+    before = {"label": "before", "settings": ["-"] * len(optimum["variables"]), **_judged(optimum["before"], optimum)}
+    return [before, *(_best_row(item, optimum) for item in optimum["best"])]
+
+
+def _best_row(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, Any]:
+    label = f"trial {item['trial']}" + ("" if item["feasible"] else " (breaks a constraint)")
+    return {"label": label, "settings": [shown_value(item["values"][name]) for name in optimum["variables"]], **_judged(item, optimum)}
+
+
+def _judged(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, list[str]]:
+    return {part: [f"{_number(item[part][name]):.4g}" for name in item[part]] for part in ("training", "held_out")}
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def judged_names(optimum: Mapping[str, Any]) -> Sequence[str]:
+    """The metrics that trials are judged on."""
+    return list(optimum["before"]["training"])

@@ -1,0 +1,100 @@
+"""A study from its file to its results, wherever it was left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.batch import processors
+from hexapod_cosim.cosim.study.columns import WALL, result_schema, schema_of
+from hexapod_cosim.cosim.study.conduct import Desk, conduct, missing
+from hexapod_cosim.cosim.study.crew import Crew
+from hexapod_cosim.cosim.study.design import Sweep
+from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE
+from hexapod_cosim.cosim.study.job import Job, make_job
+from hexapod_cosim.cosim.study.manifest import RESULTS, RUNS, TIMES, begin_folder, finish_folder, locked, manifest_of
+from hexapod_cosim.cosim.study.optimise import Optimisation, optimise
+from hexapod_cosim.cosim.study.records import Study
+from hexapod_cosim.cosim.study.store import Store, Writer, write_durably, write_whole
+
+Begun = Callable[[int, int], Callable[[int, int], None]]  # runs in all, of them done already -> who is told of progress
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How a study is run; none of it but the engine, FMU and gains shows in the results."""
+
+    engine: str = DEFAULT_ENGINE
+    fmu: Path | None = None
+    gains: Gains | None = None
+    workers: int | None = None  # processes; None: one for each processor
+    scheduler: str | None = None  # a Dask scheduler's address instead
+    command: str = ""
+    write: Writer = write_durably
+
+
+def run_study(study: Study, folder: Path, *, options: Options, begun: Begun) -> Path:
+    """Runs what of a study is not in the folder yet, and puts it all together. Returns the file of results.
+
+    Raises HexapodError: a folder of something else, a full disk, a cluster that is gone. All that was stored is kept.
+    """
+    with locked(folder):
+        job = make_job(study, engine=options.engine, fmu=options.fmu, gains=options.gains)
+        begin_folder(folder, manifest_of(study, job, runs=count_runs(study)), command=options.command)
+        store = Store(folder / RUNS, schema_of(study), write=options.write)
+        store.prepare()
+        if study.optimise is None:
+            _sweep(study, store, job, options, begun)
+        else:
+            tell = begun(count_runs(study), int(np.count_nonzero(store.done(count_runs(study)))))
+            with crew_of(job, options, study) as crew:
+                optimise(Desk(study, store, tell), crew, folder)
+        put_together(study, store, folder)
+        finish_folder(folder)
+    return folder / RESULTS
+
+
+def count_runs(study: Study) -> int:
+    """All runs of a study; of an optimisation the most there may be."""
+    return Sweep(study).count if study.optimise is None else Optimisation(study).most
+
+
+def _sweep(study: Study, store: Store, job: Job, options: Options, begun: Begun) -> None:
+    sweep = Sweep(study)
+    done = store.done(sweep.count)
+    tell = begun(sweep.count, int(np.count_nonzero(done)))
+    if done.all():
+        return
+    orders = sweep.orders(missing(done))
+    with crew_of(job, options, study) as crew, closing(conduct(Desk(study, store, tell), crew, orders)) as results:
+        for _ in results:
+            pass
+
+
+def crew_of(job: Job, options: Options, study: Study) -> AbstractContextManager[Crew]:
+    """The workers that the options name."""
+    if options.scheduler is not None:
+        from hexapod_cosim.cosim.study.cluster import cluster_crew  # noqa: PLC0415  an extra
+
+        return cluster_crew(job, options.scheduler)
+    from hexapod_cosim.cosim.study.pool import local_crew  # noqa: PLC0415
+
+    return local_crew(job, min(options.workers or processors(), count_runs(study)))
+
+
+def put_together(study: Study, store: Store, folder: Path) -> None:
+    """results.parquet, all runs in the order of their numbers, the same bytes however they were run; times.parquet, what they took."""
+    schema = schema_of(study)
+    write_whole(folder / RESULTS, store.sorted_rows(), result_schema(schema))
+    write_whole(folder / TIMES, store.sorted_rows(), pa.schema([schema.field("run"), schema.field(WALL)]))
+
+
+def rows_of(folder: Path, study: Study) -> Iterator[pa.Table]:
+    """What is stored so far, in the order of the runs' numbers."""
+    yield from Store(folder / RUNS, schema_of(study)).sorted_rows()

@@ -1,0 +1,161 @@
+"""A study's runs in whatever process: the job unpacked once, then orders turned into rows."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Lock
+from time import perf_counter
+from typing import Any
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
+from hexapod_cosim.cosim.master import INTERRUPTED, Progress
+from hexapod_cosim.cosim.run import chosen_gains, known_robot
+from hexapod_cosim.cosim.scenario import scenario_from_table, with_values
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.study.engines import ENGINES, Engine
+from hexapod_cosim.cosim.study.job import Job, environment, settings_of
+from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, Factor, Order, StudyError, Value
+from hexapod_cosim.models import HexapodError
+
+MOST_DESIGNS = 64  # sets of gains a worker keeps
+
+
+@dataclass(frozen=True)
+class Done:
+    """A run and what it came to."""
+
+    order: Order
+    summary: Summary
+    wall: float  # s
+
+
+class Workshop:
+    """A job unpacked in this process; `close` takes its files away."""
+
+    def __init__(self, job: Job) -> None:
+        differences = [
+            f"{name} {job.environment[name]}, here {have}" for name, have in environment().items() if job.environment[name] != have
+        ]
+        if differences:
+            fix = "install the same versions on all machines of the cluster"
+            raise StudyError("this worker is not like the machine that sends the study", got="; ".join(differences), fix=fix)
+        self._job, self._folder = job, TemporaryDirectory(prefix="hexapod-job-")
+        self._files = {name: self._unpack(f"robot{k}", Path(name).suffix, data) for k, (name, data) in enumerate(job.robots.items())}
+        self._fmus = {name: self._unpack(f"fmu{k}", ".fmu", data) for k, (name, data) in enumerate(job.fmus.items())}
+        self._engines: dict[str, Engine] = {}
+        self._designs: OrderedDict[tuple[str, float], Gains] = OrderedDict()
+
+    def _unpack(self, name: str, suffix: str, content: bytes) -> Path:
+        path = Path(self._folder.name) / f"{name}{suffix}"
+        path.write_bytes(content)
+        return path
+
+    def run(self, orders: Sequence[Order], progress: Progress) -> Iterator[Done]:
+        """Each order's run; ends early when `progress` raises KeyboardInterrupt within one."""
+        for order in orders:
+            begin = perf_counter()
+            summary = self._summary(order, progress)
+            if summary.status == INTERRUPTED:
+                return
+            yield Done(order, summary, perf_counter() - begin)
+
+    def _summary(self, order: Order, progress: Progress) -> Summary:
+        try:
+            scenario = self._scenario(order)
+            robot = scenario.robot
+            scenario = replace(scenario, robot=str(self._files.get(robot, robot)))
+            gains = self._gains(scenario, order)
+            return self._portable(self._engine(robot).summary(scenario, gains=gains, progress=progress))
+        except HexapodError as error:
+            return self._portable(failed(order, str(error)))
+
+    def _portable(self, summary: Summary) -> Summary:
+        """Without the place where this process unpacked the job."""
+        place = str(Path(self._folder.name) / " ").rstrip()
+        return replace(summary, reason=summary.reason.replace(place, "")) if place in summary.reason else summary
+
+    def _scenario(self, order: Order) -> Scenario:
+        case = self._job.cases[order.case]
+        settings = {
+            factor.name: factor.setting(value)
+            for factor, value in settings_of(order, self._job.factors)
+            if factor.name != SCENARIO_FACTOR and not factor.name.startswith(GAINS)
+        }
+        table = with_values(case.table, settings)
+        return scenario_from_table({**table, "seed": order.seed, "control": order.control}, where=case.where, given=list(settings))
+
+    def _gains(self, scenario: Scenario, order: Order) -> Gains | None:
+        if order.control == "kinematic":
+            return None
+        gains = self._job.gains or self._designed(scenario)
+        return changed_gains(gains, settings_of(order, self._job.factors))
+
+    def _designed(self, scenario: Scenario) -> Gains:
+        key = (known_robot(scenario).hash, scenario.macro_step)
+        if key not in self._designs:
+            gains = chosen_gains(scenario)
+            assert gains is not None  # compliant
+            self._designs[key] = gains
+            if len(self._designs) > MOST_DESIGNS:
+                self._designs.popitem(last=False)
+        return self._designs[key]
+
+    def _engine(self, robot: str) -> Engine:
+        if robot not in self._engines:
+            self._engines[robot] = ENGINES[self._job.engine](self._fmus[robot])
+        return self._engines[robot]
+
+    def close(self) -> None:
+        """Takes away what was unpacked."""
+        for engine in self._engines.values():
+            engine.close()
+        self._folder.cleanup()
+
+
+def changed_gains(gains: Gains, settings: Sequence[tuple[Factor, Value]]) -> Gains:
+    """Gains with those that are factors in their place, or times them."""
+    for factor, value in settings:
+        if factor.name.startswith(GAINS):
+            part, _, name = factor.name.removeprefix(GAINS).partition(".")
+            table = getattr(gains, part)
+            changed: Mapping[str, Any] = {name: float(value) * (getattr(table, name) if factor.relative else 1.0)}
+            gains = replace(gains, **{part: replace(table, **changed)})
+    return gains
+
+
+def failed(order: Order, reason: str, *, status: str = REFUSED) -> Summary:
+    """A run without figures."""
+    return Summary(control=order.control, seed=order.seed, status=status, reason=reason, metrics=NO_FIGURES)
+
+
+_shop: Workshop | None = None  # of this process: the job it works on
+_shop_hash = ""
+_one_at_a_time = Lock()  # a cluster's worker may have threads; the FMU's loader changes the process' folder
+
+
+def open_workshop(job: Job) -> Workshop:
+    """This process' workshop for a job, kept until it gets another."""
+    global _shop, _shop_hash
+    if _shop is None or _shop_hash != job.hash:
+        close_workshop()
+        _shop, _shop_hash = Workshop(job), job.hash
+    return _shop
+
+
+def close_workshop() -> None:
+    """Takes this process' workshop away."""
+    global _shop  # noqa: PLW0603
+    if _shop is not None:
+        _shop.close()
+        _shop = None
+
+
+def work(job: Job, orders: Sequence[Order], progress: Progress) -> list[Done]:
+    """Runs orders in this process; fewer come back when it is told to stop."""
+    with _one_at_a_time:
+        return list(open_workshop(job).run(orders, progress))
