@@ -16,6 +16,7 @@ from hexapod_cosim.models import HexapodError
 
 RUN_FILE = "run.json"  # marks a folder as ours
 RUNNING = "running"
+STUDY = "study"  # the kind of a folder that goes on where it was
 OUR_FILES = (
     "results.parquet", "results.csv", "commands.csv", "results.partial.parquet", "results.partial.csv", "seeds.csv", "seeds.partial.csv",
     "metrics.json", "scenario.toml", "report.html", "plots", "kinematic", "compliant",
@@ -104,6 +105,8 @@ def claim_folder(folder: Path) -> list[Path]:
             pass
     except OSError as error:
         raise not_writable(folder, error) from error
+    if RUN_FILE in entries and read_json(folder / RUN_FILE).get("kind") == STUDY:
+        raise HexapodError("the folder holds a study", got=str(folder), expected="a folder of its own", fix="choose another with -o")
     if entries and RUN_FILE not in entries:
         expected = f"a new or empty folder, or an earlier run's (it has {RUN_FILE})"
         raise HexapodError(

@@ -25,12 +25,12 @@ from hexapod_cosim.cosim.cli.running import (
 from hexapod_cosim.cosim.cli.study_command import report_on
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
 from hexapod_cosim.cosim.comparison import SEEDS, compare_runs, read_seeds
+from hexapod_cosim.cosim.files import STUDY
 from hexapod_cosim.cosim.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.results import read_facts, read_result, read_scenario, results_folder, stored
 from hexapod_cosim.cosim.run import Result
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.cosim.study.manifest import KIND
 
 Control = Annotated[
     str | None,
@@ -65,7 +65,7 @@ def report(
 ) -> None:
     """Make the plots and the report of a run, a comparison or a study again."""
     facts = read_facts(folder)
-    if facts.get("kind") == KIND:
+    if facts.get("kind") == STUDY:
         files = report_on(folder)[1]
     elif facts.get("kind") == "compare":
         runs = {control: read_result(folder / control) for control in CONTROLS}

@@ -28,7 +28,7 @@ class Cluster:
         self._client, self._hash = client, job.hash
         self._chunks: dict[Any, Chunk] = {}
         self._numbers = count()
-        self._back = as_completed([])
+        self._back = as_completed([], loop=client.loop)
 
     @property
     def size(self) -> int:
@@ -75,9 +75,9 @@ def lost(error: Exception) -> StudyError:
 @contextmanager
 def cluster_crew(job: Job, address: str) -> Iterator[Cluster]:
     """The workers behind a scheduler's address. Raises StudyError when there are none."""
-    client = _connect(address)
+    client, name = _connect(address), f"hexapod-{job.hash}"
     try:
-        client.register_plugin(_plugin(job), name=f"hexapod-{job.hash}")
+        client.register_plugin(_plugin(job), name=name)
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as error:
@@ -85,6 +85,8 @@ def cluster_crew(job: Job, address: str) -> Iterator[Cluster]:
             raise StudyError("the cluster has no workers", got=address, expected="one at least", fix=fix) from error
         yield Cluster(client, job)
     finally:
+        with suppress(Exception):
+            client.unregister_worker_plugin(name)
         with suppress(Exception):
             client.close(timeout=5)
 

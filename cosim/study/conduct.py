@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.study.columns import row_of
 from hexapod_cosim.cosim.study.crew import DEATHS, Chunk, Crew, Returned
-from hexapod_cosim.cosim.study.records import Order, Study
+from hexapod_cosim.cosim.study.records import Order, Study, StudyError
 from hexapod_cosim.cosim.study.store import Store
 from hexapod_cosim.cosim.study.worker import Done, failed
 
 IN_FLIGHT = 2  # chunks per worker: the next is there when one is done
 CHUNK_TIME = 0.5  # s    of work in a chunk: what a hand-over costs is small beside it, and little is lost with a worker
 MAX_CHUNK = 256
+USELESS = 3 * DEATHS  # deaths in a row, for each worker, without a run between them: it is not the runs
+CAUSES = 'look for what ends them (memory?); a script that runs a study needs `if __name__ == "__main__":`'
 DEAD = "died"  # a run's status: whatever worker had it ended
 
 Tell = Callable[[int, int], None]  # how many runs came in now, and how many of them did not walk to the end
@@ -62,7 +64,7 @@ def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[D
     """
     waiting, sizes = iter(orders), _Sizes()
     again: deque[Chunk] = deque()
-    flying = 0
+    flying, useless = 0, 0
     try:
         while True:
             while flying < IN_FLIGHT * crew.size and (chunk := _next(again, waiting, sizes.size)):
@@ -72,6 +74,9 @@ def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[D
                 return
             for returned in crew.take():
                 flying -= 1
+                useless = 0 if returned.done else useless + bool(returned.died)
+                if useless > USELESS * crew.size:
+                    raise StudyError("no worker lives to finish a run", got=returned.died, fix=CAUSES, where=desk.study.where)
                 done = [*returned.done, *_given_up(returned)]
                 again.extend(_once_more(returned, len(done)))
                 sizes.learn(returned.done)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, cast
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary, summarise
 from hexapod_cosim.cosim.master import Progress
 from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.models import HexapodError, unknown_name
 
 
 class Engine(Protocol):
@@ -24,6 +26,9 @@ class Engine(Protocol):
     def close(self) -> None:
         """Frees what it holds."""
         ...
+
+
+Maker = Callable[[Path], Engine]  # from a robot's FMU
 
 
 class PythonEngine:
@@ -43,5 +48,20 @@ class PythonEngine:
         """Nothing to free."""
 
 
-ENGINES: dict[str, Callable[[Path], Engine]] = {"python": PythonEngine}
+ENGINES: dict[str, Maker] = {"python": PythonEngine}
 DEFAULT_ENGINE = "python"
+
+
+def engine_named(name: str) -> Maker:
+    """One of ENGINES, or MODULE:NAME of one's own, which all workers must be able to import. Raises StudyError."""
+    module, colon, maker = name.partition(":")
+    if not colon:
+        if name not in ENGINES:
+            raise unknown_name("engine", name, ENGINES, where="--engine", error=StudyError)
+        return ENGINES[name]
+    try:
+        return cast(Maker, getattr(import_module(module), maker))
+    except (ImportError, AttributeError) as error:
+        raise StudyError(
+            "no such engine", got=name, expected="MODULE:NAME that Python can import", fix=str(error), where="--engine"
+        ) from error

@@ -38,14 +38,14 @@ def _named(table: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
     """Names with dots: friction.mu without quotes is a table in a table to TOML."""
     for key, value in table.items():
         name = f"{before}{key}"
-        if (
-            isinstance(value, Mapping)
-            and value
-            and all(isinstance(item, Mapping | list) and key not in KINDS for key, item in value.items())
-        ):
+        if "." not in key and isinstance(value, Mapping) and _is_section(value):
             yield from _named(value, f"{name}.")
         else:
             yield name, value
+
+
+def _is_section(table: Mapping[str, Any]) -> bool:
+    return bool(table) and all(isinstance(item, Mapping | list) and key not in KINDS for key, item in table.items())
 
 
 def _read_factor(name: str, value: Any, where: str) -> Factor:

@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table
+from hexapod_cosim.cosim.study.engines import engine_named
 from hexapod_cosim.cosim.study.records import Case, Factor, Order, Study, Value
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
@@ -47,6 +48,7 @@ def make_job(study: Study, *, engine: str, fmu: Path | None = None, gains: Gains
         fmu: of all runs; by default one is exported for each robot.
         gains: of all compliant runs; by default designed.
     """
+    engine_named(engine)  # not first in a worker
     names = _robots(study)
     fmus = {name: _fmu(name) if fmu is None else _bytes(fmu) for name in names}
     files = {name: _bytes(Path(name)) for name in names if name not in list_robots()}

@@ -10,13 +10,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.files import RUN_FILE, not_writable, read_json, to_json
+from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, STUDY, not_writable, read_json, to_json
 from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.records import Study, StudyError
 from hexapod_cosim.cosim.study.store import write_durably
 
 MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "results.parquet", "times.parquet"
-KIND, RUNNING, COMPLETED = "study", "running", "completed"
+COMPLETED = "completed"
 FORMAT = 1
 MOST_NAMED = 6  # differences in a message
 
@@ -55,7 +55,7 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
     if entries and entries != [RUN_FILE]:
         expected = f"a new or empty folder, or this study's (it has {MANIFEST})"
         raise StudyError("the folder holds other files", got=entries[0], expected=expected, fix="choose another with -o", where=str(folder))
-    write_durably(folder / RUN_FILE, _text({"kind": KIND, "status": RUNNING, "title": manifest["title"], "command": command}))
+    write_durably(folder / RUN_FILE, _text({"kind": STUDY, "status": RUNNING, "title": manifest["title"], "command": command}))
     write_durably(folder / MANIFEST, _text(manifest))
 
 

@@ -13,7 +13,7 @@ from multiprocessing.synchronize import Event
 from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
 from hexapod_cosim.cosim.study.crew import Chunk, Returned
 from hexapod_cosim.cosim.study.job import Job
-from hexapod_cosim.cosim.study.worker import Done, close_workshop, open_workshop, work
+from hexapod_cosim.cosim.study.worker import Done, close_workshop, work
 from hexapod_cosim.cosim.workers import METHOD, begin_worker, stop_if_told
 
 DIED = "its worker process ended by itself (killed, or out of memory)"
@@ -86,6 +86,36 @@ class Pool:
             lane.close()
 
 
+class Here:
+    """This process: nothing to start, easy to follow with a debugger, and gone with the first walk that ends it."""
+
+    size = 1
+
+    def __init__(self, job: Job) -> None:
+        self._job, self._chunks = job, deque[Chunk]()
+
+    def hand_in(self, chunk: Chunk) -> None:
+        """Keeps it until it is asked for."""
+        self._chunks.append(chunk)
+
+    def take(self) -> list[Returned]:
+        """Runs a chunk. Raises KeyboardInterrupt when one came within it."""
+        chunk = self._chunks.popleft()
+        done = work(self._job, chunk.orders, stop_if_told)
+        if len(done) < len(chunk.orders):
+            raise KeyboardInterrupt
+        return [Returned(chunk, done)]
+
+
+@contextmanager
+def own_crew(job: Job) -> Iterator[Here]:
+    """This process alone."""
+    try:
+        yield Here(job)
+    finally:
+        close_workshop()
+
+
 @contextmanager
 def local_crew(job: Job, workers: int) -> Iterator[Pool]:
     """Worker processes that are gone when the block ends, however it ends."""
@@ -106,7 +136,6 @@ def _begin(stop: Event, job: Job) -> None:
     begin_worker(stop)
     _job = job
     multiprocessing.util.Finalize(None, close_workshop, exitpriority=10)
-    open_workshop(job)
 
 
 def _work(chunk: Chunk) -> list[Done]:

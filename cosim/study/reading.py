@@ -131,12 +131,18 @@ def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any
     """Raises ScenarioError for a scenario that cannot be run as it is."""
     beside = folder / name
     table, told = (dict(inline), f"{where}: scenario") if inline is not None else read_tables(beside if beside.is_file() else name)
+    scenario_from_table(table, where=told)
     try:
         table = with_values(table, changes)
+        scenario_from_table(table, where=told, given=list(changes))
     except HexapodError as error:
-        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=f"{where}: set") from error
+        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=_place(error, where)) from error
     if vary and "variation" not in table:
         table["variation"] = dict(STANDARD_TABLE)
     table["outputs"] = {"plots": False}  # a study keeps no recordings
-    scenario_from_table(table, where=told, given=list(changes))
     return Case(name=name, table=table, where=told)
+
+
+def _place(error: HexapodError, where: str) -> str:
+    """The key that is wrong, as one of [set]."""
+    return f"{where}: set.{(error.where or '').rpartition(': ')[2].removeprefix('--set ')}"

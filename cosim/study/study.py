@@ -20,6 +20,7 @@ from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE
 from hexapod_cosim.cosim.study.job import Job, make_job
 from hexapod_cosim.cosim.study.manifest import RESULTS, RUNS, TIMES, begin_folder, finish_folder, locked, manifest_of
 from hexapod_cosim.cosim.study.optimise import Optimisation, optimise
+from hexapod_cosim.cosim.study.pool import local_crew, own_crew
 from hexapod_cosim.cosim.study.records import Study
 from hexapod_cosim.cosim.study.store import Store, Writer, write_durably, write_whole
 
@@ -33,7 +34,7 @@ class Options:
     engine: str = DEFAULT_ENGINE
     fmu: Path | None = None
     gains: Gains | None = None
-    workers: int | None = None  # processes; None: one for each processor
+    workers: int | None = None  # processes; None: one for each processor; 1: this one does it
     scheduler: str | None = None  # a Dask scheduler's address instead
     command: str = ""
     write: Writer = write_durably
@@ -83,8 +84,8 @@ def crew_of(job: Job, options: Options, study: Study) -> AbstractContextManager[
         from hexapod_cosim.cosim.study.cluster import cluster_crew  # noqa: PLC0415  an extra
 
         return cluster_crew(job, options.scheduler)
-    from hexapod_cosim.cosim.study.pool import local_crew  # noqa: PLC0415
-
+    if options.workers == 1:
+        return own_crew(job)
     return local_crew(job, min(options.workers or processors(), count_runs(study)))
 
 

@@ -17,7 +17,7 @@ from hexapod_cosim.cosim.master import INTERRUPTED, Progress
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.study.engines import ENGINES, Engine
+from hexapod_cosim.cosim.study.engines import Engine, engine_named
 from hexapod_cosim.cosim.study.job import Job, environment, settings_of
 from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, Factor, Order, StudyError, Value
 from hexapod_cosim.models import HexapodError
@@ -107,7 +107,7 @@ class Workshop:
 
     def _engine(self, robot: str) -> Engine:
         if robot not in self._engines:
-            self._engines[robot] = ENGINES[self._job.engine](self._fmus[robot])
+            self._engines[robot] = engine_named(self._job.engine)(self._fmus[robot])
         return self._engines[robot]
 
     def close(self) -> None:

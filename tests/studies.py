@@ -1,0 +1,43 @@
+"""Small studies, run without a walk."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+from hexapod_cosim.cosim.study.manifest import RESULTS
+from hexapod_cosim.cosim.study.reading import study_from_table
+from hexapod_cosim.cosim.study.records import Study
+from hexapod_cosim.cosim.study.study import Options, run_study
+
+FAKE, SLOW = "study_engines:Fake", "study_engines:Slow"
+SMALL: dict[str, Any] = {"scenario": "walk_flat", "seeds": 3, "factors": {"friction.mu": [0.3, 0.6, 0.9]}}
+KINEMATIC = {"controls": ["kinematic"]}
+
+
+def study_of(table: Mapping[str, Any] = SMALL, **changes: Any) -> Study:
+    return study_from_table({**table, **changes}, where="test.toml")
+
+
+def quiet(_total: int, _done: int) -> Any:
+    return lambda _more, _lost: None
+
+
+def run_quietly(study: Study, folder: Path, **options: Any) -> list[dict[str, Any]]:
+    """The rows of the results."""
+    run_study(study, folder, options=Options(**{"engine": FAKE, "workers": 1, **options}), begun=quiet)
+    return rows(folder)
+
+
+def rows(folder: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = pq.read_table(folder / RESULTS).to_pylist()
+    return found
+
+
+def digest(folder: Path) -> str:
+    """Of the bytes of the results."""
+    return hashlib.sha256((folder / RESULTS).read_bytes()).hexdigest()

@@ -1,0 +1,54 @@
+"""Engines that make figures of nothing but the scenario, at once: for tests of what lies around them. A module that workers import."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
+from hexapod_cosim.cosim.master import COMPLETED, INTERRUPTED, Progress
+from hexapod_cosim.cosim.metrics import METRICS
+from hexapod_cosim.cosim.scenario_records import Scenario
+
+DEADLY, REFUSING, FALLING, SLOW = 0.13, 0.17, 0.19, 0.01  # friction.mu that ends the process, is refused, falls; s a run takes
+
+
+def figure(seed: int, mu: float, control: str, place: int) -> float:
+    """A metric: something that every setting shows in."""
+    return (place + 1) * (1.0 + 0.1 * seed + mu * mu) * (0.5 if control == "compliant" else 1.0)
+
+
+class Fake:
+    """Figures at once."""
+
+    pause = 0.0  # s
+
+    def __init__(self, fmu: Path) -> None:
+        assert fmu.is_file()
+
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
+        """As Engine says."""
+        mu, control, seed = scenario.settings["friction"]["mu"], scenario.control, scenario.seed
+        if mu == DEADLY:
+            os._exit(9)
+        if mu == REFUSING:
+            return Summary(control=control, seed=seed, status=REFUSED, reason=f"no walk with {seed}", metrics=NO_FIGURES)
+        time.sleep(self.pause)
+        try:
+            progress(0.0)
+        except KeyboardInterrupt:
+            return Summary(control=control, seed=seed, status=INTERRUPTED, metrics=NO_FIGURES)
+        kp = 1.0 if gains is None else gains.slip.kp
+        metrics = {name: figure(seed, mu, control, place) * kp for place, name in enumerate(METRICS)}
+        return Summary(control=control, seed=seed, status=COMPLETED, upright=mu != FALLING, metrics=metrics)
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+
+class Slow(Fake):
+    """The same, and time to be killed in."""
+
+    pause = SLOW

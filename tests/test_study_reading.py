@@ -1,0 +1,103 @@
+"""Study files: what they may say, and what is said of what they may not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from studies import study_of
+
+from hexapod_cosim.cosim.study.reading import list_studies, load_study
+from hexapod_cosim.cosim.study.records import Study, StudyError
+from hexapod_cosim.models import HexapodError
+
+JUDGED = {"training": {"seeds": {"first": 10, "count": 3}}, "held_out": {"seeds": 10}}
+GAIN = {"gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True}}
+
+
+def optimisation(**changes: Any) -> dict[str, Any]:
+    return {"optimise": {"metric": "slip_per_metre", "variables": GAIN, **JUDGED, **changes}}
+
+
+@pytest.mark.parametrize("name", list_studies())
+def test_studies_that_come_with_the_package_can_be_read(name: str) -> None:
+    assert load_study(name).title
+
+
+def test_names_with_dots_need_no_quotes_and_units_are_kept(tmp_path: Path) -> None:
+    file = tmp_path / "one.toml"
+    file.write_text('[set]\ngait.period = 0.5\n[factors]\nfriction.mu = [0.3]\nterrain.incline = {linspace = [0, 10, 3], unit = "deg"}\n')
+    study = load_study(file)
+    assert [factor.name for factor in study.factors] == ["friction.mu", "terrain.incline"]
+    assert [study.factors[1].setting(value) for value in study.factors[1].values] == ["0.0 deg", "5.0 deg", "10.0 deg"]
+    assert study.cases["walk_flat"].table["gait"] == {"name": "tripod", "period": 0.5}
+
+
+def test_a_scenario_may_be_a_file_beside_the_study_or_stand_in_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("duration = 3.0\n[command]\nvx = 0.05\n")
+    for text in ('scenario = "mine.toml"\n', "[scenario]\nduration = 3.0\n[scenario.command]\nvx = 0.05\n"):
+        (tmp_path / "study.toml").write_text(text)
+        (case,) = load_study(tmp_path / "study.toml").cases.values()
+        assert (case.table["duration"], case.table["command"]) == (3.0, {"vx": 0.05})
+
+
+def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plain_walk() -> None:
+    def varied(study: Study) -> bool:
+        return "variation" in next(iter(study.cases.values())).table
+
+    assert varied(study_of({"seeds": 2}))
+    assert not varied(study_of({}))
+    assert varied(study_of({"variation": True}))
+    assert not varied(study_of({"seeds": 2, "variation": False}))
+
+
+@pytest.mark.parametrize(
+    ("table", "parts"),
+    [
+        ({"sedes": 3}, ["unknown key", "sedes", "did you mean 'seeds'"]),
+        ({"seeds": 0}, ["seeds", "got 0", "whole number >= 1"]),
+        ({"controls": ["kinetic"]}, ["kinetic", "did you mean 'kinematic'"]),
+        ({"design": "sobel", "points": 4}, ["sobel", "did you mean 'sobol'"]),
+        ({"design": "sobol", "factors": {"friction.mu": {"uniform": [0.1, 0.9]}}}, ["points = 100"]),
+        ({"points": 4}, ["points", "got 4", "leave it out"]),
+        ({"factors": {"friction.my": [0.3]}}, ["factors.friction.my", "did you mean"]),
+        ({"factors": {"friction.mu": [-0.3]}}, ["factors.friction.mu", "got -0.3", ">= 0"]),
+        ({"factors": {"friction.mu": ["much"]}}, ["factors.friction.mu", "got 'much'"]),
+        ({"factors": {"command.vx": {"linspace": [1, 2, 3], "unit": "kg"}}}, ["factors.command.vx", "wrong unit", "km/h"]),
+        ({"factors": {"friction.mu": {"unifrom": [0.1, 0.9]}}}, ["unknown key", "did you mean 'uniform'"]),
+        ({"factors": {"friction.mu": {"uniform": [0.9, 0.1]}}}, ["lower end first"]),
+        ({"factors": {"friction.mu": {"uniform": [0.1, 0.9]}}}, ["a distribution in a design 'grid'", "points = 100"]),
+        ({"factors": {"friction.mu": [0.1, 0.1]}}, ["different values"]),
+        ({"factors": {"control": ["kinematic"]}}, ["not a factor", "controls = "]),
+        ({"factors": {"seed": [1]}}, ["not a factor", "seeds = 10"]),
+        ({"factors": {"gait.nmae": ["tripod"]}}, ["factors.gait.nmae", "did you mean 'name'"]),
+        ({"factors": {"torso.maas": [2.0]}}, ["factors.torso.maas", "torso.mass"]),
+        ({"factors": {"gains.slip.kq": [1.0]}}, ["unknown gain", "gains.slip.k"]),
+        ({"factors": {"gains.slip.kp": [1.0]}, "controls": ["kinematic"]}, ["a gain that no run has"]),
+        ({"factors": {"friction.mu": {"values": [1.0], "relative": True}}}, ["relative to what?"]),
+        ({"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}}, ["different lengths"]),
+        ({"scenario": "walk_falt"}, ["unknown scenario", "did you mean 'walk_flat'"]),
+        ({"set": {"friction.mu": -1}}, ["set.friction.mu", "got -1"]),
+        (optimisation(metric="slip_per_meter"), ["optimise.metric", "did you mean 'slip_per_metre'"]),
+        (optimisation(constraints={"torque_rms": {"at_mots": 1.0}}), ["not a constraint", "at_most = 1.0"]),
+        (optimisation(variables={"gains.slip.kp": {"normal": [1, 1]}}), ["a variable without bounds"]),
+        (optimisation(held_out={"seeds": {"first": 12, "count": 5}}), ["held-out seeds that are trained on", "got [12]", "first = 13"]),
+        ({**optimisation(), "factors": {"friction.mu": [0.3]}}, ["not a key of an optimisation", "factors"]),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_named_with_its_place_and_a_way_out(table: dict[str, Any], parts: list[str]) -> None:
+    with pytest.raises(HexapodError) as refused:
+        study_of(table)
+    for part in ["test.toml" if "scenario" not in table else "scenario", *parts]:
+        assert part in str(refused.value)
+
+
+def test_what_is_no_study_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="did you mean 'monte_carlo'"):
+        load_study("monte_calro")
+    with pytest.raises(StudyError, match="cannot read the study"):
+        load_study(tmp_path / "none.toml")
+    (tmp_path / "bad.toml").write_text("seeds = \n")
+    with pytest.raises(StudyError, match="not a TOML file"):
+        load_study(tmp_path / "bad.toml")

@@ -1,0 +1,225 @@
+"""What a study keeps: nothing is lost and nothing is torn, whatever happens, and the result is the same bytes."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from command import COMMAND
+from studies import FAKE, KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
+
+from hexapod_cosim.cosim.study import store as store_module
+from hexapod_cosim.cosim.study.columns import FIGURES, result_schema, schema_of
+from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS, locked
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.store import MANY, Store, write_durably, write_whole
+from hexapod_cosim.cosim.study.study import Options, run_study
+
+ROOT = Path(__file__).resolve().parents[1]
+PATIENCE = 60.0  # s    for what takes a few on an idle machine
+MANY_RUNS: dict[str, Any] = {**KINEMATIC, "seeds": 10, "factors": {"friction.mu": {"linspace": [0.3, 0.9, 20]}}}
+
+
+@pytest.fixture
+def small(athena_fmu: Path, tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
+    """Runs a study of few kinematic walks into a folder of the test's."""
+
+    def run(name: str = "out", table: dict[str, Any] = SMALL, **options: Any) -> list[dict[str, Any]]:
+        return run_quietly(study_of({**table, **KINEMATIC}), tmp_path / name, **{"fmu": athena_fmu, **options})
+
+    return run
+
+
+def test_a_finished_study_is_left_as_it_is_when_started_again(small: Callable[..., Any], tmp_path: Path) -> None:
+    small()
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / RUNS).iterdir()}
+    first = digest(tmp_path / "out")
+    small()
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / RUNS).iterdir()} == before
+    assert digest(tmp_path / "out") == first
+
+
+def test_results_do_not_depend_on_workers_or_chunks(small: Callable[..., Any], tmp_path: Path) -> None:
+    small("one", MANY_RUNS, workers=1)
+    small("two", MANY_RUNS, workers=2)
+    small("slow", MANY_RUNS, workers=2, engine=SLOW)
+    assert digest(tmp_path / "one") == digest(tmp_path / "two")
+    assert rows(tmp_path / "one") == rows(tmp_path / "slow")  # another engine's name is in the manifest alone
+
+
+def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[..., Any]) -> None:
+    table = {**SMALL, "seeds": 1, "factors": {"friction.mu": [0.17, 0.19, 0.5], "gait.name": ["tripod"]}}
+    refused, fallen, walked = small(table=table)
+    assert (refused["status"], refused["reason"], refused["walked"]) == ("refused", "no walk with 0", False)
+    assert refused["slip_per_metre"] is None
+    assert (fallen["status"], fallen["upright"], fallen["walked"]) == ("completed", False, False)
+    assert (walked["friction.mu"], walked["gait.name"], walked["slip_per_metre"], walked["walked"]) == (0.5, "tripod", 1.25, True)
+    assert len({row["identity"] for row in (refused, fallen, walked)}) == 3
+    assert not {"wall", "realtime_factor"} & set(walked)
+
+
+def command(folder: Path, fmu: Path, *more: str, study: Path) -> subprocess.Popen[str]:
+    words = [*COMMAND, "study", str(study), "-o", str(folder), "--engine", SLOW, "--fmu", str(fmu), "--workers", "2", *more]
+    return subprocess.Popen(
+        words, cwd=ROOT, env={**os.environ, "PYTHONPATH": "tests"}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def stored_runs(folder: Path) -> int:
+    return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / RUNS).glob("*.parquet"))
+
+
+def test_a_study_killed_twice_and_completed_is_the_uninterrupted_one(athena_fmu: Path, tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text('controls = ["kinematic"]\nseeds = 50\n[factors]\nfriction.mu = {linspace = [0.3, 0.9, 20]}\n')
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    for least in (1, 300):
+        process = command(killed, athena_fmu, study=file)
+        deadline = time.monotonic() + PATIENCE
+        while stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None:
+            time.sleep(0.02)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        assert least <= stored_runs(killed) < 1000
+    kept = {path.name: path.read_bytes() for path in (killed / RUNS).glob("*.parquet")}
+    (killed / RUNS / ".part-99999999.parquet.new").write_bytes(b"half a part")
+    for folder in (killed, whole):
+        process = command(folder, athena_fmu, study=file)
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, err
+    assert digest(killed) == digest(whole)
+    assert {name: (killed / RUNS / name).read_bytes() for name in kept} == kept
+    assert not list((killed / RUNS).glob(".*"))
+    assert len(rows(whole)) == 1000
+
+
+def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena_fmu: Path, tmp_path: Path) -> None:
+    room = [3]
+
+    def filling(path: Path, content: bytes) -> None:
+        if not room[0]:
+            raise store_module._not_written(path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
+        room[0] -= 1
+        write_durably(path, content)
+
+    study, folder = study_of(MANY_RUNS), tmp_path / "out"
+    options = Options(engine=FAKE, workers=1, fmu=athena_fmu, write=filling)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(store_module, "FLUSH_ROWS", 20)
+        with pytest.raises(StudyError, match=r"the disk is full.*make room and start the study again"):
+            run_study(study, folder, options=options, begun=quiet)
+    stored = stored_runs(folder)
+    assert 0 < stored < 200
+    run_quietly(study, folder, fmu=athena_fmu)
+    run_quietly(study, tmp_path / "whole", fmu=athena_fmu)
+    assert digest(folder) == digest(tmp_path / "whole")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_file_that_does_not_fit_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = tmp_path / "results.parquet"
+    place.write_bytes(b"old")
+    (tmp_path / ".results.parquet.new").symlink_to("/dev/full")
+    with pytest.raises(StudyError, match="the disk is full"):
+        write_durably(place, b"new" * 100_000)
+    assert place.read_bytes() == b"old"
+    (tmp_path / ".results.parquet.new").symlink_to("/dev/full")
+    table = pa.table({"run": np.arange(1_000_000)})
+    with pytest.raises(StudyError, match="the disk is full"):
+        write_whole(place, [table], table.schema)
+    assert place.read_bytes() == b"old"
+    assert [path.name for path in tmp_path.iterdir()] == ["results.parquet"]
+
+
+def test_a_damaged_part_is_named_and_without_it_its_runs_are_run_again(small: Callable[..., Any], tmp_path: Path) -> None:
+    small()
+    first = digest(tmp_path / "out")
+    part = next((tmp_path / "out" / RUNS).glob("*.parquet"))
+    part.write_bytes(part.read_bytes()[:-10])
+    with pytest.raises(StudyError, match=rf"{part.name}: a damaged part.*delete it"):
+        small()
+    part.unlink()
+    small()
+    assert digest(tmp_path / "out") == first
+
+
+def rows_from(schema: pa.Schema, runs: list[int]) -> list[dict[str, Any]]:
+    zero = {pa.int64(): 0, pa.float64(): 0.5, pa.bool_(): True, pa.string(): "x"}
+    return [{**{item.name: zero[item.type] for item in schema}, "run": run, "seed": run} for run in runs]
+
+
+def test_many_parts_become_one_and_a_run_in_two_parts_counts_once(tmp_path: Path) -> None:
+    schema = schema_of(study_of())
+    store = Store(tmp_path / RUNS, schema)
+    store.prepare()
+    numbers = np.random.default_rng(0).permutation(3 * MANY).tolist()
+    for run in numbers:
+        store.add(rows_from(schema, [run]))
+        store.flush()
+    assert len(store.parts()) == 3
+    store.add(rows_from(schema, [7, 8]))  # as if a kill had come between writing one part and taking the others away
+    store.flush()
+    (table,) = store.sorted_rows()
+    assert table["run"].to_pylist() == list(range(3 * MANY))
+    assert store.done(3 * MANY + 1).tolist() == [True] * 3 * MANY + [False]
+    assert {row["seed"] for row in store.rows([3, 8]).values()} == {3, 8}
+
+
+def test_sorting_goes_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 10)
+    schema = schema_of(study_of())
+    store = Store(tmp_path / RUNS, schema)
+    store.prepare()
+    for part in ([25, 3, 11], [4, 19, 3], [12]):
+        store.add(rows_from(schema, part))
+        store.flush()
+    assert [table["run"].to_pylist() for table in store.sorted_rows()] == [[3, 4], [11, 12, 19], [25]]
+    write_whole(tmp_path / "whole.parquet", store.sorted_rows(), result_schema(schema))
+    assert pq.read_table(tmp_path / "whole.parquet")["run"].to_pylist() == [3, 4, 11, 12, 19, 25]
+    assert pq.read_schema(tmp_path / "whole.parquet").field("slip_per_metre").metadata == {b"unit": b"m/m"}
+    assert set(FIGURES) < set(schema.names)
+
+
+def test_another_study_into_the_same_folder_is_refused_and_the_differences_named(
+    small: Callable[..., Any], tmp_path: Path, athena_fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small()
+    first = (tmp_path / "out" / MANIFEST).read_bytes()
+    with pytest.raises(StudyError, match=r"another study's runs.*study.seeds was 3, is 4"):
+        small(table={**SMALL, "seeds": 4})
+    other = tmp_path / "other.fmu"
+    other.write_bytes(athena_fmu.read_bytes() + b"\0")
+    with pytest.raises(StudyError, match=r"fmus.athena was"):
+        small(fmu=other)
+    with pytest.raises(StudyError, match=f"engine was .*{FAKE}.*, is .*{SLOW}"):
+        small(engine=SLOW)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")
+    with pytest.raises(StudyError, match=r"environment.hexapod-cosim was .*, is \"9.9\""):
+        small()
+    assert (tmp_path / "out" / MANIFEST).read_bytes() == first
+
+
+def test_a_folder_of_something_else_is_refused(small: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").touch()
+    with pytest.raises(StudyError, match=r"other files.*thesis.tex"):
+        small()
+
+
+def test_two_processes_do_not_share_a_folder(small: Callable[..., Any], tmp_path: Path) -> None:
+    if sys.platform == "win32":
+        pytest.skip("nothing is locked there")
+    with locked(tmp_path / "out"), pytest.raises(StudyError, match="another process runs a study into this folder"):
+        small()

@@ -1,0 +1,156 @@
+"""Who runs a study does not show in it: this process' workers, a cluster's, those that die."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from gains import make_gains
+from studies import KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
+
+from hexapod_cosim.cosim.batch import run_batch
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.study.columns import FIGURES
+from hexapod_cosim.cosim.study.conduct import DEAD
+from hexapod_cosim.cosim.study.crew import DEATHS
+from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.study import Options, run_study
+from hexapod_cosim.models import load_robot
+
+ROOT = Path(__file__).resolve().parents[1]
+PATIENCE = 60.0  # s    for what takes a few on an idle machine
+WALK: dict[str, Any] = {"set": {"duration": 1.2, "gait.period": 0.4}, "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]}}
+
+
+@contextmanager
+def running(*words: str, cwd: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of its own group, gone with all its children when the block ends."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests"), "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", *words], cwd=cwd, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a Dask scheduler with two worker processes on loopback, which are begun anew when they die."""
+    folder = tmp_path_factory.mktemp("dask")
+    file = folder / "scheduler.json"
+    common = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file))
+    with (
+        running("distributed.cli.dask_scheduler", "--port", "0", *common, cwd=folder),
+        running("distributed.cli.dask_worker", "--nworkers", "2", "--nthreads", "1", *common, cwd=folder),
+    ):
+        deadline = time.monotonic() + PATIENCE
+        while not file.exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        yield str(json.loads(file.read_text())["address"])
+
+
+def test_real_walks_on_a_cluster_are_those_on_this_machine_bit_for_bit(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:
+    options = {"engine": "python", "fmu": athena_fmu, "gains": make_gains(load_robot("athena"))}
+    here = run_quietly(study_of(WALK), tmp_path / "here", workers=2, **options)
+    run_quietly(study_of(WALK), tmp_path / "there", scheduler=scheduler, **options)
+    assert digest(tmp_path / "here") == digest(tmp_path / "there")
+    assert all(row["walked"] for row in here)
+    slips = [row["slip_per_metre"] for row in here if row["control"] == "compliant"]
+    assert len(set(slips)) == 4  # the gain and the friction show
+
+
+def test_a_run_of_a_study_is_the_run_by_itself(athena_fmu: Path, tmp_path: Path) -> None:
+    table = {**WALK, **KINEMATIC, "seeds": {"first": 4, "count": 1}, "factors": {"friction.mu": [0.5]}}
+    (row,) = run_quietly(study_of(table), tmp_path / "out", engine="python", fmu=athena_fmu)
+    plan = load_scenario("walk_flat", overrides=["duration=1.2", "gait.period=0.4", "friction.mu=0.5", "seed=4"])
+    (summary,) = run_batch([plan], fmu=athena_fmu, workers=1)
+    assert {name: row[name] for name in FIGURES} == {name: summary.metrics[name] for name in FIGURES}
+
+
+def test_a_study_goes_from_this_machine_to_a_cluster_and_back(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:
+    study = study_of({**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5, 0.7]}})
+    for place in ({"workers": 2}, {"scheduler": scheduler}, {"workers": 1}):
+        with pytest.raises(KeyboardInterrupt):
+            run_study(study, tmp_path / "moved", options=Options(engine=SLOW, fmu=athena_fmu, **place), begun=_stop_after(20))
+    run_quietly(study, tmp_path / "moved", engine=SLOW, fmu=athena_fmu)
+    run_quietly(study, tmp_path / "stayed", engine=SLOW, fmu=athena_fmu)
+    assert digest(tmp_path / "moved") == digest(tmp_path / "stayed")
+
+
+def _stop_after(runs: int) -> Any:
+    counted = [0]
+
+    def tell(more: int, _lost: int) -> None:
+        counted[0] += more
+        if counted[0] >= runs:
+            raise KeyboardInterrupt
+
+    return lambda _total, _done: tell
+
+
+@pytest.mark.parametrize("cluster", [False, True], ids=["processes", "cluster"])
+def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go_on(
+    athena_fmu: Path, tmp_path: Path, request: pytest.FixtureRequest, cluster: bool
+) -> None:
+    place = {"scheduler": request.getfixturevalue("scheduler")} if cluster else {"workers": 2}
+    study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.3, 0.5, 0.13, 0.6]}, "seeds": 2})
+    found = run_quietly(study, tmp_path / "out", fmu=athena_fmu, **place)
+    died = [row for row in found if row["status"] == DEAD]
+    assert [(row["friction.mu"], row["seed"]) for row in died] == [(0.13, 0), (0.13, 1)]
+    assert all(f"{DEATHS} times" in row["reason"] for row in died)
+    assert sum(row["walked"] for row in found) == len(found) - 2
+    assert [row["run"] for row in found] == list(range(8))
+
+
+def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Path) -> None:
+    study = study_of({**KINEMATIC, "seeds": 100, "factors": {"friction.mu": [0.3, 0.5]}})
+    killed: list[int] = []
+
+    def tell(_more: int, _lost: int) -> None:
+        if len(killed) < 2:
+            victim = next(iter(_children() - set(killed)))
+            os.kill(victim, signal.SIGKILL)
+            killed.append(victim)
+
+    run_study(study, tmp_path / "out", options=Options(engine=SLOW, fmu=athena_fmu, workers=2), begun=lambda _total, _done: tell)
+    assert len(killed) == 2
+    assert all(row["walked"] for row in rows(tmp_path / "out"))
+    assert len(rows(tmp_path / "out")) == 200
+
+
+def _children() -> set[int]:
+    return {child.pid for child in multiprocessing.active_children() if child.pid is not None}
+
+
+def test_workers_that_cannot_work_at_all_end_the_study(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hexapod_cosim.cosim.study.conduct.USELESS", 1)
+    study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
+    with pytest.raises(StudyError, match="no worker lives to finish a run"):
+        run_quietly(study, tmp_path / "out", fmu=athena_fmu)
+    assert not list((tmp_path / "out" / "runs").iterdir())
+
+
+def test_a_scheduler_that_is_not_there_is_named(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hexapod_cosim.cosim.study.cluster.CONNECT", "1s")
+    with pytest.raises(StudyError, match=r"--scheduler: no scheduler answers.*tcp://127.0.0.1:9"):
+        run_study(study_of({**SMALL, **KINEMATIC}), tmp_path, options=Options(fmu=athena_fmu, scheduler="tcp://127.0.0.1:9"), begun=quiet)
+
+
+def test_a_worker_with_other_versions_is_refused(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")  # here, not in the worker
+    with pytest.raises(StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"):
+        run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu)
