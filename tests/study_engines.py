@@ -7,10 +7,10 @@ import time
 from pathlib import Path
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.master import COMPLETED, INTERRUPTED, Progress
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 
 DEADLY, REFUSING, FALLING, SLOW = 0.13, 0.17, 0.19, 0.01  # friction.mu that ends the process, is refused, falls; s a run takes
 
@@ -25,8 +25,9 @@ class Fake:
 
     pause = 0.0  # s
 
-    def __init__(self, fmu: Path) -> None:
+    def __init__(self, fmu: Path, controller: Path) -> None:
         assert fmu.is_file()
+        assert controller.is_file()
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
         """As Engine says."""

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli.running import FmuFile, GainsFile, given_gains
-from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, show_table, study_bar, warn
+from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, show_table, warn
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.conduct import Tell
 from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE, ENGINES
@@ -87,7 +87,16 @@ def progress() -> Iterator[Begun]:
         def begun(total: int, done: int) -> Tell:
             if done:
                 print(f"goes on: {done} of {total} runs are there already", file=sys.stderr)
-            return shown.enter_context(study_bar(total, done))
+            show = shown.enter_context(counting_bar("runs", total))
+            show(done)
+            count = done
+
+            def tell(more: int, _lost: int) -> None:
+                nonlocal count
+                count += more
+                show(count)
+
+            return tell
 
         yield begun
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -139,31 +139,4 @@ def counting_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda _done: None
         return
     with _bar(label, total, _Counted()) as tell:
-        yield tell
-
-
-class _Rate(ProgressColumn):
-    """Runs per minute since the start, and how many did not walk to their end."""
-
-    def render(self, task: Task) -> Text:
-        done, lost = task.fields["here"], task.fields["lost"]
-        rate = 60.0 * done / task.elapsed if task.elapsed else 0.0
-        return Text(f"{rate:6.0f}/min" + (f"  {lost} did not walk" if lost else ""))
-
-
-@contextmanager
-def study_bar(total: int, done: int) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar over runs, `done` of which are old; told how many came in, and how many of them did not walk to their end."""
-    if not sys.stderr.isatty():
-        yield lambda _more, _lost: None
-        return
-    columns = (TextColumn("{task.description:<6}"), BarColumn(), MofNCompleteColumn(), _Rate(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), speed_estimate_period=120.0) as bar:
-        task = bar.add_task("runs", total=total, completed=done, here=0, lost=0)
-        counts = [0, 0]
-
-        def tell(more: int, lost: int) -> None:
-            counts[:] = counts[0] + more, counts[1] + lost
-            bar.update(task, advance=more, here=counts[0], lost=counts[1])
-
         yield tell

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary, summarise
 from hexapod_cosim.cosim.master import Progress
 from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.models import HexapodError, unknown_name
 
 
@@ -28,13 +29,18 @@ class Engine(Protocol):
         ...
 
 
-Maker = Callable[[Path], Engine]  # from a robot's FMU
+Maker = Callable[[Path, Path], Engine]  # from a robot's FMU and a controller's
+
+
+def compiled_engine(fmu: Path, controller: Path) -> Engine:
+    """The loop in C, driving both FMUs: no Python between a walk's first step and its last."""
+    return Walker(fmu=fmu, controller=controller)
 
 
 class PythonEngine:
-    """The master in Python: the walk that `hexapod simulate` walks."""
+    """The master and the controller in Python: the walk that `hexapod simulate` walks."""
 
-    def __init__(self, fmu: Path) -> None:
+    def __init__(self, fmu: Path, _controller: Path) -> None:
         self._fmu = fmu
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
@@ -42,14 +48,14 @@ class PythonEngine:
         try:
             return summarise(simulate(scenario, fmu=self._fmu, gains=gains, progress=progress))
         except HexapodError as error:
-            return Summary(control=scenario.control, seed=scenario.seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES)
+            return refused(scenario, error)
 
     def close(self) -> None:
         """Nothing to free."""
 
 
-ENGINES: dict[str, Maker] = {"python": PythonEngine}
-DEFAULT_ENGINE = "python"
+ENGINES: dict[str, Maker] = {"compiled": compiled_engine, "python": PythonEngine}
+DEFAULT_ENGINE = "compiled"
 
 
 def engine_named(name: str) -> Maker:

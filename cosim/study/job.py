@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.controller_export import export_controller, make_setup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
@@ -22,6 +23,7 @@ from hexapod_cosim.cosim.study.engines import engine_named
 from hexapod_cosim.cosim.study.records import Case, Factor, Order, Study, Value
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
+CONTROLLER_PERIOD = 0.005  # s    of the FMU as packed, like all its parameters; a run has its own
 PACKAGES = ("fmpy", "numpy", "scipy", "control", "pyarrow")
 OF_DESIGN = ("robot", "macro_step", "servo.")  # factors that gains are designed anew for
 
@@ -33,6 +35,7 @@ class Job:
     cases: Mapping[str, Case]
     factors: tuple[Factor, ...]
     fmus: Mapping[str, bytes]  # by robot, as scenarios name it
+    controller: bytes  # an FMU whose parameters each run sets
     robots: Mapping[str, bytes]  # files of robots that do not come with the package, by their path
     gains: Gains | None  # of all compliant runs; None: designed by the worker, for each robot and macro-step
     engine: str
@@ -53,8 +56,8 @@ def make_job(study: Study, *, engine: str, fmu: Path | None = None, gains: Gains
     fmus = {name: _fmu(name) if fmu is None else _bytes(fmu) for name in names}
     files = {name: _bytes(Path(name)) for name in names if name not in list_robots()}
     job = Job(
-        cases=study.cases, factors=study.factors, fmus=fmus, robots=files, gains=_gains(study, gains), engine=engine,
-        environment=environment(study),
+        cases=study.cases, factors=study.factors, fmus=fmus, controller=_controller(), robots=files, gains=_gains(study, gains),
+        engine=engine, environment=environment(study),
     )  # fmt: skip
     return Job(**{**_plain(job), "hash": _hash(job)})
 
@@ -73,6 +76,12 @@ def _robots(study: Study) -> list[str]:
 def _fmu(robot: str) -> bytes:
     with TemporaryDirectory(prefix="hexapod-study-") as folder:
         return export_fmu(load_robot(robot), Path(folder) / "robot.fmu").read_bytes()
+
+
+def _controller() -> bytes:
+    setup = make_setup(load_robot(list_robots()[0]), control="kinematic", period=CONTROLLER_PERIOD)
+    with TemporaryDirectory(prefix="hexapod-study-") as folder:
+        return export_controller(setup, Path(folder) / "controller.fmu").read_bytes()
 
 
 def _bytes(path: Path) -> bytes:
@@ -106,6 +115,7 @@ def _hash(job: Job) -> str:
     digest = hashlib.sha256()
     for part in (_cases(job.cases), [asdict(item) for item in job.factors], None if job.gains is None else asdict(job.gains), job.engine):
         digest.update(canonical(part))
+    digest.update(job.controller)
     for files in (job.fmus, job.robots):
         for name, content in files.items():
             digest.update(name.encode() + hashlib.sha256(content).digest())

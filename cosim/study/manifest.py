@@ -33,6 +33,7 @@ def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
         "engine": job.engine,
         "environment": job.environment,
         "fmus": {name: hashlib.sha256(content).hexdigest() for name, content in job.fmus.items()},
+        "controller": hashlib.sha256(job.controller).hexdigest(),
         "robots": {name: hashlib.sha256(content).hexdigest() for name, content in job.robots.items()},
         "gains": None if job.gains is None else asdict(job.gains),
     }

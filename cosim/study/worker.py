@@ -12,7 +12,6 @@ from time import perf_counter
 from typing import Any
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.master import INTERRUPTED, Progress
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table, with_values
@@ -20,6 +19,7 @@ from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.study.engines import Engine, engine_named
 from hexapod_cosim.cosim.study.job import Job, environment, settings_of
 from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, Factor, Order, StudyError, Value
+from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.models import HexapodError
 
 MOST_DESIGNS = 64  # sets of gains a worker keeps
@@ -47,6 +47,7 @@ class Workshop:
         self._job, self._folder = job, TemporaryDirectory(prefix="hexapod-job-")
         self._files = {name: self._unpack(f"robot{k}", Path(name).suffix, data) for k, (name, data) in enumerate(job.robots.items())}
         self._fmus = {name: self._unpack(f"fmu{k}", ".fmu", data) for k, (name, data) in enumerate(job.fmus.items())}
+        self._controller = self._unpack("controller", ".fmu", job.controller)
         self._engines: dict[str, Engine] = {}
         self._designs: OrderedDict[tuple[str, float], Gains] = OrderedDict()
 
@@ -107,7 +108,7 @@ class Workshop:
 
     def _engine(self, robot: str) -> Engine:
         if robot not in self._engines:
-            self._engines[robot] = engine_named(self._job.engine)(self._fmus[robot])
+            self._engines[robot] = engine_named(self._job.engine)(self._fmus[robot], self._controller)
         return self._engines[robot]
 
     def close(self) -> None:
