@@ -11,7 +11,7 @@ SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu m
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
 SANITIZED := tests/test_fmi.py tests/test_fmi3.py tests/test_fmi3_order.py tests/test_plant_events.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_fmi_importers.py tests/test_fmi_exchange.py tests/test_plant_coordinates.py tests/test_plant_misuse.py tests/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-batch bench-opening control format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -25,6 +25,7 @@ help:
 	@echo "make check     formatters, linters, types, generated files"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
+	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
 	@echo "make control   what each part of the compliant control is worth, where, and what it survives: docs/control.md (5 min)"
 	@echo "make docs      the documentation's site: build/docs/index.html (1 min)"
 	@echo "make format    formats C and Python"
@@ -89,6 +90,9 @@ bench-batch: setup
 
 bench-quick: setup
 	$(BIN)/python -m benchmarks.run --quick
+
+study-demo: setup
+	$(BIN)/python -m tools.study_demo out/study-demo
 
 control: setup
 	$(BIN)/python -m benchmarks.control

@@ -15,26 +15,32 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.files import atomic_path
 from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.plots import SETTINGS
+from hexapod_cosim.cosim.study.coordinates import parallel
+from hexapod_cosim.cosim.study.marks import (
+    CHANGES,
+    COLOURMAP,
+    COLOURS,
+    COST,
+    MARKS,
+    MOST_CELLS,
+    MOST_LINES,
+    NAMES,
+    SLIP,
+    Array,
+    label_of,
+    logarithmic,
+    mean_of,
+)
 from hexapod_cosim.cosim.study.optimise import Trial
 from hexapod_cosim.cosim.study.records import VALUES, Factor, Study
 from hexapod_cosim.cosim.study.table import Point
 from hexapod_cosim.models import HexapodError
-
-Array = NDArray[np.float64]
-
-COLOURS = {"kinematic": "#D55E00", "compliant": "#0072B2"}
-MARKS = {"kinematic": "s", "compliant": "o"}
-SLIP, COST = "slip_per_metre", "cost_of_transport"
-NAMES = {SLIP: "slip [m/m]", COST: "cost of transport [1]"}
-COLOURMAP, CHANGES = "viridis", "RdBu_r"
-MOST_LINES, MOST_CELLS = 1500, 40  # beyond them a figure only gets slower and darker
 
 
 @dataclass(frozen=True)
@@ -78,21 +84,12 @@ def save(found: dict[str, Drawing], folder: Path) -> list[Path]:
     with matplotlib.rc_context(SETTINGS):
         for name, item in found.items():
             figure = item.draw()
-            for suffix, options in ((".svg", {"metadata": {"Date": None}}), (".png", {"dpi": 130})):
-                with atomic_path(folder / f"{name}{suffix}") as path:
-                    figure.savefig(path, **options)
-                files.append(folder / f"{name}{suffix}")
+            for kind, metadata in UNDATED.items():
+                with atomic_path(folder / f"{name}.{kind}") as path:
+                    figure.savefig(path, format=kind, dpi=DPI, metadata=metadata)
+                figure.set_layout_engine("none")  # laid out once is enough: it takes as long as the drawing
+                files.append(folder / f"{name}.{kind}")
     return files
-
-
-def mean_of(point: Point, control: str, metric: str) -> float:
-    """NaN where there is none."""
-    return point.means[control][metric].value if control in point.means else math.nan
-
-
-def _label(factor: Factor) -> str:
-    unit = "designed" if factor.relative else factor.unit
-    return f"{factor.name} [{unit}]" if unit else factor.name
 
 
 def _ticks(factor: Factor) -> list[str]:
@@ -106,14 +103,14 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
     paired = len(controls) == 2
     figure = Figure(figsize=(3.6 * (len(controls) + paired) + 0.8, 0.42 * min(len(second.values), 12) + 2.2))
     panels = np.atleast_1d(figure.subplots(1, len(controls) + paired, sharey=True))
-    top = max((float(np.nanmax(item)) for item in maps if np.isfinite(item).any()), default=1.0)
+    norm = logarithmic(np.concatenate(maps, axis=None))
     for axes, control, values in zip(panels, controls, maps, strict=False):
-        _image(figure, axes, values, control, "slip [m/m]", (0.0, top), COLOURMAP, first, second)
+        _image(figure, axes, values, control, "slip [m/m]", norm, COLOURMAP, first, second)
     if paired:
         with np.errstate(divide="ignore", invalid="ignore"):
             change = 100.0 * (maps[1] / maps[0] - 1.0)
-        _image(figure, panels[-1], change, f"{controls[0]} → {controls[1]}", "change [%]", (-100.0, 100.0), CHANGES, first, second)
-    panels[0].set_ylabel(_label(second))
+        _image(figure, panels[-1], change, f"{controls[0]} → {controls[1]}", "change [%]", Normalize(-100.0, 100.0), CHANGES, first, second)
+    panels[0].set_ylabel(label_of(second))
     return figure
 
 
@@ -136,21 +133,21 @@ def _image(
     values: Array,
     title: str,
     label: str,
-    limits: tuple[float, float],
+    norm: Normalize,
     colours: str,
     first: Factor,
     second: Factor,
 ) -> None:
     axes.set_title(title)
     axes.grid(visible=False)
-    image = axes.imshow(values, origin="lower", aspect="auto", cmap=colours, vmin=limits[0], vmax=limits[1])
+    image = axes.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=norm)
     for row, column in np.argwhere(~np.isfinite(values)):
         axes.plot(column, row, marker="x", color="0.5")
     if values.size <= 60:
         _numbers(axes, values, image)
     axes.set_xticks(range(len(first.values)), _ticks(first), rotation=45 if len(first.values) > 6 else 0)
     axes.set_yticks(range(len(second.values)), _ticks(second))
-    axes.set_xlabel(_label(first))
+    axes.set_xlabel(label_of(first))
     figure.colorbar(image, ax=axes, label=label, shrink=0.9)
 
 
@@ -180,68 +177,9 @@ def response(points: Sequence[Point], factor: Factor, study: Study) -> Figure:
             axes.fill_between(place, mean - half, mean + half, color=COLOURS[control], alpha=0.2, linewidth=0)
         if names:
             axes.set_xticks(range(len(factor.values)), _ticks(factor))
-        axes.set(xlabel=_label(factor), ylabel=NAMES[metric], ylim=(0.0, None))
+        axes.set(xlabel=label_of(factor), ylabel=NAMES[metric], ylim=(0.0, None))
     figure.axes[0].legend()
     return figure
-
-
-def parallel(points: Sequence[Point], study: Study) -> Figure:
-    """Parallel coordinates: an axis per factor, then slip and cost; a line per point and control."""
-    factors, controls = study.factors, study.run_controls
-    chosen = _some([point for point in points if not point.held_out and None not in point.values.values()])
-    figure = Figure(figsize=(max(1.5 * (len(factors) + 3), 7.0), 3.2 * len(controls) + 0.4))
-    placed = [tuple(_place(factor, point) for factor in factors) for point in chosen]
-    rows = [[(*places, mean_of(point, control, SLIP), mean_of(point, control, COST)) for point, places in zip(chosen, placed, strict=True)]
-            for control in controls]  # fmt: skip
-    table = np.array(rows, dtype=np.float64).reshape(len(controls), len(chosen), len(factors) + 2)
-    low, high = np.nanmin(table, axis=(0, 1)), np.nanmax(table, axis=(0, 1))
-    scaled = (table - low) / np.where(high > low, high - low, 1.0)
-    panels = np.atleast_1d(figure.subplots(len(controls), 1))
-    for axes, control, lines in zip(panels, controls, scaled, strict=True):
-        _coordinates(figure, axes, lines, control, factors, (low, high))
-    return figure
-
-
-def _coordinates(figure: Figure, axes: Axes, lines: Array, control: str, factors: Sequence[Factor], ends: tuple[Array, Array]) -> None:
-    count, (low, high) = lines.shape[1], ends
-    whole = lines[np.isfinite(lines).all(axis=1)]
-    whole = whole[np.argsort(-whole[:, -2])]  # little slip on top
-    paths = [np.column_stack([np.arange(count), line]) for line in whole]
-    collection = LineCollection(paths, array=whole[:, -2] * (high[-2] - low[-2]) + low[-2], cmap=COLOURMAP, linewidth=0.9, alpha=0.7)
-    collection.set_clim(low[-2], high[-2])
-    axes.add_collection(collection)
-    axes.set(xlim=(-0.15, count - 0.85), ylim=(-0.08, 1.08), title=control, yticks=[])
-    axes.set_xticks(range(count), [*(_label(factor).replace(" [", "\n[") for factor in factors), "slip\n[m/m]", "cost of\ntransport"])
-    for side in ("left", "bottom"):
-        axes.spines[side].set_visible(False)
-    for place in range(count):
-        axes.axvline(place, color="0.6", linewidth=0.8, zorder=0)
-        _ends(axes, place, factors[place] if place < len(factors) else None, float(low[place]), float(high[place]))
-    figure.colorbar(collection, ax=axes, label="slip [m/m]", shrink=0.9)
-
-
-def _ends(axes: Axes, place: int, factor: Factor | None, low: float, high: float) -> None:
-    """What the ends of an axis mean: numbers, or the first and last of names."""
-    texts = (f"{low:.3g}", f"{high:.3g}")
-    if factor is not None and _is_named(factor):
-        texts = (str(factor.values[int(low)]), str(factor.values[int(high)]))
-    for y, text, side in ((-0.02, texts[0], "top"), (1.02, texts[1], "bottom")):
-        axes.text(place, y, text, ha="center", va=side, fontsize=7, color="0.35")
-
-
-def _is_named(factor: Factor) -> bool:
-    return factor.kind == VALUES and not all(isinstance(value, int | float) and not isinstance(value, bool) for value in factor.values)
-
-
-def _place(factor: Factor, point: Point) -> float:
-    value = point.values[factor.name]
-    return float(factor.values.index(value)) if _is_named(factor) else float(value)
-
-
-def _some(points: Sequence[Point]) -> list[Point]:
-    """Not more than can be seen, evenly chosen."""
-    step = max(math.ceil(len(points) / MOST_LINES), 1)
-    return list(points[::step])
 
 
 def pareto(points: Sequence[Point], study: Study) -> Figure:
@@ -255,7 +193,8 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
         axes.plot(*shown.T, linestyle="", marker=MARKS[control], markersize=4, alpha=0.55, color=COLOURS[control], label=control)
         edge = front(pairs)
         axes.plot(*edge.T, drawstyle="steps-post", color=COLOURS[control], linewidth=1.4)
-    axes.set(xlabel=NAMES[COST], ylabel=NAMES[SLIP], ylim=(0.0, None))
+    axes.set(xlabel=NAMES[COST], ylabel=NAMES[SLIP], yscale="log")
+    axes.margins(0.05)
     axes.legend(title="lines: the front")
     return figure
 

@@ -1,0 +1,115 @@
+"""`make study-demo`: a study of 500 runs killed twice and completed; the same uninterrupted, and on a Dask cluster: the same bytes.
+
+usage: python -m tools.study_demo FOLDER
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pyarrow.parquet as pq
+
+STUDY = """title = "500 walks, killed twice"
+scenario = "walk_flat"
+seeds = 10
+[set]
+duration = 4.0
+[factors]
+friction.mu = [0.3, 0.45, 0.6, 0.75, 0.9]
+command.vx = { linspace = [4, 12, 5], unit = "cm/s" }
+"""
+KILLED_AT = (100, 300)  # runs stored
+
+
+def main() -> int:
+    """Returns 0 when all three are the same."""
+    if len(sys.argv) != 2:
+        print(__doc__, file=sys.stderr)
+        return 2
+    folder = Path(sys.argv[1])
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "study.toml").write_text(STUDY, encoding="utf-8")
+    for least in KILLED_AT:
+        kill_at(folder, least)
+    finish(folder, "killed")
+    finish(folder, "uninterrupted")
+    with cluster(folder) as address:
+        finish(folder, "cluster", "--scheduler", address)
+    digests = {
+        name: hashlib.sha256((folder / name / "results.parquet").read_bytes()).hexdigest()
+        for name in ("killed", "uninterrupted", "cluster")
+    }
+    for name, digest in digests.items():
+        print(f"{digest}  {folder / name}/results.parquet")
+    same = len(set(digests.values())) == 1
+    print("the same bytes" if same else "NOT the same")
+    print(f"report: {folder}/killed/report.html")
+    return 0 if same else 1
+
+
+def command(folder: Path, name: str, *more: str) -> list[str]:
+    """A study into a part of the folder."""
+    return [sys.executable, "-m", "hexapod_cosim.cosim.cli", "study", str(folder / "study.toml"), "-o", str(folder / name), *more]
+
+
+def kill_at(folder: Path, least: int) -> None:
+    """Runs until so many runs are stored, then kills the program and its workers, who get no chance to do anything."""
+    process = subprocess.Popen(command(folder, "killed"), start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while stored(folder) < least and process.poll() is None:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    print(f"killed with {stored(folder)} of 500 runs stored", flush=True)
+
+
+def stored(folder: Path) -> int:
+    """Runs in the parts of the study that is killed."""
+    return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / "killed" / "runs").glob("*.parquet"))
+
+
+def finish(folder: Path, name: str, *more: str) -> None:
+    """Runs a study to its end and says how long it took."""
+    begin = time.monotonic()
+    done = subprocess.run(command(folder, name, "--json", *more), check=True, stdout=subprocess.PIPE)
+    summary = json.loads(done.stdout)
+    print(f"{name}: {summary['runs']} runs, walked {summary['walked']}, in {time.monotonic() - begin:.0f} s", flush=True)
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[str]:
+    """A Dask scheduler and two worker processes on loopback; the scheduler's address."""
+    file = (folder / "scheduler.json").resolve()
+    common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
+    starts = (["dask_scheduler", "--port", "0"], ["dask_worker", "--nworkers", "2", "--nthreads", "1"])
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.{name}", *words, *common],
+            cwd=folder,
+            start_new_session=True,
+            stderr=subprocess.DEVNULL,
+        )
+        for name, *words in starts
+    ]
+    try:
+        while not file.exists():
+            time.sleep(0.1)
+        yield str(json.loads(file.read_text(encoding="utf-8"))["address"])
+    finally:
+        for process in processes:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
