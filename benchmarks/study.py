@@ -30,6 +30,7 @@ from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.run import chosen_gains
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.study.conduct import CHUNK_TIME
 from hexapod_cosim.cosim.study.manifest import RESULTS as RESULTS_FILE
 from hexapod_cosim.cosim.study.manifest import TIMES
 from hexapod_cosim.cosim.study.reading import study_from_table
@@ -38,10 +39,23 @@ from hexapod_cosim.cosim.summary import Summary
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE, BEGIN, END = ROOT / "docs" / "studies.md", "<!-- study -->", "<!-- /study -->"
-INSTANT = "benchmarks.study:Instant"
+PAGE = ROOT / "docs" / "studies.md"
+INSTANT, WAITING = "benchmarks.study:Instant", "benchmarks.study:Waiting"
 BOTH = ("kinematic", "compliant")
-RUNS, FEW, WALKS, REPEATS = 3000, 100, 100, 3
+RUNS, LARGE, FEW, WALKS, WAITS, REPEATS = 4000, 24_000, 20, 100, 100, 2
+CORES, MILLION = 100, 1e6  # of the plan
+# name -> unit, what it is
+MEANINGS = {
+    "overhead": ("ms", "of a processor, for a run that takes no time: its scenario made, sent, checked and stored"),
+    "overhead_dask": ("ms", "the same through a Dask scheduler with two workers"),
+    "walk_kinematic": ("ms", "of a processor, for a walk of 10 s under kinematic control, all in"),
+    "walk_compliant": ("ms", "under compliant control"),
+    "rate": ("1/min", "walks of 10 s, both controls, two processes, on a machine that others use too"),
+    "scaling": ("1", "their rate over twice that of one process, on the same machine"),
+    "scaling_waiting": ("1", "the same of runs that wait for 50 ms each: what handing out costs"),
+    "bytes": ("B", "a run in results.parquet"),
+    "memory": ("B", f"peak memory of the program, for each run from {RUNS} to {LARGE}"),
+}
 Figures = dict[str, tuple[float, str, str]]  # by name: value, unit, what it is
 
 
@@ -58,6 +72,15 @@ class Instant:
 
     def close(self) -> None:
         """Nothing to free."""
+
+
+class Waiting(Instant):
+    """An engine whose walks take the same time on any machine, however busy."""
+
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
+        """As Engine says."""
+        time.sleep(0.05)
+        return super().summary(scenario, gains=gains, progress=progress)
 
 
 class Timed:
@@ -93,28 +116,24 @@ def processor_time() -> float:
 def measured(fmu: Path, gains: Gains) -> Figures:
     """All figures. Processor time, of which others on the machine take nothing, and rates that were measured side by side."""
     common: dict[str, Any] = {"fmu": fmu, "gains": gains}
-    few = Timed(FEW, engine=INSTANT, workers=2, **common)
-    small = peak_memory()
-    many = Timed(RUNS, engine=INSTANT, workers=2, **common)
-    large = peak_memory()
+    few, many = (Timed(runs, engine=INSTANT, workers=2, **common) for runs in (FEW, RUNS))
     by_dask = [through_cluster(runs, common) for runs in (FEW, RUNS)]
-    walks = {control: Timed(WALKS, workers=1, controls=(control,), **common) for control in BOTH}
+    walks = {control: [Timed(runs, workers=1, controls=(control,), **common) for runs in (FEW, WALKS)] for control in BOTH}
     pairs = [[Timed(WALKS, controls=BOTH, workers=count, **common) for count in (1, 2)] for _ in range(REPEATS)]
-    busy = [float(two.walls.sum()) * two.rate / two.runs / 2.0 for _, two in pairs]
-    found: Figures = {
-        "overhead": (1e3 * (many.processor - few.processor) / (RUNS - FEW), "ms",
-                     "of a processor, for a run that takes no time: its scenario made, sent, checked and stored"),
-        "overhead_dask": (1e3 * (by_dask[1] - by_dask[0]) / (RUNS - FEW), "ms", "the same through a Dask scheduler with two workers"),
-    }  # fmt: skip
-    for control, item in walks.items():
-        found[f"walk_{control}"] = (1e3 * float(np.median(item.walls)), "ms", f"a walk of 10 s under {control} control, median")
-    return found | {
-        "rate": (60.0 * max(two.rate for _, two in pairs), "1/min", "walks of 10 s, both controls, two processes"),
-        "scaling": (max(two.rate / (2.0 * one.rate) for one, two in pairs), "1", "rate of two processes over twice that of one"),
-        "busy": (max(busy), "1", "share of the time that two processes are at a walk"),
-        "bytes": (many.bytes, "B", "a run in results.parquet"),
-        "memory": ((large - small) / (RUNS - FEW), "B", f"peak memory of the program, a run, from {FEW} to {RUNS} runs"),
-    }  # fmt: skip
+    waits = [[Timed(WAITS, engine=WAITING, workers=count, **common).rate for count in (1, 2)] for _ in range(REPEATS)]
+    small, _, large = peak_memory(), Timed(LARGE, engine=INSTANT, workers=2, **common), peak_memory()
+    spent = {control: 1e3 * (more.processor - less.processor) / (WALKS - FEW) for control, (less, more) in walks.items()}
+    found = {
+        "overhead": 1e3 * (many.processor - few.processor) / (RUNS - FEW),
+        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (RUNS - FEW),
+        **{f"walk_{control}": value for control, value in spent.items()},
+        "rate": 60.0 * max(two.rate for _, two in pairs),
+        "scaling": max(two.rate / (2.0 * one.rate) for one, two in pairs),
+        "scaling_waiting": max(two / (2.0 * one) for one, two in waits),
+        "bytes": many.bytes,
+        "memory": (large - small) / (LARGE - RUNS),
+    }
+    return {name: (value, *MEANINGS[name]) for name, value in found.items()}
 
 
 def through_cluster(runs: int, common: dict[str, Any]) -> float:
@@ -163,8 +182,12 @@ def write(figures: Figures, *, page: bool) -> Path:
         writer.writerow(["name", "value", "unit", "meaning"])
         writer.writerows([name, f"{value:.4g}", unit, meaning] for name, (value, unit, meaning) in figures.items())
     if page:
-        head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        write_text(PAGE, f"{head}{BEGIN}\n\n{table(figures)}\n\n{END}{rest.partition(END)[2]}")
+        text = PAGE.read_text(encoding="utf-8")
+        for name, content in (("study", table(figures)), ("plan", plan(figures))):
+            begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+            head, _, rest = text.partition(begin)
+            text = f"{head}{begin}\n\n{content}\n\n{end}{rest.partition(end)[2]}"
+        write_text(PAGE, text)
     return path
 
 
@@ -172,6 +195,22 @@ def table(figures: Mapping[str, tuple[float, str, str]]) -> str:
     """Markdown."""
     rows = [f"| {meaning} | {value:.3g} {unit} |" for value, unit, meaning in figures.values()]
     return "\n".join(["| what | measured |", "|---|---|", *rows])
+
+
+def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
+    """What a million walks of 10 s, half of them under either control, come to on a hundred such cores."""
+    values = {name: value for name, (value, _, _) in figures.items()}
+    walk = 1e-3 * 0.5 * (values["walk_kinematic"] + values["walk_compliant"])  # s
+    hours = MILLION * walk / 3600.0
+    per_second = CORES / walk
+    rows = [
+        ("processor time", f"{hours:.0f} core hours"),
+        (f"on {CORES} cores", f"{hours / CORES:.1f} h at {per_second:.0f} walks per second"),
+        ("of it the study's own", f"{100.0 * values['overhead'] / (1e3 * walk):.1f} %"),
+        ("results.parquet", f"{values['bytes'] * MILLION / 1e6:.0f} MB"),
+        ("tasks for Dask's scheduler", f"{CORES / CHUNK_TIME:.0f} per second"),
+    ]
+    return "\n".join([f"| 10⁶ walks of 10 s, {CORES} such cores | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)])
 
 
 def main() -> None:

@@ -140,7 +140,7 @@ def test_workers_that_cannot_work_at_all_end_the_study(athena_fmu: Path, tmp_pat
     monkeypatch.setattr("hexapod_cosim.cosim.study.conduct.USELESS", 1)
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
     with pytest.raises(StudyError, match="no worker lives to finish a run"):
-        run_quietly(study, tmp_path / "out", fmu=athena_fmu)
+        run_quietly(study, tmp_path / "out", fmu=athena_fmu, workers=2)
     assert not list((tmp_path / "out" / "runs").iterdir())
 
 
@@ -153,4 +153,4 @@ def test_a_scheduler_that_is_not_there_is_named(athena_fmu: Path, tmp_path: Path
 def test_a_worker_with_other_versions_is_refused(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")  # here, not in the worker
     with pytest.raises(StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"):
-        run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu)
+        run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu, workers=2)

@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.study.records import StudyError
 
 SMALL, MERGED = "part", "merged"  # names of parts
 MANY = 64  # small parts are put together
-ROWS_AT_ONCE = 65_536  # in memory, of the whole
+ROWS_AT_ONCE = 16_384  # in memory, of the whole
 FLUSH_ROWS, FLUSH_SECONDS = 1024, 2.0  # no more than this is lost to a kill
 COMPRESSION = "zstd"
 RUN = "run"
