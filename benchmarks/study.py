@@ -42,7 +42,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "studies.md"
 INSTANT, WAITING = "benchmarks.study:Instant", "benchmarks.study:Waiting"
 BOTH = ("kinematic", "compliant")
-RUNS, LARGE, FEW, WALKS, WAITS, REPEATS = 4000, 24_000, 20, 100, 100, 2
+RUNS, LARGE, BY_DASK, FEW, WALKS, WAITS, REPEATS = 20_000, 60_000, 4000, 20, 100, 100, 2
 CORES, MILLION = 100, 1e6  # of the plan
 # name -> unit, what it is
 MEANINGS = {
@@ -116,24 +116,28 @@ def processor_time() -> float:
 def measured(fmu: Path, gains: Gains) -> Figures:
     """All figures. Processor time, of which others on the machine take nothing, and rates that were measured side by side."""
     common: dict[str, Any] = {"fmu": fmu, "gains": gains}
-    few, many = (Timed(runs, engine=INSTANT, workers=2, **common) for runs in (FEW, RUNS))
-    by_dask = [through_cluster(runs, common) for runs in (FEW, RUNS)]
+    many, small, large, most = *_measured_memory(RUNS, common), *_measured_memory(LARGE, common)
+    by_dask = [through_cluster(runs, common) for runs in (FEW, BY_DASK)]
     walks = {control: [Timed(runs, workers=1, controls=(control,), **common) for runs in (FEW, WALKS)] for control in BOTH}
     pairs = [[Timed(WALKS, controls=BOTH, workers=count, **common) for count in (1, 2)] for _ in range(REPEATS)]
     waits = [[Timed(WAITS, engine=WAITING, workers=count, **common).rate for count in (1, 2)] for _ in range(REPEATS)]
-    small, _, large = peak_memory(), Timed(LARGE, engine=INSTANT, workers=2, **common), peak_memory()
     spent = {control: 1e3 * (more.processor - less.processor) / (WALKS - FEW) for control, (less, more) in walks.items()}
     found = {
-        "overhead": 1e3 * (many.processor - few.processor) / (RUNS - FEW),
-        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (RUNS - FEW),
+        "overhead": 1e3 * (large.processor - many.processor) / (LARGE - RUNS),
+        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (BY_DASK - FEW),
         **{f"walk_{control}": value for control, value in spent.items()},
         "rate": 60.0 * max(two.rate for _, two in pairs),
         "scaling": max(two.rate / (2.0 * one.rate) for one, two in pairs),
         "scaling_waiting": max(two / (2.0 * one) for one, two in waits),
         "bytes": many.bytes,
-        "memory": (large - small) / (LARGE - RUNS),
+        "memory": (most - small) / (LARGE - RUNS),
     }
     return {name: (value, *MEANINGS[name]) for name, value in found.items()}
+
+
+def _measured_memory(runs: int, common: dict[str, Any]) -> tuple[Timed, float]:
+    """Runs that take no time, and the peak memory after them [B]."""
+    return Timed(runs, engine=INSTANT, workers=2, **common), peak_memory()
 
 
 def through_cluster(runs: int, common: dict[str, Any]) -> float:

@@ -163,6 +163,15 @@ def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(ath
     assert {row["friction.mu"] for row in found if row["point"] == 12} == {None}  # before: nothing is set
 
 
+def test_a_fall_leaves_a_trial_without_figures_and_out_of_the_choice(athena_fmu: Path, tmp_path: Path) -> None:
+    variables = {"friction.mu": [0.17, 0.19, 0.5, 0.7]}  # refused, falls, walks, walks
+    study = study_of(optimisation(variables=variables, metric="stability_margin"))  # more is better
+    run_quietly(study, tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
+    (best,) = json.loads((tmp_path / "out" / OPTIMUM).read_text())["best"]
+    assert (best["values"], best["feasible"], best["held_out"]["walked"]) == ({"friction.mu": 0.7}, True, 1.0)
+    assert {trial.feasible for trial in read_results(tmp_path / "out").trials} == {True, False}
+
+
 def test_a_constraint_keeps_the_best_within_it(athena_fmu: Path, tmp_path: Path) -> None:
     bound = {"cost_of_transport": {"at_least": 3.0}}
     study = study_of(optimisation(constraints=bound))

@@ -172,10 +172,14 @@ def _judge(desk: Desk, crew: Crew, sets: Sequence[list[Order]]) -> list[list[dic
 
 
 def _means(rows: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, float]:
-    """Of every metric that counts; NaN where a run has none."""
+    """Of every metric that counts, over the walks that have it (none on the spot has a slip per metre); NaN where a run did not walk."""
     names = dict.fromkeys([*asked.metrics, *(bound.metric for bound in asked.constraints)])
-    values = {name: [math.nan if row[name] is None else float(row[name]) for row in rows] for name in names}
-    return {name: float(np.mean(items)) for name, items in values.items()}
+    whole = all(row["walked"] for row in rows)
+    found: dict[str, float] = {}
+    for name in names:
+        values = [float(row[name]) for row in rows if row[name] is not None]
+        found[name] = float(np.mean(values)) if values and (whole or name == WALKED) else math.nan
+    return found
 
 
 def _feasible(means: Mapping[str, float], asked: Optimise) -> bool:
