@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 
-DEADLY, REFUSING, FALLING, SLOW = 0.13, 0.17, 0.19, 0.01  # friction.mu that ends the process, is refused, falls; s a run takes
+DEADLY, REFUSING, FALLING, SLOW = 0.13, 0.17, 0.19, 0.02  # friction.mu that ends the process, is refused, falls; s a run takes
 
 
 def figure(seed: int, mu: float, control: str, place: int) -> float:

@@ -27,7 +27,7 @@ from hexapod_cosim.cosim.study.store import MANY, Store, write_durably, write_wh
 from hexapod_cosim.cosim.study.study import Options, run_study
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 60.0  # s    for what takes a few on an idle machine
+PATIENCE = 180.0  # s    for what takes a few on an idle machine
 MANY_RUNS: dict[str, Any] = {**KINEMATIC, "seeds": 10, "factors": {"friction.mu": {"linspace": [0.3, 0.9, 20]}}}
 
 
@@ -83,16 +83,16 @@ def stored_runs(folder: Path) -> int:
 
 def test_a_study_killed_twice_and_completed_is_the_uninterrupted_one(athena_fmu: Path, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    file.write_text('controls = ["kinematic"]\nseeds = 50\n[factors]\nfriction.mu = {linspace = [0.3, 0.9, 20]}\n')
+    file.write_text('controls = ["kinematic"]\nseeds = 30\n[factors]\nfriction.mu = {linspace = [0.3, 0.9, 20]}\n')
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    for least in (1, 300):
+    for least in (1, 200):
         process = command(killed, athena_fmu, study=file)
         deadline = time.monotonic() + PATIENCE
         while stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None:
             time.sleep(0.02)
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        assert least <= stored_runs(killed) < 1000
+        assert least <= stored_runs(killed) < 600
     kept = {path.name: path.read_bytes() for path in (killed / RUNS).glob("*.parquet")}
     (killed / RUNS / ".part-99999999.parquet.new").write_bytes(b"half a part")
     for folder in (killed, whole):
@@ -102,7 +102,7 @@ def test_a_study_killed_twice_and_completed_is_the_uninterrupted_one(athena_fmu:
     assert digest(killed) == digest(whole)
     assert {name: (killed / RUNS / name).read_bytes() for name in kept} == kept
     assert not list((killed / RUNS).glob(".*"))
-    assert len(rows(whole)) == 1000
+    assert len(rows(whole)) == 600
 
 
 def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena_fmu: Path, tmp_path: Path) -> None:
@@ -118,6 +118,7 @@ def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena
     options = Options(engine=FAKE, workers=1, fmu=athena_fmu, write=filling)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(store_module, "FLUSH_ROWS", 20)
+        patch.setattr("hexapod_cosim.cosim.study.conduct.MAX_CHUNK", 10)
         with pytest.raises(StudyError, match=r"the disk is full.*make room and start the study again"):
             run_study(study, folder, options=options, begun=quiet)
     stored = stored_runs(folder)

@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.study.study import Options, run_study
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 60.0  # s    for what takes a few on an idle machine
+PATIENCE = 180.0  # s    for what takes a few on an idle machine
 WALK: dict[str, Any] = {"set": {"duration": 1.2, "gait.period": 0.4}, "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]}}
 
 
