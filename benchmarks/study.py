@@ -42,7 +42,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "studies.md"
 INSTANT, WAITING = "benchmarks.study:Instant", "benchmarks.study:Waiting"
 BOTH = ("kinematic", "compliant")
-RUNS, LARGE, BY_DASK, FEW, WALKS, WAITS, REPEATS = 20_000, 60_000, 4000, 20, 100, 100, 2
+RUNS, LARGE, BY_DASK, FEW, WALKS, WAITS, REPEATS = 20_000, 50_000, 2000, 20, 60, 100, 1
 CORES, MILLION = 100, 1e6  # of the plan
 # name -> unit, what it is
 MEANINGS = {
