@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.comparison import BETTER, SAME, WORSE, Change, change_of, compare_runs, read_seeds, write_seeds
 from hexapod_cosim.cosim.master import COMPLETED, FAILED
 from hexapod_cosim.cosim.metrics import FLOORS, METRICS
 from hexapod_cosim.cosim.report import about, comparison_rows
+from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.models import HexapodError
 
 ROUNDING = 1e-12

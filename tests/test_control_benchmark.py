@@ -14,12 +14,12 @@ from benchmarks.control.cases import DATA, PARTS, Case, ablation, grid, judged_w
 from benchmarks.control.measure import Section, measure
 from benchmarks.control.tables import cell, changes_table, put_into, robustness_table, write_csv
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.batch import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.comparison import Comparison, change_of, compare_runs
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.variation import STANDARD
 from hexapod_cosim.models import HexapodError, load_robot
 

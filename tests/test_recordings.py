@@ -16,7 +16,7 @@ from command import QUICK, Call
 from fmpy.util import read_csv as fmpy_read_csv
 
 from hexapod_cosim.cosim.columns import bare_name, heading, known_columns
-from hexapod_cosim.cosim.fmu import read_description
+from hexapod_cosim.cosim.descriptions import read_description
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.recordings import read_csv, read_parquet, read_recording, write_csv, write_parquet, write_recording
 from hexapod_cosim.cosim.results import RESULTS, read_result
