@@ -70,6 +70,13 @@ void hx_instance_close(hxInstance *instance) {
 
 /* ---------------------------------------------------------------------------------------------- values */
 
+/* as hx_variable_find, which looks through all sections; here the one given is tried first: neighbours are asked for together */
+static inline const hxVariable *row_of(unsigned reference, hxCausality *causality) {
+  const hxSection *section = &hx_sections[*causality];
+  const unsigned place = reference - section->first;
+  return place < section->count ? &section->variable[place] : hx_variable_find(reference, causality);
+}
+
 const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality) {
   for (int k = 0; k < HX_CAUSALITIES; k++) {
     const hxSection *section = &hx_sections[k];
@@ -85,16 +92,21 @@ int hx_variable_takes(const hxVariable *variable, double value) { return value >
 
 static const char *const type_names[] = {[HX_REAL] = "Real", [HX_INTEGER] = "Integer or Enumeration", [HX_BOOLEAN] = "Boolean"};
 
-const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality) {
-  const hxVariable *variable = hx_variable_find(reference, causality);
+/* says why a reference is none of the type */
+static hxStatus refuse_reference(hxInstance *instance, hxType type, unsigned reference, const hxVariable *variable) {
   if (!variable)
     hx_log(instance, HX_LOG_ERROR, "value reference: got %u, expected one of modelDescription.xml; nothing was done", reference);
-  else if (variable->type != type) {
+  else
     hx_log(instance, HX_LOG_ERROR, "%s: got a call for %s, expected one for %s; nothing was done", variable->name, type_names[type],
            type_names[variable->type]);
-    return NULL;
-  }
-  return variable;
+  return HX_INVALID_ARGUMENT;
+}
+
+const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned reference, hxCausality *causality) {
+  const hxVariable *variable = hx_variable_find(reference, causality);
+  if (variable && variable->type == type) return variable;
+  refuse_reference(instance, type, reference, variable);
+  return NULL;
 }
 
 hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate) {
@@ -114,40 +126,39 @@ hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate) {
   return HX_OK;
 }
 
-/* brings what is asked for up to date; all of it must be numbers */
+/* brings what is asked for up to date */
 static hxStatus prepare_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n) {
-  const char *variables = (const char *)&instance->state.variables;
-  hxCausality causality;
+  hxCausality causality = HX_OUTPUT;
   int needs_output = 0, needs_rate = 0;
   for (size_t i = 0; i < n; i++) {
-    if (!hx_instance_find(instance, type, reference[i], &causality)) return HX_INVALID_ARGUMENT;
+    const hxVariable *variable = row_of(reference[i], &causality);
+    if (!variable || variable->type != type) return refuse_reference(instance, type, reference[i], variable);
     needs_output |= causality == HX_OUTPUT;
     needs_rate |= causality == HX_LOCAL;
   }
-  if (needs_output || needs_rate) {
-    const hxStatus status = hx_instance_refresh(instance, needs_output, needs_rate);
-    if (status != HX_OK) return status;
+  return needs_output || needs_rate ? hx_instance_refresh(instance, needs_output, needs_rate) : HX_OK;
+}
+
+/* values that exist, all of them numbers, or else none */
+static hxStatus get_reals(hxInstance *instance, const unsigned reference[], size_t n, double value[]) {
+  const char *variables = (const char *)&instance->state.variables;
+  hxCausality causality = HX_OUTPUT;
+  for (size_t i = 0; i < n; i++) {
+    const hxVariable *variable = row_of(reference[i], &causality);
+    const double *number = (const double *)(variables + variable->offset);
+    if (!isfinite(*number)) return hx_instance_check_finite(instance, number, 1, variable->name);
   }
-  for (size_t i = 0; i < n && type == HX_REAL; i++) {
-    const hxVariable *variable = hx_variable_find(reference[i], &causality);
-    const hxStatus status = hx_instance_check_finite(instance, (const double *)(variables + variable->offset), 1, variable->name);
-    if (status != HX_OK) return status;
-  }
+  for (size_t i = 0; i < n; i++) memcpy(value + i, variables + row_of(reference[i], &causality)->offset, sizeof *value);
   return HX_OK;
 }
 
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
   const char *variables = (const char *)&instance->state.variables;
-  hxCausality causality;
+  hxCausality causality = HX_OUTPUT;
   const hxStatus status = prepare_get(instance, type, reference, n);
   if (status != HX_OK) return status;
-  for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = hx_variable_find(reference[i], &causality);
-    if (type == HX_REAL)
-      memcpy((double *)value + i, variables + variable->offset, sizeof(double));
-    else
-      memcpy((int *)value + i, variables + variable->offset, sizeof(int));
-  }
+  if (type == HX_REAL) return get_reals(instance, reference, n, value);
+  for (size_t i = 0; i < n; i++) memcpy((int *)value + i, variables + row_of(reference[i], &causality)->offset, sizeof(int));
   return HX_OK;
 }
 
@@ -176,10 +187,10 @@ static hxStatus check_set(hxInstance *instance, const hxVariable *variable, hxCa
 }
 
 hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value) {
-  hxCausality causality;
+  hxCausality causality = HX_INPUT;
   for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = hx_instance_find(instance, type, reference[i], &causality);
-    if (!variable) return HX_INVALID_ARGUMENT;
+    const hxVariable *variable = row_of(reference[i], &causality);
+    if (!variable || variable->type != type) return refuse_reference(instance, type, reference[i], variable);
     const hxStatus status = check_set(instance, variable, causality, value_at(type, value, i));
     if (status != HX_OK) return status;
   }
@@ -192,7 +203,7 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
   const hxStatus status = hx_instance_check_set(instance, type, reference, n, value);
   if (status != HX_OK) return status;
   for (size_t i = 0; i < n; i++) {
-    const hxVariable *variable = hx_variable_find(reference[i], &causality);
+    const hxVariable *variable = row_of(reference[i], &causality);
     const int number = type == HX_REAL ? 0 : ((const int *)value)[i],
               stored = type == HX_BOOLEAN ? number != 0 : number; /* true may be -1 */
     if (type == HX_REAL)
