@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.metrics import View, body_height, cut_walk
+from hexapod_cosim.cosim.metrics import View, body_height
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.signals import joint_names
@@ -23,7 +23,7 @@ def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
     """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), whether the robot stayed upright, and the
     share of time in which the controller fell back to kinematic control, if it tells.
     """
-    walk = cut_walk(view)
+    walk = view.walk
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
     doubted = fallback_columns(view.recording)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,11 @@ class View:
     parameters: Mapping[str, float]  # of the FMU
     period: float  # s    of the gait
 
+    @cached_property
+    def walk(self) -> Walk | None:
+        """Whole gait cycles after the first two; None when there is none."""
+        return _cut_walk(self)
+
     def last_cycles(self) -> View:
         """The end of the run."""
         time = self.recording.time
@@ -94,7 +100,7 @@ class Walk:
 
 def compute_metrics(view: View, *, realtime_factor: float) -> dict[str, float]:
     """All figures of METRICS."""
-    walk, parameters = cut_walk(view), view.parameters
+    walk, parameters = view.walk, view.parameters
     if walk is None:
         return dict.fromkeys(METRICS, np.nan) | {"realtime_factor": realtime_factor}
     figures = _slip(walk, parameters) | _path(walk) | _posture(walk, parameters) | _force(walk) | _effort(walk)
@@ -104,8 +110,7 @@ def compute_metrics(view: View, *, realtime_factor: float) -> dict[str, float]:
     return {name: float(figures[name]) for name in METRICS}
 
 
-def cut_walk(view: View) -> Walk | None:
-    """Whole gait cycles after the first two; None when there is none."""
+def _cut_walk(view: View) -> Walk | None:
     recording, period = view.recording, view.period
     time = recording.time - recording.time[0] if len(recording.time) else np.zeros(1)
     cycles = int((time[-1] + ROUND_OFF) / period)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.scenario_records import Command, Variation
 from hexapod_cosim.cosim.signals import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.contact import foot_contacts
-from hexapod_cosim.models.kinematics import body_states, quaternion_product
+from hexapod_cosim.models.contact import ground
+from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
 
 Array = NDArray[np.float64]
 
@@ -85,6 +85,6 @@ def _depths_at_rest(robot: Robot, *pose: tuple[float, ...]) -> Array:
 
 def _depths(robot: Robot, position: Array, quaternion: Array, angle: Array) -> Array:
     """(6,) penetration of the feet [m], negative above the ground."""
-    still, joints = np.zeros(3), angle.reshape(LEGS, JOINTS)
-    body = body_states(robot, position, quaternion, still, still, joints, np.zeros_like(joints))
-    return np.array([foot.penetration for foot in foot_contacts(robot, body)])
+    feet = foot_positions(robot, angle.reshape(LEGS, JOINTS)) - np.array(robot.torso.com)
+    centres = position + feet @ rotation_matrix(quaternion / np.linalg.norm(quaternion)).T
+    return np.array([robot.foot.radius - ground(robot.terrain, centre)[0] for centre in centres])

@@ -101,9 +101,10 @@ def _robot_path(path_or_name: str | Path) -> Path:
     path = Path(path_or_name)
     if path.suffix or len(path.parts) != 1 or path.is_file():
         return path
-    if str(path_or_name) not in list_robots():
+    own = Path(__file__).parent / f"{path_or_name}.toml"
+    if not own.is_file():
         raise unknown_name("robot", str(path_or_name), list_robots(), error=RobotError)
-    return Path(__file__).parent / f"{path_or_name}.toml"
+    return own
 
 
 def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:

@@ -37,16 +37,16 @@ ALL = [True] * 6
     ],
 )
 def test_the_margin_is_the_distance_to_the_nearest_edge(standing: list[bool], centre: tuple[float, float], margin: float) -> None:
-    got = polygon_margins(SQUARE[None], np.array([standing]), np.array([centre]))
+    got = polygon_margins(SQUARE[..., None], np.array([standing]), np.array(centre)[:, None])
     assert got == pytest.approx([margin], nan_ok=True)
 
 
 def test_the_margin_does_not_depend_on_the_order_of_the_feet() -> None:
     generator = np.random.default_rng(5)
-    feet = generator.normal(size=(50, 6, 2))
-    centre, standing = 0.3 * generator.normal(size=(50, 2)), generator.random((50, 6)) < 0.7
+    feet = generator.normal(size=(6, 2, 50))
+    centre, standing = 0.3 * generator.normal(size=(2, 50)), generator.random((50, 6)) < 0.7
     order = generator.permutation(6)
-    first, second = polygon_margins(feet, standing, centre), polygon_margins(feet[:, order], standing[:, order], centre)
+    first, second = polygon_margins(feet, standing, centre), polygon_margins(feet[order], standing[:, order], centre)
     np.testing.assert_allclose(first, second, atol=1e-12)
 
 
