@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.scenario_records import Command, Variation
 from hexapod_cosim.cosim.signals import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.contact import ground
 from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
+from hexapod_cosim.models.terrain import ground
 
 Array = NDArray[np.float64]
 

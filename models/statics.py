@@ -32,7 +32,8 @@ from hexapod_cosim.models.terrain import ground_normal
 RESIDUAL = 1e-9  # N and N m: some 1e4 times the rounding of forces of this size
 ITERATIONS = 60
 DIFFERENCE = 1e-7  # of the Jacobian's columns; Newton forgives its error
-UNKNOWNS = 6 + LEGS * JOINTS
+TORSO = 6  # of the unknowns, and of the residual
+UNKNOWNS = TORSO + LEGS * JOINTS
 
 
 @dataclass(frozen=True)
@@ -77,15 +78,15 @@ def standing(robot: Robot) -> Standing:
 @lru_cache(maxsize=64)
 def _found(robot: Robot) -> Standing:
     x = _start(robot)
-    residual = _residual(robot, x)
+    loads = _loads(robot, x)
     for _ in range(ITERATIONS):
-        if np.max(np.abs(residual)) < RESIDUAL:
+        if np.max(np.abs(_residual(robot, loads))) < RESIDUAL:
             pose = _standing(robot, x)
             for array in vars(pose).values():
                 array.flags.writeable = False
             return pose
-        x, residual = _newton_step(robot, x, residual)
-    raise _no_equilibrium(robot, residual)
+        x, loads = _newton_step(robot, x, loads)
+    raise _no_equilibrium(robot, _residual(robot, loads))
 
 
 def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
@@ -94,18 +95,36 @@ def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
     return RobotError("the robot does not stand", got=got, expected=f"a pose in balance to {RESIDUAL} N", fix=fix, where=robot.name)
 
 
-def _newton_step(robot: Robot, x: Array, residual: Array) -> tuple[Array, Array]:
+def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:
     """One damped step: halved until the residual falls, since feet lose the ground (and all slope) when a step is too long."""
-    columns = [(_residual(robot, x + DIFFERENCE * unit) - residual) / DIFFERENCE for unit in np.eye(UNKNOWNS)]
+    residual = _residual(robot, loads)
     try:
-        step = np.linalg.solve(np.array(columns).T, -residual)
+        step = np.linalg.solve(_jacobian(robot, x, loads), -residual)
     except np.linalg.LinAlgError as error:
         raise _no_equilibrium(robot, residual) from error
     for shorter in 0.5 ** np.arange(30):
-        trial = _residual(robot, x + shorter * step)
-        if np.linalg.norm(trial) < np.linalg.norm(residual):
+        trial = _loads(robot, x + shorter * step)
+        if np.linalg.norm(_residual(robot, trial)) < np.linalg.norm(residual):
             return x + shorter * step, trial
     raise _no_equilibrium(robot, residual)
+
+
+def _jacobian(robot: Robot, x: Array, loads: Array) -> Array:
+    """(24, 24) of the residual by differences. A leg's loads do not depend on other legs' angles: all legs' are moved at once."""
+
+    def change(direction: Array) -> Array:
+        return (_loads(robot, x + DIFFERENCE * direction) - loads) / DIFFERENCE
+
+    jacobian = np.zeros((UNKNOWNS, UNKNOWNS))
+    for column, unit in enumerate(np.eye(UNKNOWNS)[:TORSO]):
+        changed = change(unit)
+        jacobian[:, column] = np.concatenate([changed[:, :TORSO].sum(axis=0), changed[:, TORSO:].ravel()])
+    for joint, unit in enumerate(np.eye(JOINTS)):
+        changed = change(np.concatenate([np.zeros(TORSO), np.tile(unit, LEGS)]))
+        for leg in range(LEGS):
+            begin = TORSO + JOINTS * leg
+            jacobian[:TORSO, begin + joint], jacobian[begin : begin + JOINTS, begin + joint] = changed[leg, :TORSO], changed[leg, TORSO:]
+    return jacobian
 
 
 def _start(robot: Robot) -> Array:
@@ -157,8 +176,14 @@ def _foot_forces(robot: Robot, body: Array) -> Array:
     return np.array([foot_force(robot, foot, 0.0, bristle[leg]) for leg, foot in enumerate(feet)])
 
 
-def _residual(robot: Robot, x: Array) -> Array:
+def _residual(robot: Robot, loads: Array) -> Array:
     """(24,) force and moment on the robot at the torso, and the torque left over at each joint (kinematic: rad off the stance)."""
+    weight = robot.torso.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0])
+    return np.concatenate([weight + loads[:, :TORSO].sum(axis=0), loads[:, TORSO:].ravel()])
+
+
+def _loads(robot: Robot, x: Array) -> Array:
+    """(6, 9) each leg's force and moment on the torso at its centre of mass, world axes, and what is left over at its joints."""
     body = _bodies(robot, x)
     force = masses(robot)[:, None] * np.array(robot.gravity)
     moment = np.zeros_like(force)
@@ -166,27 +191,34 @@ def _residual(robot: Robot, x: Array) -> Array:
         tibia = JOINTS * (leg + 1)
         force[tibia] += push
         moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
-    left_over = _carry_to_torso(robot, body, force, moment)
-    angle = x[6:]
+    on_torso, left_over = _carry_to_torso(robot, body, force, moment)
+    angle = x[TORSO:]
     if robot.servo.mode == "kinematic":
         left_over = robot.stance.ravel() - angle
     else:
         servo, zero = replace(robot.servo, mode="position"), np.zeros_like(angle)
         left_over += servo_torque(servo, angle, zero, robot.stance.ravel(), zero, zero)
-    return np.concatenate([force[0], moment[0], left_over])
+    return np.column_stack([on_torso, left_over.reshape(LEGS, JOINTS)])
 
 
-def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> Array:
-    """Adds each child's force and moment to its parent's, leaf to root, in place; returns (18,) torques about the joint axes."""
-    torque = np.zeros(LEGS * JOINTS)
+def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> tuple[Array, Array]:
+    """Adds each link's force and moment to that above it, leaf to root, in place; returns (6, 6) what the legs do to the torso, and (18,)
+    torques about the joint axes.
+    """
+    on_torso, torque = np.zeros((LEGS, TORSO)), np.zeros(LEGS * JOINTS)
     for k, joint in reversed(list(enumerate(joint_models(robot)))):
         i, j = joint.parent, joint.child
         R_i = rotation_matrix(body[i, 3:7])
-        at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + R_i @ joint.point_i), force[j])
+        arm = R_i @ joint.point_i
+        at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + arm), force[j])
         torque[k] = at_joint @ (R_i @ joint.s_i)
-        force[i] += force[j]
-        moment[i] += at_joint + cross(R_i @ joint.point_i, force[j])
-    return torque
+        carried = at_joint + cross(arm, force[j])
+        if i == 0:
+            on_torso[k // JOINTS] = np.concatenate([force[j], carried])
+        else:
+            force[i] += force[j]
+            moment[i] += carried
+    return on_torso, torque
 
 
 def _standing(robot: Robot, x: Array) -> Standing:
