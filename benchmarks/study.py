@@ -9,17 +9,21 @@ import csv
 import json
 import os
 import resource
+import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
-import pyarrow.parquet as pq
 
 from benchmarks.run import RESULTS, machine
 from hexapod_cosim.controller import Gains
@@ -30,32 +34,46 @@ from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.run import chosen_gains
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.study.conduct import CHUNK_TIME
+from hexapod_cosim.cosim.study import conduct
 from hexapod_cosim.cosim.study.manifest import RESULTS as RESULTS_FILE
-from hexapod_cosim.cosim.study.manifest import TIMES
 from hexapod_cosim.cosim.study.reading import study_from_table
+from hexapod_cosim.cosim.study.report import write_study_report
+from hexapod_cosim.cosim.study.results import read_results
 from hexapod_cosim.cosim.study.study import Options, run_study
 from hexapod_cosim.cosim.summary import Summary
+from hexapod_cosim.cosim.variation import STANDARD
+from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "studies.md"
-INSTANT, WAITING = "benchmarks.study:Instant", "benchmarks.study:Waiting"
+INSTANT = "benchmarks.study:Instant"
 BOTH = ("kinematic", "compliant")
-RUNS, LARGE, BY_DASK, FEW, WALKS, WAITS, REPEATS = 20_000, 50_000, 2000, 20, 60, 100, 1
+RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = 20_000, 50_000, 2000, 600, 20, 120, 40, 5
 CORES, MILLION = 100, 1e6  # of the plan
+DEFAULT: dict[str, Any] = {}
+# settings of the solver by name: docs/studies.md says what they cost in accuracy
+SOLVERS: dict[str, dict[str, Any]] = {
+    "": {"solver.method": "ros2", "solver.tolerance": 3e-3}, "_coarse": {"solver.method": "ros2", "solver.tolerance": 1e-2},
+    "_default": DEFAULT,
+}  # fmt: skip
+SOLVER_NAMES = {"": "ros2, tolerance 3e-3", "_coarse": "ros2, tolerance 1e-2", "_default": "the default solver"}
 # name -> unit, what it is
 MEANINGS = {
+    **{f"rate{key}": ("1/min", f"walks of 10 s, both controls, two processes, {name}") for key, name in SOLVER_NAMES.items()},
+    "rate_python": ("1/min", "the same with the Python controller and master (`--engine python`), the default solver"),
+    **{f"walk_{control}{key}": ("ms", f"of a processor, for a walk of 10 s under {control} control, all in, {name}")
+       for key, name in SOLVER_NAMES.items() for control in BOTH},
+    "scaling": ("1", "two workers' rate over twice one's"),
+    "scaling_free": ("1", "two programs without any study over twice one: what the machine gives"),
     "overhead": ("ms", "of a processor, for a run that takes no time: its scenario made, sent, checked and stored"),
-    "overhead_dask": ("ms", "the same through a Dask scheduler with two workers"),
-    "walk_kinematic": ("ms", "of a processor, for a walk of 10 s under kinematic control, all in"),
-    "walk_compliant": ("ms", "under compliant control"),
-    "rate": ("1/min", "walks of 10 s, both controls, two processes, on a machine that others use too"),
-    "scaling": ("1", "their rate over twice that of one process, on the same machine"),
-    "scaling_waiting": ("1", "the same of runs that wait for 50 ms each: what handing out costs"),
+    "handed_out": ("1/s", "runs that take no time, handed out and stored by one program with two workers"),
+    "overhead_dask": ("ms", "of a processor, for a run that takes no time, through a Dask scheduler with two workers, in chunks"),
+    "task_dask": ("ms", "of a processor, for a task of one such run: client, scheduler and worker"),
+    "finish": ("ms", "of a processor, for each run when all are there: put in order, read, added up, reported"),
     "bytes": ("B", "a run in results.parquet"),
     "memory": ("B", f"peak memory of the program, for each run from {RUNS} to {LARGE}"),
-}
+}  # fmt: skip
 Figures = dict[str, tuple[float, str, str]]  # by name: value, unit, what it is
 
 
@@ -74,27 +92,23 @@ class Instant:
         """Nothing to free."""
 
 
-class Waiting(Instant):
-    """An engine whose walks take the same time on any machine, however busy."""
-
-    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says."""
-        time.sleep(0.05)
-        return super().summary(scenario, gains=gains, progress=progress)
-
-
 class Timed:
     """A study, run into a folder that is gone afterwards."""
 
-    def __init__(self, runs: int, *, controls: tuple[str, ...] = ("kinematic",), **options: Any) -> None:
-        study = study_from_table({"seeds": runs // len(controls), "controls": list(controls)}, where="bench")
+    def __init__(
+        self, runs: int, *, controls: tuple[str, ...] = ("kinematic",), settings: Mapping[str, Any] = DEFAULT, report: bool = False,
+        **options: Any,
+    ) -> None:  # fmt: skip
+        table = {"seeds": runs // len(controls), "controls": list(controls), "variation": True, "set": dict(settings)}
         self.runs, self._stamps = runs, list[tuple[float, int]]()
         with TemporaryDirectory(prefix="hexapod-bench-") as folder:
             begin = processor_time()
-            run_study(study, Path(folder), options=Options(**options), begun=self._begun)
+            run_study(study_from_table(table, where="bench"), Path(folder), options=Options(**options), begun=self._begun)
             self.processor = processor_time() - begin  # s    of this process and the workers it waited for
             self.bytes = (Path(folder) / RESULTS_FILE).stat().st_size / runs
-            self.walls = pq.read_table(Path(folder) / TIMES)["wall"].to_numpy()
+            if report:
+                write_study_report(read_results(Path(folder)), Path(folder))
+            self.reported = processor_time() - begin  # s    the report included
 
     def _begun(self, _total: int, _done: int) -> Any:
         self._stamps.append((time.perf_counter(), 0))
@@ -102,10 +116,11 @@ class Timed:
 
     @property
     def rate(self) -> float:
-        """Runs per second, from when a tenth of them was there: workers take a while to begin."""
-        done = np.cumsum([more for _, more in self._stamps])
-        first = int(np.searchsorted(done, 0.1 * self.runs))
-        return float((done[-1] - done[first]) / (self._stamps[-1][0] - self._stamps[first][0]))
+        """Runs per second, from when a tenth of them was there, for workers take a while to begin, until the last tenth."""
+        times, counts = np.array(self._stamps).T
+        done = np.cumsum(counts)
+        first, last = np.searchsorted(done, [0.1 * self.runs, 0.9 * self.runs])
+        return float((done[last] - done[first]) / (times[last] - times[first]))
 
 
 def processor_time() -> float:
@@ -114,25 +129,81 @@ def processor_time() -> float:
 
 
 def measured(fmu: Path, gains: Gains) -> Figures:
-    """All figures. Processor time, of which others on the machine take nothing, and rates that were measured side by side."""
+    """All figures. Processor time, of which others on the machine take nothing, and medians of rates that were measured side by side."""
     common: dict[str, Any] = {"fmu": fmu, "gains": gains}
+    found = _own_costs(common) | _walk_costs(common) | _rates(common)
+    return {name: (found[name], *MEANINGS[name]) for name in MEANINGS}
+
+
+def _own_costs(common: dict[str, Any]) -> dict[str, float]:
+    """Of runs that take no time. A study's own costs are what more runs take more."""
     many, small, large, most = *_measured_memory(RUNS, common), *_measured_memory(LARGE, common)
+    told = [Timed(runs, engine=INSTANT, workers=2, report=True, **common) for runs in (RUNS // 10, RUNS)]
     by_dask = [through_cluster(runs, common) for runs in (FEW, BY_DASK)]
-    walks = {control: [Timed(runs, workers=1, controls=(control,), **common) for runs in (FEW, WALKS)] for control in BOTH}
-    pairs = [[Timed(WALKS, controls=BOTH, workers=count, **common) for count in (1, 2)] for _ in range(REPEATS)]
-    waits = [[Timed(WAITS, engine=WAITING, workers=count, **common).rate for count in (1, 2)] for _ in range(REPEATS)]
-    spent = {control: 1e3 * (more.processor - less.processor) / (WALKS - FEW) for control, (less, more) in walks.items()}
-    found = {
-        "overhead": 1e3 * (large.processor - many.processor) / (LARGE - RUNS),
-        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (BY_DASK - FEW),
-        **{f"walk_{control}": value for control, value in spent.items()},
-        "rate": 60.0 * max(two.rate for _, two in pairs),
-        "scaling": max(two.rate / (2.0 * one.rate) for one, two in pairs),
-        "scaling_waiting": max(two / (2.0 * one) for one, two in waits),
-        "bytes": many.bytes,
-        "memory": (most - small) / (LARGE - RUNS),
-    }
-    return {name: (value, *MEANINGS[name]) for name, value in found.items()}
+    with patch.object(conduct, "CHUNK_TIME", 0.0):  # chunks of one run
+        tasks = [through_cluster(runs, common) for runs in (FEW, TASKS)]
+    report = [item.reported - item.processor for item in told]
+    return {
+        "overhead": 1e3 * (large.processor - many.processor) / (LARGE - RUNS), "handed_out": large.rate,
+        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (BY_DASK - FEW), "task_dask": 1e3 * (tasks[1] - tasks[0]) / (TASKS - FEW),
+        "finish": 1e3 * (report[1] - report[0]) / (RUNS - RUNS // 10), "bytes": many.bytes, "memory": (most - small) / (LARGE - RUNS),
+    }  # fmt: skip
+
+
+def _walk_costs(common: dict[str, Any]) -> dict[str, float]:
+    found = {}
+    for key, settings in SOLVERS.items():
+        for control in BOTH:
+            less, more = (
+                Timed(runs, workers=1, controls=(control,), settings=settings, **common).processor for runs in (FEW, FEW + WALKS // 2)
+            )
+            found[f"walk_{control}{key}"] = 1e3 * (more - less) / (WALKS // 2)
+    return found
+
+
+def _rates(common: dict[str, Any]) -> dict[str, float]:
+    """Per minute, and two workers over one: medians, each time all of them one after the other."""
+    rates: dict[str, list[float]] = {name: [] for name in MEANINGS if name.startswith(("rate", "scaling"))}
+    for _ in range(REPEATS):
+        for key, settings in SOLVERS.items():
+            rates[f"rate{key}"].append(60.0 * Timed(WALKS, controls=BOTH, workers=2, settings=settings, **common).rate)
+        alone = 60.0 * Timed(WALKS, controls=BOTH, workers=1, settings=SOLVERS[""], **common).rate
+        rates["scaling"].append(rates["rate"][-1] / (2.0 * alone))
+        rates["scaling_free"].append(free_rate(2, common) / (2.0 * free_rate(1, common)))
+        rates["rate_python"].append(60.0 * Timed(PYTHON_WALKS, controls=BOTH, workers=2, engine="python", **common).rate)
+    return {name: statistics.median(values) for name, values in rates.items()}
+
+
+def free_rate(count: int, common: dict[str, Any]) -> float:
+    """Walks per second of so many processes that know nothing of each other or of a study."""
+    context = get_context("spawn")
+    together = context.Barrier(count)
+    with ProcessPoolExecutor(count, mp_context=context, initializer=_meet_at, initargs=(together,)) as processes:
+        futures = [processes.submit(walk_alone, common["fmu"], common["gains"]) for _ in range(count)]
+        return sum(future.result() for future in futures)
+
+
+_together: Any = None  # of a process of `free_rate`: where it waits for the others
+
+
+def _meet_at(barrier: Any) -> None:
+    global _together  # noqa: PLW0603  the one thing such a process is told beside its task
+    _together = barrier
+
+
+def walk_alone(fmu: Path, gains: Gains) -> float:
+    """Walks per second of this process."""
+    settings = [f"{name}={value}" for name, value in SOLVERS[""].items()]
+    plans = [load_scenario("walk_flat", overrides=[f"control={control}", *settings]) for control in BOTH]
+    with Walker(fmu=fmu) as walker:
+        for plan in plans:
+            walker.summary(plan, gains=gains)
+        _together.wait()
+        begin = time.perf_counter()
+        for seed in range(WALKS // 4):
+            for plan in plans:
+                walker.summary(replace(plan, seed=seed, variation=STANDARD), gains=gains)
+        return 2 * (WALKS // 4) / (time.perf_counter() - begin)
 
 
 def _measured_memory(runs: int, common: dict[str, Any]) -> tuple[Timed, float]:
@@ -207,12 +278,15 @@ def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
     walk = 1e-3 * 0.5 * (values["walk_kinematic"] + values["walk_compliant"])  # s
     hours = MILLION * walk / 3600.0
     per_second = CORES / walk
+    tasks = CORES / conduct.CHUNK_TIME
     rows = [
-        ("processor time", f"{hours:.0f} core hours"),
-        (f"on {CORES} cores", f"{hours / CORES:.1f} h at {per_second:.0f} walks per second"),
-        ("of it the study's own", f"{100.0 * values['overhead'] / (1e3 * walk):.1f} %"),
+        ("processor time", f"{hours:.1f} core hours"),
+        (f"on {CORES} cores", f"{60.0 * hours / CORES:.0f} min at {per_second:.0f} walks per second"),
+        ("of what one program hands out and stores", f"{100.0 * per_second / values['handed_out']:.0f} %"),
+        ("to put in order, add up and report at the end, on one core", f"{1e-3 * MILLION * values['finish'] / 60.0:.1f} min"),
         ("results.parquet", f"{values['bytes'] * MILLION / 1e6:.0f} MB"),
-        ("tasks for Dask's scheduler", f"{CORES / CHUNK_TIME:.0f} per second"),
+        ("memory of the program for its runs", f"{values['memory'] * MILLION / 1e6:.0f} MB"),
+        ("tasks for Dask's scheduler", f"{tasks:.0f} per second, {100.0 * tasks * 1e-3 * values['task_dask']:.0f} % of one core"),
     ]
     return "\n".join([f"| 10⁶ walks of 10 s, {CORES} such cores | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)])
 
