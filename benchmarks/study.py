@@ -257,13 +257,18 @@ def write(figures: Figures, *, page: bool) -> Path:
         writer.writerow(["name", "value", "unit", "meaning"])
         writer.writerows([name, f"{value:.4g}", unit, meaning] for name, (value, unit, meaning) in figures.items())
     if page:
-        text = PAGE.read_text(encoding="utf-8")
-        for name, content in (("study", table(figures)), ("plan", plan(figures))):
-            begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
-            head, _, rest = text.partition(begin)
-            text = f"{head}{begin}\n\n{content}\n\n{end}{rest.partition(end)[2]}"
-        write_text(PAGE, text)
+        put_in_page({"study": table(figures), "plan": plan(figures)})
     return path
+
+
+def put_in_page(contents: Mapping[str, str]) -> None:
+    """Parts of docs/studies.md anew, each between its own marks."""
+    text = PAGE.read_text(encoding="utf-8")
+    for name, content in contents.items():
+        begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        head, _, rest = text.partition(begin)
+        text = f"{head}{begin}\n\n{content}\n\n{end}{rest.partition(end)[2]}"
+    write_text(PAGE, text)
 
 
 def table(figures: Mapping[str, tuple[float, str, str]]) -> str:
