@@ -109,18 +109,20 @@ class NativeMaster:
         self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
         seen, flagged = plant.names("output"), plant.names("output", "Boolean")
         refuse_foreign(seen, plant.names("input"), flagged)
+        shown = {"insides": INSIDES, "flags": CONTROLLER_FLAGS}  # of the controller
         if columns is not None:  # what nobody looks at is not read
             wanted = {*columns, *(name for key in SENSED for name in MEASURED[key])}
             seen, flagged = ([name for name in names if name in wanted] for names in (seen, flagged))
-        shown = (f"controller.{name}" for name in (*INSIDES, *CONTROLLER_FLAGS))
-        self._places = {name: place for place, name in enumerate((*seen, *flagged, *PUSH, *JOINT_COMMANDS, *shown))}
+            shown = {key: [name for name in names if f"controller.{name}" in wanted] for key, names in shown.items()}
+        told = (f"controller.{name}" for names in shown.values() for name in names)
+        self._places = {name: place for place, name in enumerate((*seen, *flagged, *PUSH, *JOINT_COMMANDS, *told))}
         self._reading = len(self._places)  # the sensors' readings come last, and are not recorded
         self._value = np.zeros(self._reading + len(FORCE))
         self.columns = tuple(self._places if columns is None else columns)
         self._keep: list[NDArray[Any]] = []  # what the structure points to
-        self._master = self._wire(seen, flagged)
+        self._master = self._wire(seen, flagged, **shown)
 
-    def _wire(self, seen: list[str], flagged: list[str]) -> _Master:
+    def _wire(self, seen: list[str], flagged: list[str], *, insides: list[str], flags: list[str]) -> _Master:
         """What is the same in all runs."""
         plant, controller = self._fmus["plant"], self._fmus["controller"]
         sensed = [name for key in SENSED for name in MEASURED[key]]
@@ -129,8 +131,8 @@ class NativeMaster:
             plant=_functions(plant), controller=_functions(controller),
             plant_output=self._block(plant, seen), plant_flag=self._block(plant, flagged),
             plant_input=self._block(plant, [*PUSH, *JOINT_COMMANDS]),
-            controller_output=self._block(controller, [*JOINT_COMMANDS, *INSIDES]),
-            controller_flag=self._block(controller, CONTROLLER_FLAGS, self._places[f"controller.{CONTROLLER_FLAGS[0]}"]),
+            controller_output=self._block(controller, [*JOINT_COMMANDS, *insides]),
+            controller_flag=self._block(controller, flags, self._reading - len(flags)),
             flag=self._hold(np.zeros(max(len(flagged), len(CONTROLLER_FLAGS)), dtype=np.int32)), value=self._value.ctypes.data,
             controller_input=self._references(controller, [*COMMANDS, *sensed]),
             controller_value=self._hold(np.zeros(len(COMMANDS) + len(sensed))),
