@@ -14,11 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.batch import Summary
 from hexapod_cosim.cosim.files import atomic_text
 from hexapod_cosim.cosim.metrics import FLOORS, METRICS
 from hexapod_cosim.models import HexapodError
+
+Array = NDArray[np.float64]
 
 SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
 CONFIDENCE = 0.95
@@ -128,29 +131,36 @@ def change_of(name: str, pairs: Sequence[tuple[float, float]]) -> Change:
     values = np.array([pair for pair in pairs if all(map(math.isfinite, pair))]).reshape(-1, 2)
     n = len(values)
     before, after = values.mean(axis=0).tolist() if n else (math.nan, math.nan)
-    half_width = half_width_of(values[:, 1] - values[:, 0])
-    verdict = _verdict(name, before, after, half_width) if n else ""
-    return Change(before=before, after=after, half_width=half_width, pairs=n, floor=FLOORS[name], verdict=verdict)
+    return made_change(name, before=before, after=after, half_width=half_width_of(values[:, 1] - values[:, 0]), pairs=n)
+
+
+def made_change(name: str, *, before: float, after: float, half_width: float, pairs: int) -> Change:
+    """The change of a metric from means over pairs and the interval of their difference; NaN when there is no pair."""
+    verdict = str(verdicts(name, np.array(before), np.array(after), np.array(half_width)))
+    return Change(before=before, after=after, half_width=half_width, pairs=pairs, floor=FLOORS[name], verdict=verdict)
 
 
 def half_width_of(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
     """Half the width of the interval in which the mean of what these are drawn from lies with CONFIDENCE; NaN for fewer than two."""
+    n = len(values)
+    return float(half_widths(np.array(n), np.array(np.sum((values - values.mean()) ** 2)))) if n > 1 else math.nan
+
+
+def half_widths(count: Array, square: Array) -> Array:
+    """Of samples by their counts and sums of squared deviations from the mean: Student's interval; NaN for fewer than two values."""
     from scipy.special import stdtrit  # noqa: PLC0415  slow to import
 
-    n = len(values)
-    if n < 2:
-        return math.nan
-    return float(stdtrit(n - 1, 0.5 + 0.5 * CONFIDENCE) * np.std(values, ddof=1) / math.sqrt(n))
+    free = np.where(count > 1, count - 1.0, math.nan)
+    return np.asarray(stdtrit(free, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(square / (free * (free + 1.0))))
 
 
-def _verdict(name: str, before: float, after: float, half_width: float) -> str:
+def verdicts(name: str, before: Array, after: Array, half_width: Array) -> np.ndarray[Any, np.dtype[np.str_]]:
+    """BETTER, WORSE, SAME, or "" where neither side is better or there is no mean."""
     less_is_better, difference = METRICS[name][1], after - before
-    if less_is_better is None:
-        return ""
-    unsure = LEAST_CHANGE * abs(before) if math.isnan(half_width) else half_width
-    if abs(difference) < FLOORS[name] or abs(difference) <= unsure:
-        return SAME
-    return BETTER if (difference < 0.0) == less_is_better else WORSE
+    unsure = np.where(np.isnan(half_width), LEAST_CHANGE * np.abs(before), half_width)
+    same = (np.abs(difference) < FLOORS[name]) | (np.abs(difference) <= unsure)
+    none = np.isnan(difference) | (less_is_better is None)
+    return np.select([none, same, (difference < 0.0) == less_is_better], ["", SAME, BETTER], WORSE)
 
 
 def write_seeds(path: Path, runs: Sequence[Summary]) -> None:

@@ -205,8 +205,9 @@ def trials_of(plan: Optimisation, points: Sequence[Point]) -> list[Trial]:
     for point in points:
         if point.held_out or point.number >= plan.asked.trials or point.runs[plan.asked.control] < plan.asked.training.runs:
             continue
-        means = {name: item.value for name, item in point.means[plan.asked.control].items()}
-        means[WALKED] = point.walked[plan.asked.control] / point.runs[plan.asked.control]
+        share = point.walked[plan.asked.control] / point.runs[plan.asked.control]
+        means = {name: item.value if share == 1.0 else math.nan for name, item in point.means[plan.asked.control].items()}
+        means[WALKED] = share
         values = tuple(point.values[factor.name] for factor in plan.study.factors)
         found.append(Trial(number=point.number, values=values, means=means, feasible=_feasible(means, plan.asked)))
     return found

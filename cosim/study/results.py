@@ -8,19 +8,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
+from hexapod_cosim.cosim.comparison import verdicts
 from hexapod_cosim.cosim.files import RUN_FILE, read_json, to_json
 from hexapod_cosim.cosim.study.columns import FIGURES, WALL, schema_of
 from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS
+from hexapod_cosim.cosim.study.moments import Array
 from hexapod_cosim.cosim.study.optimise import OPTIMUM, Optimisation, Trial, trials_of
 from hexapod_cosim.cosim.study.reading import study_from_table
 from hexapod_cosim.cosim.study.records import SCENARIO_FACTOR, Study
 from hexapod_cosim.cosim.study.store import Store, write_durably, write_whole
-from hexapod_cosim.cosim.study.table import Mean, Overall, Point, Tally, points_of
+from hexapod_cosim.cosim.study.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, blocks_of, whole_pairs
+from hexapod_cosim.cosim.study.table import Mean, Overall, Point, Tally, point_at
 from hexapod_cosim.models import HexapodError
 
 POINTS, SUMMARY = "points.parquet", "summary.json"
+HALF = ".half_width"  # of a 95 % interval
 MOST_POINTS = 4000  # kept for figures and tables, evenly chosen of more
 
 
@@ -53,26 +59,27 @@ def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
 def read_results(folder: Path) -> Results:
     """Reads all runs once. Writes points.parquet and summary.json. Raises HexapodError."""
     study, manifest = stored_study(folder)
-    store = Store(folder / RUNS, schema_of(study))
-    tally, wall, kept, count = Tally(study.run_controls), 0.0, list[Point](), 0
+    tally, kept, count = Tally(study), list[Point](), 0
+    wall = 0.0
 
-    def watched() -> Iterator[pa.Table]:
+    def watched() -> Iterator[Rows]:
         nonlocal wall
-        for table in store.sorted_rows():
-            tally.add(table)
-            wall += pa.compute.sum(table[WALL]).as_py() or 0.0
-            yield table
+        for table in whole_pairs(Store(folder / RUNS, schema_of(study)).sorted_rows(), study.run_controls):
+            wall += pc.sum(table[WALL]).as_py() or 0.0
+            rows = Rows(table, study)
+            tally.add(rows)
+            yield rows
 
-    def chosen() -> Iterator[Point]:
+    def chosen() -> Iterator[pa.Table]:
         nonlocal count
-        for point in points_of(watched(), study):
-            if point.number % step == 0:
-                kept.append(point)
-            count += 1
-            yield point
+        for block in blocks_of(watched()):
+            places = np.flatnonzero(block.first["point"].to_numpy() % step == 0).tolist()
+            kept.extend(point_at(block, place, study) for place in places)
+            count += len(block.held_out)
+            yield points_table(block, study)
 
     step = max(math.ceil(manifest["runs"] / (len(study.seeds) * len(study.run_controls)) / MOST_POINTS), 1) if study.optimise is None else 1
-    _write_points(folder / POINTS, chosen(), study)
+    write_whole(folder / POINTS, chosen(), points_schema(study))
     trials = [] if study.optimise is None else trials_of(Optimisation(study), kept)
     optimum = read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None
     results = Results(
@@ -92,7 +99,7 @@ def summary_of(results: Results) -> dict[str, Any]:
     ]
     return {
         "title": results.study.title, "runs": overall.runs, "of": results.manifest["runs"], "points": results.of_points,
-        "walked": dict(overall.walked), "run_by_control": dict(overall.total),
+        "walked": dict(overall.walked), "run_by_control": dict(overall.total), "pairs": overall.pairs,
         "means": {control: {name: _mean(item) for name, item in means.items()} for control, means in overall.means.items()},
         "change": {name: change.as_table() for name, change in overall.changes.items()},
         "failures": failures, "optimum": results.optimum,
@@ -103,23 +110,8 @@ def _mean(item: Mean) -> dict[str, float]:
     return {"mean": item.value, "half_width": item.half_width, "runs": item.runs}
 
 
-def _write_points(path: Path, points: Iterator[Point], study: Study) -> None:
-    schema = points_schema(study)
-
-    def tables() -> Iterator[pa.Table]:
-        rows: list[dict[str, Any]] = []
-        for point in points:
-            rows.append(_row(point, study))
-            if len(rows) == 4096:
-                yield pa.Table.from_pylist(rows, schema=schema)
-                rows = []
-        yield pa.Table.from_pylist(rows, schema=schema)
-
-    write_whole(path, tables(), schema)
-
-
 def points_schema(study: Study) -> pa.Schema:
-    """A point's settings, then by control runs, walked and each metric's mean with half its interval, then the changes."""
+    """A point's settings, then by control runs, walked and each metric's mean with half its interval, then pairs and their changes."""
     runs = schema_of(study)
     fields = [runs.field(name) for name in ("point", "case")] + [
         runs.field(factor.name) for factor in study.factors if factor.name != SCENARIO_FACTOR
@@ -127,24 +119,39 @@ def points_schema(study: Study) -> pa.Schema:
     fields.append(pa.field("held_out", pa.bool_()))
     for control in study.run_controls:
         fields += [pa.field(f"{control}.runs", pa.int64()), pa.field(f"{control}.walked", pa.int64())]
-        fields += [runs.field(name).with_name(f"{control}.{name}{part}") for name in FIGURES for part in ("", ".half_width")]
+        fields += [runs.field(name).with_name(f"{control}.{name}{part}") for name in FIGURES for part in ("", HALF)]
     if len(study.run_controls) == 2:
-        fields += [runs.field(name).with_name(f"change.{name}{part}") for name in FIGURES for part in ("", ".half_width")]
+        fields.append(pa.field("pairs", pa.int64()))
+        fields += [runs.field(name).with_name(f"change.{name}{part}") for name in FIGURES for part in ("", HALF)]
         fields += [pa.field(f"change.{name}.verdict", pa.string()) for name in FIGURES]
     return pa.schema(fields)
 
 
-def _row(point: Point, study: Study) -> dict[str, Any]:
-    row: dict[str, Any] = {"point": point.number, "case": point.case, "held_out": point.held_out, **point.values}
-    for control, means in point.means.items():
-        row |= {f"{control}.runs": point.runs[control], f"{control}.walked": point.walked[control]}
-        for name, item in means.items():
-            row |= {f"{control}.{name}": _known(item.value), f"{control}.{name}.half_width": _known(item.half_width)}
-    for name, change in point.changes.items():
-        row |= {f"change.{name}": _known(change.difference), f"change.{name}.half_width": _known(change.half_width)}
-        row[f"change.{name}.verdict"] = change.verdict
-    return row
+def points_table(block: Block, study: Study) -> pa.Table:
+    """A block's points as rows of points.parquet."""
+    sums, schema = block.sums, points_schema(study)
+    columns: dict[str, Any] = {name: block.first[name] for name in schema.names if name in block.first.schema.names}
+    columns["held_out"] = block.held_out
+    for k, control in enumerate(study.run_controls):
+        columns |= {f"{control}.runs": sums.runs[:, k], f"{control}.walked": sums.walked[:, k]}
+        part = sums.moments[:, k]
+        columns |= _by_metric(control, part.value, part.half_width)
+    if len(study.run_controls) == 2:
+        before, after, half_width = (sums.moments[:, part] for part in (BEFORE, AFTER, DIFFERENCE))
+        columns |= {"pairs": sums.pairs, **_by_metric("change", after.value - before.value, half_width.half_width)}
+        for k, name in enumerate(FIGURES):
+            verdict = verdicts(name, before.value[:, k], after.value[:, k], half_width.half_width[:, k])
+            columns[f"change.{name}.verdict"] = verdict.tolist()
+    arrays = [
+        pa.array(item, schema.field(name).type, from_pandas=True) if isinstance(item, np.ndarray) else item
+        for name, item in ((name, columns[name]) for name in schema.names)
+    ]
+    return pa.table(arrays, schema=schema)
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _by_metric(what: str, values: Array, half_widths: Array) -> dict[str, Any]:
+    """(g, figures) as columns."""
+    found: dict[str, Any] = {}
+    for k, name in enumerate(FIGURES):
+        found |= {f"{what}.{name}": values[:, k], f"{what}.{name}{HALF}": half_widths[:, k]}
+    return found
