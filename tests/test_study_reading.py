@@ -10,9 +10,10 @@ from studies import study_of
 
 from hexapod_cosim.cosim.study.reading import list_studies, load_study
 from hexapod_cosim.cosim.study.records import Study, StudyError
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.models import HexapodError, load_robot
 
-JUDGED = {"training": {"seeds": {"first": 10, "count": 3}}, "held_out": {"seeds": 10}}
+TRAINING = {"scenarios": ["walk_flat"], "seeds": {"first": 10, "count": 3}}
+JUDGED = {"training": TRAINING, "held_out": {"scenarios": ["ripple"], "seeds": 10}}
 GAIN = {"gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True}}
 
 
@@ -82,7 +83,11 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         (optimisation(metric="slip_per_meter"), ["optimise.metric", "did you mean 'slip_per_metre'"]),
         (optimisation(constraints={"torque_rms": {"at_mots": 1.0}}), ["not a constraint", "at_most = 1.0"]),
         (optimisation(variables={"gains.slip.kp": {"normal": [1, 1]}}), ["a variable without bounds"]),
-        (optimisation(held_out={"seeds": {"first": 12, "count": 5}}), ["held-out seeds that are trained on", "got [12]", "first = 13"]),
+        (optimisation(held_out={"scenarios": ["ripple"], "seeds": {"first": 12, "count": 5}}),
+         ["held-out seeds that are trained on", "got [12]", "first = 13"]),
+        (optimisation(training={"seeds": 3}), ["optimise.training.scenarios", "missing key", 'scenarios = ["walk_flat"]']),
+        (optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
+         ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "incline"']),
         ({**optimisation(), "factors": {"friction.mu": [0.3]}}, ["not a key of an optimisation", "factors"]),
     ],
 )  # fmt: skip
@@ -101,3 +106,38 @@ def test_what_is_no_study_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("seeds = \n")
     with pytest.raises(StudyError, match="not a TOML file"):
         load_study(tmp_path / "bad.toml")
+
+
+SAME = """title = "Another"
+robot = "own.toml"
+duration = "4 s"
+macro_step = "4 ms"
+seed = 7
+[command]
+vx = "8 cm/s"
+[gait]
+name = "tripod"
+"""
+
+
+@pytest.mark.parametrize(
+    ("more", "changes"),
+    [
+        ("", {}),
+        ("[variation]\nheight = 0.001\n[solver]\ntolerance = 0.01\n[outputs]\nplots = false\n", {}),
+        ("[friction]\nmu = 0.4\n", {"set": {"friction": {"mu": 0.5}}}),
+        ("[compliance]\nslip_pid = false\n", {"variables": {"compliance.slip_pid": [True, False]}}),
+        ('[parameters]\n"torso.mass" = 2.6\n', {}),
+    ],
+)
+def test_a_held_out_scenario_is_told_from_training_by_its_walk_not_by_its_name(tmp_path: Path, more: str, changes: dict[str, Any]) -> None:
+    """A file that names the robot by a path, seconds by a unit, and settings that the study puts the same in either walk."""
+    (tmp_path / "own.toml").write_text((Path(load_robot.__code__.co_filename).parent / "athena.toml").read_text())
+    mine = tmp_path / "Mine.toml"
+    mine.write_text(SAME + more)
+    table = optimisation(held_out={"scenarios": ["ripple", str(mine)]}, **{key: value for key, value in changes.items() if key != "set"})
+    table |= {key: value for key, value in changes.items() if key == "set"}
+    with pytest.raises(StudyError, match=r"Mine.toml, the same walk as walk_flat"):
+        study_of(table)
+    mine.write_text((SAME + more).replace("8 cm/s", "7 cm/s"))
+    assert study_of(table).optimise

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from gains import make_gains
@@ -132,7 +133,8 @@ def optimisation(**changes: Any) -> dict[str, Any]:
     question = {
         "metric": "slip_per_metre", "trials": 12, "batch": 3, "sampler": "random",
         "variables": {"friction.mu": {"uniform": [0.3, 0.9]}, "gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True}},
-        "training": {"seeds": {"first": 10, "count": 2}}, "held_out": {"scenarios": ["walk_flat", "turn"], "seeds": 3},
+        "training": {"scenarios": ["walk_flat", "push"], "seeds": {"first": 10, "count": 2}},
+        "held_out": {"scenarios": ["ripple", "turn"], "seeds": 3},
     }  # fmt: skip
     return {"set": {"friction.mu": 0.5}, "optimise": {**question, **changes}}
 
@@ -158,9 +160,29 @@ def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(ath
     (best,) = json.loads((tmp_path / "out" / OPTIMUM).read_text())["best"]
     assert best["trial"] == min(means, key=lambda point: means[point])
     assert best["training"]["slip_per_metre"] == pytest.approx(means[best["trial"]], rel=1e-12)
-    assert {row["case"] for row in held} == {"walk_flat", "turn"}
+    assert {row["case"] for row in held} == {"ripple", "turn"}
+    assert {row["case"] for row in training} == {"walk_flat", "push"}
     assert {row["point"] for row in held} == {12, best["trial"]}
     assert {row["friction.mu"] for row in found if row["point"] == 12} == {None}  # before: nothing is set
+
+
+def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(athena_fmu: Path, tmp_path: Path) -> None:
+    """The store is left with the first batch and with held-out runs whose figures would turn any search and any choice."""
+    gains, study, out = make_gains(load_robot("athena")), study_of(optimisation(sampler="tpe", trials=15)), tmp_path / "out"
+    whole = [row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10]
+    best = json.loads((out / OPTIMUM).read_text())["best"]
+    parts = sorted((out / "runs").iterdir())
+    stored = pa.concat_tables([pq.read_table(part) for part in parts]).to_pylist()
+    kept = [row for row in stored if row["seed"] < 10 or row["point"] < 3]
+    for row in kept:
+        row["slip_per_metre"] -= 1e6 if row["seed"] < 10 else 0.0
+    pq.write_table(pa.Table.from_pylist(kept, schema=pq.read_schema(parts[0])), parts[0])
+    for part in parts[1:]:
+        part.unlink()
+    assert [row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10] == whole
+    (again,) = json.loads((out / OPTIMUM).read_text())["best"]
+    assert (again["trial"], again["values"], again["training"]) == (best[0]["trial"], best[0]["values"], best[0]["training"])
+    assert again["held_out"]["slip_per_metre"] < -1e5  # they were there, and read for the report
 
 
 def test_a_fall_leaves_a_trial_without_figures_and_out_of_the_choice(athena_fmu: Path, tmp_path: Path) -> None:

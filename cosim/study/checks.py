@@ -7,6 +7,7 @@ from typing import Any, get_type_hints
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.scenario import scenario_from_table, with_values
+from hexapod_cosim.cosim.study.apart import check_scenarios_apart
 from hexapod_cosim.cosim.study.design import check_design
 from hexapod_cosim.cosim.study.factors import samples
 from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, VALUES, Factor, Study, StudyError, Value
@@ -32,6 +33,8 @@ def check_study(study: Study) -> None:
             _check_setting(factor, study, where)
         elif factor.kind != VALUES:
             raise StudyError("not scenarios", got=factor.kind, expected="a list of names", where=where)
+    if study.optimise is not None:
+        check_scenarios_apart(study, study.optimise)
 
 
 def gain_names() -> list[str]:

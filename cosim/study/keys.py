@@ -56,3 +56,11 @@ def read_seeds(value: Any, where: str, *, most: int) -> Sequence[int]:
             raise StudyError("not seeds", got=value, expected="different whole numbers >= 0", fix="write seeds = 10", where=where)
         return tuple(whole(item, where, least=0) for item in value)
     return range(whole(value, where, least=1, most=most))
+
+
+def flat(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Values by name with dots, written in quotes or as tables."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        found |= flat(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
+    return found

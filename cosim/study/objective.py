@@ -10,8 +10,8 @@ gains.slip.kp = { loguniform = [0.3, 3.0], relative = true }
 [optimise.training]
 scenarios = ["walk_flat"]
 seeds = { first = 100, count = 4 }
-[optimise.held_out]
-scenarios = ["walk_flat", "ripple"]
+[optimise.held_out]                       # no scenario and no seed of training
+scenarios = ["ripple", "wave"]
 seeds = { first = 0, count = 10 }
 """
 
@@ -23,6 +23,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.scenario_records import CONTROLS
+from hexapod_cosim.cosim.study.apart import check_seeds_apart
 from hexapod_cosim.cosim.study.factors import read_factors
 from hexapod_cosim.cosim.study.keys import names_of, read_seeds, text_of, whole
 from hexapod_cosim.cosim.study.records import NORMAL, SAMPLERS, SCENARIO_FACTOR, Bound, Factor, Judging, Optimise, StudyError
@@ -51,8 +52,8 @@ def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]
         raise StudyError(
             "a variable without bounds", got=NORMAL, expected="values, uniform, loguniform or integers", where=f"{where}.variables"
         )
-    training, held_out = _judging(table["training"], f"{where}.training"), _judging(table["held_out"], f"{where}.held_out")
-    _keep_apart(training, held_out, where)
+    training, held_out = (_judging(table[part], f"{where}.{part}") for part in ("training", "held_out"))
+    check_seeds_apart(training, held_out, where)
     metric = table["metric"]
     optimise = Optimise(
         metrics=names_of(metric if isinstance(metric, list) else [metric], JUDGED, f"{where}.metric"),
@@ -72,19 +73,12 @@ def _judging(table: Any, where: str) -> Judging:
     for key in table:
         if key not in ("scenarios", "seeds"):
             raise unknown_name("key", key, ("scenarios", "seeds"), where=where, error=StudyError)
-    names = table.get("scenarios", ["walk_flat"])
+    if "scenarios" not in table:
+        raise StudyError("missing key", expected="a list of scenarios", fix='write scenarios = ["walk_flat"]', where=f"{where}.scenarios")
+    names = table["scenarios"]
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names) or len(set(names)) != len(names):
         raise StudyError("wrong type", got=names, expected="a list of scenarios", where=f"{where}.scenarios")
     return Judging(cases=tuple(names), seeds=read_seeds(table.get("seeds", 1), f"{where}.seeds", most=MAX_SEEDS))
-
-
-def _keep_apart(training: Judging, held_out: Judging, where: str) -> None:
-    """A seed draws the same changes in any scenario, so it is either trained on or held out."""
-    shared = sorted(set(training.seeds) & set(held_out.seeds))
-    if shared:
-        expected = "seeds that the optimiser never sees"
-        fix = f"write seeds = {{ first = {max(training.seeds) + 1}, count = {len(held_out.seeds)} }}"
-        raise StudyError("held-out seeds that are trained on", got=shared, expected=expected, fix=fix, where=f"{where}.held_out.seeds")
 
 
 def _bounds(table: Any, where: str) -> tuple[Bound, ...]:

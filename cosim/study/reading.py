@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.scenario import read_tables, scenario_from_table, with_
 from hexapod_cosim.cosim.scenario_records import CONTROLS
 from hexapod_cosim.cosim.study.checks import check_study
 from hexapod_cosim.cosim.study.factors import read_factors
-from hexapod_cosim.cosim.study.keys import names_of, read_seeds, text_of, truth_of, whole
+from hexapod_cosim.cosim.study.keys import flat, names_of, read_seeds, text_of, truth_of, whole
 from hexapod_cosim.cosim.study.objective import read_optimise
 from hexapod_cosim.cosim.study.records import DESIGNS, DRAWN, GRID, SCENARIO_FACTOR, VALUES, Case, Factor, Optimise, Study, StudyError
 from hexapod_cosim.cosim.variation import STANDARD
@@ -111,20 +111,12 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
         tables[names[0]] = own
     elif not isinstance(own, str):
         raise StudyError("wrong type", got=own, expected="a scenario's name, file or table", where=f"{where}: scenario")
-    return {name: _case(name, inline, _flat(changes), folder, where, vary=vary) for name, inline in tables.items()}
+    return {name: _case(name, inline, flat(changes), folder, where, vary=vary) for name, inline in tables.items()}
 
 
 def _named_scenarios(factors: Sequence[Factor], optimise: Optimise | None) -> list[str]:
     values = [str(value) for factor in factors if factor.name == SCENARIO_FACTOR and factor.kind == VALUES for value in factor.values]
     return values if optimise is None else [*values, *optimise.training.cases, *optimise.held_out.cases]
-
-
-def _flat(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Values by name with dots, written in quotes or as tables."""
-    found: dict[str, Any] = {}
-    for key, value in table.items():
-        found |= _flat(value, f"{before}{key}.") if isinstance(value, Mapping) else {f"{before}{key}": value}
-    return found
 
 
 def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any], folder: Path, where: str, *, vary: bool) -> Case:
