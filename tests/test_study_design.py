@@ -97,11 +97,11 @@ def test_runs_are_points_then_seeds_then_controls() -> None:
     assert list(sweep.orders(iter([1, 5]))) == [orders[1], orders[5]]
 
 
-def test_a_plan_of_a_thousand_million_points_is_not_made_beforehand() -> None:
-    sweep = Sweep(drawn("random", points=10**9))
-    assert sweep.count == 2 * 10**9
-    (order,) = sweep.orders(iter([2 * 10**9 - 1]))
-    assert order.point == 10**9 - 1
+def test_a_plan_of_a_hundred_million_runs_is_not_made_beforehand() -> None:
+    sweep = Sweep(drawn("random", points=5 * 10**7))
+    assert sweep.count == 10**8
+    (order,) = sweep.orders(iter([10**8 - 1]))
+    assert order.point == 5 * 10**7 - 1
 
 
 def test_scenarios_are_a_factor_too() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,46 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         (optimisation(training={"seeds": 3}), ["optimise.training.scenarios", "missing key", 'scenarios = ["walk_flat"]']),
         (optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
          ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "incline"']),
+        ({"factors": {"gains.slip.kp": [math.nan]}}, ["factors.gains.slip.kp[0]", "got nan", "finite number"]),
+        ({"factors": {"gains.slip.kp": {"uniform": [0.5, math.inf]}}}, ["factors.gains.slip.kp.uniform[1]", "got inf"]),
+        ({"factors": {"gains.slip.kp": [-1.0]}}, ["not a gain's value", "got -1.0", ">= 0"]),
+        ({"factors": {"gains.slip.filter_time": [0.0]}}, ["not a gain's value", "got 0.0", "> 0"]),
+        ({"seeds": 1e20}, ["seeds", "whole number"]),
+        ({"seeds": [10**20]}, ["seeds[0]", "64 bits"]),
+        ({"seeds": {"first": 2**63 - 2, "count": 5}}, ["seeds.first", "<="]),
+        ({"seed": 2**40}, ["seed", "<= 4294967295"]),
+        ({"factors": {"friction.mu": [0.3], "friction": {"mu": [0.4]}}}, ["given twice", "friction.mu", "take one away"]),
+        ({"factors": {"torso.mass": [2.0], "parameters.torso.mass": [2.5]}}, ["given twice", "torso.mass"]),
+        ({"set": {"friction.mu": 0.3, "friction": {"mu": 0.4}}}, ["set.friction.mu", "given twice"]),
+        ({"factors": {"torso.mass": [2.7, "3 kg"]}}, ["factors.torso.mass", "values of one kind"]),
+        ({"factors": {"gait.name": ["tripod", True]}}, ["factors.gait.name", "values of one kind"]),
+        ({"factors": {"torso.mass": ["2.7 kg", "3 kg"]}}, ["factors.torso.mass", "a number in a text", 'unit = "deg"']),
+        ({"factors": {"torso.mass": {"values": [2.7], "unit": "kg"}}}, ["factors.torso.mass", "got '2.7 kg'", "plain numbers"]),
+        ({"factors": {"gait.name": {"values": ["tripod"], "unit": "s"}}}, ["factors.gait.name", "there is a unit"]),
+        ({"factors": {"torso.mass": [2.7, -1.0]}}, ["factors.torso.mass", "got -1.0", ">="]),
+        ({"set": {"torso.mass": "heavy"}}, ["set.torso.mass", "got 'heavy'", "kg"]),
+        ({"factors": {"contact.law": ["hertz", "herz"]}}, ["factors.contact.law", "herz"]),
+        ({"design": "sobol", "points": 4, "factors": {"robot": ["athena", "athana"]}}, ["factors.robot", "did you mean 'athena'"]),
+        ({"design": "list", "factors": {"robot": ["athena", "athana"]}}, ["factors.robot", "did you mean 'athena'"]),
+        ({"set": {"robot": "athana"}}, ["set.robot", "did you mean 'athena'"]),
+        ({"design": "random", "points": 4, "factors": {"friction.mu": {"uniform": [-0.1, 0.5]}}}, ["factors.friction.mu", "got -0.1"]),
+        ({"design": "random", "points": 4, "factors": {"friction.mu": {"normal": [0.1, 0.5]}}}, ["factors.friction.mu", "got -0.4"]),
+        ({"design": "random", "points": 4, "factors": {"friction.mu": {"uniform": [0.1, 1e308]}}}, ["friction.mu", "so far apart"]),
+        ({"factors": {"friction.mu": {"linspace": [0.3, 0.3, 2]}}}, ["friction.mu", "different ends"]),
+        ({"factors": {f"torso.inertia[{k}]": {"linspace": [1, 2, 10**6]} for k in range(3)}}, ["too many runs", "2e+18", "100,000,000"]),
+        ({"design": "sobol", "points": 10**8, "seeds": 10, "factors": {"friction.mu": [0.3]}},
+         ["too many runs", "2,000,000,000 runs", "split"]),
+        ({"design": "latin_hypercube", "points": 10**7, "factors": {"friction.mu": {"uniform": [0.1, 1]},
+          "command.vx": {"uniform": [0, 0.1]}}}, ["too large a Latin hypercube", 'design = "sobol"']),
+        (optimisation(trials=10**5, training={**TRAINING, "seeds": 5000}, held_out={"scenarios": ["ripple"], "seeds": [9999]}),
+         ["too many runs", "split"]),
+        ({"set": {"seed": 3}}, ["set.seed", "not a setting", "seeds = 10"]),
+        ({"set": {"control": "compliant"}}, ["set.control", "not a setting", "controls ="]),
+        ({"set": {"outputs": {"plots": True}}}, ["set.outputs.plots", "not a setting", "no recordings"]),
+        ({"factors": {"outputs.plots": [True]}}, ["factors.outputs.plots", "not a factor"]),
+        ({"title": "two\nlines"}, ["title", "printable"]),
+        ({"title": "walk_flat", "factors": {"scenario": ["walk_flat"]}, "scenario": {"duration": 1.0}}, ["two scenarios of one name"]),
+        ({"scenario": "x" * 300}, ["scenario", "255"]),
         ({**optimisation(), "factors": {"friction.mu": [0.3]}}, ["not a key of an optimisation", "factors"]),
     ],
 )  # fmt: skip
@@ -96,6 +137,18 @@ def test_a_mistake_is_named_with_its_place_and_a_way_out(table: dict[str, Any], 
         study_of(table)
     for part in ["test.toml" if "scenario" not in table else "scenario", *parts]:
         assert part in str(refused.value)
+
+
+def test_numbers_of_a_parameter_are_in_its_own_unit_and_its_choices_are_names() -> None:
+    study = study_of({"factors": {"torso.mass": [2.7, 3], "parameters.torso.com[1]": [0.0], "contact.law": ["hertz", "flores"]}})
+    assert [factor.name for factor in study.factors] == ["torso.mass", "torso.com[1]", "contact.law"]
+
+
+def test_the_ends_of_long_lists_are_tried_too() -> None:
+    values = [0.3 + 1e-3 * k for k in range(1000)]
+    values[501] = -0.1
+    with pytest.raises(StudyError, match=r"got -0\.1"):
+        study_of({"factors": {"friction.mu": values}})
 
 
 def test_what_is_no_study_is_refused(tmp_path: Path) -> None:

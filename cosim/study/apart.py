@@ -63,11 +63,12 @@ def content_of(case: Case, study: Study) -> Any:
 
 def _fix(study: Study, asked: Optimise, trained: Sequence[Any]) -> str:
     """Names scenarios of the same robot that go somewhere and are not trained on."""
+    settings = flat(study.source.get("set", {}), study.where)
     robot, names = study.cases[asked.training.cases[0]].table.get("robot"), []
     for name in list_scenarios():
         table, told = read_tables(name)
         try:
-            case = Case(name=name, table=with_values(table, flat(study.source.get("set", {}))), where=told)
+            case = Case(name=name, table=with_values(table, settings), where=told)
             other = content_of(case, study) not in trained
         except HexapodError:
             continue

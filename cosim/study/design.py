@@ -28,6 +28,7 @@ from hexapod_cosim.cosim.study.records import (
     Value,
 )
 
+MAX_STRATA = 10**7  # of all factors of a Latin hypercube
 STREAM = 2  # of the study's seed; a scenario's own are 0 and 1
 Shares = Callable[[int], np.ndarray[tuple[int], np.dtype[np.float64]]]
 
@@ -131,6 +132,10 @@ def check_design(study: Study) -> None:
     lengths = {factor.name: len(factor.values) for factor in study.factors}
     if study.design == LIST and len(set(lengths.values())) > 1:
         raise StudyError("lists of different lengths", got=lengths, expected="one value of each factor per point", where=where)
+    if study.design == LATIN_HYPERCUBE and study.points * len(study.factors) > MAX_STRATA:
+        fix = f'write design = "{SOBOL}", which holds none'
+        got, expected = f"{study.points} points, {len(study.factors)} factors", f"points times factors of at most {MAX_STRATA:,}"
+        raise StudyError("too large a Latin hypercube", got=got, expected=expected, fix=fix, where=f"{study.where}: points")
     if study.design != GRID and not study.factors:
         fix = "leave design out to run the seeds alone"
         raise StudyError("nothing to vary", got=f"design {study.design!r} without factors", expected="factors", fix=fix, where=where)

@@ -22,7 +22,9 @@ from hexapod_cosim.models import unknown_name
 SPACED = ("linspace", "logspace")
 KINDS = (VALUES, *SPACED, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS)
 BESIDES = ("unit", "relative")
-MAX_VALUES = 1_000_000
+MAX_VALUES, MAX_FACTORS = 1_000_000, 1000
+LARGEST_INTEGER = 2**53  # that a double holds with all below
+PARAMETERS = "parameters."
 LEAST_QUANTILE = 2.0**-53  # a normal distribution has no value at 0
 EXAMPLE = '"friction.mu" = { uniform = [0.3, 0.9] }'
 
@@ -31,7 +33,20 @@ def read_factors(table: Any, where: str) -> tuple[Factor, ...]:
     """The factors of a table, whose names may be written with dots in quotes or as tables. Raises StudyError."""
     if not isinstance(table, Mapping):
         raise StudyError("wrong type", got=table, expected="a table of factors", fix=f"write [{where.rpartition(' ')[2]}]", where=where)
-    return tuple(_read_factor(name, value, f"{where}.{name}") for name, value in _named(table, ""))
+    found: dict[str, Factor] = {}
+    for name, value in _named(table, ""):
+        plain = plain_name(name)
+        if plain in found:
+            raise StudyError("a factor given twice", got=name, expected="each name once", fix="take one away", where=f"{where}.{name}")
+        found[plain] = _read_factor(plain, value, f"{where}.{name}")
+    if len(found) > MAX_FACTORS:
+        raise StudyError("too many factors", got=len(found), expected=f"at most {MAX_FACTORS}", where=where)
+    return tuple(found.values())
+
+
+def plain_name(name: str) -> str:
+    """Of a setting: parameters.torso.mass is another way to write torso.mass."""
+    return name.removeprefix(PARAMETERS)
 
 
 def _named(table: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
@@ -65,6 +80,8 @@ def _read_factor(name: str, value: Any, where: str) -> Factor:
     if not isinstance(unit, str) or not isinstance(relative, bool):
         raise StudyError("wrong type", got=dict(value), expected='unit = "deg", relative = true or false', where=where)
     made = _of_kind(kinds[0], value[kinds[0]], f"{where}.{kinds[0]}")
+    numbers = all(isinstance(item, int | float) and not isinstance(item, bool) for item in made.get("values", ()))
+    _require(numbers or not unit, value[kinds[0]], f"numbers, as there is a unit {unit!r}", where)
     return Factor(name=name, unit=unit, relative=relative, **made)
 
 
@@ -76,19 +93,31 @@ def _of_kind(kind: str, given: Any, where: str) -> dict[str, Any]:
         space = np.linspace if kind == "linspace" else np.geomspace
         _require(count == int(count) and 1 <= count <= MAX_VALUES, given, f"a whole number of 1 to {MAX_VALUES} values", where)
         _require(kind == "linspace" or (low > 0.0 and high > 0.0), given, "ends > 0", where)
+        _require(low != high or count == 1, given, "different ends", where)
+        _require(_spans(low, high, kind == "logspace"), given, "ends that are not so far apart", where)
         return {"kind": VALUES, "values": tuple(space(low, high, int(count)).tolist())}
     low, high = _numbers(given, 2, where)
     _require(kind != NORMAL or high >= 0.0, given, "a standard deviation >= 0", where)
     _require(kind == NORMAL or low <= high, given, "the lower end first", where)
     _require(kind != LOGUNIFORM or low > 0.0, given, "ends > 0", where)
     _require(kind != INTEGERS or (low == int(low) and high == int(high)), given, "whole numbers", where)
+    _require(kind != INTEGERS or max(-low, high) <= LARGEST_INTEGER, given, "whole numbers within 53 bits", where)
+    _require(_spans(low, high, kind == LOGUNIFORM), given, "ends that are not so far apart", where)
     return {"kind": kind, "low": low, "high": high}
+
+
+def _spans(low: float, high: float, ratio: bool) -> bool:
+    """Whether what lies between can be counted with."""
+    return math.isfinite(high / low if ratio else max(abs(low), abs(high)) * 10.0)
 
 
 def _values(given: Any, where: str) -> tuple[Value, ...]:
     fix = "write values = [0.3, 0.6]"
     if not isinstance(given, list) or not given or not all(isinstance(item, int | float | bool | str) for item in given):
         raise StudyError("not values", got=given, expected="a list of numbers, names or truths", fix=fix, where=where)
+    kinds = {bool: "truths", str: "texts"}
+    _require(len({kinds.get(type(item), "numbers") for item in given}) == 1, given, "values of one kind: numbers, texts or truths", where)
+    _require(len(given) <= MAX_VALUES, f"{len(given)} values", f"at most {MAX_VALUES}", where)
     _require(len({(type(item) is bool, item) for item in given}) == len(given), given, "different values", where)
     return tuple(given)
 
@@ -120,9 +149,14 @@ def at_quantile(factor: Factor, share: float) -> Value:
 
 
 def samples(factor: Factor) -> tuple[Value, ...]:
-    """Values that tell whether the factor's name, unit and range are right: all of a list, the ends or the mean of a distribution."""
+    """Values that tell whether the factor's name, unit and range are right: all of a list, the ends of a distribution.
+
+    A normal one has no ends: a deviation from the mean either way stands for them, and what is drawn further out is judged when it is run.
+    """
     if factor.kind == VALUES:
         return factor.values
     if factor.kind == INTEGERS:
         return int(factor.low), int(factor.high)
-    return (factor.low,) if factor.kind == NORMAL else (factor.low, factor.high)
+    if factor.kind == NORMAL:
+        return factor.low, factor.low - factor.high, factor.low + factor.high
+    return factor.low, factor.high

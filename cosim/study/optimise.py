@@ -28,7 +28,6 @@ from hexapod_cosim.cosim.study.store import write_durably
 from hexapod_cosim.cosim.study.table import Point
 
 OPTIMUM = "optimum.json"
-FRONT = 8  # members of a front that are tried on the held-out runs
 WORST = 1e9  # what a trial without a figure gets; the samplers take no infinities as constraints
 EXTRA = "pip install 'hexapod-cosim[optimise]'"
 
@@ -49,8 +48,7 @@ class Optimisation:
     def __init__(self, study: Study) -> None:
         assert study.optimise is not None
         self.study, self.asked = study, study.optimise
-        self.trained = (self.asked.trials + 1) * self.asked.training.runs
-        self.most = self.trained + (1 + chosen_most(self.asked)) * self.asked.held_out.runs
+        self.trained, self.most = self.asked.trained, self.asked.most
 
     def training(self, point: int, values: tuple[Value | None, ...]) -> list[Order]:
         """The training runs of a trial."""
@@ -70,11 +68,6 @@ class Optimisation:
     def unset(self) -> tuple[None, ...]:
         """The values that leave all as it is without the study."""
         return (None,) * len(self.study.factors)
-
-
-def chosen_most(asked: Optimise) -> int:
-    """How many trials are tried on the held-out runs, at most."""
-    return 1 if len(asked.metrics) == 1 else FRONT
 
 
 def optimise(desk: Desk, crew: Crew, folder: Path) -> None:
@@ -194,8 +187,7 @@ def best_of(trials: Sequence[Trial], asked: Optimise) -> list[Trial]:
     front = sorted(
         (trial for trial in able if not any(_beats(other, trial, asked) for other in able)), key=lambda trial: _costs(trial, asked)
     )
-    most = chosen_most(asked)
-    places = np.unique(np.linspace(0, len(front) - 1, min(most, len(front))).round().astype(int))
+    places = np.unique(np.linspace(0, len(front) - 1, min(asked.chosen, len(front))).round().astype(int))
     return [front[place] for place in places.tolist()]
 
 

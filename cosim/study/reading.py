@@ -10,16 +10,18 @@ from typing import Any
 
 from hexapod_cosim.cosim.scenario import read_tables, scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.cosim.study.checks import check_study
-from hexapod_cosim.cosim.study.factors import read_factors
-from hexapod_cosim.cosim.study.keys import flat, names_of, read_seeds, text_of, truth_of, whole
+from hexapod_cosim.cosim.study.checks import check_scenario, check_settable, check_study
+from hexapod_cosim.cosim.study.factors import plain_name, read_factors
+from hexapod_cosim.cosim.study.keys import check_plain, flat, names_of, read_seeds, text_of, truth_of, whole
 from hexapod_cosim.cosim.study.objective import read_optimise
 from hexapod_cosim.cosim.study.records import DESIGNS, DRAWN, GRID, SCENARIO_FACTOR, VALUES, Case, Factor, Optimise, Study, StudyError
 from hexapod_cosim.cosim.variation import STANDARD
 from hexapod_cosim.models import HexapodError, unknown_name
 
 KEYS = ("title", "scenario", "set", "design", "points", "seeds", "controls", "seed", "variation", "factors", "optimise")
-MAX_POINTS, MAX_SEEDS = 10**9, 10**7
+MAX_POINTS, MAX_SEEDS = 10**8, 10**7
+MAX_SEED = 2**32 - 1  # that all generators of random numbers take
+MOST_OF_NAME = 255  # bytes of a file's
 STANDARD_TABLE = {name: getattr(STANDARD, name) for name in ("attitude", "height", "joint_angle", "command_delay")}
 
 
@@ -40,7 +42,7 @@ def load_study(path_or_name: str | Path) -> Study:
     except OSError as error:
         fix = "give the path of a study file, or one of: " + ", ".join(bundled)
         raise StudyError("cannot read the study", got=error.strerror, fix=fix, where=str(path)) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise StudyError(
             "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
         ) from error
@@ -54,6 +56,7 @@ def study_from_table(
 
     `scenarios`: in full, by name, when they are known already and no file is read.
     """
+    check_plain(table, where)
     for key in table:
         if key not in KEYS:
             raise unknown_name("key", key, KEYS, where=where, error=StudyError)
@@ -66,7 +69,7 @@ def study_from_table(
         design=_design(table, where), points=_points(table, where),
         seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
         controls=names_of(table.get("controls", list(CONTROLS)), CONTROLS, f"{where}: controls"),
-        seed=whole(table.get("seed", 0), f"{where}: seed", least=0), optimise=None if optimise is None else optimise[0],
+        seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED), optimise=None if optimise is None else optimise[0],
         source=dict(table), where=where,
     )  # fmt: skip
     if scenarios is not None:
@@ -104,14 +107,20 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     changes = source.get("set", {})
     if not isinstance(changes, Mapping):
         raise StudyError("wrong type", got=changes, expected="a table of settings", fix="write [set]", where=f"{where}: set")
+    changed = flat(changes, f"{where}: set")
+    for name in changed:
+        check_settable(plain_name(name), f"{where}: set.{name}", kind="setting")
     vary = truth_of(source, "variation", len(study.seeds) > 1 or study.optimise is not None, where)
     names = [own if isinstance(own, str) else study.title, *_named_scenarios(study.factors, study.optimise)]
     tables: dict[str, Mapping[str, Any] | None] = dict.fromkeys(names)
     if isinstance(own, Mapping):
+        if names[0] in names[1:]:
+            fix = "give the study another title"
+            raise StudyError("two scenarios of one name", got=names[0], expected="different names", fix=fix, where=f"{where}: scenario")
         tables[names[0]] = own
     elif not isinstance(own, str):
         raise StudyError("wrong type", got=own, expected="a scenario's name, file or table", where=f"{where}: scenario")
-    return {name: _case(name, inline, flat(changes), folder, where, vary=vary) for name, inline in tables.items()}
+    return {name: _case(name, inline, changed, folder, where, vary=vary) for name, inline in tables.items()}
 
 
 def _named_scenarios(factors: Sequence[Factor], optimise: Optimise | None) -> list[str]:
@@ -122,11 +131,15 @@ def _named_scenarios(factors: Sequence[Factor], optimise: Optimise | None) -> li
 def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any], folder: Path, where: str, *, vary: bool) -> Case:
     """Raises ScenarioError for a scenario that cannot be run as it is."""
     beside = folder / name
+    if inline is None and len(beside.name.encode()) > MOST_OF_NAME:
+        expected = f"a name of at most {MOST_OF_NAME} letters"
+        raise StudyError("no file has such a name", got=name, expected=expected, fix="name a scenario", where=f"{where}: scenario")
     table, told = (dict(inline), f"{where}: scenario") if inline is not None else read_tables(beside if beside.is_file() else name)
-    scenario_from_table(table, where=told)
+    scenario = scenario_from_table(table, where=told)
+    check_scenario(scenario, names=list(scenario.parameters))
     try:
         table = with_values(table, changes)
-        scenario_from_table(table, where=told, given=list(changes))
+        check_scenario(scenario_from_table(table, where=told, given=list(changes)), names=[plain_name(name) for name in changes])
     except HexapodError as error:
         raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=_place(error, where)) from error
     if vary and "variation" not in table:
@@ -137,4 +150,5 @@ def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any
 
 def _place(error: HexapodError, where: str) -> str:
     """The key that is wrong, as one of [set]."""
-    return f"{where}: set.{(error.where or '').rpartition(': ')[2].removeprefix('--set ')}"
+    key = (error.where or "").rpartition(": ")[2].removeprefix("--set ")
+    return f"{where}: set.{plain_name(key)}"

@@ -16,6 +16,7 @@ GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = ("grid", "list", "random"
 DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs of a number of points that the file gives
 SCENARIO_FACTOR = "scenario"
 GAINS = "gains."  # what begins so is a gain of the compliant control
+FRONT = 8  # members of a front that are tried on the held-out runs
 SAMPLERS = ("tpe", "nsga2", "random")
 
 
@@ -87,6 +88,21 @@ class Optimise:
     control: str
     training: Judging
     held_out: Judging
+
+    @property
+    def chosen(self) -> int:
+        """How many trials are tried on the held-out runs, at most."""
+        return 1 if len(self.metrics) == 1 else FRONT
+
+    @property
+    def trained(self) -> int:
+        """Training runs: those of all trials and of what they began from."""
+        return (self.trials + 1) * self.training.runs
+
+    @property
+    def most(self) -> int:
+        """Runs in all, at most."""
+        return self.trained + (1 + self.chosen) * self.held_out.runs
 
 
 @dataclass(frozen=True, kw_only=True)
