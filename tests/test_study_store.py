@@ -55,7 +55,7 @@ def test_results_do_not_depend_on_workers_or_chunks(small: Callable[..., Any], t
     small("two", MANY_RUNS, workers=2)
     small("slow", MANY_RUNS, workers=2, engine=SLOW)
     assert digest(tmp_path / "one") == digest(tmp_path / "two")
-    assert rows(tmp_path / "one") == rows(tmp_path / "slow")  # another engine's name is in the manifest alone
+    assert rows(tmp_path / "one") == rows(tmp_path / "slow")  # another engine's name is in the manifest and the file's metadata
 
 
 def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[..., Any]) -> None:

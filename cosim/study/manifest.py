@@ -18,6 +18,7 @@ from hexapod_cosim.cosim.study.store import write_durably
 MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "results.parquet", "times.parquet"
 COMPLETED = "completed"
 FORMAT = 1
+OF_FILE = "hexapod."  # keys of a file's metadata
 MOST_NAMED = 6  # differences in a message
 
 
@@ -42,6 +43,22 @@ def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
 def _judged(study: Study) -> dict[str, list[int]]:
     assert study.optimise is not None
     return {"training": list(study.optimise.training.seeds), "held_out": list(study.optimise.held_out.seeds)}
+
+
+def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """What a file of results needs to be trusted by itself, as texts for its metadata; the same however, wherever and how often it was run.
+
+    By hexapod.NAME: format, study (its file as JSON), scenarios (in full), seeds, engine, environment (versions), fmus, controller and
+    robots (SHA-256), gains (as JSON, and their SHA-256).
+    """
+    names = ("format", "title", "study", "scenarios", "runs", "seeds", "engine", "environment", "fmus", "controller", "robots", "gains")
+    found = {f"{OF_FILE}{name}": manifest[name] if isinstance(manifest[name], str) else _plain(manifest[name]) for name in names}
+    return found | {f"{OF_FILE}gains_sha256": hashlib.sha256(found[f"{OF_FILE}gains"].encode()).hexdigest()}
+
+
+def _plain(content: Any) -> str:
+    """JSON in one line, in the content's own order."""
+    return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> None:

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from hexapod_cosim.cosim.comparison import verdicts
 from hexapod_cosim.cosim.files import RUN_FILE, read_json, to_json
 from hexapod_cosim.cosim.study.columns import FIGURES, WALL, schema_of
-from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS
+from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS, provenance
 from hexapod_cosim.cosim.study.moments import Array
 from hexapod_cosim.cosim.study.optimise import OPTIMUM, Optimisation, Trial, trials_of
 from hexapod_cosim.cosim.study.reading import study_from_table
@@ -79,7 +79,7 @@ def read_results(folder: Path) -> Results:
             yield points_table(block, study)
 
     step = max(math.ceil(manifest["runs"] / (len(study.seeds) * len(study.run_controls)) / MOST_POINTS), 1) if study.optimise is None else 1
-    write_whole(folder / POINTS, chosen(), points_schema(study))
+    write_whole(folder / POINTS, chosen(), points_schema(study).with_metadata(provenance(manifest)))
     trials = [] if study.optimise is None else trials_of(Optimisation(study), kept)
     optimum = read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None
     results = Results(

@@ -12,13 +12,24 @@ import pyarrow as pa
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.batch import processors
+from hexapod_cosim.cosim.files import read_json
 from hexapod_cosim.cosim.study.columns import WALL, result_schema, schema_of
 from hexapod_cosim.cosim.study.conduct import Desk, conduct, missing
 from hexapod_cosim.cosim.study.crew import Crew
 from hexapod_cosim.cosim.study.design import Sweep
 from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE
 from hexapod_cosim.cosim.study.job import Job, make_job
-from hexapod_cosim.cosim.study.manifest import RESULTS, RUNS, TIMES, begin_folder, finish_folder, locked, manifest_of
+from hexapod_cosim.cosim.study.manifest import (
+    MANIFEST,
+    RESULTS,
+    RUNS,
+    TIMES,
+    begin_folder,
+    finish_folder,
+    locked,
+    manifest_of,
+    provenance,
+)
 from hexapod_cosim.cosim.study.optimise import Optimisation, optimise
 from hexapod_cosim.cosim.study.pool import local_crew, own_crew
 from hexapod_cosim.cosim.study.records import Study
@@ -92,7 +103,8 @@ def crew_of(job: Job, options: Options, study: Study) -> AbstractContextManager[
 def put_together(study: Study, store: Store, folder: Path) -> None:
     """results.parquet, all runs in the order of their numbers, the same bytes however they were run; times.parquet, what they took."""
     schema = schema_of(study)
-    write_whole(folder / RESULTS, store.sorted_rows(), result_schema(schema))
+    facts = provenance(read_json(folder / MANIFEST))
+    write_whole(folder / RESULTS, store.sorted_rows(), result_schema(schema).with_metadata(facts))
     write_whole(folder / TIMES, store.sorted_rows(), pa.schema([schema.field("run"), schema.field(WALL)]))
 
 
