@@ -36,8 +36,9 @@ def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
 
 
 def test_a_list_takes_the_factors_side_by_side() -> None:
-    design = Design(study_of({"design": "list", "factors": {"friction.mu": [0.3, 0.6], "gait.name": ["tripod", "wave"]}}))
-    assert [design.point(index) for index in range(design.count)] == [(0.3, "tripod"), (0.6, "wave")]
+    factors = {"friction.mu": [0.3, 0.6, 0.3], "gait.name": ["tripod", "wave", "wave"]}  # in a list a value may come again
+    design = Design(study_of({"design": "list", "factors": factors}))
+    assert [design.point(index) for index in range(design.count)] == [(0.3, "tripod"), (0.6, "wave"), (0.3, "wave")]
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])

@@ -17,7 +17,7 @@ from scipy import stats
 from studies import FAKE, KINEMATIC, rows, run_quietly, study_of
 
 from hexapod_cosim.controller import save_gains
-from hexapod_cosim.cosim.study.figures import front
+from hexapod_cosim.cosim.study.curves import front
 from hexapod_cosim.cosim.study.optimise import OPTIMUM
 from hexapod_cosim.cosim.study.results import POINTS, SUMMARY, read_results
 from hexapod_cosim.models import load_robot

@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.study.apart import check_scenarios_apart
 from hexapod_cosim.cosim.study.design import check_design
 from hexapod_cosim.cosim.study.factors import PARAMETERS, samples
-from hexapod_cosim.cosim.study.records import DRAWN, GAINS, GRID, SCENARIO_FACTOR, VALUES, Case, Factor, Study, StudyError, Value
+from hexapod_cosim.cosim.study.records import DRAWN, GAINS, GRID, LIST, SCENARIO_FACTOR, VALUES, Case, Factor, Study, StudyError, Value
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
 ELSEWHERE = {
@@ -36,6 +36,8 @@ def check_study(study: Study) -> None:
     for factor in study.factors:
         where = f"{study.where}: {'factors' if study.optimise is None else 'optimise.variables'}.{factor.name}"
         check_settable(factor.name, where)
+        if (study.design != LIST or study.optimise is not None) and len(set(factor.values)) < len(factor.values):
+            raise StudyError("value not allowed", got=list(factor.values), expected="different values", fix="correct it", where=where)
         if factor.name.startswith(GAINS):
             _check_gain(factor, study, where)
         elif factor.relative:

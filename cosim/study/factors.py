@@ -118,7 +118,6 @@ def _values(given: Any, where: str) -> tuple[Value, ...]:
     kinds = {bool: "truths", str: "texts"}
     _require(len({kinds.get(type(item), "numbers") for item in given}) == 1, given, "values of one kind: numbers, texts or truths", where)
     _require(len(given) <= MAX_VALUES, f"{len(given)} values", f"at most {MAX_VALUES}", where)
-    _require(len({(type(item) is bool, item) for item in given}) == len(given), given, "different values", where)
     return tuple(given)
 
 

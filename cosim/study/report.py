@@ -15,6 +15,9 @@ from hexapod_cosim.cosim.files import write_text
 from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS
 from hexapod_cosim.cosim.study.columns import FIGURES
 from hexapod_cosim.cosim.study.figures import drawings, save
+from hexapod_cosim.cosim.study.manifest import COMPLETED
+from hexapod_cosim.cosim.study.objective import WALKED
+from hexapod_cosim.cosim.study.records import DRAWN
 from hexapod_cosim.cosim.study.results import POINTS, SUMMARY, Results
 from hexapod_cosim.cosim.study.table import Mean, Point
 from hexapod_cosim.cosim.toml_text import to_toml
@@ -35,7 +38,8 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
     environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "study"), autoescape=True, undefined=StrictUndefined)
     page = environment.get_template("study.html.jinja").render(
         results=results, overall=overall_rows(results), points=point_rows(results), figures=pictures, optimum=optimum_rows(results),
-        failures=[(*key, count) for key, count in results.overall.failures.items()], toml=_toml(results), shown=SHOWN_POINTS,
+        failures=[(*key, count) for key, count in results.overall.failures.items()], toml=_toml(results), notes=notes(results),
+        of_what=of_what(results), wall=shown_time(results.wall), metrics=OF_POINTS,
     )  # fmt: skip
     write_text(folder / REPORT, page)
     return [folder / POINTS, folder / SUMMARY, *files, folder / REPORT]
@@ -48,14 +52,44 @@ def _embedded(svg: Path) -> str:
 def _toml(results: Results) -> dict[str, str]:
     """What it takes to run it again, as files."""
     gains = results.manifest["gains"]
-    texts = {"The study": to_toml(results.manifest["study"])}
-    texts |= {f"Scenario {name}": to_toml(table) for name, table in results.manifest["scenarios"].items()}
+    texts = {"The study": to_toml(_known(results.manifest["study"]))}
+    texts |= {f"Scenario {name}": to_toml(_known(table)) for name, table in results.manifest["scenarios"].items()}
     return texts | ({} if gains is None else {"Gains": to_toml(_known(gains))})
 
 
-def _known(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what JSON could not hold."""
-    return {key: _known(value) if isinstance(value, Mapping) else value for key, value in table.items() if value is not None}
+def _known(content: Any) -> Any:
+    """Without what JSON could not hold: an endless duration, which a file says by saying nothing."""
+    if isinstance(content, Mapping):
+        return {key: _known(value) for key, value in content.items() if value is not None}
+    return [_known(value) for value in content] if isinstance(content, list) else content
+
+
+def notes(results: Results) -> list[str]:
+    """What to know before reading the figures of this study."""
+    overall, study = results.overall, results.study
+    found = []
+    if results.facts["status"] != COMPLETED and study.optimise is None:
+        means = "Means by control are of what is there, which need not be the same points and seeds"
+        found.append(f"Not all runs are there. {means}; changes are of whole pairs.")
+    walked = sum(overall.walked.values())
+    if overall.runs and not walked:
+        found.append("No run walked to its end, so there are no figures of walks. What ended the runs stands under Failures.")
+    elif walked and all(not mean.runs for means in overall.means.values() for mean in means.values()):
+        found.append("The walks are too short for figures, which are of whole gait cycles after the second: set a longer duration.")
+    return found
+
+
+def of_what(results: Results) -> str:
+    """What the intervals of the table over all runs are over."""
+    study = results.study
+    if study.optimise is not None:
+        return "over all trials, training and held-out runs together: how far trials lie apart, not how sure the optimum is"
+    if results.of_points == 1:
+        return "over seeds"
+    seeds = "; runs of one point share it, so with several seeds the interval is on the narrow side" if len(study.seeds) > 1 else ""
+    if study.design in DRAWN:
+        return f"over points drawn from the factors' distributions{seeds}"
+    return "as if the points had been drawn at random: mostly how far they lie apart. The table of points has intervals over seeds alone"
 
 
 def overall_rows(results: Results) -> list[dict[str, Any]]:
@@ -65,7 +99,8 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
         unit, _, meaning = METRICS[name]
         values = [shown_mean(name, overall.means[control][name]) for control in results.study.run_controls]
         change = overall.changes.get(name)
-        rows.append({"name": name, "unit": unit, "meaning": meaning, "values": values, **shown_change(change)})
+        pairs = 0 if change is None else change.pairs
+        rows.append({"name": name, "unit": unit, "meaning": meaning, "values": values, "pairs": pairs, **shown_change(change)})
     return rows
 
 
@@ -77,15 +112,23 @@ def point_rows(results: Results) -> list[dict[str, Any]]:
 
 
 def _point_row(point: Point, results: Results) -> dict[str, Any]:
-    controls = [control for control in results.study.run_controls if control in point.means]
+    controls = results.study.run_controls
     cells = [
         {"values": [shown_mean(name, point.means[control][name]) for control in controls], **shown_change(point.changes.get(name))}
         for name in OF_POINTS
     ]
     return {
         "number": point.number, "settings": [shown_value(value) for value in point.values.values()], "held_out": point.held_out,
-        "walked": [f"{point.walked[control]}/{point.runs[control]}" for control in controls], "cells": cells,
+        "walked": [f"{point.walked[control]} of {point.runs[control]}" for control in controls], "cells": cells,
     }  # fmt: skip
+
+
+def shown_time(seconds: float) -> str:
+    """Of a processor, for people."""
+    for unit, size in (("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.3g} core {unit}"
+    return f"{seconds:.3g} core seconds"
 
 
 def shown_value(value: Any) -> str:
@@ -98,8 +141,14 @@ def shown_mean(name: str, item: Mean) -> str:
     if not math.isfinite(item.value):
         return "-"
     value = 0.0 if abs(item.value) < DUST * FLOORS[name] else item.value
-    half = f" ± {item.half_width:.1g}" if math.isfinite(item.half_width) and item.half_width >= DUST * FLOORS[name] else ""
-    return f"{value:.3g}{half}"
+    half = f" ± {short(item.half_width, 2)}" if math.isfinite(item.half_width) and item.half_width >= DUST * FLOORS[name] else ""
+    return f"{short(value, 3)}{half}"
+
+
+def short(value: float, digits: int) -> str:
+    """A number of so many digits, in plain decimals unless it is tiny."""
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text else text
 
 
 def shown_change(change: Change | None) -> dict[str, str]:
@@ -116,17 +165,23 @@ def optimum_rows(results: Results) -> list[dict[str, Any]]:
     optimum = results.optimum
     if optimum is None:
         return []
-    before = {"label": "before", "settings": ["-"] * len(optimum["variables"]), **_judged(optimum["before"], optimum)}
+    before = {"label": "before", "settings": ["-"] * len(optimum["variables"]), **_judged(optimum["before"])}
     return [before, *(_best_row(item, optimum) for item in optimum["best"])]
 
 
 def _best_row(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, Any]:
     label = f"trial {item['trial']}" + ("" if item["feasible"] else " (breaks a constraint)")
-    return {"label": label, "settings": [shown_value(item["values"][name]) for name in optimum["variables"]], **_judged(item, optimum)}
+    return {"label": label, "settings": [shown_value(item["values"][name]) for name in optimum["variables"]], **_judged(item)}
 
 
-def _judged(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, list[str]]:
-    return {part: [f"{_number(item[part][name]):.4g}" for name in item[part]] for part in ("training", "held_out")}
+def _judged(item: Mapping[str, Any]) -> dict[str, list[str]]:
+    return {part: [_shown_figure(name, value) for name, value in item[part].items()] for part in ("training", "held_out")}
+
+
+def _shown_figure(name: str, value: float | None) -> str:
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{value:.0%}" if name == WALKED else f"{value:.4g}"
 
 
 def _number(value: float | None) -> float:

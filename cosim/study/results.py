@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,8 @@ def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
         fix = "give a folder written by `hexapod study`"
         raise HexapodError("not a study's folder", got=str(folder), expected=f"a folder with {MANIFEST}", fix=fix) from error
     where = str(folder / MANIFEST)
-    return study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"]), manifest
+    study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
+    return replace(study, title=manifest["title"]), manifest  # which is the file's name where the file has none
 
 
 def read_results(folder: Path) -> Results:
