@@ -51,10 +51,11 @@ def test_a_finished_study_is_left_as_it_is_when_started_again(small: Callable[..
 
 
 def test_results_do_not_depend_on_workers_or_chunks(small: Callable[..., Any], tmp_path: Path) -> None:
+    small("none", MANY_RUNS, workers=0)
     small("one", MANY_RUNS, workers=1)
     small("two", MANY_RUNS, workers=2)
     small("slow", MANY_RUNS, workers=2, engine=SLOW)
-    assert digest(tmp_path / "one") == digest(tmp_path / "two")
+    assert digest(tmp_path / "none") == digest(tmp_path / "one") == digest(tmp_path / "two")
     assert rows(tmp_path / "one") == rows(tmp_path / "slow")  # another engine's name is in the manifest and the file's metadata
 
 
@@ -115,7 +116,7 @@ def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena
         write_durably(path, content)
 
     study, folder = study_of(MANY_RUNS), tmp_path / "out"
-    options = Options(engine=FAKE, workers=1, fmu=athena_fmu, write=filling)
+    options = Options(engine=FAKE, workers=0, fmu=athena_fmu, write=filling)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(store_module, "FLUSH_ROWS", 20)
         patch.setattr("hexapod_cosim.cosim.study.conduct.MAX_CHUNK", 10)

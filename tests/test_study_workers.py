@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import signal
-import subprocess
-import sys
-import time
+from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from dask_cluster import lasting_workers, scheduling
 from gains import make_gains
 from studies import KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
+from study_engines import DEATHS_FILE
 
 from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.scenario import load_scenario
@@ -27,40 +25,24 @@ from hexapod_cosim.cosim.study.records import StudyError
 from hexapod_cosim.cosim.study.study import Options, run_study
 from hexapod_cosim.models import load_robot
 
-ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 180.0  # s    for what takes a few on an idle machine
 WALK: dict[str, Any] = {"set": {"duration": 1.2, "gait.period": 0.4}, "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]}}
 
 
-@contextmanager
-def running(*words: str, cwd: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of its own group, gone with all its children when the block ends."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "tests"), "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
-    process = subprocess.Popen(
-        [sys.executable, "-m", *words], cwd=cwd, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )  # fmt: skip
-    try:
-        yield process
-    finally:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+@pytest.fixture(scope="module")
+def deaths(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Where engines say that they end their process."""
+    file = tmp_path_factory.mktemp("deaths") / "deaths.txt"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(DEATHS_FILE, str(file))
+        yield file
 
 
 @pytest.fixture(scope="module")
-def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def scheduler(tmp_path_factory: pytest.TempPathFactory, deaths: Path) -> Iterator[str]:
     """The address of a Dask scheduler with two worker processes on loopback, which are begun anew when they die."""
     folder = tmp_path_factory.mktemp("dask")
-    file = folder / "scheduler.json"
-    common = ("--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file))
-    with (
-        running("distributed.cli.dask_scheduler", "--port", "0", *common, cwd=folder),
-        running("distributed.cli.dask_worker", "--nworkers", "2", "--nthreads", "1", *common, cwd=folder),
-    ):
-        deadline = time.monotonic() + PATIENCE
-        while not file.exists() and time.monotonic() < deadline:
-            time.sleep(0.1)
-        yield str(json.loads(file.read_text())["address"])
+    with scheduling(folder) as (address, _), lasting_workers(address, 2, folder):
+        yield address
 
 
 def test_real_walks_on_a_cluster_are_those_on_this_machine_bit_for_bit(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:
@@ -104,8 +86,9 @@ def _stop_after(runs: int) -> Any:
 
 @pytest.mark.parametrize("cluster", [False, True], ids=["processes", "cluster"])
 def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go_on(
-    athena_fmu: Path, tmp_path: Path, request: pytest.FixtureRequest, cluster: bool
+    athena_fmu: Path, tmp_path: Path, request: pytest.FixtureRequest, deaths: Path, cluster: bool
 ) -> None:
+    deaths.unlink(missing_ok=True)
     place = {"scheduler": request.getfixturevalue("scheduler")} if cluster else {"workers": 2}
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.3, 0.5, 0.13, 0.6]}, "seeds": 2})
     found = run_quietly(study, tmp_path / "out", fmu=athena_fmu, **place)
@@ -114,6 +97,9 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
     assert all(f"{DEATHS} times" in row["reason"] for row in died)
     assert sum(row["walked"] for row in found) == len(found) - 2
     assert [row["run"] for row in found] == list(range(8))
+    counted = Counter(deaths.read_text().splitlines())
+    assert set(counted) == {"kinematic 0", "kinematic 1"}
+    assert set(counted.values()) <= {DEATHS, DEATHS + 1}  # by itself, and once before among others
 
 
 def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.study.study import Begun, Options, run_study
 
 MAX_WORKERS, MOST_REASONS = 4096, 10
 Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes on this machine; default: one for each processor; 1: this one.")
+    int | None, typer.Option("--workers", metavar="N", help="Processes on this machine; default: one for each processor; 0: this one.")
 ]
 Scheduler = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="Run on the workers of this Dask scheduler: tcp://HOST:8786.")
@@ -42,7 +42,7 @@ def study(
     plan = load_study(file)
     folder = output or Path("out") / Path(file).stem
     options = Options(
-        engine=engine, fmu=fmu, gains=given_gains(gains), workers=_checked_workers(workers), scheduler=scheduler,
+        engine=engine, fmu=fmu, gains=given_gains(gains), workers=_checked_workers(workers), scheduler=scheduler, say=warn,
         command=_command_line(file, {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains}),
     )  # fmt: skip
     try:
@@ -69,8 +69,8 @@ def report_on(folder: Path) -> tuple[Results, list[Path]]:
 
 
 def _checked_workers(count: int | None) -> int | None:
-    if count is not None and not 1 <= count <= MAX_WORKERS:
-        raise StudyError("not a number of workers", got=count, expected=f"1 to {MAX_WORKERS}", fix="write --workers 2", where="--workers")
+    if count is not None and not 0 <= count <= MAX_WORKERS:
+        raise StudyError("not a number of workers", got=count, expected=f"0 to {MAX_WORKERS}", fix="write --workers 2", where="--workers")
     return count
 
 

@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.study.columns import row_of
-from hexapod_cosim.cosim.study.crew import DEATHS, Chunk, Crew, Returned
+from hexapod_cosim.cosim.study.crew import DEATHS, IN_FLIGHT, Chunk, Crew, Returned
 from hexapod_cosim.cosim.study.records import Order, Study, StudyError
 from hexapod_cosim.cosim.study.store import Store
 from hexapod_cosim.cosim.study.worker import Done, failed
 
-IN_FLIGHT = 2  # chunks per worker: the next is there when one is done
 CHUNK_TIME = 0.5  # s    of work in a chunk: what a hand-over costs is small beside it, and little is lost with a worker
 MAX_CHUNK = 256
 USELESS = 3 * DEATHS  # deaths in a row, for each worker, without a run between them: it is not the runs
@@ -108,7 +107,7 @@ def _once_more(returned: Returned, done: int) -> list[Chunk]:
     rest = replace(chunk, orders=chunk.orders[done:])
     if not rest.orders:
         return []
-    return replace(rest, deaths=chunk.deaths + 1).parts() if returned.died else [rest]
+    return rest.tried_again() if returned.died else [rest]
 
 
 def missing(done: NDArray[np.bool_]) -> Iterator[int]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from hexapod_cosim.cosim.study.records import Order
 from hexapod_cosim.cosim.study.worker import Done
 
+Say = Callable[[str], None]  # who hears, in words, of what the program waits for or puts right by itself
+
+IN_FLIGHT = 2  # chunks per worker: the next is there when one is done
 DEATHS = 3  # of workers on a run alone, before it is given up
+
+
+def silent(_text: str) -> None:
+    """Nobody hears."""
 
 
 @dataclass(frozen=True)
@@ -17,11 +24,13 @@ class Chunk:
     """Orders that one worker runs in a go."""
 
     orders: tuple[Order, ...]
-    deaths: int = 0  # of workers that had it
+    deaths: int = 0  # of workers that had it, it being a run by itself
+    suspect: bool = False  # a worker died that had it: no other chunk may wait behind it, so that it is known what the next one dies of
 
-    def parts(self) -> list[Chunk]:
+    def tried_again(self) -> list[Chunk]:
         """Each order by itself, after a worker died of one of them."""
-        return [Chunk((order,), self.deaths) for order in self.orders]
+        deaths = self.deaths + 1 if len(self.orders) == 1 else 0
+        return [Chunk((order,), deaths, suspect=True) for order in self.orders]
 
 
 @dataclass(frozen=True)

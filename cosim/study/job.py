@@ -7,11 +7,12 @@ import json
 import platform
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from uuid import uuid4
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.controller_export import export_controller, make_setup
@@ -30,7 +31,9 @@ OF_DESIGN = ("robot", "macro_step", "servo.")  # factors that gains are designed
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """Everything but the orders. Its hash names it."""
+    """Everything but the orders."""
+
+    name: str  # unlike any other's: studies share a cluster's workers
 
     cases: Mapping[str, Case]
     factors: tuple[Factor, ...]
@@ -40,7 +43,6 @@ class Job:
     gains: Gains | None  # of all compliant runs; None: designed by the worker, for each robot and macro-step
     engine: str
     environment: Mapping[str, str]
-    hash: str = field(default="")
 
 
 def make_job(study: Study, *, engine: str, fmu: Path | None = None, gains: Gains | None = None) -> Job:
@@ -55,15 +57,10 @@ def make_job(study: Study, *, engine: str, fmu: Path | None = None, gains: Gains
     names = _robots(study)
     fmus = {name: _fmu(name) if fmu is None else _bytes(fmu) for name in names}
     files = {name: _bytes(Path(name)) for name in names if name not in list_robots()}
-    job = Job(
-        cases=study.cases, factors=study.factors, fmus=fmus, controller=_controller(), robots=files, gains=_gains(study, gains),
-        engine=engine, environment=environment(study),
+    return Job(
+        name=uuid4().hex, cases=study.cases, factors=study.factors, fmus=fmus, controller=_controller(), robots=files,
+        gains=_gains(study, gains), engine=engine, environment=environment(study),
     )  # fmt: skip
-    return Job(**{**_plain(job), "hash": _hash(job)})
-
-
-def _plain(job: Job) -> dict[str, Any]:
-    return {name: getattr(job, name) for name in Job.__dataclass_fields__}
 
 
 def _robots(study: Study) -> list[str]:
@@ -109,21 +106,6 @@ def environment(study: Study | None = None) -> dict[str, str]:
         "hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names},
         "platform": f"{sys.platform} {platform.machine()}",
     }  # fmt: skip
-
-
-def _hash(job: Job) -> str:
-    digest = hashlib.sha256()
-    for part in (_cases(job.cases), [asdict(item) for item in job.factors], None if job.gains is None else asdict(job.gains), job.engine):
-        digest.update(canonical(part))
-    digest.update(job.controller)
-    for files in (job.fmus, job.robots):
-        for name, content in files.items():
-            digest.update(name.encode() + hashlib.sha256(content).digest())
-    return digest.hexdigest()
-
-
-def _cases(cases: Mapping[str, Case]) -> dict[str, Any]:
-    return {name: case.table for name, case in cases.items()}
 
 
 def canonical(content: Any) -> bytes:

@@ -113,7 +113,7 @@ def own_crew(job: Job) -> Iterator[Here]:
     try:
         yield Here(job)
     finally:
-        close_workshop()
+        close_workshop(job.name)
 
 
 @contextmanager
@@ -135,7 +135,7 @@ def _begin(stop: Event, job: Job) -> None:
     global _job  # noqa: PLW0603  the one thing a worker is told beside its orders
     begin_worker(stop)
     _job = job
-    multiprocessing.util.Finalize(None, close_workshop, exitpriority=10)
+    multiprocessing.util.Finalize(None, close_workshop, args=(job.name,), exitpriority=10)
 
 
 def _work(chunk: Chunk) -> list[Done]:

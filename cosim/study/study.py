@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.batch import processors
 from hexapod_cosim.cosim.files import read_json
 from hexapod_cosim.cosim.study.columns import WALL, result_schema, schema_of
 from hexapod_cosim.cosim.study.conduct import Desk, conduct, missing
-from hexapod_cosim.cosim.study.crew import Crew
+from hexapod_cosim.cosim.study.crew import Crew, Say, silent
 from hexapod_cosim.cosim.study.design import Sweep
 from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE
 from hexapod_cosim.cosim.study.job import Job, make_job
@@ -45,10 +45,11 @@ class Options:
     engine: str = DEFAULT_ENGINE
     fmu: Path | None = None
     gains: Gains | None = None
-    workers: int | None = None  # processes; None: one for each processor; 1: this one does it
+    workers: int | None = None  # processes; None: one for each processor; 0: this one does it, and ends with a walk that ends it
     scheduler: str | None = None  # a Dask scheduler's address instead
     command: str = ""
     write: Writer = write_durably
+    say: Say = silent  # e.g. that workers are waited for
 
 
 def run_study(study: Study, folder: Path, *, options: Options, begun: Begun) -> Path:
@@ -94,8 +95,8 @@ def crew_of(job: Job, options: Options, study: Study) -> AbstractContextManager[
     if options.scheduler is not None:
         from hexapod_cosim.cosim.study.cluster import cluster_crew  # noqa: PLC0415  an extra
 
-        return cluster_crew(job, options.scheduler)
-    if options.workers == 1:
+        return cluster_crew(job, options.scheduler, options.say)
+    if options.workers == 0:
         return own_crew(job)
     return local_crew(job, min(options.workers or processors(), count_runs(study)))
 

@@ -134,29 +134,25 @@ def failed(order: Order, reason: str, *, status: str = REFUSED) -> Summary:
     return Summary(control=order.control, seed=order.seed, status=status, reason=reason, metrics=NO_FIGURES)
 
 
-_shop: Workshop | None = None  # of this process: the job it works on
-_shop_hash = ""
+_shops: dict[str, Workshop] = {}  # of this process, by the name of their job; a cluster's worker may serve several studies
 _one_at_a_time = Lock()  # a cluster's worker may have threads; the FMU's loader changes the process' folder
 
 
-def open_workshop(job: Job) -> Workshop:
-    """This process' workshop for a job, kept until it gets another."""
-    global _shop, _shop_hash
-    if _shop is None or _shop_hash != job.hash:
-        close_workshop()
-        _shop, _shop_hash = Workshop(job), job.hash
-    return _shop
-
-
-def close_workshop() -> None:
-    """Takes this process' workshop away."""
-    global _shop  # noqa: PLW0603
-    if _shop is not None:
-        _shop.close()
-        _shop = None
+def close_workshop(job: str) -> None:
+    """Takes this process' workshop of a job away, when nothing is being run."""
+    with _one_at_a_time:
+        shop = _shops.pop(job, None)
+        if shop is not None:
+            shop.close()
 
 
 def work(job: Job, orders: Sequence[Order], progress: Progress) -> list[Done]:
     """Runs orders in this process; fewer come back when it is told to stop."""
     with _one_at_a_time:
-        return list(open_workshop(job).run(orders, progress))
+        try:
+            progress(0.0)
+        except KeyboardInterrupt:
+            return []
+        if job.name not in _shops:
+            _shops[job.name] = Workshop(job)
+        return list(_shops[job.name].run(orders, progress))
