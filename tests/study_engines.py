@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master import COMPLETED, INTERRUPTED, Progress
@@ -57,6 +62,62 @@ class Fake:
 
     def close(self) -> None:
         """Nothing to free."""
+
+
+class SourError(Exception):
+    """What cannot be sent to another process."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.cause = lambda: text
+
+
+MISTAKES: dict[float, Callable[[], object]] = {
+    0.21: lambda: np.linalg.inv(np.zeros((2, 2))),
+    0.22: lambda: np.zeros(2) + np.zeros(3),
+    0.23: lambda: _raise(MemoryError("no more")),
+    0.24: lambda: _raise(SourError(f"nobody can send {object()}")),
+    0.25: lambda: sys.exit("enough"),
+    0.26: lambda: _raise(BadTextError()),
+}
+
+
+class BadTextError(Exception):
+    """What cannot even say what it is."""
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+def _raise(error: Exception) -> None:
+    raise error
+
+
+class Buggy(Fake):
+    """Makes mistakes; each time it is used once after one it says so, which it must not be."""
+
+    broken = False
+
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
+        """As Engine says, but for the mistakes."""
+        assert not self.broken
+        mu = scenario.settings["friction"]["mu"]
+        if mu == 0.27:
+            return "walked"  # type: ignore[return-value]
+        self.broken = mu in MISTAKES
+        MISTAKES.get(mu, lambda: None)()
+        return super().summary(scenario, gains=gains, progress=progress)
+
+
+class Counting(Fake):
+    """Keeps in this process what it was asked."""
+
+    asked: ClassVar[list[tuple[str, int]]] = []
+
+    def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
+        """As Engine says."""
+        self.asked.append((scenario.control, scenario.seed))
+        return super().summary(scenario, gains=gains, progress=progress)
 
 
 class Slow(Fake):

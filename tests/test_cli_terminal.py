@@ -14,6 +14,7 @@ import pytest
 from command import COMMAND, QUICK, Call, assert_refused
 from typer.main import get_command
 
+from hexapod_cosim.cosim.cli import terminal as terminal_module
 from hexapod_cosim.cosim.cli.app import app
 from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
 from hexapod_cosim.cosim.results import NEEDED
@@ -57,8 +58,9 @@ def test_runs_are_counted_with_their_rate_and_in_the_end_their_time(terminal: Ca
     with counting_bar("seeds", 6) as tell:
         tell(2)
         tell(3)
-        tell(6)
+        tell(6, 4)
     shown = screen.getvalue()
+    assert "4 failed" in shown
     assert "6 of 6 runs" in shown
     assert "a minute" in shown
     assert "in 0:0" in shown
@@ -106,6 +108,21 @@ def test_pipes_get_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
         tell(2)
         assert none is None
     assert pipe.getvalue() == ""
+
+
+def test_a_log_gets_a_line_of_progress_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, clock = io.StringIO(), [0.0]
+    monkeypatch.setattr(sys, "stderr", log)
+    monkeypatch.setattr(terminal_module, "monotonic", lambda: clock[0])
+    with counting_bar("runs", 1000, plain=True) as tell:
+        for second, done in enumerate(range(100, 200)):
+            clock[0] = float(second)
+            tell(done, 3)
+    assert log.getvalue().splitlines() == [
+        "runs: 130 of 1000, 60 a minute, 14:30 left, 3 failed",
+        "runs: 160 of 1000, 60 a minute, 14:00 left, 3 failed",
+        "runs: 190 of 1000, 60 a minute, 13:30 left, 3 failed",
+    ]
 
 
 def test_columns_of_a_table_are_aligned(call: Call) -> None:

@@ -14,9 +14,10 @@ import pytest
 from dask_cluster import lasting_workers, scheduling
 from gains import make_gains
 from studies import KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
-from study_engines import DEATHS_FILE
+from study_engines import DEATHS_FILE, Counting
 
 from hexapod_cosim.cosim.batch import run_batch
+from hexapod_cosim.cosim.master import FAILED
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.study.columns import FIGURES
 from hexapod_cosim.cosim.study.conduct import DEAD
@@ -140,3 +141,38 @@ def test_a_worker_with_other_versions_is_refused(athena_fmu: Path, tmp_path: Pat
     monkeypatch.setattr("hexapod_cosim.cosim.study.job.package_version", lambda: "9.9")  # here, not in the worker
     with pytest.raises(StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"):
         run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu, workers=2)
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(athena_fmu: Path, tmp_path: Path, workers: int) -> None:
+    mistakes = {
+        0.21: "LinAlgError: Singular matrix",
+        0.22: "ValueError: operands could not be broadcast",
+        0.23: "MemoryError: no more",
+        0.24: "SourError: nobody can send <object object at 0x...>",
+        0.25: "SystemExit: enough",
+        0.26: "BadTextError: it cannot say what",
+        0.27: "TypeError: the engine gave str, expected a Summary",
+    }
+    study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *mistakes, 0.5]}})
+    first, *bad, last = run_quietly(study, tmp_path / "out", engine="study_engines:Buggy", fmu=athena_fmu, workers=workers)
+    assert first["walked"]
+    assert last["walked"]
+    for row, expected in zip(bad, mistakes.values(), strict=True):
+        assert row["status"] == FAILED
+        assert row["reason"].startswith(expected)
+        assert row["slip_per_metre"] is None
+    assert "(study_engines.py, line" in bad[2]["reason"]
+
+
+def test_a_run_that_was_made_before_is_not_made_again(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    table = {"seeds": 2, "factors": {"gains.slip.kp": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]}}
+    options = {"engine": "study_engines:Counting", "fmu": athena_fmu, "gains": make_gains(load_robot("athena"))}
+    kept = run_quietly(study_of(table), tmp_path / "kept", **options)
+    assert Counter(control for control, _ in Counting.asked) == {"kinematic": 2 * 2, "compliant": 3 * 2 * 2}
+    Counting.asked.clear()
+    monkeypatch.setattr("hexapod_cosim.cosim.study.worker.MOST_KNOWN", 0)
+    assert run_quietly(study_of(table), tmp_path / "made", **options) == kept
+    assert len(Counting.asked) == 24
+    assert digest(tmp_path / "kept") == digest(tmp_path / "made")
+    assert len({row["slip_per_metre"] for row in kept}) == 4 + 12

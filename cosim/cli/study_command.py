@@ -46,18 +46,33 @@ def study(
         command=_command_line(file, {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains}),
     )  # fmt: skip
     try:
-        with progress() as begun:
+        with progress(plain=not json) as begun:
             results = run_study(plan, folder, options=options, begun=begun)
     except KeyboardInterrupt:
         warn(f"stopped; what was run is in {folder}, and the same command goes on from there")
         raise
     found, files = report_on(folder)
+    for text in hopeless(found):
+        warn(text)
     if json:
         show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
         return
     show_study(found)
     show_files([results, folder / TIMES, *files])
     print(f"report: {files[-1]}")
+
+
+def hopeless(found: Results) -> list[str]:
+    """Controls under which no run at all walked to its end, and why."""
+    texts = []
+    for control, total in found.overall.total.items():
+        if total and not found.overall.walked.get(control, 0):
+            reasons = [(count, *key[1:]) for key, count in found.overall.failures.items() if key[0] == control]
+            count, status, reason = reasons[0]
+            alike = "all" if len(reasons) == 1 else f"{count} of them"
+            how = "fell" if status == COMPLETED else status
+            texts.append(f"none of {total} {control} runs walked to its end; {alike} {how}: {reason}")
+    return texts
 
 
 def report_on(folder: Path) -> tuple[Results, list[Path]]:
@@ -80,21 +95,21 @@ def _command_line(file: str, options: Mapping[str, object]) -> str:
 
 
 @contextmanager
-def progress() -> Iterator[Begun]:
-    """A bar with rate and estimate on a terminal, from when it is known how many runs there are; silent elsewhere."""
+def progress(*, plain: bool) -> Iterator[Begun]:
+    """A bar with rate, estimate and failures on a terminal, `plain` lines elsewhere, from when it is known how many runs there are."""
     with ExitStack() as shown:
 
         def begun(total: int, done: int) -> Tell:
             if done:
                 print(f"goes on: {done} of {total} runs are there already", file=sys.stderr)
-            show = shown.enter_context(counting_bar("runs", total))
-            show(done)
-            count = done
+            show = shown.enter_context(counting_bar("runs", total, plain=plain))
+            show(done, 0)
+            count, failed = done, 0
 
-            def tell(more: int, _lost: int) -> None:
-                nonlocal count
-                count += more
-                show(count)
+            def tell(more: int, lost: int) -> None:
+                nonlocal count, failed
+                count, failed = count + more, failed + lost
+                show(count, failed)
 
             return tell
 

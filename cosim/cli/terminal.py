@@ -7,7 +7,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from time import monotonic
+from typing import Annotated, Any, Protocol
 
 import typer
 from rich.console import Console
@@ -17,6 +18,8 @@ from rich.text import Text
 
 from hexapod_cosim.cosim import master
 from hexapod_cosim.cosim.files import to_json
+
+EVERY = 30.0  # s    between lines of progress in a log
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 
@@ -75,11 +78,12 @@ class _Simulated(ProgressColumn):
 
 
 class _Counted(ProgressColumn):
-    """How many of how many runs, and how many a minute since the count began; `already` were there then."""
+    """How many of how many runs, how many a minute since the count began, `already` being there then, and how many failed."""
 
     def render(self, task: Task) -> Text:
         rate = f"{60.0 * _rate(task):4.0f} a minute" if _rate(task) else ""
-        return Text(f"{task.completed:.0f} of {task.total:.0f} runs  {rate}")
+        failed = f"  {task.fields['failed']} failed" if task.fields.get("failed") else ""
+        return Text(f"{task.completed:.0f} of {task.total:.0f} runs  {rate}{failed}")
 
 
 class _Left(ProgressColumn):
@@ -107,17 +111,17 @@ def _clock(seconds: float) -> str:
 
 
 @contextmanager
-def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[[float], None]]:
+def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[..., None]]:
     """A progress bar that moves to and fro until it is told for the first time how much is done, and counts from there."""
     columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left())
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total, start=False, already=0.0)
 
-        def tell(done: float) -> None:
+        def tell(done: float, failed: int = 0) -> None:
             if bar.tasks[0].start_time is None:
                 bar.start_task(task)
                 bar.update(task, already=done)
-            bar.update(task, completed=done)
+            bar.update(task, completed=done, failed=failed)
 
         yield tell
 
@@ -132,11 +136,36 @@ def progress_bar(label: str, duration: float) -> Iterator[master.Progress | None
         yield tell
 
 
+class Count(Protocol):
+    """Told how many runs are done, and how many of them, since it was first told, failed."""
+
+    def __call__(self, done: int, failed: int = 0) -> None: ...
+
+
 @contextmanager
-def counting_bar(label: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A progress bar over a number of runs, told how many are done; silent where there is no terminal."""
+def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Count]:
+    """A progress bar over a number of runs; where there is no terminal nothing, or a line now and then when `plain`."""
     if not sys.stderr.isatty():
-        yield lambda _done: None
+        yield _PlainCount(label, total) if plain else lambda done, failed=0: None
         return
     with _bar(label, total, _Counted()) as tell:
         yield tell
+
+
+class _PlainCount:
+    """Lines for a log."""
+
+    def __init__(self, label: str, total: int) -> None:
+        self._label, self._total = label, total
+        self._begun = self._told = monotonic()
+        self._already: int | None = None
+
+    def __call__(self, done: int, failed: int = 0) -> None:
+        now = monotonic()
+        if self._already is None:
+            self._already, self._begun, self._told = done, now, now
+        elif now - self._told >= EVERY:
+            self._told = now
+            rate = (done - self._already) / (now - self._begun)
+            left = f", {_clock((self._total - done) / rate)} left" if rate else ""
+            print(f"{self._label}: {done} of {self._total}, {60.0 * rate:.0f} a minute{left}, {failed} failed", file=sys.stderr, flush=True)

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table
 from hexapod_cosim.cosim.study.engines import engine_named
-from hexapod_cosim.cosim.study.records import Case, Factor, Order, Study, Value
+from hexapod_cosim.cosim.study.records import Case, Factor, Order, Study, StudyError, Value
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
 CONTROLLER_PERIOD = 0.005  # s    of the FMU as packed, like all its parameters; a run has its own
@@ -55,6 +55,9 @@ def make_job(study: Study, *, engine: str, fmu: Path | None = None, gains: Gains
     """
     engine_named(engine)  # not first in a worker
     names = _robots(study)
+    if fmu is not None and len(names) > 1:
+        fix = "leave --fmu out: each robot's is exported; or split the study by robots"
+        raise StudyError("one FMU for several robots", got=", ".join(names), expected="a single robot", fix=fix, where="--fmu")
     fmus = {name: _fmu(name) if fmu is None else _bytes(fmu) for name in names}
     files = {name: _bytes(Path(name)) for name in names if name not in list_robots()}
     return Job(

@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import re
+import traceback
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from threading import Lock
 from time import perf_counter
 from typing import Any
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.master import INTERRUPTED, Progress
+from hexapod_cosim.cosim.master import FAILED, INTERRUPTED, Progress
+from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.study.engines import Engine, engine_named
-from hexapod_cosim.cosim.study.job import Job, environment, settings_of
+from hexapod_cosim.cosim.study.job import Job, canonical, environment, settings_of
 from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, Factor, Order, StudyError, Value
 from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.models import HexapodError
 
 MOST_DESIGNS = 64  # sets of gains a worker keeps
+MOST_KNOWN = 4096  # summaries a worker keeps: some 10 MB
+MOST_TEXT = 400  # characters of what an exception says
+ADDRESS = re.compile(r"0x[0-9a-fA-F]+")  # of an object in memory: another one each time
 
 
 @dataclass(frozen=True)
@@ -44,16 +51,20 @@ class Workshop:
         if differences:
             fix = "install the same versions on all machines of the cluster"
             raise StudyError("this worker is not like the machine that sends the study", got="; ".join(differences), fix=fix)
-        self._job, self._folder = job, TemporaryDirectory(prefix="hexapod-job-")
+        self._job, self._folder = job, _folder()
         self._files = {name: self._unpack(f"robot{k}", Path(name).suffix, data) for k, (name, data) in enumerate(job.robots.items())}
         self._fmus = {name: self._unpack(f"fmu{k}", ".fmu", data) for k, (name, data) in enumerate(job.fmus.items())}
         self._controller = self._unpack("controller", ".fmu", job.controller)
         self._engines: dict[str, Engine] = {}
         self._designs: OrderedDict[tuple[str, float], Gains] = OrderedDict()
+        self._known: OrderedDict[bytes, Summary] = OrderedDict()
 
     def _unpack(self, name: str, suffix: str, content: bytes) -> Path:
         path = Path(self._folder.name) / f"{name}{suffix}"
-        path.write_bytes(content)
+        try:
+            path.write_bytes(content)
+        except OSError as error:
+            raise _no_room(error, self._folder.name) from error
         return path
 
     def run(self, orders: Sequence[Order], progress: Progress) -> Iterator[Done]:
@@ -66,14 +77,31 @@ class Workshop:
             yield Done(order, summary, perf_counter() - begin)
 
     def _summary(self, order: Order, progress: Progress) -> Summary:
+        """What a run came to, whatever happens; a run that was made before is not made again."""
+        key = effective(order, self._job.factors)
+        if key in self._known:
+            self._known.move_to_end(key)
+            return self._known[key]
         try:
-            scenario = self._scenario(order)
-            robot = scenario.robot
-            scenario = replace(scenario, robot=str(self._files.get(robot, robot)))
-            gains = self._gains(scenario, order)
-            return self._portable(self._engine(robot).summary(scenario, gains=gains, progress=progress))
+            summary = checked(self._walked(order, progress))
         except HexapodError as error:
             return self._portable(failed(order, str(error)))
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # a mistake in an engine, or no memory: this run's result, not the study's end
+            self._drop_engines()
+            return self._portable(failed(order, told(error), status=FAILED))
+        if summary.status != INTERRUPTED:
+            self._known[key] = self._portable(summary)
+            if len(self._known) > MOST_KNOWN:
+                self._known.popitem(last=False)
+        return self._portable(summary)
+
+    def _walked(self, order: Order, progress: Progress) -> Summary:
+        scenario = self._scenario(order)
+        robot = scenario.robot
+        scenario = replace(scenario, robot=str(self._files.get(robot, robot)))
+        return self._engine(robot).summary(scenario, gains=self._gains(scenario, order), progress=progress)
 
     def _portable(self, summary: Summary) -> Summary:
         """Without the place where this process unpacked the job."""
@@ -111,11 +139,60 @@ class Workshop:
             self._engines[robot] = engine_named(self._job.engine)(self._fmus[robot], self._controller)
         return self._engines[robot]
 
+    def _drop_engines(self) -> None:
+        """They begin anew: who knows how an exception left them."""
+        for engine in self._engines.values():
+            with suppress(Exception):
+                engine.close()
+        self._engines.clear()
+
     def close(self) -> None:
         """Takes away what was unpacked."""
-        for engine in self._engines.values():
-            engine.close()
+        self._drop_engines()
         self._folder.cleanup()
+
+
+def _folder() -> TemporaryDirectory[str]:
+    try:
+        return TemporaryDirectory(prefix="hexapod-job-")
+    except OSError as error:
+        raise _no_room(error, gettempdir()) from error
+
+
+def _no_room(error: OSError, where: str) -> StudyError:
+    fix = "make room there, or name another folder with TMPDIR"
+    return StudyError("a worker cannot unpack its job", got=error.strerror, expected="room for temporary files", fix=fix, where=where)
+
+
+def effective(order: Order, factors: Sequence[Factor]) -> bytes:
+    """All that a run depends on: kinematic control has no gains."""
+    settings = {
+        factor.name: value
+        for factor, value in settings_of(order, factors)
+        if order.control != "kinematic" or not factor.name.startswith(GAINS)
+    }
+    return canonical([order.case, settings, order.seed, order.control])
+
+
+def checked(summary: Summary) -> Summary:
+    """What an engine gave, if it can be stored. Raises TypeError, ValueError, KeyError."""
+    if not isinstance(summary, Summary):
+        raise TypeError(f"the engine gave {type(summary).__name__}, expected a Summary")
+    fallback = None if summary.fallback is None else float(summary.fallback)
+    return replace(
+        summary, status=str(summary.status), reason=str(summary.reason), upright=bool(summary.upright), fallback=fallback,
+        warnings=tuple(map(str, summary.warnings)), metrics={name: float(summary.metrics[name]) for name in METRICS},
+    )  # fmt: skip
+
+
+def told(error: BaseException) -> str:
+    """An exception's kind, text and place, the same on every machine."""
+    try:
+        text = ADDRESS.sub("0x...", str(error))
+    except Exception:
+        text = "it cannot say what"
+    *_, last = traceback.extract_tb(error.__traceback__)
+    return f"{type(error).__name__}: {text[:MOST_TEXT]} ({Path(last.filename).name}, line {last.lineno})"
 
 
 def changed_gains(gains: Gains, settings: Sequence[tuple[Factor, Value]]) -> Gains:
