@@ -9,7 +9,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -221,7 +223,17 @@ def test_a_folder_of_something_else_is_refused(small: Callable[..., Any], tmp_pa
 
 
 def test_two_processes_do_not_share_a_folder(small: Callable[..., Any], tmp_path: Path) -> None:
-    if sys.platform == "win32":
-        pytest.skip("nothing is locked there")
     with locked(tmp_path / "out"), pytest.raises(StudyError, match="another process runs a study into this folder"):
         small()
+    small()
+
+
+@pytest.mark.parametrize("held", [True, False], ids=["held", "no-locks-there"])
+def test_windows_has_its_own_lock(held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def locking(_file: int, _mode: int, _size: int) -> None:
+        raise OSError(errno.EACCES if held else errno.ENOTSUP, "no")
+
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(StudyError, match="another process") if held else nullcontext(), locked(tmp_path):
+        pass

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, STUDY, not_writable, read_json, to_json
 from hexapod_cosim.cosim.study.job import Job
@@ -19,6 +21,7 @@ MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "result
 COMPLETED = "completed"
 FORMAT = 1
 OF_FILE = "hexapod."  # keys of a file's metadata
+HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what asking for a lock says that another has
 MOST_NAMED = 6  # differences in a message
 
 
@@ -121,13 +124,21 @@ def locked(folder: Path) -> Iterator[None]:
         raise not_writable(folder, error) from error
     with file:
         try:
-            import fcntl  # noqa: PLC0415  not on Windows, where nothing is locked
-        except ImportError:
-            pass
-        else:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
+            _lock(file)
+        except OSError as error:
+            if error.errno in HELD:
                 fix = "wait for it, or choose another with -o"
                 raise StudyError("another process runs a study into this folder", fix=fix, where=str(folder)) from error
         yield
+
+
+def _lock(file: TextIO) -> None:
+    """Until the file is closed or the process ends. Raises OSError: one of HELD when another has it, others where there are no locks."""
+    if sys.platform == "win32":
+        import msvcrt  # noqa: PLC0415
+
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl  # noqa: PLC0415
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
