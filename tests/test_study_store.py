@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.study import store as store_module
 from hexapod_cosim.cosim.study.columns import FIGURES, result_schema, schema_of
 from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS, locked
 from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.results import read_results
 from hexapod_cosim.cosim.study.store import MANY, Store, write_durably, write_whole
 from hexapod_cosim.cosim.study.study import Options, run_study
 
@@ -97,14 +98,15 @@ def test_a_study_killed_twice_and_completed_is_the_uninterrupted_one(athena_fmu:
         process.wait()
         assert least <= stored_runs(killed) < 600
     kept = {path.name: path.read_bytes() for path in (killed / RUNS).glob("*.parquet")}
-    (killed / RUNS / ".part-99999999.parquet.new").write_bytes(b"half a part")
+    (killed / RUNS / ".part-99999999.parquet.12345678.new").write_bytes(b"half a part")
+    (killed / ".results.parquet.12345678.new").write_bytes(b"half a file")
     for folder in (killed, whole):
         process = command(folder, athena_fmu, study=file)
         _, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, err
     assert digest(killed) == digest(whole)
     assert {name: (killed / RUNS / name).read_bytes() for name in kept} == kept
-    assert not list((killed / RUNS).glob(".*"))
+    assert not list(killed.rglob(".*.new"))
     assert len(rows(whole)) == 600
 
 
@@ -135,11 +137,13 @@ def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena
 def test_a_file_that_does_not_fit_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place = tmp_path / "results.parquet"
     place.write_bytes(b"old")
-    (tmp_path / ".results.parquet.new").symlink_to("/dev/full")
+    unfinished = tmp_path / ".results.parquet.new"
+    monkeypatch.setattr(store_module, "_unfinished", lambda _path: unfinished)
+    unfinished.symlink_to("/dev/full")
     with pytest.raises(StudyError, match="the disk is full"):
         write_durably(place, b"new" * 100_000)
     assert place.read_bytes() == b"old"
-    (tmp_path / ".results.parquet.new").symlink_to("/dev/full")
+    unfinished.symlink_to("/dev/full")
     table = pa.table({"run": np.arange(1_000_000)})
     with pytest.raises(StudyError, match="the disk is full"):
         write_whole(place, [table], table.schema)
@@ -147,16 +151,87 @@ def test_a_file_that_does_not_fit_leaves_the_old_one(tmp_path: Path, monkeypatch
     assert [path.name for path in tmp_path.iterdir()] == ["results.parquet"]
 
 
-def test_a_damaged_part_is_named_and_without_it_its_runs_are_run_again(small: Callable[..., Any], tmp_path: Path) -> None:
+def cut(content: bytes) -> bytes:
+    return content[: len(content) // 2]
+
+
+def flipped(content: bytes) -> bytes:
+    place = len(content) // 3
+    return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+
+
+@pytest.mark.parametrize(
+    "damage", [cut, flipped, lambda _: b"", lambda _: b"PAR1 garbage PAR1"], ids=["cut", "flipped", "empty", "garbage"]
+)
+def test_a_damaged_part_is_set_aside_and_its_runs_are_run_again(
+    small: Callable[..., Any], tmp_path: Path, damage: Callable[[bytes], bytes]
+) -> None:
+    small()
+    first, said = digest(tmp_path / "out"), list[str]()
+    (part,) = (tmp_path / "out" / RUNS).glob("*.parquet")
+    content = damage(part.read_bytes())
+    part.write_bytes(content)
+    with pytest.raises(StudyError, match=rf"{part.name}: a damaged part.*start the study again"):
+        read_results(tmp_path / "out")
+    small(say=said.append)
+    assert digest(tmp_path / "out") == first
+    assert part.with_name(part.name + ".damaged").read_bytes() == content
+    assert [f"{part.name}: a damaged part" in text for text in said] == [True]
+    small(say=said.append)
+    assert len(said) == 1
+
+
+def test_a_part_of_another_study_is_set_aside(small: Callable[..., Any], tmp_path: Path) -> None:
     small()
     first = digest(tmp_path / "out")
-    part = next((tmp_path / "out" / RUNS).glob("*.parquet"))
-    part.write_bytes(part.read_bytes()[:-10])
-    with pytest.raises(StudyError, match=rf"{part.name}: a damaged part.*delete it"):
-        small()
-    part.unlink()
+    small("columns", {**SMALL, "factors": {"friction.mu": [0.3], "command.vx": [0.05]}})
+    small("more", {**SMALL, "seeds": 9})
+    for other in ("columns", "more"):
+        (part,) = (tmp_path / other / RUNS).glob("*.parquet")
+        said: list[str] = []
+        (tmp_path / "out" / RUNS / part.name).write_bytes(part.read_bytes())
+        small(say=said.append)
+        assert digest(tmp_path / "out") == first
+        assert len(said) == 1
+
+
+def test_what_is_not_a_part_is_left_alone(small: Callable[..., Any], tmp_path: Path) -> None:
+    small()
+    first = digest(tmp_path / "out")
+    (tmp_path / "out" / RUNS / "part-mine.parquet").write_bytes(b"mine")
     small()
     assert digest(tmp_path / "out") == first
+    assert (tmp_path / "out" / RUNS / "part-mine.parquet").read_bytes() == b"mine"
+
+
+def test_a_reader_finds_every_run_while_parts_are_put_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 10)
+    monkeypatch.setattr(store_module, "MANY", 4)
+    schema = schema_of(study_of())
+    writer, reader = Store(tmp_path / RUNS, schema), Store(tmp_path / RUNS, schema)
+    writer.prepare(100)
+    for first in (0, 20, 40):
+        writer.add(rows_from(schema, list(range(first, first + 20))))
+        writer.flush()
+    found: list[int] = []
+    for block, table in enumerate(reader.sorted_rows()):
+        found += table["run"].to_pylist()
+        if block == 1:  # the three parts become one
+            writer.add(rows_from(schema, [60, 61]))
+            writer.flush()
+            assert len(writer.parts()) == 1
+    assert found == list(range(62))
+
+
+def test_files_that_others_may_write_just_now_are_left_alone_for_a_while(small: Callable[..., Any], tmp_path: Path) -> None:
+    small()
+    young, old = (tmp_path / "out" / f".summary.json.{name}.new" for name in ("12345678", "87654321"))
+    for path in (young, old):
+        path.touch()
+    os.utime(old, (0.0, 0.0))
+    small()
+    assert young.exists()
+    assert not old.exists()
 
 
 def rows_from(schema: pa.Schema, runs: list[int]) -> list[dict[str, Any]]:
@@ -167,7 +242,7 @@ def rows_from(schema: pa.Schema, runs: list[int]) -> list[dict[str, Any]]:
 def test_many_parts_become_one_and_a_run_in_two_parts_counts_once(tmp_path: Path) -> None:
     schema = schema_of(study_of())
     store = Store(tmp_path / RUNS, schema)
-    store.prepare()
+    store.prepare(3 * MANY)
     numbers = np.random.default_rng(0).permutation(3 * MANY).tolist()
     for run in numbers:
         store.add(rows_from(schema, [run]))
@@ -185,7 +260,7 @@ def test_sorting_goes_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 10)
     schema = schema_of(study_of())
     store = Store(tmp_path / RUNS, schema)
-    store.prepare()
+    store.prepare(26)
     for part in ([25, 3, 11], [4, 19, 3], [12]):
         store.add(rows_from(schema, part))
         store.flush()

@@ -6,16 +6,17 @@ import errno
 import hashlib
 import json
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
+from time import time
 from typing import Any, TextIO
 
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, STUDY, not_writable, read_json, to_json
 from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.records import Study, StudyError
-from hexapod_cosim.cosim.study.store import write_durably
+from hexapod_cosim.cosim.study.store import LEFTOVERS, write_durably
 
 MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "results.parquet", "times.parquet"
 COMPLETED = "completed"
@@ -23,6 +24,7 @@ FORMAT = 1
 OF_FILE = "hexapod."  # keys of a file's metadata
 HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what asking for a lock says that another has
 MOST_NAMED = 6  # differences in a message
+WHILE = 600.0  # s    after which nobody is writing a file any more
 
 
 def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
@@ -70,7 +72,7 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
         _compare(read_json(folder / MANIFEST), json.loads(to_json(manifest)), folder)
         return
     try:
-        entries = sorted(entry.name for entry in folder.iterdir() if entry.name not in (LOCK, f".{MANIFEST}.new", f".{RUN_FILE}.new"))
+        entries = sorted(entry.name for entry in folder.iterdir() if entry.name != LOCK and not entry.match(LEFTOVERS))
     except OSError as error:
         raise not_writable(folder, error) from error
     if entries and entries != [RUN_FILE]:
@@ -78,6 +80,14 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
         raise StudyError("the folder holds other files", got=entries[0], expected=expected, fix="choose another with -o", where=str(folder))
     write_durably(folder / RUN_FILE, _text({"kind": STUDY, "status": RUNNING, "title": manifest["title"], "command": command}))
     write_durably(folder / MANIFEST, _text(manifest))
+
+
+def clear_leftovers(folder: Path, *, shared: Sequence[str]) -> None:
+    """Takes half-written files of killed processes away; of `shared` files, which others may write just now, after a while."""
+    for left in folder.glob(LEFTOVERS):
+        with suppress(OSError):
+            if not left.name.startswith(tuple(f".{name}." for name in shared)) or time() - left.stat().st_mtime > WHILE:
+                left.unlink()
 
 
 def finish_folder(folder: Path) -> None:

@@ -25,6 +25,7 @@ from hexapod_cosim.cosim.study.manifest import (
     RUNS,
     TIMES,
     begin_folder,
+    clear_leftovers,
     finish_folder,
     locked,
     manifest_of,
@@ -33,6 +34,7 @@ from hexapod_cosim.cosim.study.manifest import (
 from hexapod_cosim.cosim.study.optimise import Optimisation, optimise
 from hexapod_cosim.cosim.study.pool import local_crew, own_crew
 from hexapod_cosim.cosim.study.records import Study
+from hexapod_cosim.cosim.study.results import POINTS, SUMMARY
 from hexapod_cosim.cosim.study.store import Store, Writer, write_durably, write_whole
 
 Begun = Callable[[int, int], Callable[[int, int], None]]  # runs in all, of them done already -> who is told of progress
@@ -60,8 +62,9 @@ def run_study(study: Study, folder: Path, *, options: Options, begun: Begun) -> 
     with locked(folder):
         job = make_job(study, engine=options.engine, fmu=options.fmu, gains=options.gains)
         begin_folder(folder, manifest_of(study, job, runs=count_runs(study)), command=options.command)
+        clear_leftovers(folder, shared=(POINTS, SUMMARY))
         store = Store(folder / RUNS, schema_of(study), write=options.write)
-        store.prepare()
+        store.prepare(count_runs(study), say=options.say)
         if study.optimise is None:
             _sweep(study, store, job, options, begun)
         else:
