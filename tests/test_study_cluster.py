@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -15,6 +16,7 @@ from typing import Any
 import pytest
 from command import COMMAND
 from dask_cluster import PATIENCE, ROOT, kill, lasting_workers, mortal_workers, scheduling
+from distributed import Client
 from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
 
 from hexapod_cosim.cosim.study import cluster
@@ -22,10 +24,13 @@ from hexapod_cosim.cosim.study.cluster_worker import work_here
 from hexapod_cosim.cosim.study.crew import Chunk
 from hexapod_cosim.cosim.study.design import Sweep
 from hexapod_cosim.cosim.study.job import make_job
+from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.study.records import StudyError
 from hexapod_cosim.cosim.study.study import Options, run_study
+from hexapod_cosim.cosim.toml_text import to_toml
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 60, "factors": {"friction.mu": [0.3, 0.5]}}
+REAL: dict[str, Any] = {**KINEMATIC, "seeds": 100, "set": {"duration": 0.6}, "factors": {"friction.mu": [0.3, 0.4, 0.5]}}
 SHORT = 3.0  # s    without workers, in place of a minute
 
 
@@ -123,6 +128,28 @@ def test_ctrl_c_is_heard_while_workers_are_waited_for(scheduler: str, athena_fmu
     assert "no workers" in told
     assert "stopped; what was run is in" in err
     assert process.returncode == 130
+
+
+def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_order(
+    athena_fmu: Path, tmp_path: Path, scheduler: str
+) -> None:
+    file, folder = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text(to_toml(REAL))
+    words = [*COMMAND, "study", str(file), "-o", str(folder), "--fmu", str(athena_fmu), "--scheduler", scheduler]
+    with lasting_workers(scheduler, 2, tmp_path):
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        deadline = time.monotonic() + PATIENCE
+        while not list(folder.glob("runs/*.parquet")) and time.monotonic() < deadline and process.poll() is None:
+            time.sleep(0.02)
+        kill(process)
+        assert not (folder / "results.parquet").exists()
+        study, options = load_study(str(file)), {"engine": "compiled", "fmu": athena_fmu}
+        run_quietly(study, folder, scheduler=scheduler, **options)
+        with Client(scheduler, set_as_default=False) as client:
+            left = client.run_on_scheduler(lambda dask_scheduler: list(dask_scheduler.worker_plugins))
+        assert not [name for name in left if name.startswith(cluster.OURS)]
+    run_quietly(study, tmp_path / "alone", **options)
+    assert digest(folder) == digest(tmp_path / "alone")
 
 
 def test_studies_that_share_a_cluster_do_not_disturb_each_other(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:

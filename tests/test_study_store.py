@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from studies import FAKE, KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quiet
 from hexapod_cosim.cosim.study import store as store_module
 from hexapod_cosim.cosim.study.columns import FIGURES, result_schema, schema_of
 from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS, locked
+from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.study.records import StudyError
 from hexapod_cosim.cosim.study.results import read_results
 from hexapod_cosim.cosim.study.store import MANY, Store, write_durably, write_whole
@@ -73,41 +75,44 @@ def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[
     assert not {"wall", "realtime_factor"} & set(walked)
 
 
+REAL = 'controls = ["kinematic"]\nseeds = 20\n[set]\nduration = 0.4\n[factors]\nfriction.mu = {linspace = [0.3, 0.9, 20]}\n'
+REAL_RUNS = 400
+
+
 def command(folder: Path, fmu: Path, *more: str, study: Path) -> subprocess.Popen[str]:
-    words = [*COMMAND, "study", str(study), "-o", str(folder), "--engine", SLOW, "--fmu", str(fmu), "--workers", "2", *more]
-    return subprocess.Popen(
-        words, cwd=ROOT, env={**os.environ, "PYTHONPATH": "tests"}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        start_new_session=True,
-    )  # fmt: skip
+    words = [*COMMAND, "study", str(study), "-o", str(folder), "--fmu", str(fmu), "--workers", "2", *more]
+    return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True)
 
 
 def stored_runs(folder: Path) -> int:
     return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / RUNS).glob("*.parquet"))
 
 
-def test_a_study_killed_twice_and_completed_is_the_uninterrupted_one(athena_fmu: Path, tmp_path: Path) -> None:
+def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupted_ones(athena_fmu: Path, tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    file.write_text('controls = ["kinematic"]\nseeds = 30\n[factors]\nfriction.mu = {linspace = [0.3, 0.9, 20]}\n')
+    file.write_text(REAL)
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    for least in (1, 200):
+    for least in (1, 150):
         process = command(killed, athena_fmu, study=file)
         deadline = time.monotonic() + PATIENCE
         while stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None:
             time.sleep(0.02)
+        time.sleep(random.uniform(0.0, 0.3))
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        assert least <= stored_runs(killed) < 600
+        assert least <= stored_runs(killed) < REAL_RUNS
     kept = {path.name: path.read_bytes() for path in (killed / RUNS).glob("*.parquet")}
     (killed / RUNS / ".part-99999999.parquet.12345678.new").write_bytes(b"half a part")
     (killed / ".results.parquet.12345678.new").write_bytes(b"half a file")
-    for folder in (killed, whole):
-        process = command(folder, athena_fmu, study=file)
-        _, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, err
+    process = command(killed, athena_fmu, study=file)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, err
+    run_quietly(load_study(str(file)), whole, fmu=athena_fmu, engine="compiled")
     assert digest(killed) == digest(whole)
     assert {name: (killed / RUNS / name).read_bytes() for name in kept} == kept
     assert not list(killed.rglob(".*.new"))
-    assert len(rows(whole)) == 600
+    assert len(rows(whole)) == REAL_RUNS
+    assert all(row["status"] == "completed" for row in rows(whole))
 
 
 def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena_fmu: Path, tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ CONNECT = "10s"  # until a scheduler that does not answer is given up
 PATIENCE = 60.0  # s    without any worker, until the study stops
 LOOK = 1.0  # s    between looks at who is there; the scheduler also tells, but a message may be lost
 FETCH = 5.0  # s    for a chunk's results to travel, until it is looked at whether their worker is still there
+OURS = "hexapod-"  # begins the names of jobs, which their client's ends
 DIED = "its worker of the cluster died"
 AGAIN = "start the study again when it is back: it goes on, all runs stored so far are kept"
 
@@ -196,9 +197,11 @@ def no_workers(address: str) -> StudyError:
 @contextmanager
 def cluster_crew(job: Job, address: str, say: Say) -> Iterator[Cluster]:
     """The workers behind a scheduler's address. Raises StudyError when there are none."""
-    client, name = _connect(address), f"hexapod-{job.name}"
+    client = _connect(address)
+    name = f"{OURS}{client.id}"
     with ExitStack() as opened:
         opened.callback(_quietly, client.close, timeout=5)
+        _quietly(client.run_on_scheduler, _left_behind())
         opened.callback(_while_there, client, client.unregister_worker_plugin, name)
         try:
             client.register_plugin(job_plugin(job), name=name)
@@ -207,6 +210,18 @@ def cluster_crew(job: Job, address: str, say: Say) -> Iterator[Cluster]:
         crew = Cluster(client, job, say)
         opened.callback(_while_there, client, crew.close)
         yield crew
+
+
+def _left_behind() -> Callable[..., Any]:
+    """What takes the jobs of studies that were killed off the cluster; a function within, to travel by value."""
+    ours = OURS
+
+    async def clear(dask_scheduler: Any) -> None:
+        for name in list(dask_scheduler.worker_plugins):
+            if name.startswith(ours) and name.removeprefix(ours) not in dask_scheduler.clients:
+                await dask_scheduler.unregister_worker_plugin(comm=None, name=name)
+
+    return clear
 
 
 def _while_there(client: Any, act: Callable[..., Any], *arguments: Any) -> None:
