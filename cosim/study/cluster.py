@@ -25,6 +25,7 @@ CONNECT = "10s"  # until a scheduler that does not answer is given up
 PATIENCE = 60.0  # s    without any worker, until the study stops
 LOOK = 1.0  # s    between looks at who is there; the scheduler also tells, but a message may be lost
 FETCH = 5.0  # s    for a chunk's results to travel, until it is looked at whether their worker is still there
+COME_AND_GO = ("add-worker", "remove-worker")
 OURS = "hexapod-"  # begins the names of jobs, which their client's ends
 DIED = "its worker of the cluster died"
 AGAIN = "start the study again when it is back: it goes on, all runs stored so far are kept"
@@ -80,8 +81,8 @@ class Cluster:
         _, told = event
         if told.get("action") == "remove-worker":
             self._news.put(_Gone(told["worker"], expected=bool(told.get("expected"))))
-        elif told.get("action") == "add-worker":
-            self._looked = -LOOK
+        if told.get("action") in COME_AND_GO:
+            self._looked = -LOOK  # at once
 
     def _heard(self) -> list[Any]:
         """All news, after waiting for some."""
@@ -98,7 +99,7 @@ class Cluster:
         """Sees who is there, now and then."""
         if monotonic() - self._looked < LOOK:
             return
-        self._looked = monotonic()
+        self._looked = monotonic()  # first: what is told meanwhile asks for another look
         try:
             if self._client.status != "running":
                 raise lost(f"the client is {self._client.status}")
