@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
 
-from hexapod_cosim.cosim.study.manifest import RESULTS
+from hexapod_cosim.cosim.study.columns import schema_of
+from hexapod_cosim.cosim.study.manifest import RESULTS, RUNS
 from hexapod_cosim.cosim.study.reading import study_from_table
 from hexapod_cosim.cosim.study.records import Study
+from hexapod_cosim.cosim.study.store import Store
 from hexapod_cosim.cosim.study.study import Options, run_study
 
 FAKE, SLOW = "study_engines:Fake", "study_engines:Slow"
@@ -41,3 +43,13 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 def digest(folder: Path) -> str:
     """Of the bytes of the results."""
     return hashlib.sha256((folder / RESULTS).read_bytes()).hexdigest()
+
+
+def store_instead(study: Study, folder: Path, kept: Callable[[dict[str, Any]], dict[str, Any] | None]) -> None:
+    """Puts what `kept` makes of each stored run in its place, None taking it away: as another past would have left the folder."""
+    store = Store(folder / RUNS, schema_of(study))
+    stored = [row for table in store.sorted_rows() for row in table.to_pylist()]
+    for part in store.parts():
+        part.unlink()
+    store.add(row for row in map(kept, stored) if row is not None)
+    store.flush()
