@@ -13,9 +13,10 @@ import pytest
 from studies import study_of
 
 from hexapod_cosim.cosim.files import to_json
+from hexapod_cosim.cosim.study.bundled import list_studies
 from hexapod_cosim.cosim.study.columns import schema_of
 from hexapod_cosim.cosim.study.design import Sweep
-from hexapod_cosim.cosim.study.reading import list_studies, load_study, study_from_table
+from hexapod_cosim.cosim.study.reading import load_study, study_from_table
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.models import HexapodError
 

@@ -13,7 +13,7 @@ from gains import make_gains
 from matplotlib.figure import Figure
 from studies import KINEMATIC, run_quietly, store_instead, study_of
 
-from hexapod_cosim.cosim.cli.study_command import report_on
+from hexapod_cosim.cosim.cli.studying import report_on
 from hexapod_cosim.cosim.comparison import made_change
 from hexapod_cosim.cosim.study import heat
 from hexapod_cosim.cosim.study.columns import FIGURES

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from studies import study_of
 
-from hexapod_cosim.cosim.study.reading import list_studies, load_study
+from hexapod_cosim.cosim.study.bundled import list_studies
+from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.study.records import Study, StudyError
 from hexapod_cosim.models import HexapodError, load_robot
 

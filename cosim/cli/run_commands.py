@@ -22,7 +22,6 @@ from hexapod_cosim.cosim.cli.running import (
     show_rows,
     titled,
 )
-from hexapod_cosim.cosim.cli.study_command import report_on
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
 from hexapod_cosim.cosim.comparison import SEEDS, compare_runs, read_seeds
 from hexapod_cosim.cosim.files import STUDY
@@ -66,6 +65,8 @@ def report(
     """Make the plots and the report of a run, a comparison or a study again."""
     facts = read_facts(folder)
     if facts.get("kind") == STUDY:
+        from hexapod_cosim.cosim.cli.studying import report_on  # noqa: PLC0415  slow to import
+
         files = report_on(folder)[1]
     elif facts.get("kind") == "compare":
         runs = {control: read_result(folder / control) for control in CONTROLS}

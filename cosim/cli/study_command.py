@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import shlex
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from hexapod_cosim.cosim.cli.running import FmuFile, GainsFile, given_gains
-from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, show_table, warn
-from hexapod_cosim.cosim.master import COMPLETED
-from hexapod_cosim.cosim.study.conduct import Tell
+from hexapod_cosim.cosim.cli.terminal import Json, warn
 from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE, ENGINES
-from hexapod_cosim.cosim.study.manifest import TIMES
-from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.study.records import StudyError
-from hexapod_cosim.cosim.study.results import Results, read_results, summary_of
-from hexapod_cosim.cosim.study.study import Begun, Options, run_study
 
-MAX_WORKERS, MOST_REASONS = 4096, 10
+MAX_WORKERS = 4096
 Workers = Annotated[
     int | None, typer.Option("--workers", metavar="N", help="Processes on this machine; default: one for each processor; 0: this one.")
 ]
@@ -39,48 +31,14 @@ def study(
     fmu: FmuFile = None, gains: GainsFile = None, json: Json = False,
 ) -> None:  # fmt: skip
     """Run a study: sweeps, Monte Carlo, tuning. Stopped at any point and started again, it goes on where it was."""
-    plan = load_study(file)
-    folder = output or Path("out") / Path(file).stem
+    from hexapod_cosim.cosim.cli.studying import carry_out  # noqa: PLC0415  slow to import, and no other command needs it
+    from hexapod_cosim.cosim.study.study import Options  # noqa: PLC0415
+
     options = Options(
         engine=engine, fmu=fmu, gains=given_gains(gains), workers=_checked_workers(workers), scheduler=scheduler, say=warn,
         command=_command_line(file, {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains}),
     )  # fmt: skip
-    try:
-        with progress(plain=not json) as begun:
-            results = run_study(plan, folder, options=options, begun=begun)
-    except KeyboardInterrupt:
-        warn(f"stopped; what was run is in {folder}, and the same command goes on from there")
-        raise
-    found, files = report_on(folder)
-    for text in hopeless(found):
-        warn(text)
-    if json:
-        show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
-        return
-    show_study(found)
-    show_files([results, folder / TIMES, *files])
-    print(f"report: {files[-1]}")
-
-
-def hopeless(found: Results) -> list[str]:
-    """Controls under which no run at all walked to its end, and why."""
-    texts = []
-    for control, total in found.overall.total.items():
-        if total and not found.overall.walked.get(control, 0):
-            reasons = [(count, *key[1:]) for key, count in found.overall.failures.items() if key[0] == control]
-            count, status, reason = reasons[0]
-            alike = "all" if len(reasons) == 1 else f"{count} of them"
-            how = "fell" if status == COMPLETED else status
-            texts.append(f"none of {total} {control} runs walked to its end; {alike} {how}: {reason}")
-    return texts
-
-
-def report_on(folder: Path) -> tuple[Results, list[Path]]:
-    """Reads a study's folder and writes its tables and report."""
-    from hexapod_cosim.cosim.study.report import write_study_report  # noqa: PLC0415  matplotlib is slow to import
-
-    found = read_results(folder)
-    return found, write_study_report(found, folder)
+    carry_out(file, output or Path("out") / Path(file).stem, options, json=json)
 
 
 def _checked_workers(count: int | None) -> int | None:
@@ -92,46 +50,3 @@ def _checked_workers(count: int | None) -> int | None:
 def _command_line(file: str, options: Mapping[str, object]) -> str:
     words = [word for name, value in options.items() if value is not None for word in (f"--{name}", str(value))]
     return shlex.join(["hexapod", "study", file, *words])
-
-
-@contextmanager
-def progress(*, plain: bool) -> Iterator[Begun]:
-    """A bar with rate, estimate and failures on a terminal, `plain` lines elsewhere, from when it is known how many runs there are."""
-    with ExitStack() as shown:
-
-        def begun(total: int, done: int) -> Tell:
-            if done:
-                print(f"goes on: {done} of {total} runs are there already", file=sys.stderr)
-            show = shown.enter_context(counting_bar("runs", total, plain=plain))
-            show(done, 0)
-            count, failed = done, 0
-
-            def tell(more: int, lost: int) -> None:
-                nonlocal count, failed
-                count, failed = count + more, failed + lost
-                show(count, failed)
-
-            return tell
-
-        yield begun
-
-
-def show_study(found: Results) -> None:
-    """Totals, the table of all runs, the optimum, failures by reason."""
-    from hexapod_cosim.cosim.study.report import optimum_rows, overall_rows  # noqa: PLC0415  matplotlib is slow to import
-
-    overall, controls = found.overall, found.study.run_controls
-    rows = overall_rows(found)
-    columns = ["metric", "unit", *controls, *(["change", "95 % interval", ""] if len(controls) == 2 else [])]
-    texts = [
-        [row["name"], row["unit"], *row["values"], *([row["change"], row["interval"], row["verdict"]] if len(controls) == 2 else [])]
-        for row in rows
-    ]
-    show_table(columns, texts, right=[k for k, name in enumerate(columns) if name not in ("metric", "unit", "")])
-    walked = ", ".join(f"{control} {overall.walked.get(control, 0)} of {overall.total.get(control, 0)}" for control in controls)
-    print(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
-    for (control, status, reason), count in list(overall.failures.items())[:MOST_REASONS]:
-        print(f"{count:6d} x {control} {'fell' if status == COMPLETED else status}: {reason}")
-    for row in optimum_rows(found):
-        settings = ", ".join(f"{name} {text}" for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True))
-        print(f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}")

@@ -10,6 +10,7 @@ from typing import Any
 
 from hexapod_cosim.cosim.scenario import read_tables, scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario_records import CONTROLS
+from hexapod_cosim.cosim.study.bundled import list_studies
 from hexapod_cosim.cosim.study.checks import check_scenario, check_settable, check_study
 from hexapod_cosim.cosim.study.factors import plain_name, read_factors
 from hexapod_cosim.cosim.study.keys import check_plain, flat, names_of, read_seeds, text_of, truth_of, whole
@@ -23,11 +24,6 @@ MAX_POINTS, MAX_SEEDS = 10**8, 10**7
 MAX_SEED = 2**32 - 1  # that all generators of random numbers take
 MOST_OF_NAME = 255  # bytes of a file's
 STANDARD_TABLE = {name: getattr(STANDARD, name) for name in ("attitude", "height", "joint_angle", "command_delay")}
-
-
-def list_studies() -> dict[str, Path]:
-    """The studies that come with the package, by name."""
-    return {path.stem: path for path in sorted((Path(__file__).parents[1] / "studies").glob("*.toml"))}
 
 
 def load_study(path_or_name: str | Path) -> Study:
