@@ -48,7 +48,7 @@ def errors(control: str) -> list[dict[str, Any]]:
     """For each setting: steps, and the largest error over the seeds of each metric, in its own unit and relative to its mean."""
     gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
     rows = []
-    with Walker(columns=None) as walker:
+    with Walker(everything=True) as walker:
         exact, _ = walked(walker, control, gains, REFERENCE)
         for name, settings in SETTINGS.items():
             figures, steps = walked(walker, control, gains, settings)

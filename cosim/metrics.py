@@ -49,13 +49,13 @@ METRICS: dict[str, tuple[str, bool | None, str]] = {
 }
 
 # what all this and the warnings of a run look at; of controllers, those that tell
-JUDGED = (
+_JUDGED = (
     *vector_names("torso.position"), *vector_names("torso.quaternion", 4), "torso.roll", "torso.pitch", "torso.yaw",
     *(name for quantity in ("angle", "speed", "torque") for name in joint_names(quantity)),
     *(name for quantity in ("normal_force", "tangential_force", "slip_speed", "contact") for name in foot_names(quantity)),
-    *(name for quantity in ("position", "velocity", "bristle") for name in foot_vector_names(quantity)),
-    *(f"controller.{leg}.{flag}" for flag in ("unreachable", "fallback") for leg in LEG_NAMES),
+    *foot_vector_names("position"), *(f"controller.{leg}.{flag}" for flag in ("unreachable", "fallback") for leg in LEG_NAMES),
 )  # fmt: skip
+_JUDGED_BRISTLES = tuple(name for quantity in ("velocity", "bristle") for name in foot_vector_names(quantity))
 
 # name -> the least change, in the metric's unit, that means anything: less than this no one could measure on the robot
 # (a tenth of a millimetre, a tenth of a milliradian, the resolution of its force and torque sensing), so it reads "same"
@@ -65,6 +65,11 @@ FLOORS: dict[str, float] = {
     "stability_margin": 1e-4, "realtime_factor": 0.0,
 }  # fmt: skip
 DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
+
+
+def judged_columns(*, bristles: bool) -> tuple[str, ...]:
+    """What has to be recorded of a robot for its metrics and warnings; `bristles`: whether its friction has them."""
+    return (*_JUDGED, *_JUDGED_BRISTLES) if bristles else _JUDGED
 
 
 @dataclass(frozen=True)

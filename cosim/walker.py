@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,7 +15,7 @@ from hexapod_cosim.cosim.controller_interface import ControllerSetup, controller
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master import Progress
-from hexapod_cosim.cosim.metrics import JUDGED
+from hexapod_cosim.cosim.metrics import judged_columns
 from hexapod_cosim.cosim.native_master import NativeMaster
 from hexapod_cosim.cosim.run import (
     Plan,
@@ -45,14 +44,15 @@ class Walker:
     Args:
         fmu: the plant's FMU for all runs; by default one is exported for each robot.
         controller: a controller's FMU, whose parameters every run sets as its scenario says; by default one is exported.
-        columns: what is recorded; by default what metrics and warnings look at. None: all signals.
+        everything: whether all signals are recorded, not only what metrics and warnings look at.
     """
 
-    def __init__(self, *, fmu: Path | None = None, controller: Path | None = None, columns: Sequence[str] | None = JUDGED) -> None:
-        self._given, self._given_controller, self._columns = fmu, controller, columns
+    def __init__(self, *, fmu: Path | None = None, controller: Path | None = None, everything: bool = False) -> None:
+        self._given, self._given_controller, self._everything = fmu, controller, everything
         self._open = ExitStack()
         self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
-        self._masters: dict[str | Path, tuple[Fmu, NativeMaster]] = {}  # by robot, or by the FMU given
+        # by robot, or by the FMU given; and by what is recorded
+        self._masters: dict[tuple[str | Path, tuple[str, ...] | None], tuple[Fmu, NativeMaster]] = {}
         self._controller: Fmu | None = None
         self.loop_time = 0.0  # s  of the processor, the last run's loop alone
         self._told: tuple[ControllerSetup, list[FmuBlock]] | None = None  # the controller's latest set-up and the blocks that set it
@@ -65,7 +65,7 @@ class Walker:
         """A scenario's run and what came of it, on the plant `fmu` if given. Raises HexapodError for what keeps it from starting."""
         plan = make_plan(scenario, gains=self._gains(scenario, gains))
         controller = self._told_controller(plan)
-        plant, master = self._plant(scenario, controller, fmu or self._given)
+        plant, master = self._plant(plan, controller, fmu or self._given)
         plant.reset()
         plant.set_parameters(self._settings(plant, plan.robot))
         parameters = initialise_plant(plant, plan)
@@ -95,13 +95,16 @@ class Walker:
             self._designs[key] = chosen_gains(scenario)
         return self._designs[key]
 
-    def _plant(self, scenario: Scenario, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
-        """A given FMU or that of the scenario's robot, wired to the controller."""
-        key = scenario.robot if fmu is None else fmu
+    def _plant(self, plan: Plan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
+        """A given FMU or that of the plan's robot, wired to the controller."""
+        name = plan.scenario.robot
+        bristles = plan.robot.friction.law == "bristle" or "friction.law" in plan.scenario.parameters
+        columns = None if self._everything else judged_columns(bristles=bristles)
+        key = name if fmu is None else fmu, columns
         if key not in self._masters:
-            path = fmu or export_fmu(load_robot(scenario.robot), self._folder / f"{len(self._masters)}.fmu")
+            path = fmu or export_fmu(load_robot(name), self._folder / f"{len(self._masters)}.fmu")
             plant = self._open.enter_context(Fmu(path))
-            self._masters[key] = plant, NativeMaster(plant, controller, columns=self._columns)
+            self._masters[key] = plant, NativeMaster(plant, controller, columns=columns)
         return self._masters[key]
 
     def _told_controller(self, plan: Plan) -> Fmu:

@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.scenario_records import Command, Scenario
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.cosim.variation import STANDARD
 from hexapod_cosim.cosim.walker import Walker
-from hexapod_cosim.models import FmuError, load_robot
+from hexapod_cosim.models import FRICTION_LAWS, FmuError, load_robot
 
 SENSORS = ("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=0.012")
 FAULTS = 'events=[{time=1.5, leg="LM", fault="dead", duration=0.5}, {time=1.2, leg="RF", fault="stuck"}]'
@@ -90,7 +90,7 @@ WALKS = [
 
 @pytest.mark.parametrize("scenario", WALKS, ids=lambda scenario: scenario.title)
 def test_every_signal_of_a_walk_is_the_python_masters_bit_for_bit(scenario: Scenario) -> None:
-    with Walker(columns=None) as walker:
+    with Walker(everything=True) as walker:
         expected, judged = in_python(scenario, walker)
         found = walker.simulate(scenario, gains=gains_of(scenario))
     assert (found.outcome.status, found.outcome.simulated) == (expected.status, expected.simulated)
@@ -110,8 +110,22 @@ def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_befo
     again = [steady(walker.summary(plan, gains=gains_of(plan))) for plan in reversed(plans)]
     assert again[::-1] == first
     for plan, summary in zip(plans, first, strict=True):
-        with Walker(columns=None) as other:
+        with Walker(everything=True) as other:
             assert steady(other.summary(plan, gains=gains_of(plan))) == summary
+
+
+def test_bristles_are_judged_however_a_scenario_asks_for_them(walker: Walker) -> None:
+    plain = replace(WALKS[0], control="kinematic", variation=None)
+    number = 1.0 + FRICTION_LAWS.index("bristle")
+    named, numbered = (
+        replace(plain, settings={**plain.settings, "friction": {"law": "bristle"}}),
+        replace(plain, parameters={"friction.law": number}),
+    )
+    figures = [walker.summary(plan) for plan in (named, numbered, plain)]
+    assert all(summary.walked for summary in figures)
+    net = [summary.metrics["slip_net_per_metre"] for summary in figures]
+    assert net[0] == pytest.approx(net[1], rel=0.2)
+    assert net[2] != net[0]
 
 
 def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:
