@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.study.records import VALUES, Factor
 from hexapod_cosim.cosim.study.table import Point
 
 Array = NDArray[np.float64]
-Item = TypeVar("Item")
+_Item = TypeVar("_Item")
 
 COLOURS = {"kinematic": "#D55E00", "compliant": "#0072B2"}
 MARKS = {"kinematic": "s", "compliant": "o"}
@@ -57,7 +57,7 @@ def logarithmic(slips: Array) -> LogNorm:
     return LogNorm(float(seen.min()), float(seen.max()) * (1.0 + 1e-9)) if len(seen) else LogNorm(FLOORS[SLIP], 1.0)
 
 
-def some_of(items: Sequence[Item]) -> list[Item]:
+def some_of(items: Sequence[_Item]) -> list[_Item]:
     """Not more than can be seen, evenly chosen."""
     step = max(math.ceil(len(items) / MOST_LINES), 1)
     return list(items[::step])
