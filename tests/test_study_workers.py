@@ -104,7 +104,8 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
     assert [row["run"] for row in found] == list(range(8))
     counted = Counter(deaths.read_text().splitlines())
     assert set(counted) == {"kinematic 0", "kinematic 1"}
-    assert set(counted.values()) <= {DEATHS, DEATHS + 1}  # by itself, and once before among others
+    # by itself; before that among others, or unnoticed: a worker that ends right after a run may take that one's result with it
+    assert all(DEATHS <= number <= 2 * DEATHS for number in counted.values())
 
 
 def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Path) -> None:

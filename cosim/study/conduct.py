@@ -22,6 +22,7 @@ from hexapod_cosim.cosim.study.store import Store
 from hexapod_cosim.cosim.study.worker import Done, failed
 
 CHUNK_TIME = 0.5  # s    of work in a chunk: what a hand-over costs is small beside it, and little is lost with a worker
+MOST_CHUNKS = 40.0  # 1/s    that come back from all workers together: a cluster's scheduler takes some milliseconds for each
 MAX_CHUNK = 256
 USELESS = 3 * DEATHS  # deaths in a row, for each worker, without a run between them: it is not the runs
 CAUSES = 'look for what ends them (memory?); a script that runs a study needs `if __name__ == "__main__":`'
@@ -49,11 +50,15 @@ class _Sizes:
         for item in done:
             self._runs, self._time = self._runs + 1, self._time + item.wall
 
-    @property
-    def size(self) -> int:
+    def of_chunk(self, workers: int) -> int:
         if not self._runs:
             return 1
-        return int(min(max(CHUNK_TIME * self._runs / max(self._time, 1e-9), 1), MAX_CHUNK))
+        return int(min(max(chunk_time(workers) * self._runs / max(self._time, 1e-9), 1), MAX_CHUNK))
+
+
+def chunk_time(workers: int) -> float:
+    """s    of work in a chunk, for so many workers"""
+    return max(CHUNK_TIME, workers / MOST_CHUNKS)
 
 
 def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[Done], None, None]:
@@ -66,7 +71,7 @@ def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[D
     flying, useless = 0, 0
     try:
         while True:
-            while flying < IN_FLIGHT * crew.size and (chunk := _next(again, waiting, sizes.size)):
+            while flying < IN_FLIGHT * crew.size and (chunk := _next(again, waiting, sizes.of_chunk(crew.size))):
                 crew.hand_in(chunk)
                 flying += 1
             if not flying:
