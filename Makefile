@@ -47,8 +47,9 @@ $(STAMP): $(SOURCES)
 demo: setup
 	$(BIN)/hexapod compare walk_flat -o out/demo
 
+# a process for each core has no use for threads of matrices
 test: setup typing
-	$(BIN)/python -m pytest $(PARALLEL)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
 
 test-browser: setup
 	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/test_browser.py

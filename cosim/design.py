@@ -8,6 +8,8 @@ from dataclasses import fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from threadpoolctl import threadpool_limits
+
 from hexapod_cosim.controller import Gains, GainsError, Requirements
 from hexapod_cosim.controller.design import StandingPlant, design_gains
 from hexapod_cosim.cosim.export import export_fmu
@@ -21,7 +23,8 @@ LOADS = (0.1, 1.0, 2.0)  # 1    mean load of the standing legs, in thirds of the
 
 def design_for(robot: Robot, period: float, requirements: Requirements | None = None) -> Gains:
     """Gains of a robot for a controller period [s]. Raises GainsError, FmuError."""
-    return design_gains(robot, period, plants=standing_plants(robot, period), requirements=requirements)
+    with threadpool_limits(1):  # its matrices are small: threads would wait for each other longer than they compute
+        return design_gains(robot, period, plants=standing_plants(robot, period), requirements=requirements)
 
 
 def standing_plants(robot: Robot, period: float) -> dict[str, StandingPlant]:

@@ -16,7 +16,10 @@ _stop: Event | None = None  # of this process, when it is a worker
 def begin_worker(stop: Event) -> None:
     """Makes this process a worker that ends its run when `stop` is set, and itself when its parent is gone."""
     global _stop  # noqa: PLW0603  the one thing a worker is told beside its tasks
+    from threadpoolctl import threadpool_limits  # noqa: PLC0415  commands without workers begin sooner without it
+
     _stop = stop
+    threadpool_limits(1)  # there is a worker for each processor
     Thread(target=_end_with_parent, daemon=True).start()
 
 
