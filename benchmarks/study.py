@@ -247,7 +247,7 @@ def cluster() -> Iterator[str]:
             for name, *words in commands
         ]  # fmt: skip
         try:
-            while not file.exists():
+            while not (file.exists() and file.read_text().rstrip().endswith("}")):
                 time.sleep(0.1)
             yield str(json.loads(file.read_text())["address"])
         finally:

@@ -20,13 +20,12 @@ from hexapod_cosim.cosim.fmu_controller import COMMANDS, FLAGS, SENSED
 from hexapod_cosim.cosim.force_sensor import SensorSettings, noise_factors
 from hexapod_cosim.cosim.interrupts import interruptible
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, Outcome, Progress
-from hexapod_cosim.cosim.plant_files import BUILD, shared_library
+from hexapod_cosim.cosim.plant_files import BUILD, LOOP, shared_library
 from hexapod_cosim.cosim.recorder import COMMAND_COLUMNS, Recording
 from hexapod_cosim.cosim.schedule import Schedule
 from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, PUSH, refuse_foreign, vector_names
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
-LIBRARY = "hexapod_master"
 STEPS_AT_ONCE = 500  # macro-steps between two looks at interrupts: some 10 ms
 FORCE = MEASURED["foot_force"]
 JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
@@ -88,7 +87,7 @@ CALLS = (
 @cache
 def _library() -> ct.CDLL:
     """The loop, its functions' types declared. Raises FmuError when it is missing or another version's."""
-    path = shared_library(LIBRARY)
+    path = shared_library(LOOP)
     library = ct.CDLL(str(path))
     library.hx_master_size.restype = _Size
     if library.hx_master_size() != ct.sizeof(_Master):

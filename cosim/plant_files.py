@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import sys
 import tomllib
+from functools import cache
 from importlib import metadata, util
 from pathlib import Path
 
@@ -15,6 +17,7 @@ DISTRIBUTION = "hexapod-cosim"
 GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")  # of the plant's, in every component
 SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
+LOOP = "hexapod_master"  # the shared library of the co-simulation loop
 PLANT_ALONE = "plant.c"  # of the FMI layer: the plant as a component
 FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"  # each needs the headers of its own standard alone
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
@@ -41,6 +44,17 @@ def package_version() -> str:
         project = tomllib.loads((_TREE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
         return str(project["version"])
     return metadata.version(DISTRIBUTION)
+
+
+@cache
+def code_hash() -> str:
+    """16 digits that tell this package's code from any other: of its Python files, robots and co-simulation loop."""
+    digest = hashlib.sha256()
+    for folder in (_HERE, _HERE.parent / "controller", _HERE.parent / "models"):
+        for path in sorted([*folder.rglob("*.py"), *folder.glob("*.toml")]):
+            digest.update(path.relative_to(_HERE.parent).as_posix().encode() + hashlib.sha256(path.read_bytes()).digest())
+    digest.update(shared_library(LOOP).read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def source_files(component: Component = PLANT) -> dict[str, Path]:

@@ -44,7 +44,7 @@ def scheduling(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     file = folder / "scheduler.json"
     with running("distributed.cli.dask_scheduler", "--port", "0", *COMMON, "--scheduler-file", str(file), cwd=folder) as process:
         deadline = time.monotonic() + PATIENCE
-        while not file.exists() and time.monotonic() < deadline:
+        while not (file.exists() and file.read_text().rstrip().endswith("}")) and time.monotonic() < deadline:
             time.sleep(0.05)
         yield str(json.loads(file.read_text())["address"]), process
 

@@ -115,6 +115,13 @@ def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupte
     assert all(row["status"] == "completed" for row in rows(whole))
 
 
+def test_a_study_does_not_go_on_with_other_code(small: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    small("out", SMALL)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.job.code_hash", lambda: "0123456789abcdef")
+    with pytest.raises(StudyError, match=r"environment.code was .*, is \"0123456789abcdef\""):
+        small("out", SMALL)
+
+
 def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena_fmu: Path, tmp_path: Path) -> None:
     room = [3]
 

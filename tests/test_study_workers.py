@@ -5,15 +5,19 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
+import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import pytest
 from dask_cluster import lasting_workers, scheduling
 from gains import make_gains
-from studies import KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
+from studies import FAKE, KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
 from study_engines import DEATHS_FILE, Counting
 
 from hexapod_cosim.cosim.batch import run_batch
@@ -23,11 +27,19 @@ from hexapod_cosim.cosim.study.columns import FIGURES
 from hexapod_cosim.cosim.study.conduct import DEAD
 from hexapod_cosim.cosim.study.crew import DEATHS
 from hexapod_cosim.cosim.study.engines import ENGINES
+from hexapod_cosim.cosim.study.job import make_job
 from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.scratch import JOB, LOCK, PREFIX, scratch
 from hexapod_cosim.cosim.study.study import Options, run_study
 from hexapod_cosim.models import load_robot
 
 WALK: dict[str, Any] = {"set": {"duration": 1.2, "gait.period": 0.4}, "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]}}
+
+WAIT = 120.0  # s    a busy machine may take
+LONG = """
+controls = ["kinematic"]
+seeds = 2000
+"""
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +134,66 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
     assert len(killed) == 2
     assert all(row["walked"] for row in rows(tmp_path / "out"))
     assert len(rows(tmp_path / "out")) == 200
+
+
+def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(athena_fmu: Path, tmp_path: Path) -> None:
+    study = study_of({**KINEMATIC, "seeds": 10, "factors": {"friction.mu": [0.3, 0.5]}})
+    killed: set[int] = set()
+    end = Event()
+
+    def kill_on_sight() -> None:
+        while len(killed) < 2 and not end.is_set():
+            for pid in _children() - killed:
+                os.kill(pid, signal.SIGKILL)
+                killed.add(pid)
+            time.sleep(0.001)
+
+    killer = Thread(target=kill_on_sight, daemon=True)
+    runner = Thread(target=run_quietly, args=(study, tmp_path / "out"), kwargs={"fmu": athena_fmu, "workers": 2}, daemon=True)
+    killer.start()
+    runner.start()
+    runner.join(timeout=WAIT)
+    end.set()
+    assert not runner.is_alive()
+    assert len(killed) == 2
+    assert [row["reason"] for row in rows(tmp_path / "out") if not row["walked"]] == []
+
+
+def test_nothing_is_left_of_what_workers_unpacked(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+    dead, young = place / f"{PREFIX}dead", place / f"{PREFIX}young"
+    for folder in (dead, young):
+        folder.mkdir()
+    (dead / LOCK).touch()
+    with scratch(make_job(study_of(KINEMATIC), engine=FAKE, fmu=athena_fmu)) as alive:
+        assert not dead.exists()
+        run_quietly(study_of(KINEMATIC), tmp_path / "out", fmu=athena_fmu, workers=1)
+        assert alive.exists()
+        assert {path.name for path in place.iterdir() if path.name.startswith(PREFIX)} == {alive.name, young.name}
+    assert [path.name for path in place.iterdir()] == [young.name]
+
+
+def test_a_workers_folder_goes_with_it_when_its_program_is_killed(athena_fmu: Path, tmp_path: Path) -> None:
+    place, file = tmp_path / "temporary", tmp_path / "study.toml"
+    place.mkdir()
+    file.write_text(LONG)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hexapod_cosim.cosim.cli", "study", str(file), "-o", str(tmp_path / "out"), "--fmu", str(athena_fmu)],
+        env={**os.environ, "TMPDIR": str(place)}, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    _wait_until(lambda: any(place.glob(f"{PREFIX}*/hexapod-job-*")))
+    process.kill()
+    process.wait()
+    _wait_until(lambda: not any(place.glob(f"{PREFIX}*/{JOB}")))
+
+
+def _wait_until(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + WAIT
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.02)
 
 
 def _children() -> set[int]:

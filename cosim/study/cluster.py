@@ -6,6 +6,7 @@ scheduler does not try it again by itself, and a run that ends its worker costs 
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -170,8 +171,8 @@ class Cluster:
             died = DIED
         except HexapodError:
             raise
-        except Exception as error:
-            raise unfit(error) from error
+        except Exception as error:  # of the chunk, or of fetching what it came to
+            raise (unfit(error) if future.status == "error" else lost(f"{type(error).__name__}: {error}")) from error
         address, chunk = self._chunks.pop(future)
         self._lanes[address].remove(future)
         future.release()
@@ -201,6 +202,7 @@ def cluster_crew(job: Job, address: str, say: Say) -> Iterator[Cluster]:
     client = _connect(address)
     name = f"{OURS}{client.id}"
     with ExitStack() as opened:
+        opened.enter_context(_silence("distributed"))  # its tracebacks of a scheduler that died: we say what there is to say
         opened.callback(_quietly, client.close, timeout=5)
         _quietly(client.run_on_scheduler, _left_behind())
         opened.callback(_while_there, client, client.unregister_worker_plugin, name)
@@ -211,6 +213,18 @@ def cluster_crew(job: Job, address: str, say: Say) -> Iterator[Cluster]:
         crew = Cluster(client, job, say)
         opened.callback(_while_there, client, crew.close)
         yield crew
+
+
+@contextmanager
+def _silence(name: str) -> Iterator[None]:
+    """Keeps a library's messages off the terminal for a while."""
+    log = logging.getLogger(name)
+    before = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
 
 
 def _left_behind() -> Callable[..., Any]:

@@ -17,7 +17,7 @@ from uuid import uuid4
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.controller_export import export_controller, make_setup
 from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.plant_files import package_version
+from hexapod_cosim.cosim.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table
 from hexapod_cosim.cosim.study.engines import engine_named
@@ -106,8 +106,8 @@ def environment(study: Study | None = None) -> dict[str, str]:
     """What figures may depend on beside the job: every worker's must be the same."""
     names = PACKAGES if study is None or study.optimise is None else (*PACKAGES, "optuna")
     return {
-        "hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names},
-        "platform": f"{sys.platform} {platform.machine()}",
+        "hexapod-cosim": package_version(), "code": code_hash(), "python": platform.python_version(),
+        **{name: version(name) for name in names}, "platform": f"{sys.platform} {platform.machine()}",
     }  # fmt: skip
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from time import time
-from typing import Any, TextIO
+from typing import Any
 
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, STUDY, not_writable, read_json, to_json
 from hexapod_cosim.cosim.study.job import Job
+from hexapod_cosim.cosim.study.locks import HELD, lock_file
 from hexapod_cosim.cosim.study.records import Study, StudyError
 from hexapod_cosim.cosim.study.store import LEFTOVERS, write_durably
 
@@ -22,7 +21,6 @@ MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "result
 COMPLETED = "completed"
 FORMAT = 1
 OF_FILE = "hexapod."  # keys of a file's metadata
-HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what asking for a lock says that another has
 MOST_NAMED = 6  # differences in a message
 WHILE = 600.0  # s    after which nobody is writing a file any more
 
@@ -134,21 +132,9 @@ def locked(folder: Path) -> Iterator[None]:
         raise not_writable(folder, error) from error
     with file:
         try:
-            _lock(file)
+            lock_file(file)
         except OSError as error:
             if error.errno in HELD:
                 fix = "wait for it, or choose another with -o"
                 raise StudyError("another process runs a study into this folder", fix=fix, where=str(folder)) from error
         yield
-
-
-def _lock(file: TextIO) -> None:
-    """Until the file is closed or the process ends. Raises OSError: one of HELD when another has it, others where there are no locks."""
-    if sys.platform == "win32":
-        import msvcrt  # noqa: PLC0415
-
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-    else:
-        import fcntl  # noqa: PLC0415
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

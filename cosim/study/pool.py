@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import multiprocessing
+import tempfile
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.synchronize import Event
+from pathlib import Path
 
 from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
 from hexapod_cosim.cosim.study.crew import Chunk, Returned
 from hexapod_cosim.cosim.study.job import Job
+from hexapod_cosim.cosim.study.scratch import job_in, scratch
 from hexapod_cosim.cosim.study.worker import Done, close_workshop, work
 from hexapod_cosim.cosim.workers import METHOD, begin_worker, stop_if_told
 
@@ -22,14 +25,15 @@ DIED = "its worker process ended by itself (killed, or out of memory)"
 class _Lane:
     """One worker process and the chunks it was given, the first of which it is at."""
 
-    def __init__(self, job: Job, stop: Event) -> None:
-        self._job, self._stop = job, stop
+    def __init__(self, folder: Path, stop: Event) -> None:
+        self._folder, self._stop = folder, stop
         self.chunks: deque[tuple[Future[list[Done]], Chunk]] = deque()
         self._begin()
 
     def _begin(self) -> None:
         context = multiprocessing.get_context(METHOD)
-        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(self._stop, self._job))
+        # the job is read by the process: it would fill the pipe to one that dies before it reads, and be waited for without end
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(self._stop, self._folder))
 
     def hand_in(self, chunk: Chunk) -> None:
         try:
@@ -67,9 +71,9 @@ class _Lane:
 class Pool:
     """Worker processes of this machine."""
 
-    def __init__(self, job: Job, size: int, stop: Event) -> None:
+    def __init__(self, folder: Path, size: int, stop: Event) -> None:
         self.size = size
-        self._lanes = [_Lane(job, stop) for _ in range(size)]
+        self._lanes = [_Lane(folder, stop) for _ in range(size)]
 
     def hand_in(self, chunk: Chunk) -> None:
         """To the one with the least to do."""
@@ -119,23 +123,25 @@ def own_crew(job: Job) -> Iterator[Here]:
 @contextmanager
 def local_crew(job: Job, workers: int) -> Iterator[Pool]:
     """Worker processes that are gone when the block ends, however it ends."""
-    stop = multiprocessing.get_context(METHOD).Event()
-    pool = Pool(job, workers, stop)
-    try:
-        yield pool
-    finally:
-        stop.set()
-        pool.close()
+    with scratch(job) as folder:
+        stop = multiprocessing.get_context(METHOD).Event()
+        pool = Pool(folder, workers, stop)
+        try:
+            yield pool
+        finally:
+            stop.set()
+            pool.close()
 
 
 _job: Job | None = None  # of this process, when it is a worker
 
 
-def _begin(stop: Event, job: Job) -> None:
+def _begin(stop: Event, folder: Path) -> None:
     global _job  # noqa: PLW0603  the one thing a worker is told beside its orders
-    begin_worker(stop)
-    _job = job
-    multiprocessing.util.Finalize(None, close_workshop, args=(job.name,), exitpriority=10)
+    begin_worker(stop, folder)
+    tempfile.tempdir = str(folder)  # so that nothing is left when this process is killed
+    _job = job_in(folder)
+    multiprocessing.util.Finalize(None, close_workshop, args=(_job.name,), exitpriority=10)
 
 
 def _work(chunk: Chunk) -> list[Done]:
