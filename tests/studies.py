@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.study.records import Study
 from hexapod_cosim.cosim.study.store import Store
 from hexapod_cosim.cosim.study.study import Options, run_study
 
-FAKE, SLOW = "study_engines:Fake", "study_engines:Slow"
+FAKE, SLOW, BRIEF = "study_engines:Fake", "study_engines:Slow", "study_engines:Brief"
 SMALL: dict[str, Any] = {"scenario": "walk_flat", "seeds": 3, "factors": {"friction.mu": [0.3, 0.6, 0.9]}}
 KINEMATIC = {"controls": ["kinematic"]}
 

@@ -12,13 +12,14 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from command import COMMAND, Call, assert_refused
-from studies import FAKE, digest, run_quietly
+from studies import BRIEF, FAKE, digest, run_quietly
 
 from hexapod_cosim.cosim.study.reading import load_study
 
 TESTS = Path(__file__).resolve().parent
 MANY = "seeds = 3000\n"  # parts of 1024 runs
 KINEMATIC = 'controls = ["kinematic"]\n'
+GRIP = "seeds = 2\n[set]\nfriction.mu = 0.5\n"
 ONE_FACTOR = "[factors]\nfriction.mu = [0.5]\n"
 
 
@@ -34,6 +35,23 @@ def test_it_says_when_no_run_walked_at_all(call: Call, athena_fmu: Path, tmp_pat
     assert code == 0
     assert "4 x kinematic refused" in out
     assert err == "warning: none of 4 kinematic runs walked to its end; all refused: no walk with #\n"
+
+
+def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
+    mixed = '[factors]\ngait.name = ["tripod", "ripple"]\nscenario = ["walk_flat", "turn"]\n'
+    file = study_file(tmp_path, KINEMATIC + GRIP + mixed)
+    words = ["study", file, "-o", tmp_path / "out", "--engine", BRIEF, "--fmu", athena_fmu, "--workers", "0"]
+    code, _, err = call(*words)
+    assert (code, err) == (0, "")  # each scenario has walks with figures
+    file = study_file(tmp_path, KINEMATIC + GRIP + '[factors]\nscenario = ["walk_flat", "ripple"]\n')
+    code, _, err = call(*words[:3], tmp_path / "short", *words[4:])
+    told = "All 2 kinematic walks of ripple are too short for figures"
+    assert code == 0
+    assert err.startswith(f"warning: {told}")
+    assert told in (tmp_path / "short" / "report.html").read_text()
+    assert told in call("report", tmp_path / "short")[2]
+    file = study_file(tmp_path, KINEMATIC + 'scenario = "ripple"\n' + GRIP)
+    assert call(*words[:3], tmp_path / "none", *words[4:])[2].startswith("warning: The walks are too short for figures")
 
 
 def test_one_fmu_for_several_robots_is_refused(call: Call, athena_fmu: Path, tmp_path: Path) -> None:

@@ -65,9 +65,10 @@ def report(
     """Make the plots and the report of a run, a comparison or a study again."""
     facts = read_facts(folder)
     if facts.get("kind") == STUDY:
-        from hexapod_cosim.cosim.cli.studying import report_on  # noqa: PLC0415  slow to import
+        from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415  slow to import
 
-        files = report_on(folder)[1]
+        found, files = report_on(folder)
+        warn_of(found)
     elif facts.get("kind") == "compare":
         runs = {control: read_result(folder / control) for control in CONTROLS}
         comparison = compare_runs(*(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS))

@@ -11,6 +11,7 @@ from hexapod_cosim.cosim.cli.terminal import counting_bar, show_files, show_json
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.conduct import Tell
 from hexapod_cosim.cosim.study.manifest import TIMES
+from hexapod_cosim.cosim.study.notes import NO_WALK, notes
 from hexapod_cosim.cosim.study.reading import load_study
 from hexapod_cosim.cosim.study.report import optimum_rows, overall_rows, write_study_report
 from hexapod_cosim.cosim.study.results import Results, read_results, summary_of
@@ -29,14 +30,19 @@ def carry_out(file: str, folder: Path, options: Options, *, json: bool) -> None:
         warn(f"stopped; what was run is in {folder}, and the same command goes on from there")
         raise
     found, files = report_on(folder)
-    for text in hopeless(found):
-        warn(text)
+    warn_of(found)
     if json:
         show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
         return
     show_study(found)
     show_files([results, folder / TIMES, *files])
     print(f"report: {files[-1]}")
+
+
+def warn_of(found: Results) -> None:
+    """What to know before reading the figures, as the report says it; where nothing walked, what ended the runs instead."""
+    for text in (*hopeless(found), *(note for note in notes(found) if note != NO_WALK)):
+        warn(text)
 
 
 def hopeless(found: Results) -> list[str]:

@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.files import write_text
 from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS
 from hexapod_cosim.cosim.study.columns import FIGURES
 from hexapod_cosim.cosim.study.figures import drawings, save
-from hexapod_cosim.cosim.study.manifest import COMPLETED
+from hexapod_cosim.cosim.study.notes import notes
 from hexapod_cosim.cosim.study.objective import WALKED
 from hexapod_cosim.cosim.study.records import DRAWN
 from hexapod_cosim.cosim.study.results import POINTS, SUMMARY, Results
@@ -62,21 +62,6 @@ def _known(content: Any) -> Any:
     if isinstance(content, Mapping):
         return {key: _known(value) for key, value in content.items() if value is not None}
     return [_known(value) for value in content] if isinstance(content, list) else content
-
-
-def notes(results: Results) -> list[str]:
-    """What to know before reading the figures of this study."""
-    overall, study = results.overall, results.study
-    found = []
-    if results.facts["status"] != COMPLETED and study.optimise is None:
-        means = "Means by control are of what is there, which need not be the same points and seeds"
-        found.append(f"Not all runs are there. {means}; changes are of whole pairs.")
-    walked = sum(overall.walked.values())
-    if overall.runs and not walked:
-        found.append("No run walked to its end, so there are no figures of walks. What ended the runs stands under Failures.")
-    elif walked and all(not mean.runs for means in overall.means.values() for mean in means.values()):
-        found.append("The walks are too short for figures, which are of whole gait cycles after the second: set a longer duration.")
-    return found
 
 
 def of_what(results: Results) -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.compute as pc
 
 from hexapod_cosim.cosim.comparison import Change, made_change
@@ -57,6 +58,7 @@ class Overall:
     failures: Mapping[tuple[str, str, str], int]  # by control, status and reason, the most frequent first
     changes: Mapping[str, Change]  # over all pairs
     means: Mapping[str, Mapping[str, Mean]]
+    walks: Mapping[tuple[str, str], tuple[int, int]]  # by scenario and control: how many walked, how many of these have any figure
 
 
 MOST_REASONS = 30
@@ -105,11 +107,15 @@ class Tally:
         self._study = study
         self._sums: Sums | None = None
         self._failures = Counter[tuple[str, str, str]]()
+        self._walks: dict[tuple[str, str], tuple[int, int]] = {}
 
     def add(self, rows: Rows) -> None:
         """Runs of which no pair is cut."""
         sums = rows.sums(np.zeros(1, dtype=np.int64))
         self._sums = sums if self._sums is None else self._sums.merged(sums)
+        for case, control, walked, figured in _walks(rows.table):
+            before = self._walks.get((case, control), (0, 0))
+            self._walks[case, control] = before[0] + walked, before[1] + figured
         lost = rows.table.filter(pc.invert(rows.table["walked"])).select(["control", "status", "reason", "warnings"])
         for row in lost.to_pylist():
             kind = (row["control"], row["status"], _reason(row))
@@ -124,8 +130,19 @@ class Tally:
         return Overall(
             runs=sum(runs), walked=dict(zip(controls, walked, strict=True)), total=dict(zip(controls, runs, strict=True)),
             pairs=int(sums.pairs[0]), failures=dict(self._failures.most_common(MOST_REASONS)), changes=_changes(sums, self._study),
-            means=_means(sums, self._study),
+            means=_means(sums, self._study), walks=dict(self._walks),
         )  # fmt: skip
+
+
+def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
+    """By scenario and control: how many walked, and how many of these have any figure."""
+    kept = table.filter(table["walked"])
+    figured = pc.is_valid(pc.coalesce(*(kept[name] for name in FIGURES)))
+    groups = pa.table({"case": kept["case"], "control": kept["control"], "figured": figured}).group_by(["case", "control"])
+    return [
+        (row["case"], row["control"], row["figured_count"], row["figured_sum"])
+        for row in groups.aggregate([("figured", "count"), ("figured", "sum")]).to_pylist()
+    ]
 
 
 def _no_sums(study: Study) -> Sums:
