@@ -109,11 +109,11 @@ def _point_row(point: Point, results: Results) -> dict[str, Any]:
 
 
 def shown_time(seconds: float) -> str:
-    """Of a processor, for people."""
+    """For people."""
     for unit, size in (("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} core {unit}"
-    return f"{seconds:.3g} core seconds"
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds:.3g} seconds"
 
 
 def shown_value(value: Any) -> str:

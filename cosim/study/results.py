@@ -42,7 +42,7 @@ class Results:
     of_points: int  # how many there are
     trials: list[Trial]  # of an optimiser
     optimum: Mapping[str, Any] | None
-    wall: float  # s    over all runs, of one core
+    wall: float  # s    elapsed, added up over all runs, whatever ran beside them
 
 
 def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
