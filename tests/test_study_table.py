@@ -16,8 +16,10 @@ from scipy import stats
 from studies import FAKE, KINEMATIC, rows, run_quietly, store_instead, study_of
 
 from hexapod_cosim.controller import save_gains
+from hexapod_cosim.cosim.cli.studying import report_on
 from hexapod_cosim.cosim.study.curves import front
 from hexapod_cosim.cosim.study.optimise import OPTIMUM
+from hexapod_cosim.cosim.study.report import optimum_changes
 from hexapod_cosim.cosim.study.results import POINTS, SUMMARY, read_results
 from hexapod_cosim.models import load_robot
 
@@ -163,6 +165,28 @@ def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(ath
     assert {row["case"] for row in training} == {"walk_flat", "push"}
     assert {row["point"] for row in held} == {12, best["trial"]}
     assert {row["friction.mu"] for row in found if row["point"] == 12} == {None}  # before: nothing is set
+
+
+def test_what_the_best_trial_gains_is_paired_and_by_hand(athena_fmu: Path, tmp_path: Path) -> None:
+    found = run_quietly(study_of(optimisation()), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
+    (best,) = json.loads((tmp_path / "out" / OPTIMUM).read_text())["best"]
+
+    def sample(point: int, *, held_out: bool) -> np.ndarray[Any, Any]:
+        chosen = [row for row in found if row["point"] == point and (row["seed"] < 10) == held_out]
+        return np.array([row["slip_per_metre"] for row in sorted(chosen, key=lambda row: (row["case"], row["seed"]))])
+
+    for part, held_out, pairs in (("training", False, 4), ("held_out", True, 6)):
+        before, after = sample(12, held_out=held_out), sample(best["trial"], held_out=held_out)
+        change = best["change"][part]["slip_per_metre"]
+        assert (change["pairs"], change["verdict"]) == (pairs, "better")
+        assert change["relative"] == pytest.approx((after - before).mean() / before.mean(), rel=1e-12)
+        assert change["half_width"] == pytest.approx(half_width(after - before), rel=1e-9)
+    report_on(tmp_path / "out")
+    row = optimum_changes(read_results(tmp_path / "out"))[0]
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert row["part"] == "held out"
+    for text in (row["change"], row["interval"]):
+        assert text in page
 
 
 def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(athena_fmu: Path, tmp_path: Path) -> None:

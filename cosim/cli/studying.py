@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.study.conduct import Tell
 from hexapod_cosim.cosim.study.manifest import TIMES
 from hexapod_cosim.cosim.study.notes import NO_WALK, notes
 from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.study.report import optimum_rows, overall_rows, write_study_report
+from hexapod_cosim.cosim.study.report import optimum_changes, optimum_rows, overall_rows, write_study_report
 from hexapod_cosim.cosim.study.results import Results, read_results, summary_of
 from hexapod_cosim.cosim.study.study import Begun, Options, run_study
 
@@ -103,3 +103,12 @@ def show_study(found: Results) -> None:
     for row in optimum_rows(found):
         settings = ", ".join(f"{name} {text}" for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True))
         print(f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}")
+    show_gained(found)
+
+
+def show_gained(found: Results) -> None:
+    """What the best trials change of what the optimiser began from."""
+    for row in optimum_changes(found):
+        interval = f" (95 % interval {row['interval']})" if row["interval"] else ""
+        verdict = f", {row['verdict']}" if row["verdict"] else ""
+        print(f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, {row['pairs']} pairs{verdict}")

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from hexapod_cosim.cosim.comparison import change_of
 from hexapod_cosim.cosim.files import to_json
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.study.conduct import Desk, conduct
@@ -79,15 +80,17 @@ def optimise(desk: Desk, crew: Crew, folder: Path) -> None:
     picked = [plan.unset, *(trial.values for trial in chosen)]
     points = [plan.asked.trials, *(trial.number for trial in chosen)]
     sets = [plan.held_out(place, *pair) for place, pair in enumerate(zip(points, picked, strict=True))]
-    held = [_means(rows, plan.asked) for rows in _judge(desk, crew, sets)]
+    held = _judge(desk, crew, sets)
+    trained = _judge(desk, crew, [plan.training(trial.number, trial.values) for trial in chosen])
     content = {
         "metrics": list(plan.asked.metrics),
         "variables": [factor.name for factor in plan.study.factors],
-        "before": {"training": _means(begin[0], plan.asked), "held_out": held[0]},
+        "before": {"training": _means(begin[0], plan.asked), "held_out": _means(held[0], plan.asked)},
         "best": [
             {"trial": trial.number, "values": dict(zip((item.name for item in plan.study.factors), trial.values, strict=True)),
-             "feasible": trial.feasible, "training": dict(trial.means), "held_out": after}
-            for trial, after in zip(chosen, held[1:], strict=True)
+             "feasible": trial.feasible, "training": dict(trial.means), "held_out": _means(after, plan.asked),
+             "change": {"training": _changes(begin[0], rows, plan.asked), "held_out": _changes(held[0], after, plan.asked)}}
+            for trial, rows, after in zip(chosen, trained, held[1:], strict=True)
         ],
     }  # fmt: skip
     write_durably(folder / OPTIMUM, (to_json(content) + "\n").encode())
@@ -166,13 +169,32 @@ def _judge(desk: Desk, crew: Crew, sets: Sequence[list[Order]]) -> list[list[dic
 
 def _means(rows: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, float]:
     """Of every metric that counts, over the walks that have it (none on the spot has a slip per metre); NaN where a run did not walk."""
-    names = dict.fromkeys([*asked.metrics, *(bound.metric for bound in asked.constraints)])
+    names = _judged(asked)
     whole = all(row["walked"] for row in rows)
     found: dict[str, float] = {}
     for name in names:
         values = [float(row[name]) for row in rows if row[name] is not None]
         found[name] = float(np.mean(values)) if values and (whole or name == WALKED) else math.nan
     return found
+
+
+def _judged(asked: Optimise) -> list[str]:
+    """Every metric that counts, once."""
+    return list(dict.fromkeys([*asked.metrics, *(bound.metric for bound in asked.constraints)]))
+
+
+def _changes(before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, dict[str, Any]]:
+    """By metric, over pairs of runs of the same scenario, seed and control, of which both walked: as `hexapod compare` has changes."""
+    pairs = [(first, second) for first, second in zip(before, after, strict=True) if first["walked"] and second["walked"]]
+    return {
+        name: change_of(name, [(_figure(first[name]), _figure(second[name])) for first, second in pairs]).as_table()
+        for name in _judged(asked)
+        if name != WALKED
+    }
+
+
+def _figure(value: float | None) -> float:
+    return math.nan if value is None else float(value)
 
 
 def _feasible(means: Mapping[str, float], asked: Optimise) -> bool:

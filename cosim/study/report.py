@@ -38,6 +38,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
     environment = Environment(loader=PackageLoader("hexapod_cosim.cosim", "study"), autoescape=True, undefined=StrictUndefined)
     page = environment.get_template("study.html.jinja").render(
         results=results, overall=overall_rows(results), points=point_rows(results), figures=pictures, optimum=optimum_rows(results),
+        gained=optimum_changes(results),
         failures=[(*key, count) for key, count in results.overall.failures.items()], toml=_toml(results), notes=notes(results),
         of_what=of_what(results), wall=shown_time(results.wall), metrics=OF_POINTS,
     )  # fmt: skip
@@ -140,9 +141,11 @@ def shown_change(change: Change | None) -> dict[str, str]:
     """A change relative to the first control's mean, where that has a meaning, and its interval."""
     if change is None or not change.pairs or not math.isfinite(change.relative):
         return {"change": "", "interval": "", "verdict": "" if change is None else change.verdict}
-    low, high = change.interval
-    interval = f"{low:+.1%} .. {high:+.1%}" if math.isfinite(low) else ""
-    return {"change": f"{change.relative:+.0%}", "interval": interval, "verdict": change.verdict}
+    return {"change": f"{change.relative:+.0%}", "interval": _shown_interval(*change.interval), "verdict": change.verdict}
+
+
+def _shown_interval(low: float, high: float) -> str:
+    return f"{low:+.1%} .. {high:+.1%}" if math.isfinite(low) else ""
 
 
 def optimum_rows(results: Results) -> list[dict[str, Any]]:
@@ -152,6 +155,22 @@ def optimum_rows(results: Results) -> list[dict[str, Any]]:
         return []
     before = {"label": "before", "settings": ["-"] * len(optimum["variables"]), **_judged(optimum["before"])}
     return [before, *(_best_row(item, optimum) for item in optimum["best"])]
+
+
+def optimum_changes(results: Results) -> list[dict[str, Any]]:
+    """A row per best trial, metric and part (held out first): how it differs from what the optimiser began from, over pairs of runs."""
+    return [
+        {"label": f"trial {item['trial']}", "part": part.replace("_", " "), "metric": name, **_found_change(table)}
+        for item in (results.optimum or {"best": []})["best"]
+        for part in ("held_out", "training")
+        for name, table in item.get("change", {}).get(part, {}).items()  # folders of before have none
+    ]
+
+
+def _found_change(table: Mapping[str, Any]) -> dict[str, Any]:
+    relative, low, high = (_number(table[key]) for key in ("relative", "low", "high"))
+    change = f"{relative:+.1%}" if math.isfinite(relative) else "-"
+    return {"change": change, "interval": _shown_interval(low, high), "verdict": table["verdict"], "pairs": table["pairs"]}
 
 
 def _best_row(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, Any]:
