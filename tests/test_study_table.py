@@ -124,6 +124,28 @@ def test_a_study_that_is_not_done_has_a_report_that_says_so(call: Call, compared
     assert "not done yet" in (compared / "report.html").read_text()
 
 
+def test_a_damaged_part_of_a_finished_study_leaves_its_report_whole_and_of_another_is_named(call: Call, compared: Path) -> None:
+    assert call("report", compared)[0] == 0
+    whole, summary = (compared / "report.html").read_text(), (compared / SUMMARY).read_bytes()
+    (part,) = (compared / "runs").iterdir()
+    part.write_bytes(part.read_bytes()[:-7])
+    code, _, err = call("report", compared)
+    assert (code, err) == (0, "")
+    assert ((compared / "report.html").read_text(), (compared / SUMMARY).read_bytes()) == (whole, summary)
+    (compared / "run.json").write_text((compared / "run.json").read_text().replace('"completed"', '"running"'))
+    code, _, err = call("report", compared)
+    assert code == 0
+    assert f"Damaged parts of the results are left out, and their runs with them: {part.name}" in err
+    assert part.name in (compared / "report.html").read_text()
+    (compared / "run.json").write_text((compared / "run.json").read_text().replace('"running"', '"completed"'))
+    results = bytearray((compared / "results.parquet").read_bytes())
+    results[4:400] = bytes(396)
+    (compared / "results.parquet").write_bytes(results)
+    code, _, err = call("report", compared)
+    assert (code, err.count("\n")) == (1, 1)
+    assert "damaged results" in err
+
+
 def test_other_commands_leave_a_studys_folder_alone(call: Call, compared: Path) -> None:
     code, _, err = call("simulate", "stand", "-o", compared)
     assert code == 1

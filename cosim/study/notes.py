@@ -17,6 +17,9 @@ def notes(results: Results) -> list[str]:
 
 
 def _of_what_is_there(results: Results) -> Iterator[str]:
+    if results.damaged:
+        again = "Start the study again: their runs are run again"
+        yield f"Damaged parts of the results are left out, and their runs with them: {', '.join(results.damaged)}. {again}."
     if results.facts["status"] != COMPLETED and results.study.optimise is None:
         means = "Means by control are of what is there, which need not be the same points and seeds"
         yield f"Not all runs are there. {means}; changes are of whole pairs."

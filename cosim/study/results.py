@@ -11,16 +11,17 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+import pyarrow.parquet as pq
 
 from hexapod_cosim.cosim.comparison import verdicts
 from hexapod_cosim.cosim.files import RUN_FILE, read_json, to_json
-from hexapod_cosim.cosim.study.columns import FIGURES, WALL, schema_of
-from hexapod_cosim.cosim.study.manifest import MANIFEST, RUNS, provenance
+from hexapod_cosim.cosim.study.columns import FIGURES, WALL, result_schema, schema_of
+from hexapod_cosim.cosim.study.manifest import COMPLETED, MANIFEST, RESULTS, RUNS, TIMES, provenance
 from hexapod_cosim.cosim.study.moments import Array
 from hexapod_cosim.cosim.study.optimise import OPTIMUM, Optimisation, Trial, trials_of
 from hexapod_cosim.cosim.study.reading import study_from_table
 from hexapod_cosim.cosim.study.records import SCENARIO_FACTOR, Study
-from hexapod_cosim.cosim.study.store import Store, write_durably, write_whole
+from hexapod_cosim.cosim.study.store import ROWS_AT_ONCE, Store, write_durably, write_whole
 from hexapod_cosim.cosim.study.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, blocks_of, whole_pairs
 from hexapod_cosim.cosim.study.table import Mean, Overall, Point, Tally, point_at
 from hexapod_cosim.models import HexapodError
@@ -42,6 +43,7 @@ class Results:
     of_points: int  # how many there are
     trials: list[Trial]  # of an optimiser
     optimum: Mapping[str, Any] | None
+    damaged: list[str]  # parts that could not be read, in words
     wall: float  # s    elapsed, added up over all runs, whatever ran beside them
 
 
@@ -60,12 +62,14 @@ def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
 def read_results(folder: Path) -> Results:
     """Reads all runs once. Writes points.parquet and summary.json. Raises HexapodError."""
     study, manifest = stored_study(folder)
+    facts = read_json(folder / RUN_FILE)
+    tables, damaged = _tables(folder, study, finished=facts["status"] == COMPLETED)
     tally, kept, count = Tally(study), list[Point](), 0
     wall = 0.0
 
     def watched() -> Iterator[Rows]:
         nonlocal wall
-        for table in whole_pairs(Store(folder / RUNS, schema_of(study)).sorted_rows(), study.run_controls):
+        for table in whole_pairs(tables, study.run_controls):
             wall += pc.sum(table[WALL]).as_py() or 0.0
             rows = Rows(table, study)
             tally.add(rows)
@@ -84,11 +88,42 @@ def read_results(folder: Path) -> Results:
     trials = [] if study.optimise is None else trials_of(Optimisation(study), kept)
     optimum = read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None
     results = Results(
-        study=study, manifest=manifest, facts=read_json(folder / RUN_FILE), overall=tally.overall(), points=kept, of_points=count,
-        trials=trials, optimum=optimum, wall=wall,
+        study=study, manifest=manifest, facts=facts, overall=tally.overall(), points=kept, of_points=count,
+        trials=trials, optimum=optimum, damaged=damaged, wall=wall,
     )  # fmt: skip
     write_durably(folder / SUMMARY, (to_json(summary_of(results)) + "\n").encode())
     return results
+
+
+def _tables(folder: Path, study: Study, *, finished: bool) -> tuple[Iterator[pa.Table], list[str]]:
+    """All runs in order from their parts, which have checksums; where one is damaged, from a finished study's results or from the others.
+
+    And in words, which parts are missing.
+    """
+    store = Store(folder / RUNS, schema_of(study))
+    damaged = store.skip_damaged()
+    whole = _readable(folder, study) if finished and (damaged or not store.parts()) else None
+    return (store.sorted_rows(), damaged) if whole is None else (_blocks(*whole), [])
+
+
+def _readable(folder: Path, study: Study) -> tuple[pq.ParquetFile, pq.ParquetFile] | None:
+    """The results and times of a finished study, if they are there and whole as far as their ends tell."""
+    try:
+        files = pq.ParquetFile(folder / RESULTS), pq.ParquetFile(folder / TIMES)
+    except (OSError, pa.ArrowException):
+        return None
+    known = files[0].schema_arrow.names == result_schema(schema_of(study)).names
+    return files if known and files[0].metadata.num_rows == files[1].metadata.num_rows else None
+
+
+def _blocks(results: pq.ParquetFile, times: pq.ParquetFile) -> Iterator[pa.Table]:
+    """Runs with what they took, some ten thousand at a time."""
+    try:
+        for runs, took in zip(results.iter_batches(ROWS_AT_ONCE), times.iter_batches(ROWS_AT_ONCE), strict=True):
+            yield pa.Table.from_batches([runs]).append_column(WALL, took[WALL])
+    except (OSError, pa.ArrowException) as error:
+        fix = "start the study again: it runs what is missing and writes them anew"
+        raise HexapodError("damaged results", got=str(error), expected=f"{RESULTS} and {TIMES} as they were written", fix=fix) from error
 
 
 def summary_of(results: Results) -> dict[str, Any]:

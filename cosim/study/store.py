@@ -93,6 +93,7 @@ class Store:
         self._folder, self._schema, self._write = folder, schema, write
         self._next = 1 + max((number_of(path) for path in self.parts()), default=-1)
         self._ranges: dict[Path, tuple[int, int]] = {}
+        self._skipped: dict[Path, DamagedPartError] = {}
         self._rows: list[dict[str, object]] = []
         self._flushed = monotonic()
 
@@ -164,12 +165,23 @@ class Store:
                 found |= {row[RUN]: row for row in table.filter(pa.compute.field(RUN).isin(list(runs))).to_pylist()}
         return found
 
+    def skip_damaged(self) -> list[str]:
+        """Leaves damaged parts out of `sorted_rows` from now on, and says in words which they are. They stay where they are."""
+        for path in self.parts():
+            try:
+                self._range(path)
+            except FileNotFoundError:  # a running study put it together with others
+                continue
+            except DamagedPartError as error:
+                self._skipped[path] = error
+        return [f"{path.name} ({error.got})" for path, error in self._skipped.items()]
+
     def sorted_rows(self) -> Iterator[pa.Table]:
         """All runs once, in the order of their numbers, some ten thousand at a time."""
         begin, looks = 0, 0
         while True:
             try:
-                ranges = {path: self._range(path) for path in self._settled_parts()}
+                ranges = {path: self._range(path) for path in self._settled_parts() if path not in self._skipped}
                 if begin > max((high for _, high in ranges.values()), default=-1):
                     return
                 table = self._block(begin, begin + ROWS_AT_ONCE, ranges)
