@@ -49,7 +49,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "studies.md"
 INSTANT = "benchmarks.study:Instant"
 BOTH = ("kinematic", "compliant")
-RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = 20_000, 50_000, 2000, 600, 20, 480, 60, 3
+RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = 20_000, 50_000, 2000, 600, 20, 360, 60, 3
 CORES, MILLION = 100, 1e6  # of the plan
 DEFAULT: dict[str, Any] = {}
 # settings of the solver by name: docs/studies.md says what they cost in accuracy
