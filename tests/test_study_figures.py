@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -144,6 +145,19 @@ def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pa
     assert "<h1>test</h1>" in page
     assert "pair" not in page.partition("<h2>Over all runs</h2>")[2]
     assert "half of Student's 95 % interval over its seeds" in page
+
+
+def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder: Any) -> None:
+    page = folder({"seeds": 3, **GRID}).partition("<h2>")[0]
+    assert re.search(r"([+-]\d+%) \.\. \1 by point", page)  # the fake engine changes all figures by one share
+    assert "95 %" not in page
+    assert "no interval of how sure" in page
+
+
+def test_the_headline_of_one_point_has_its_interval(folder: Any) -> None:
+    page = folder({"seeds": 3, "factors": {"friction.mu": [0.5]}}).partition("<h2>")[0]
+    assert "95 %: " in page
+    assert "by point" not in page
 
 
 def test_a_page_of_an_unfinished_study_says_what_its_figures_are_of(folder: Any) -> None:

@@ -86,8 +86,25 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
         values = [shown_mean(name, overall.means[control][name]) for control in results.study.run_controls]
         change = overall.changes.get(name)
         pairs = 0 if change is None else change.pairs
-        rows.append({"name": name, "unit": unit, "meaning": meaning, "values": values, "pairs": pairs, **shown_change(change)})
+        rows.append(
+            {
+                "name": name,
+                "unit": unit,
+                "meaning": meaning,
+                "values": values,
+                "pairs": pairs,
+                **shown_change(change),
+                "spread": spread(results, name),
+            }
+        )
     return rows
+
+
+def spread(results: Results, name: str) -> str:
+    """The least and the largest change of a metric over the points, relative; "" where fewer than two have one."""
+    found = [point.changes[name].relative for point in results.points if name in point.changes]
+    known = [value for value in found if math.isfinite(value)]
+    return f"{min(known):+.0%} .. {max(known):+.0%}" if len(known) > 1 else ""
 
 
 def point_rows(results: Results) -> list[dict[str, Any]]:
