@@ -132,7 +132,7 @@ def test_where_nothing_walks_there_are_no_figures_and_the_page_says_why(folder: 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("table", [LIST, {**GRID, "seeds": 2}, {"seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}}])
 def test_figures_of_all_designs_are_drawn_without_a_warning(athena_fmu: Path, tmp_path: Path, table: dict[str, Any]) -> None:
-    run_quietly(study_of({"set": {"friction.mu": 0.5}, **table}), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
+    run_quietly(study_of(table), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
     results = read_results(tmp_path / "out")
     found = drawings(results.study, results.points, results.trials)
     assert len(found) >= 2

@@ -82,14 +82,17 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
     if factor.name not in gain_names():
         raise unknown_name("gain", factor.name, gain_names(), where=where, error=StudyError)
     if factor.unit or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in samples(factor)):
-        raise StudyError("not a gain's value", got=samples(factor)[0], expected="numbers without a unit", where=where)
+        raise StudyError(
+            "not a gain's value", got=samples(factor)[0], expected="numbers without a unit", fix="leave the unit out", where=where
+        )
     part, _, name = factor.name.removeprefix(GAINS).partition(".")
     above = name in POSITIVE[part]
     bad = next((value for value in samples(factor) if not (value > 0.0 if above else value >= 0.0)), None)  # type: ignore[operator]
     if bad is not None:
         raise StudyError("not a gain's value", got=bad, expected="numbers > 0" if above else "numbers >= 0", fix="correct it", where=where)
     if "compliant" not in study.run_controls:
-        raise StudyError("a gain that no run has", got=factor.name, expected="compliant among the controls", where=where)
+        fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
+        raise StudyError("a gain that no run has", got=factor.name, expected="compliant among the controls", fix=fix, where=where)
 
 
 def _check_setting(factor: Factor, study: Study, where: str) -> None:

@@ -131,7 +131,8 @@ def check_design(study: Study) -> None:
         raise StudyError(f"a distribution in a design {study.design!r}", got=drawn[0], expected="values", fix=fix, where=where)
     lengths = {factor.name: len(factor.values) for factor in study.factors}
     if study.design == LIST and len(set(lengths.values())) > 1:
-        raise StudyError("lists of different lengths", got=lengths, expected="one value of each factor per point", where=where)
+        fix = f'make them as long as each other, or write design = "{GRID}" for all combinations'
+        raise StudyError("lists of different lengths", got=lengths, expected="one value of each factor per point", fix=fix, where=where)
     if study.design == LATIN_HYPERCUBE and study.points * len(study.factors) > MAX_STRATA:
         fix = f'write design = "{SOBOL}", which holds none'
         got, expected = f"{study.points} points, {len(study.factors)} factors", f"points times factors of at most {MAX_STRATA:,}"

@@ -53,7 +53,9 @@ def truth_of(table: Mapping[str, Any], key: str, default: bool, where: str) -> b
     """True or false. Raises StudyError."""
     value = table.get(key, default)
     if not isinstance(value, bool):
-        raise StudyError("wrong type", got=value, expected="true or false", where=f"{where}: {key}")
+        raise StudyError(
+            "wrong type", got=value, expected="true or false", fix=f"write {key} = true, without quotes", where=f"{where}: {key}"
+        )
     return value
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hexapod_cosim.cosim.study.manifest import COMPLETED
+from hexapod_cosim.cosim.study.records import SOBOL, Study
 from hexapod_cosim.cosim.study.results import Results
 
 NO_WALK = "No run walked to its end, so there are no figures of walks. What ended the runs stands under Failures."
@@ -13,7 +14,13 @@ TOO_SHORT = "too short for figures, which are of whole gait cycles after the sec
 
 def notes(results: Results) -> list[str]:
     """Whole sentences."""
-    return [*_of_what_is_there(results), *_of_walks(results)]
+    return [*_of_design(results.study), *_of_what_is_there(results), *_of_walks(results)]
+
+
+def _of_design(study: Study) -> Iterator[str]:
+    if study.design == SOBOL and study.optimise is None and study.points & (study.points - 1):
+        below = 1 << (study.points.bit_length() - 1)
+        yield f"{study.points} Sobol points are no power of two: only {below} or {2 * below} would cover the factors evenly."
 
 
 def _of_what_is_there(results: Results) -> Iterator[str]:

@@ -106,6 +106,7 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     changed = flat(changes, f"{where}: set")
     for name in changed:
         check_settable(plain_name(name), f"{where}: set.{name}", kind="setting")
+        _refuse_twice(name, study)
     vary = truth_of(source, "variation", len(study.seeds) > 1 or study.optimise is not None, where)
     names = [own if isinstance(own, str) else study.title, *_named_scenarios(study.factors, study.optimise)]
     tables: dict[str, Mapping[str, Any] | None] = dict.fromkeys(names)
@@ -119,6 +120,15 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     return {name: _case(name, inline, changed, folder, where, vary=vary) for name, inline in tables.items()}
 
 
+def _refuse_twice(name: str, study: Study) -> None:
+    """A setting that is a factor too; where an optimiser begins is its own to set."""
+    if study.optimise is None and plain_name(name) in {factor.name for factor in study.factors}:
+        fix = "take one of them away: the factor's values would replace it in every run"
+        raise StudyError(
+            "set and varied", got=name, expected="each name in [set] or [factors]", fix=fix, where=f"{study.where}: set.{name}"
+        )
+
+
 def _named_scenarios(factors: Sequence[Factor], optimise: Optimise | None) -> list[str]:
     values = [str(value) for factor in factors if factor.name == SCENARIO_FACTOR and factor.kind == VALUES for value in factor.values]
     return values if optimise is None else [*values, *optimise.training.cases, *optimise.held_out.cases]
@@ -130,7 +140,7 @@ def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any
     if inline is None and len(beside.name.encode()) > MOST_OF_NAME:
         expected = f"a name of at most {MOST_OF_NAME} letters"
         raise StudyError("no file has such a name", got=name, expected=expected, fix="name a scenario", where=f"{where}: scenario")
-    table, told = (dict(inline), f"{where}: scenario") if inline is not None else read_tables(beside if beside.is_file() else name)
+    table, told = (dict(inline), f"{where}: scenario") if inline is not None else _read(beside, name, where)
     scenario = scenario_from_table(table, where=told)
     check_scenario(scenario, names=list(scenario.parameters))
     try:
@@ -142,6 +152,16 @@ def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any
         table["variation"] = dict(STANDARD_TABLE)
     table["outputs"] = {"plots": False}  # a study keeps no recordings
     return Case(name=name, table=table, where=told)
+
+
+def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
+    """A scenario's tables, from a file beside the study if there is one. Raises HexapodError; of an unknown name with the study's place."""
+    try:
+        return read_tables(beside if beside.is_file() else name)
+    except HexapodError as error:
+        if error.where:
+            raise
+        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=f"{where}: scenario") from error
 
 
 def _place(error: HexapodError, where: str) -> str:
