@@ -147,6 +147,11 @@ def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pa
     assert "half of Student's 95 % interval over its seeds" in page
 
 
+def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
+    page = folder({"design": "sobol", "points": 3, "factors": {"friction.mu": {"uniform": [0.3, 0.9]}}})
+    assert "3 Sobol points are no power of two: only 2 or 4" in page
+
+
 def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder: Any) -> None:
     page = folder({"seeds": 3, **GRID}).partition("<h2>")[0]
     assert re.search(r"([+-]\d+%) \.\. \1 by point", page)  # the fake engine changes all figures by one share

@@ -83,6 +83,8 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ({"variation": "yes"}, ["variation", "got 'yes'", "write variation = true"]),
         ({"factors": {"gains.slip.kp": {"values": [1.0], "unit": "s"}}}, ["not a gain's value", "leave the unit out"]),
         ({"set": {"friction.mu": 0.5}, "factors": {"friction.mu": [0.3]}}, ["set.friction.mu", "set and varied", "take one of them away"]),
+        ({"factors": {"scenario": ["walk_falt"]}}, ["test.toml: factors.scenario", "unknown scenario"]),
+        (optimisation(held_out={"scenarios": ["riple"], "seeds": 2}), ["test.toml: optimise.held_out.scenarios", "'ripple'"]),
         ({"scenario": "walk_falt"}, ["test.toml: scenario", "unknown scenario", "did you mean 'walk_flat'"]),
         ({"set": {"friction.mu": -1}}, ["set.friction.mu", "got -1"]),
         (optimisation(metric="slip_per_meter"), ["optimise.metric", "did you mean 'slip_per_metre'"]),

@@ -117,7 +117,18 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
         tables[names[0]] = own
     elif not isinstance(own, str):
         raise StudyError("wrong type", got=own, expected="a scenario's name, file or table", where=f"{where}: scenario")
-    return {name: _case(name, inline, changed, folder, where, vary=vary) for name, inline in tables.items()}
+    return {name: _case(name, inline, changed, folder, where, vary=vary, key=_key_of(name, study)) for name, inline in tables.items()}
+
+
+def _key_of(name: str, study: Study) -> str:
+    """The key under which a scenario stands in the file."""
+    if any(factor.name == SCENARIO_FACTOR and name in factor.values for factor in study.factors):
+        return "factors.scenario"
+    if study.optimise is not None:
+        for part, judging in (("training", study.optimise.training), ("held_out", study.optimise.held_out)):
+            if name in judging.cases:
+                return f"optimise.{part}.scenarios"
+    return "scenario"
 
 
 def _refuse_twice(name: str, study: Study) -> None:
@@ -134,13 +145,15 @@ def _named_scenarios(factors: Sequence[Factor], optimise: Optimise | None) -> li
     return values if optimise is None else [*values, *optimise.training.cases, *optimise.held_out.cases]
 
 
-def _case(name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any], folder: Path, where: str, *, vary: bool) -> Case:
+def _case(
+    name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any], folder: Path, where: str, *, vary: bool, key: str
+) -> Case:
     """Raises ScenarioError for a scenario that cannot be run as it is."""
     beside = folder / name
     if inline is None and len(beside.name.encode()) > MOST_OF_NAME:
         expected = f"a name of at most {MOST_OF_NAME} letters"
         raise StudyError("no file has such a name", got=name, expected=expected, fix="name a scenario", where=f"{where}: scenario")
-    table, told = (dict(inline), f"{where}: scenario") if inline is not None else _read(beside, name, where)
+    table, told = (dict(inline), f"{where}: scenario") if inline is not None else _read(beside, name, f"{where}: {key}")
     scenario = scenario_from_table(table, where=told)
     check_scenario(scenario, names=list(scenario.parameters))
     try:
@@ -161,7 +174,7 @@ def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
     except HexapodError as error:
         if error.where:
             raise
-        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=f"{where}: scenario") from error
+        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
 
 
 def _place(error: HexapodError, where: str) -> str:
