@@ -53,9 +53,13 @@ def hopeless(found: Results) -> list[str]:
             reasons = [(count, *key[1:]) for key, count in found.overall.failures.items() if key[0] == control]
             count, status, reason = reasons[0]
             alike = "all" if len(reasons) == 1 else f"{count} of them"
-            how = "fell" if status == COMPLETED else status
-            texts.append(f"none of {total} {control} runs walked to its end; {alike} {how}: {reason}")
+            texts.append(f"none of {total} {control} runs walked to its end; {alike} {_ending(status)}: {reason}")
     return texts
+
+
+def _ending(status: str) -> str:
+    """How a run that did not walk to its end came to it."""
+    return "fell" if status == COMPLETED else status
 
 
 def report_on(folder: Path) -> tuple[Results, list[Path]]:
@@ -99,7 +103,7 @@ def show_study(found: Results) -> None:
     walked = ", ".join(f"{control} {overall.walked.get(control, 0)} of {overall.total.get(control, 0)}" for control in controls)
     print(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
     for (control, status, reason), count in list(overall.failures.items())[:MOST_REASONS]:
-        print(f"{count:6d} x {control} {'fell' if status == COMPLETED else status}: {reason}")
+        print(f"{count:6d} x {control} {_ending(status)}: {reason}")
     for row in optimum_rows(found):
         settings = ", ".join(f"{name} {text}" for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True))
         print(f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}")

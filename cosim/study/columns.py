@@ -16,8 +16,6 @@ FIGURES = tuple(name for name in METRICS if name != OF_TIME)
 UNITS = {name: unit for name, (unit, _, _) in METRICS.items()}
 WALL = "wall"
 BETWEEN = " | "  # warnings of a run
-STATE = ("status", "reason", "upright", "walked", "fallback", "warnings")
-RESERVED = ("run", "point", "case", "seed", "control", *STATE, *METRICS, "identity", WALL)
 
 
 def schema_of(study: Study) -> pa.Schema:

@@ -12,13 +12,13 @@ from time import time
 from typing import Any
 
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, STUDY, not_writable, read_json, to_json
+from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.locks import HELD, lock_file
 from hexapod_cosim.cosim.study.records import Study, StudyError
 from hexapod_cosim.cosim.study.store import LEFTOVERS, write_durably
 
 MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "results.parquet", "times.parquet"
-COMPLETED = "completed"
 FORMAT = 1
 OF_FILE = "hexapod."  # keys of a file's metadata
 MOST_NAMED = 6  # differences in a message

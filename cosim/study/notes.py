@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hexapod_cosim.cosim.study.manifest import COMPLETED
+from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.records import SOBOL, Study
 from hexapod_cosim.cosim.study.results import Results
 

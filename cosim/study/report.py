@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -207,8 +207,3 @@ def _shown_figure(name: str, value: float | None) -> str:
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def judged_names(optimum: Mapping[str, Any]) -> Sequence[str]:
-    """The metrics that trials are judged on."""
-    return list(optimum["before"]["training"])

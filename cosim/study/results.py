@@ -15,8 +15,9 @@ import pyarrow.parquet as pq
 
 from hexapod_cosim.cosim.comparison import verdicts
 from hexapod_cosim.cosim.files import RUN_FILE, read_json, to_json
+from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.columns import FIGURES, WALL, result_schema, schema_of
-from hexapod_cosim.cosim.study.manifest import COMPLETED, MANIFEST, RESULTS, RUNS, TIMES, provenance
+from hexapod_cosim.cosim.study.manifest import MANIFEST, RESULTS, RUNS, TIMES, provenance
 from hexapod_cosim.cosim.study.moments import Array
 from hexapod_cosim.cosim.study.optimise import OPTIMUM, Optimisation, Trial, trials_of
 from hexapod_cosim.cosim.study.reading import study_from_table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,8 +110,3 @@ def put_together(study: Study, store: Store, folder: Path) -> None:
     facts = provenance(read_json(folder / MANIFEST))
     write_whole(folder / RESULTS, store.sorted_rows(), result_schema(schema).with_metadata(facts))
     write_whole(folder / TIMES, store.sorted_rows(), pa.schema([schema.field("run"), schema.field(WALL)]))
-
-
-def rows_of(folder: Path, study: Study) -> Iterator[pa.Table]:
-    """What is stored so far, in the order of the runs' numbers."""
-    yield from Store(folder / RUNS, schema_of(study)).sorted_rows()
