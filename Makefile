@@ -6,12 +6,20 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 PARALLEL := -n auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder# a process a core; files stay whole, see tests/conftest.py
+CMAKE = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
+CONFIGURE = $(CMAKE) -G Ninja -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python --log-level=WARNING --preset
+BUILD = $(CMAKE) --build --preset
+REPORT := $(CURDIR)/build/sanitize/report# what a sanitizer says before it ends a process, which pytest would keep to itself
+SANITIZER = rm -f $(REPORT).*; HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1:log_path=$(REPORT) \
+	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so)
+SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*)
-C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.c benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c)
-SANITIZED := tests/test_fmi.py tests/test_fmi3.py tests/test_fmi3_order.py tests/test_plant_events.py tests/test_fmi_state.py tests/test_fmi_values.py tests/test_fmi_importers.py tests/test_fmi_exchange.py tests/test_plant_coordinates.py tests/test_plant_misuse.py tests/test_endurance.py
+C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
+SANITIZED_SHORT := $(patsubst %,tests/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange plant_events plant_coordinates plant_misuse)
+SANITIZED := $(SANITIZED_SHORT) tests/test_fmi_importers.py tests/test_endurance.py
 
-.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-sanitize check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
+.PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
 
 help:
 	@echo "make setup     the hexapod command in $(BIN)"
@@ -21,8 +29,12 @@ help:
 	@echo "make test-importers  the same walk through libcosim, Ecos, ... and how far each is from fmpy (2 min)"
 	@echo "make test-platforms  the binaries for all platforms, Windows under Wine and Arm under qemu-user (installed with apt when root)"
 	@echo "make test-endurance  10,000 instances, 5,000 loadings, a million steps, threads, random calls (10 min)"
-	@echo "make test-sanitize   the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
-	@echo "make check     formatters, linters, types, generated files"
+	@echo "make test-native   the tests that are programs in C, run by ctest (1 min)"
+	@echo "make test-sanitize   these, the FMU's tests and random calls under address and undefined-behaviour sanitizers (5 min)"
+	@echo "make test-sanitize-short  the same without random calls and many instances (2 min)"
+	@echo "make test-robots  30 robots drawn at random, 0.5 to 30 kg: all designed for, all walk (3 min)"
+	@echo "make check     formatters, linters, types, generated files, warnings of gcc and clang"
+	@echo "make lint-c    warnings of gcc and clang alone"
 	@echo "make bench     speed and accuracy against the engines people would pick instead (15 min); bench-quick: 1.5 min"
 	@echo "make bench-batch  walks a minute on one core and on all, cost of a run beside its loop, memory (5 min)"
 	@echo "make study-demo  500 walks, killed twice and completed; the same uninterrupted and on a Dask cluster: the same bytes (5 min)"
@@ -65,12 +77,35 @@ test-endurance: setup
 	$(BIN)/python -m pytest -q tests/test_endurance.py
 	$(BIN)/python tests/endurance.py build/test/plant_fmu/hexapod.[sd]*
 
-# memory is measured without sanitizers, which keep what was freed
-test-sanitize: setup
-	HEXAPOD_PRESET=sanitize ASAN_OPTIONS=detect_leaks=0:quarantine_size_mb=1 LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) \
-	$(BIN)/python -m pytest -q $(SANITIZED) -k "not states and not libraries and not instances-500"
+test-robots: setup
+	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/test_random_robots.py
 
-check: setup typing
+# programs in C, run by ctest
+test-native: setup
+	$(CONFIGURE) test
+	$(BUILD) native -- --quiet
+	PATH="$(CURDIR)/$(BIN):$$PATH" ctest --preset test
+
+test-native-sanitize: setup
+	$(CONFIGURE) sanitize
+	$(BUILD) native-sanitize -- --quiet
+	PATH="$(CURDIR)/$(BIN):$$PATH" ctest --preset sanitize
+
+# memory is measured without sanitizers, which keep what was freed
+test-sanitize: test-native-sanitize
+	$(SANITIZER) $(BIN)/python -m pytest -q $(SANITIZED) -k "not states and not libraries and not instances-500" $(SANITIZED_END)
+
+test-sanitize-short: test-native-sanitize
+	$(SANITIZER) $(BIN)/python -m pytest -q $(PARALLEL) $(SANITIZED_SHORT) $(SANITIZED_END)
+
+# warnings are errors: gcc -std=c11 -Wpedantic; clang -Weverything but for plant_fmu/cmake/warnings.cmake
+lint-c: lint-c-gcc lint-c-clang
+
+lint-c-%: setup
+	@if command -v $* >/dev/null; then $(CONFIGURE) lint-$* && $(BUILD) lint-$* -- --quiet; \
+	else echo "lint-c: skipped what $* warns about: no $* is installed (Debian, Ubuntu: apt-get install $*)"; fi
+
+check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim

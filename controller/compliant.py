@@ -66,7 +66,7 @@ class Compliant:
         return {"laws": self.laws.save(), "hold": self.hold.save(), "offset": self._offset.copy(), "own": own}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         self.laws.restore(state["laws"])
         self.hold.restore(state["hold"])
         self._offset[:] = state["offset"]
@@ -96,7 +96,7 @@ class Compliant:
 
     def lower(self, feet: Feet, steps: Steps, *, walking: bool) -> Feet:
         """Planned feet, all rows, lowered by what the ground will give way under their loads."""
-        self._activation = self._support.activation(steps.phase, steps.swinging[-1], walking=walking)
+        self._activation = self._support.activation(steps.phase, steps.stayed, steps.stays, walking=walking)
         self._heights = feet.height
         if not self._parts.support:
             return feet
@@ -114,10 +114,12 @@ class Compliant:
         rotation = None if level else rotations(value[:, 4], value[:, 5])
         demand = self._dynamics.demand(pose, speed, Frames(steps.way, cis(steps.turn), value[:, 3:4], rotation))
         rows = slice(first, None)
-        shares = self._support.shares(steps.plane + shift, self._activation, demand).rows(rows)
+        feet = steps.plane + shift
+        shares = self._support.shares(feet, self._activation, demand).rows(rows)
         self.laws.plan(
             demand.rows(rows),
             shares,
+            feet=feet[rows],
             height=(steps.height - self._home)[rows],
             rise=steps.rise[rows],
             swinging=steps.swinging[-1],

@@ -34,11 +34,11 @@ class ContactDetector:
         self.touching = np.zeros(LEGS, dtype=np.bool_)
 
     def save(self) -> Mask:
-        """What it remembers."""
+        """Returns the state that restore() takes."""
         return self.touching
 
     def restore(self, state: Mask) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         self.touching = state
 
     def step(self, normal: Array) -> Mask:
@@ -67,7 +67,7 @@ class SensorWatch:
         return self._contradicted, self._left
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         self._contradicted, self._left = state
         self.doubted, self.busy = [left > 0.0 for left in self._left], any(self._left) or any(self._contradicted)
 

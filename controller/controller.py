@@ -61,6 +61,7 @@ class JointCommand:
     angle_ref: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed_ref: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
     torque_ref: Array = field(default_factory=_zeros)  # N m    (6, 3)
+    acceleration_ref: Array = field(default_factory=_zeros)  # rad/s2    (6, 3) planned, for kinematic drives
 
 
 @dataclass(frozen=True)
@@ -68,16 +69,19 @@ class Diagnostics:
     """The controller's insides for recorders and tests: arrays of six legs that change at every step."""
 
     swinging: Mask  # planned to be in the air
+    planned: Array  # m    (6, 3) the feet's centres as the command plans them, torso frame, without any correction
     shift: Plane  # m    horizontal correction of the feet by the compliance, x + i y in the walking frame
     lift: Array  # m    vertical correction, of all parts
     unreachable: Mask  # the joints could not follow at the last step
-    fallback: Mask  # walks without feedback: its foot's sensor is not believed, or the robot slides or outruns its joints
+    fallback: Mask  # walks without feedback: sensor not believed, or the robot slides, outruns its joints or is far too heavy
 
 
 def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
-    """Whether gains are of another robot or period [s]."""
-    mismatch = None if gains is None else gains.mismatch(robot, period=period)
-    return () if mismatch is None else (mismatch,)
+    """Whether gains are of another robot or period [s], and what they were not designed for."""
+    if gains is None:
+        return ()
+    mismatch = gains.mismatch(robot, period=period)
+    return (*(() if mismatch is None else (mismatch,)), *gains.caveats)
 
 
 class Controller:
@@ -111,8 +115,8 @@ class Controller:
         compliant, (swinging, lost) = self.compliant, np.zeros((2, LEGS), dtype=np.bool_)
         if compliant is None:
             still = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
-            return Diagnostics(swinging, *still, lost, np.zeros(LEGS, dtype=np.bool_))
-        return Diagnostics(swinging, compliant.shift, compliant.lift, lost, compliant.laws.fallback)
+            return Diagnostics(swinging, _zeros(), *still, lost, np.zeros(LEGS, dtype=np.bool_))
+        return Diagnostics(swinging, _zeros(), compliant.shift, compliant.lift, lost, compliant.laws.fallback)
 
     def reset(self) -> None:
         """Standing in the stance, all memory cleared; the next step is the first."""
@@ -127,7 +131,7 @@ class Controller:
     def save(self) -> dict[str, Any]:
         """Everything the controller remembers between steps, and what it has planned."""
         compliant = None if self.compliant is None else self.compliant.save()
-        own = {name: getattr(self, name) for name in ("_start", "_count", "_plan", "_at", "_last", "_cut")}
+        own = {name: getattr(self, name) for name in ("_start", "_count", "_plan", "_planned", "_acceleration", "_at", "_last", "_cut")}
         return {"ramp": self.ramp.save(), "paths": self.paths.save(), "compliant": compliant, "own": own}
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -149,8 +153,9 @@ class Controller:
         """
         self._advance(t, command)
         at, out, plan, compliant = self._at, self._out, self._plan, self.compliant
-        out.angle_ref[...], out.speed_ref[...] = plan.angle[at], plan.speed[at]
+        out.angle_ref[...], out.speed_ref[...], out.acceleration_ref[...] = plan.angle[at], plan.speed[at], self._acceleration[at]
         self.diagnostics.unreachable[...] = plan.unreachable[at]
+        self.diagnostics.planned[...] = self._planned[at]
         if compliant is not None:
             compliant.step(measurement, out)
         return out
@@ -199,11 +204,14 @@ class Controller:
         if compliant is not None:
             feet = compliant.lower(feet, steps, walking=self.paths.walking)
         level = not (value[:, 3:].any() or rate[:, 3:].any())
-        pose, seen, shift = self._pose(feet, None if level else (value[:, 3:], rate[:, 3:]))
+        posture = None if level else (value[:, 3:], rate[:, 3:])
+        pose, seen, shift = self._pose(feet, posture)
         joints = self.legs.solve(pose, seen.velocity, seen.rise)
         if compliant is not None:
             compliant.plan(first, steps, value, pose, joints.speed, shift=shift, level=level)
         self._plan = Joints(joints.angle[rows], joints.speed[rows], joints.unreachable[rows])
+        self._planned = _centres(Feet(steps.plane + shift, steps.height, steps.plane_velocity, steps.rise), posture)[rows]
+        self._acceleration = self.legs.accelerations(joints, self.period)[rows]
         self._at, self._last = -first, len(value) - first - 1
 
     def _pose(self, feet: Feet, posture: tuple[Array, Array] | None) -> tuple[Pose, Feet, Plane]:
@@ -219,3 +227,9 @@ class Controller:
         rolling = replace(feet, plane=feet.plane + shift, velocity=feet.velocity + rates(shift, self.period))
         seen = rolling if posture is None else in_torso_frame(rolling, *posture)
         return self.legs.pose(seen.plane, seen.height), seen, shift
+
+
+def _centres(feet: Feet, posture: tuple[Array, Array] | None) -> Array:
+    """(n, 6, 3) feet of the walking frame in the torso frame [m], under the commanded height, roll and pitch; None: these are 0."""
+    seen = feet if posture is None else in_torso_frame(feet, *posture)
+    return np.stack([seen.plane.real, seen.plane.imag, seen.height], axis=-1)

@@ -79,7 +79,7 @@ class LimitGains:
 
 @dataclass(frozen=True, kw_only=True)
 class Requirements:
-    """What a design must meet."""
+    """What a design must meet. The figures suit legs of 0.22 to 0.44 m; for others: size.py."""
 
     phase_margin: float = 60.0  # deg    at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
@@ -138,6 +138,7 @@ class Gains:
     hold: HoldGains
     limits: LimitGains
     margins: Margins
+    caveats: tuple[str, ...] = ()  # stances that are left out, and why; what was not reached
 
     def mismatch(self, robot: Robot, *, period: float) -> str | None:
         """Why these gains are not for this robot and period; None when they are."""
@@ -168,6 +169,7 @@ Record = TypeVar("Record")
 def save_gains(gains: Gains, path: str | Path) -> Path:
     """Writes a gains file (TOML, floats to the last bit). Raises GainsError when the file cannot be written."""
     head = {"format": FORMAT, "robot": gains.robot, "robot_hash": gains.robot_hash, "period": gains.period}
+    head |= {"caveats": list(gains.caveats)} if gains.caveats else {}
     lines = ["# Gains of the compliant control, SI units; made by `hexapod design`."]
     lines += _toml_lines(head)
     for part in PARTS:
@@ -184,7 +186,7 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
 
 def _toml_lines(table: Mapping[str, Any]) -> list[str]:
     # a JSON text is a TOML text too; repr gives floats to the last bit, and TOML knows its inf
-    return [f"{key} = {json.dumps(value) if isinstance(value, str) else repr(value)}" for key, value in table.items()]
+    return [f"{key} = {json.dumps(value) if isinstance(value, str | list) else repr(value)}" for key, value in table.items()]
 
 
 def load_gains(path: str | Path) -> Gains:
@@ -204,8 +206,15 @@ def load_gains(path: str | Path) -> Gains:
     for key in ("robot", "robot_hash"):
         _text(table.get(key), f"{where}: {key}")
     period = _number(table.get("period"), f"{where}: period", positive=True)
+    caveats = _texts(table.pop("caveats", []), f"{where}: caveats")
     _refuse_unknown(table, ["robot", "robot_hash", "period"], where)
-    return Gains(robot=table["robot"], robot_hash=table["robot_hash"], period=period, **parts)
+    return Gains(robot=table["robot"], robot_hash=table["robot_hash"], period=period, caveats=caveats, **parts)
+
+
+def _texts(value: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise GainsError("wrong type", got=value, expected="a list of texts", fix="put it in brackets", where=where)
+    return tuple(_text(entry, where) for entry in value)
 
 
 def _read_part(kind: type[Record], name: str, table: Any, where: str) -> Record:

@@ -56,11 +56,11 @@ class Hold:
         self._before: tuple[list[complex], Sequence[float], float] | None = None
 
     def save(self) -> dict[str, Any]:
-        """What it remembers."""
+        """Returns the state that restore() takes."""
         return {name: value for name, value in vars(self).items() if name not in {"every", "_gains", "_parts", "_time"}}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         vars(self).update(state)
 
     def look(self, seen: Sight) -> None:

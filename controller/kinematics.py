@@ -204,3 +204,20 @@ class LegSolver:
         np.minimum(np.maximum(speed, -self.speed_max, out=speed), self.speed_max, out=speed)
         speed[held] = 0.0
         return Joints(angle, speed, pose.lost | held.any(axis=-1))
+
+    def accelerations(self, joints: Joints, period: float) -> Array:
+        """(n, 6, 3) [rad/s2] that lead the joints from each row to the angles of the next.
+
+        Rows are a period [s] apart; the last row has those that led there. A joint that its limits
+        hold, of angle or of speed, has none; no joint has more than turns its speed round within a
+        period.
+        """
+        angle, speed, found = joints.angle, joints.speed, np.zeros_like(joints.angle)
+        if len(angle) > 1:
+            found[:-1] = 2.0 * (angle[1:] - angle[:-1] - period * speed[:-1]) / period**2
+            found[-1] = 2.0 * (angle[-2] - angle[-1] + period * speed[-1]) / period**2
+        most = 2.0 * self.speed_max / period
+        np.minimum(np.maximum(found, -most, out=found), most, out=found)
+        held = (angle <= self.angle_min) | (angle >= self.angle_max) | (np.abs(speed) >= self.speed_max)
+        found[held] = 0.0
+        return found

@@ -16,6 +16,6 @@ class Parts:
     posture: bool = True  # roll, pitch and height are held
     path: bool = True  # the walked way is measured at the feet and held to the command
     limits: bool = True  # corrections are limited in rate and torque
-    fallback: bool = (
-        True  # no feedback from a sensor that contradicts the plan; kinematic control while the robot slides or outruns its joints
-    )
+    # no feedback from a sensor that contradicts the plan; kinematic control of a robot that slides,
+    # outruns its joints or is far too heavy for them
+    fallback: bool = True

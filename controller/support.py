@@ -66,15 +66,19 @@ class Support:
         """m    (n, 6) how much lower than planned the feet must be for the torso to keep its height over the ground that gives way"""
         return self.indentation(self.normal(feet, activation, self._still)) - self._rest
 
-    def activation(self, phase: Array, swinging: Mask, *, walking: bool) -> Array:
-        """(n, 6) in [0, 1] at gait phases (n, 6); `swinging` (6,): these legs are in the air throughout."""
+    def activation(self, phase: Array, stayed: Mask, stays: Mask, *, walking: bool) -> Array:
+        """(n, 6) in [0, 1] at gait phases (n, 6).
+
+        stayed, stays: (6,) these legs had nowhere to step when they were to lift off last, or will have nowhere to when they are next.
+        """
         if not walking:
             return np.ones_like(phase)
         half = 0.5 * self._handover
         since = (phase + half) % 1.0  # cycles since the activation began to rise
         rising, falling = _smooth(since / self._handover), _smooth((self._gait.duty + 2.0 * half - since) / self._handover)
-        # a leg that has nowhere to step stays
-        return np.where((phase >= self._gait.duty) & ~swinging, 1.0, np.minimum(rising, falling))
+        # a leg that stayed where it was has neither given up its load nor takes it up again
+        handing = np.minimum(np.where(stayed, 1.0, rising), np.where(stays, 1.0, falling))
+        return np.where(stayed & (phase >= self._gait.duty), 1.0, handing)
 
     def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
         """Shares of feet (n, 6) x + i y in the walking frame."""

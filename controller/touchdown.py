@@ -35,11 +35,11 @@ class Touchdown:
         self.restore(([0.0] * LEGS, [0.0] * LEGS))
 
     def save(self) -> tuple[Any, ...]:
-        """What it remembers."""
+        """Returns the state that restore() takes."""
         return self.offset, self._late
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         self.offset, self._late = state
         self.busy = any(self.offset) or any(self._late)
 

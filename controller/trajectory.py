@@ -65,11 +65,11 @@ class CommandRamp:
         self.steps = self._end
 
     def save(self) -> tuple[Any, ...]:
-        """What it remembers."""
+        """Returns the state that restore() takes."""
         return self.target, self._goal, self.steps, self._cubic.copy()
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         self.target, self._goal, self.steps, self._cubic[:] = state
 
     @property
@@ -122,6 +122,8 @@ class Steps:
     pull: Plane  # m    (goal - foot)/(1 - s) on the ground, 0 of standing feet
     way: Plane  # m    (n, 1) of the walking frame over the ground
     turn: Array  # rad    (n, 1)
+    stayed: Mask  # had nowhere to step when they were to lift off last, so they stood through the time of their swing
+    stays: Mask  # will have nowhere to when they are next: at home under a body at rest
 
 
 class FootPaths:
@@ -137,7 +139,9 @@ class FootPaths:
         self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
         self.swing_time = gait.period * (1.0 - gait.duty)
         self._landing_lead = 0.5 * gait.period * gait.duty + self.swing_time  # s    from lift-off to the middle of the next stance
-        self._offsets = np.array(gait.offsets) + gait.start_clock() - CLOCK_EPSILON
+        begin = np.array(gait.offsets) + gait.start_clock()
+        self._offsets, self._never = begin - CLOCK_EPSILON, np.zeros(LEGS, dtype=np.bool_)
+        self._late = (begin + CLOCK_EPSILON) % 1.0 >= gait.duty  # the walk begins in the time of their swing
         self.steps: Steps
         self.at, self.walking, self._before = 0, False, 0
         self.reset()
@@ -151,7 +155,7 @@ class FootPaths:
         return self.steps, self.at, self.walking, self._before
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        """Goes back to it."""
+        """Restores a state returned by save()."""
         self.steps, self.at, self.walking, self._before = state
 
     @property
@@ -170,7 +174,7 @@ class FootPaths:
         self.walking, self.at, self._before = False, 0, 0
         self.steps = Steps(
             plane=plane, height=height, plane_velocity=still, rise=zeros, phase=phase, swinging=zeros > 0.0, progress=zeros, blend=zeros,
-            goal=plane, pull=still, way=still[:, :1], turn=zeros[:, :1],
+            goal=plane, pull=still, way=still[:, :1], turn=zeros[:, :1], stayed=np.broadcast_to(self._late, zeros.shape), stays=zeros > 0.0,
         )  # fmt: skip
 
     def _phases(self, numbers: Array) -> Array:
@@ -192,22 +196,25 @@ class FootPaths:
             return
         phase = self._phases(np.arange(before, before + len(v), dtype=np.float64))
         standing = phase < self.gait.duty
-        feet, lifted = steps.plane[at], standing[0] & ~standing[1]
+        due = standing[0] & ~standing[1]
+        feet, lifted, stays = steps.plane[at], due.copy(), self._never
         swinging = steps.swinging[at] & ~standing[1]
         if not going:
             landed = steps.swinging[at] & standing[1]
             feet = np.where(landed, cis(-steps.turn[at]) * (steps.goal[at] - steps.way[at]), feet)
             home = np.abs(feet - self.home) < HOME_TOLERANCE
             lifted &= ~home
+            stays = home & ~swinging
             if home.all() and not (swinging | lifted).any():
                 self._rest(feet, len(v) - 1)
                 return
         changed = int((standing[1:] != standing[1]).argmax()) // LEGS  # the first never differs from itself: 0 is none
         end = 1 + (changed or len(v) - 1)
-        self.steps = self._walk(v[:end, None], yaw_rate[:end, None], phase[:end], swinging | lifted, lifted)
+        stayed = (steps.stayed[at] | due) & ~lifted
+        self.steps = self._walk(v[:end, None], yaw_rate[:end, None], phase[:end], swinging | lifted, lifted, (stayed, stays))
         self.walking, self.at, self._before = True, 0, before
 
-    def _walk(self, v: Plane, yaw_rate: Array, phase: Array, swinging: Mask, lifted: Mask) -> Steps:
+    def _walk(self, v: Plane, yaw_rate: Array, phase: Array, swinging: Mask, lifted: Mask, stay: tuple[Mask, Mask]) -> Steps:
         """The steps in which these legs (6,) are in the air; those that lift off just now will in any case be aimed once."""
         now, at, time = self.steps, self.at, self.swing_time
         tau = (phase - self.gait.duty) / (1.0 - self.gait.duty)
@@ -231,6 +238,7 @@ class FootPaths:
             plane=plane, height=self.home_height + np.where(swinging, lift, 0.0), plane_velocity=velocity,
             rise=np.where(swinging, climb / time, 0.0), phase=phase, swinging=np.broadcast_to(swinging, phase.shape),
             progress=np.where(swinging, tau, 0.0), blend=s, goal=goal, pull=pull, way=way, turn=turn,
+            stayed=np.broadcast_to(stay[0], phase.shape), stays=np.broadcast_to(stay[1], phase.shape),
         )  # fmt: skip
 
     def _odometry(self, v: Plane, yaw_rate: Array) -> tuple[Plane, Array]:

@@ -1,7 +1,15 @@
 """Runs against runs, seed by seed: means, changes, and how sure they are; seeds.csv, where all runs of a comparison stand.
 
-The change of a metric is paired: with d the difference of a pair, the interval of its mean is mean(d) +- t(0.975, n - 1) sd(d)/sqrt(n),
-Student's, and both are told relative to the first runs' mean, as if that were exact.
+A pair has values a and b, their difference is d = b - a, means are over n pairs, and t = t(0.975, n - 1) is Student's quantile.
+
+The change is mean(d), in the metric's unit, with the interval mean(d) -+ t s(d)/sqrt(n), s being the standard deviation. The relative
+change is r - 1, r = mean(b)/mean(a). Its interval is that of ln r, by the delta method, so that it is never below -100 % and knows that
+mean(a) is not exact either. With S, the sum of squared deviations from the mean, it is
+
+    ln r -+ t w        w^2 = (S(a)/mean(a)^2 + S(b)/mean(b)^2 - (S(a) + S(b) - S(d))/(mean(a) mean(b))) / (n (n - 1))
+
+where S(a) + S(b) - S(d) is twice the sum of the products of a pair's deviations. A change is sure when the relative interval leaves out 0;
+where there is none, because a mean is not positive, when the other one does.
 """
 
 from __future__ import annotations
@@ -26,6 +34,8 @@ Array = NDArray[np.float64]
 SEEDS, SEEDS_PARTIAL = "seeds.csv", "seeds.partial.csv"
 CONFIDENCE = 0.95
 BETTER, WORSE, SAME = "better", "worse", "same"
+LARGEST = 700.0  # of a logarithm, so that its exponential is a number
+METHOD = "95 % intervals are of the ratio of the means over pairs (Student's, of its logarithm), so none is below -100 %"
 LEAST_CHANGE = 0.005  # of a single pair, which has no interval: less is neither better nor worse
 FACTS = tuple(item.name for item in fields(Summary) if item.name != "metrics")
 BETWEEN = " | "  # warnings of a run in one cell
@@ -38,6 +48,7 @@ class Change:
     before: float  # mean
     after: float
     half_width: float  # of the difference's interval; NaN for a single pair
+    log_half_width: float  # of the interval of ln(after/before); NaN for a single pair, and where a mean is not positive
     pairs: int  # that have the metric
     floor: float  # less means nothing
     verdict: str  # BETTER, WORSE, SAME, or "" where neither side is better
@@ -57,8 +68,13 @@ class Change:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Relative."""
-        return (self.difference - self.half_width) / self.scale, (self.difference + self.half_width) / self.scale
+        """Of the relative change; NaN where there is none."""
+        if self.after == 0.0 and math.isfinite(self.half_width * self.scale):  # nothing is left of it in any pair
+            return -1.0, -1.0
+        if not math.isfinite(self.log_half_width * self.scale):
+            return math.nan, math.nan
+        low, high = (math.log(self.after / self.before) + side * self.log_half_width for side in (-1.0, 1.0))
+        return math.expm1(low), math.expm1(min(high, LARGEST))
 
     def as_table(self) -> dict[str, Any]:
         """For JSON: relative figures, then those in the metric's unit."""
@@ -94,6 +110,12 @@ class Comparison:
         return {label: sum(run.walked for run in runs) for label, runs in zip(self.labels, (self.first, self.second), strict=True)}
 
     @property
+    def judged(self) -> tuple[list[Summary], list[Summary]]:
+        """The runs that the figures are of, in pairs."""
+        pairs = judged_pairs(self.first, self.second)
+        return [first for first, _ in pairs], [second for _, second in pairs]
+
+    @property
     def means(self) -> dict[str, dict[str, float]]:
         """By control, then metric."""
         first, second = self.labels
@@ -120,24 +142,34 @@ def compare_runs(first: Sequence[Summary], second: Sequence[Summary]) -> Compari
     if [run.seed for run in first] != [run.seed for run in second] or not first:
         got = f"seeds {[run.seed for run in first]} and {[run.seed for run in second]}"
         raise HexapodError("runs that cannot be compared", got=got, expected="the same seeds in the same order", fix="run both again")
-    pairs = list(zip(first, second, strict=True))
-    judged = [pair for pair in pairs if pair[0].walked and pair[1].walked] or pairs
+    judged = judged_pairs(first, second)
     changes = {name: change_of(name, [(a.metrics[name], b.metrics[name]) for a, b in judged]) for name in METRICS}
     return Comparison(tuple(first), tuple(second), changes)
+
+
+def judged_pairs(first: Sequence[Summary], second: Sequence[Summary]) -> list[tuple[Summary, Summary]]:
+    """Those in which both walked to the end; where there is none, all."""
+    pairs = list(zip(first, second, strict=True))
+    return [pair for pair in pairs if pair[0].walked and pair[1].walked] or pairs
 
 
 def change_of(name: str, pairs: Sequence[tuple[float, float]]) -> Change:
     """The change of a metric over pairs of its values, of which those without both are left out."""
     values = np.array([pair for pair in pairs if all(map(math.isfinite, pair))]).reshape(-1, 2)
     n = len(values)
-    before, after = values.mean(axis=0).tolist() if n else (math.nan, math.nan)
-    return made_change(name, before=before, after=after, half_width=half_width_of(values[:, 1] - values[:, 0]), pairs=n)
+    samples = np.column_stack([values, values[:, 1] - values[:, 0]])
+    mean = samples.mean(axis=0) if n else np.full(3, math.nan)
+    square = np.sum((samples - mean) ** 2, axis=0)
+    width, log_width = half_widths(np.array(n), square[2]), log_half_widths(np.array(n), mean[0], mean[1], square)
+    return made_change(name, before=float(mean[0]), after=float(mean[1]), half_width=float(width), log_half_width=float(log_width), pairs=n)
 
 
-def made_change(name: str, *, before: float, after: float, half_width: float, pairs: int) -> Change:
-    """The change of a metric from means over pairs and the interval of their difference; NaN when there is no pair."""
-    verdict = str(verdicts(name, np.array(before), np.array(after), np.array(half_width)))
-    return Change(before=before, after=after, half_width=half_width, pairs=pairs, floor=FLOORS[name], verdict=verdict)
+def made_change(name: str, *, before: float, after: float, half_width: float, log_half_width: float, pairs: int) -> Change:
+    """The change of a metric from means over pairs and the intervals of their difference and ratio; NaN when there is no pair."""
+    verdict = str(verdicts(name, *map(np.array, (before, after, half_width, log_half_width))))
+    return Change(
+        before=before, after=after, half_width=half_width, log_half_width=log_half_width, pairs=pairs, floor=FLOORS[name], verdict=verdict
+    )
 
 
 def half_width_of(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
@@ -154,11 +186,28 @@ def half_widths(count: Array, square: Array) -> Array:
     return np.asarray(stdtrit(free, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(square / (free * (free + 1.0))))
 
 
-def verdicts(name: str, before: Array, after: Array, half_width: Array) -> np.ndarray[Any, np.dtype[np.str_]]:
+def log_half_widths(count: Array, before: Array, after: Array, squares: Sequence[Array] | Array) -> Array:
+    """Half the widths of the intervals of ln(after/before), of pairs by their counts and means; NaN where a mean is not positive.
+
+    squares: sums of squared deviations of the first values, the second, and the differences.
+    """
+    from scipy.special import stdtrit  # noqa: PLC0415  slow to import
+
+    known = (np.asarray(before) > 0.0) & (np.asarray(after) > 0.0)
+    free = np.where(known & (count > 1), count - 1.0, math.nan)
+    a, b = np.where(known, before, 1.0), np.where(known, after, 1.0)
+    first, second, apart = squares
+    square = (1.0 / a - 1.0 / b) * (first / a - second / b) + apart / (a * b)  # as above, without its cancellation
+    return np.asarray(stdtrit(free, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(np.maximum(square, 0.0) / (free * (free + 1.0))))
+
+
+def verdicts(name: str, before: Array, after: Array, half_width: Array, log_half_width: Array) -> np.ndarray[Any, np.dtype[np.str_]]:
     """BETTER, WORSE, SAME, or "" where neither side is better or there is no mean."""
     less_is_better, difference = METRICS[name][1], after - before
+    ratio = np.isfinite(log_half_width) & (np.abs(before) > FLOORS[name])
+    change = np.where(ratio, np.log(np.where(ratio, after / np.where(ratio, before, 1.0), 1.0)), difference)
     unsure = np.where(np.isnan(half_width), LEAST_CHANGE * np.abs(before), half_width)
-    same = (np.abs(difference) < FLOORS[name]) | (np.abs(difference) <= unsure)
+    same = (np.abs(difference) < FLOORS[name]) | (np.abs(change) <= np.where(ratio, log_half_width, unsure))
     none = np.isnan(difference) | (less_is_better is None)
     return np.select([none, same, (difference < 0.0) == less_is_better], ["", SAME, BETTER], WORSE)
 
@@ -198,7 +247,7 @@ def _summary(row: Mapping[str, str]) -> Summary:
     return Summary(
         control=row["control"], seed=int(row["seed"]), status=row["status"], reason=row["reason"], upright=row["upright"] == str(True),
         fallback=_number(row["fallback"]) if row["fallback"] else None, warnings=tuple(filter(None, row["warnings"].split(BETWEEN))),
-        metrics={name: _number(row[name]) for name in METRICS},
+        metrics={name: _number(row.get(name) or "") for name in METRICS},  # files of earlier versions have fewer
     )  # fmt: skip
 
 

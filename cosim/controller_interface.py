@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
 
-from hexapod_cosim.controller import Controller, Gains, Gait, Parts, Requirements
+from hexapod_cosim.controller import Controller, Gains, Gait, Parts
 from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, HoldGains, LimitGains, SlipGains, SupportGains, SuspensionGains
+from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.components import CONTROLLER
 from hexapod_cosim.cosim.interface import Interface, expand_interface
 from hexapod_cosim.cosim.start_values import parameter_values
@@ -69,7 +70,7 @@ def passive_gains(robot: Robot) -> SimpleNamespace:
     """What the gains' parameters start with under kinematic control, which has none: a law against slip that answers nothing, and
     what requirements alone say of the rest.
     """
-    wanted, servo = Requirements(), robot.servo
+    wanted, servo = requirements_for(robot), robot.servo
     stiffness, omega = robot.weight / TRIPOD_LEGS / wanted.deflection, 2.0 * math.pi * wanted.frequency
     slip = SlipGains(
         kp=0.0, ki=0.0, kd=0.0, derivative_time=wanted.filter_time, filter_time=wanted.filter_time, load_time=wanted.load_time,

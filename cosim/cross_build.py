@@ -20,6 +20,7 @@ from pathlib import Path
 import platformdirs
 
 from hexapod_cosim.cosim.files import atomic_path
+from hexapod_cosim.cosim.installation import install_extra
 from hexapod_cosim.models.errors import FmuError, HexapodError
 
 PACKAGE = "ziglang"
@@ -84,7 +85,7 @@ def find_compiler() -> Compiler:
     """The installed cross compiler. Raises FmuError when there is none."""
     spec = util.find_spec(PACKAGE)
     if spec is None or spec.origin is None:
-        fix = f"pip install '{APPLICATION}[platforms]'; without --platforms an FMU gets this machine's installed binary"
+        fix = f"{install_extra('platforms')}; without --platforms an FMU gets this machine's installed binary"
         raise FmuError("no cross compiler", got=f"no package {PACKAGE}", expected=PACKAGE, fix=fix)
     program = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
     return Compiler((str(program), "cc"), metadata.version(PACKAGE))

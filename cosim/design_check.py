@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,17 @@ from hexapod_cosim.controller.compliance import LARGEST_LOAD
 from hexapod_cosim.controller.design.closed import closed_loop, disturbed, rising, splay
 from hexapod_cosim.controller.design.laws import Laws, delay_steps
 from hexapod_cosim.controller.design.standing import Places, weight_share
+from hexapod_cosim.controller.size import size_of
+from hexapod_cosim.controller.slip_pid import squeeze
 from hexapod_cosim.cosim.design import STANCES, level_fmu
-from hexapod_cosim.cosim.linearise import ANGLES, LATEST, Bench, linearise, rest
-from hexapod_cosim.models import LEG_NAMES, Robot
+from hexapod_cosim.cosim.fmu import Fmu
+from hexapod_cosim.cosim.linearise import ANGLES, Bench, Motion, linearise
+from hexapod_cosim.cosim.standing import StanceError, rest
+from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Array
 
-DURATION = 0.6  # s
+DURATION = 0.6  # s    by the robot's size
+SQUEEZE = 0.03  # 1    of a third of the weight
 LEAST = 1e-6  # N    below it no foot carries anything
 
 
@@ -49,7 +55,9 @@ class FeetLaws:
         """N    (n, 3) that the servos are relieved of, after forces (n, 3) [N] at joint angles (6, 3)"""
         self._forces.append(force)
         late = self._forces[0]
-        squeezed = late[:, :2] - np.outer(late[:, 2] / max(late[:, 2].sum(), LEAST), late[:, :2].sum(axis=0))
+        feet = self._legs.forward(angle)[self._standing]
+        left = squeeze(late[:, 0] + 1j * late[:, 1], late[:, 2], feet[:, 0] + 1j * feet[:, 1])
+        squeezed = np.column_stack([left.real, left.imag])
         pid, spring = self._pid, self._spring
         answer = pid.C @ self._slip + pid.D * squeezed.reshape(-1)
         self._slip = pid.A @ self._slip + pid.B * squeezed.reshape(-1)
@@ -71,22 +79,36 @@ class FeetLaws:
         return shift
 
 
-def check_design(robot: Robot, gains: Gains, *, stance: str = "six legs", size: float = 0.5) -> DesignCheck:
-    """Legs in their stance start to splay by a force [N], which both laws take away; in the FMU and in the linear closed loop."""
-    period, standing = gains.period, STANCES[stance]
+def check_design(robot: Robot, gains: Gains, *, stance: str | None = None, squeeze: float | None = None) -> DesignCheck:
+    """Legs that stand start to splay by a force, which both laws take away.
+
+    In the FMU and in the linear closed loop. stance: by default the first in which the robot
+    stands;  squeeze [N]: by default SQUEEZE of a third of the weight.
+    """
+    period = gains.period
     laws = Laws(slip=gains.slip, suspension=gains.suspension, period=period, delays=delay_steps(gains.requirements, period=period))
-    friction, places = robot.servo.coulomb_friction, np.flatnonzero([leg in standing for leg in LEG_NAMES])
+    force = SQUEEZE * weight_share(robot) if squeeze is None else squeeze
+    friction = robot.servo.coulomb_friction
     with level_fmu(robot) as fmu:
-        motion, inputs = rest(fmu, robot, standing=standing, load=1.0)
+        motion, inputs = _rest(fmu, robot, stance)
         plant = linearise(fmu, robot, motion, inputs, period=period, coulomb_friction=friction)
-        push = splay(robot, plant)
-        time, forces = disturbed(closed_loop(robot, plant, laws), push, duration=min(DURATION, LATEST))
-        bench = Bench(fmu, coulomb_friction=friction, slope=robot.friction.slope, period=period)
+        push, places = splay(robot, plant), np.flatnonzero(plant.standing)
+        time, forces = disturbed(closed_loop(robot, plant, laws), push, duration=DURATION * size_of(robot).time)
+        bench = Bench(fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=period)
         bench.start(motion, inputs)
         feet = FeetLaws(robot, laws, places, plant.force[places])
-        simulated = _run(bench, feet, inputs, np.outer(size * rising(time), push).reshape(len(time), -1, 3), places)
-    seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -size
+        simulated = _run(bench, feet, inputs, np.outer(force * rising(time), push).reshape(len(time), -1, 3), places)
+    seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -force
     return DesignCheck(time=time, predicted=-push @ forces, simulated=seen)
+
+
+def _rest(fmu: Fmu, robot: Robot, stance: str | None) -> tuple[Motion, Array]:
+    """At rest in a stance, or in the first possible. Raises StanceError."""
+    *others, last = STANCES if stance is None else [stance]
+    for name in others:
+        with suppress(StanceError):
+            return rest(fmu, robot, standing=STANCES[name], load=1.0)
+    return rest(fmu, robot, standing=STANCES[last], load=1.0)
 
 
 def _run(bench: Bench, feet: FeetLaws, inputs: Array, disturbance: Array, places: Places) -> Array:

@@ -138,7 +138,7 @@ def read_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        fix = "give a folder written by `hexapod simulate` or `hexapod compare`"
+        fix = "give a folder written by `hexapod simulate`, `hexapod compare` or `hexapod study`"
         raise HexapodError("not a results folder", got=str(path.parent), expected=f"a folder with {path.name}", fix=fix) from error
     except ValueError as error:
         raise HexapodError("damaged file", got=str(error), expected="JSON", fix="run the scenario again", where=str(path)) from error

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, vector_names
+from hexapod_cosim.cosim.signals import ACCELERATION, COMMANDED, MEASURED, vector_names
 from hexapod_cosim.models import LEG_NAMES
 
 LEGS = len(LEG_NAMES)
@@ -26,12 +26,18 @@ class FmuController:
         self._inputs = fmu.block([*COMMANDS, *(name for key in SENSED for name in MEASURED[key])])
         shift = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
         joints = [name for names in COMMANDED.values() for name in names]
-        self._outputs = fmu.block([*joints, *shift, *(f"{leg}.lift" for leg in LEG_NAMES)])
+        acceleration_names = ACCELERATION if set(ACCELERATION) <= set(fmu.names("output")) else []
+        lifts_and_plan = [f"{leg}.lift" for leg in LEG_NAMES]
+        lifts_and_plan += [name for leg in LEG_NAMES for name in vector_names(f"{leg}.planned")]
+        self._outputs = fmu.block([*joints, *shift, *lifts_and_plan, *acceleration_names])
         self._flags = fmu.block([f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES])
-        angle, speed, torque, rest = np.split(self._outputs.values, [3 * LEGS, 6 * LEGS, 9 * LEGS])
-        self._out = JointCommand(angle.reshape(LEGS, 3), speed.reshape(LEGS, 3), torque.reshape(LEGS, 3))
+        ends = LEGS * np.array([3, 6, 9, 11, 12, 15])
+        angle, speed, torque, shifts, lifts, feet, acceleration = np.split(self._outputs.values, ends)
+        self._out = JointCommand(*(part.reshape(LEGS, 3) for part in (angle, speed, torque)))
+        if acceleration_names:
+            self._out.acceleration_ref = acceleration.reshape(LEGS, 3)
         swinging, unreachable, fallback = self._shown = np.zeros((len(FLAGS), LEGS), dtype=np.bool_)
-        self.diagnostics = Diagnostics(swinging, rest[: 2 * LEGS].view(np.complex128), rest[2 * LEGS :], unreachable, fallback)
+        self.diagnostics = Diagnostics(swinging, feet.reshape(LEGS, 3), shifts.view(np.complex128), lifts, unreachable, fallback)
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """The joint commands for [t, t + period). The result's arrays are reused by the next step. Raises FmuError."""

@@ -23,27 +23,23 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
-from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
+from hexapod_cosim.controller.design.standing import StandingPlant
+from hexapod_cosim.controller.size import Size, size_of
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.signals import COMMANDED, JOINTS, LEGS, MEASURED, PUSH, vector_names
-from hexapod_cosim.models import LEG_NAMES, FmuError, Robot
-from hexapod_cosim.models.dynamics import masses
-from hexapod_cosim.models.kinematics import body_states, quaternion_product
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import quaternion_product
 from hexapod_cosim.models.records import Array
 
 ANGLES = LEGS * JOINTS
 POSES = 6 + ANGLES  # of torso and joints; the states are these and their velocities
 STATES = 2 * POSES
-SIZES = np.repeat([1e-6, 1e-5], POSES)  # m and rad, m/s and rad/s    of the differences
-TORQUE = 1e-4  # N m    the same
-LONGEST_STEP = 5e-4  # s    of the integration
-LIFT = 0.04  # m    of the feet that do not stand
-SETTLING, SETTLING_STEP = 2.0, 0.05  # s
-SETTLING_SLOPE = 0.1  # 1    of the friction's: the pose of rest is the same, and feet get there as much faster
-REST = 1e-3  # m/s or rad/s
-UNLIMITED = 1e3  # N m
-LATEST = 60.0  # s    no start is stepped beyond it
+CHANGE, RATE = 1e-6, 1e-5  # m and rad, m/s and rad/s    of the differences, by the robot's size
+TORQUE = 1e-4  # N m    the same, of servos of STIFFNESS, otherwise by theirs
+STIFFNESS = 40.0  # N m/rad
+LONGEST_STEP = 5e-4  # s    of the integration, by the robot's size
+UNLIMITED = 1e6  # N m
+LATEST = 600.0  # s    no start is stepped beyond it
 TORSO = [f"torso.{name}[{k}]" for name in ("position", "rotation") for k in (1, 2, 3)]
 TORSO_RATES = [*vector_names("torso.velocity"), *MEASURED["angular_velocity"]]
 STATE_NAMES = [*TORSO, *MEASURED["angle"], *TORSO_RATES, *MEASURED["speed"]]
@@ -80,10 +76,14 @@ class Motion:
 class Bench:
     """An FMU that is started over and over again. Inputs (60,): angle_ref, speed_ref, torque_ref of all joints, push force and torque."""
 
-    def __init__(self, plant: Fmu, *, coulomb_friction: float, slope: float, period: float) -> None:
-        """coulomb_friction: of the gears [N m]; slope: of the feet's friction [s/m]; period [s]."""
+    def __init__(self, plant: Fmu, robot: Robot, *, coulomb_friction: float, slope: float, period: float) -> None:
+        """robot: the FMU's; coulomb_friction: of the gears [N m]; slope: of the feet's friction [s/m];
+        period [s].
+        """
+        size = size_of(robot)
         self.plant, self.period = plant, period
-        step = period / math.ceil(period / LONGEST_STEP - 1e-9)
+        self._sizes, self._torque = difference_sizes(size), TORQUE * (robot.servo.kp / STIFFNESS)
+        step = period / math.ceil(period / (LONGEST_STEP * size.time) - 1e-9)
         self._settings = plant.block(["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"])
         self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step
         pose, rates = [*vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"]], [*TORSO_RATES, *MEASURED["speed"]]
@@ -121,30 +121,15 @@ class Bench:
         self._forces.get()
         return np.array(self._forces.values)
 
-    def settle(self, motion: Motion, inputs: Array) -> Motion:
-        """Where it comes to rest. Raises FmuError when it does not."""
-        self.start(motion, inputs)
-        for k in range(round(SETTLING / SETTLING_STEP)):
-            self.plant.step(k * SETTLING_STEP, SETTLING_STEP)
-        way = self.motion().less(motion)
-        speed = float(np.abs(way[POSES:]).max())
-        if not speed < REST:
-            raise FmuError(
-                "the robot does not come to rest", got=f"{speed:.3g} m/s or rad/s", expected=f"less than {REST:g}",
-                fix="give it servos that carry it", where=self.plant.path.name,
-            )  # fmt: skip
-        way[POSES:] = 0.0
-        return motion.moved(way)
-
     def differences(self, motion: Motion, inputs: Array, *, scale: float = 1.0) -> tuple[Array, Array, Array]:
         """A (48, 48), B (48, 18) of the joints' torques and C (18, 48) of the feet's forces about a motion; scale: of the differences."""
         a, b, c = np.zeros((STATES, STATES)), np.zeros((STATES, ANGLES)), np.zeros((ANGLES, STATES))
-        for k, change in enumerate(scale * np.diag(SIZES)):
+        for k, change in enumerate(scale * np.diag(self._sizes)):
             ahead, behind = (self._step_from(motion.moved(way), inputs) for way in (change, -change))
             c[:, k], a[:, k] = (ahead[0] - behind[0]) / (2.0 * change[k]), ahead[1].less(behind[1]) / (2.0 * change[k])
-        for k, change in enumerate(scale * TORQUE * np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]):
+        for k, change in enumerate(scale * self._torque * np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]):
             ahead, behind = (self._step_from(motion, inputs + way) for way in (change, -change))
-            b[:, k] = ahead[1].less(behind[1]) / (2.0 * scale * TORQUE)
+            b[:, k] = ahead[1].less(behind[1]) / (2.0 * scale * self._torque)
         return a, b, c
 
     def _step_from(self, motion: Motion, inputs: Array) -> tuple[Array, Motion]:
@@ -154,47 +139,13 @@ class Bench:
         return force, self.motion()
 
 
-def rest(plant: Fmu, robot: Robot, *, standing: Sequence[str], load: float) -> tuple[Motion, Array]:
-    """How the robot stands on the named legs, and the inputs (60,) under which it does.
-
-    load: mean of the standing legs', in thirds of the weight; the torso is pushed down or up to have it. The servos are told the torques
-    that carry it. Raises FmuError when it does not come to rest.
-    """
-    angle, total = lifted_stance(robot, standing), load * len(standing) * weight_share(robot)
-    share, feet = shares(robot, angle, standing, total), LegSolver(robot).forward(angle) - np.array(robot.torso.com)
-    push = robot.weight - total
-    inputs = np.zeros(3 * ANGLES + len(PUSH))
-    inputs[:ANGLES] = angle.reshape(-1)
-    inputs[2 * ANGLES : 3 * ANGLES] = -(LegSolver(robot).jacobian(angle)[:, 2] * share[:, None]).reshape(-1)
-    inputs[3 * ANGLES + 2] = push
-    depth = (share.max() / robot.contact.stiffness) ** (2.0 / 3.0)
-    start = np.zeros(1 + STATES)
-    start[2], start[3], start[7 : 7 + ANGLES] = robot.foot.radius - depth - feet[:, 2].min(), 1.0, angle.reshape(-1)
-    bench = Bench(plant, coulomb_friction=0.0, slope=SETTLING_SLOPE * robot.friction.slope, period=SETTLING_STEP)
-    settled = bench.settle(Motion(values=start), inputs)
-    stands = [leg for leg, force in zip(LEG_NAMES, bench.force()[2::3], strict=True) if force > 0.0]
-    if stands != [leg for leg in LEG_NAMES if leg in standing]:
-        fix = "choose legs with the centre of mass between them"
-        raise FmuError("the robot does not stay on its legs", got=" ".join(stands), expected=" ".join(standing), fix=fix)
-    return settled, inputs
-
-
-def lifted_stance(robot: Robot, standing: Sequence[str]) -> Array:
-    """(6, 3) joint angles [rad] of the stance, the feet of the other legs lifted."""
-    legs = LegSolver(robot)
-    feet = legs.forward(robot.stance)
-    feet[[leg not in standing for leg in LEG_NAMES], 2] += LIFT
-    return legs.inverse(feet)
-
-
-def shares(robot: Robot, angle: Array, standing: Sequence[str], total: float) -> Array:
-    """N    (6,) least vertical forces that add up to `total` and hold the torso level, pushed at its centre of mass."""
-    level, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
-    body = body_states(robot, still, level, still, still, angle, np.zeros((LEGS, JOINTS)))
-    moment = masses(robot) @ body[:, :2] * float(np.linalg.norm(robot.gravity))
-    feet = LegSolver(robot).forward(angle) - np.array(robot.torso.com)
-    rows = np.array([np.ones(LEGS), feet[:, 0], feet[:, 1]]) * [leg in standing for leg in LEG_NAMES]
-    return np.asarray(np.linalg.pinv(rows) @ [total, *moment])
+def difference_sizes(size: Size) -> Array:
+    """(48,) of the differences of states: torso's way, all angles, and the rates of both."""
+    sizes = np.repeat([CHANGE, RATE], POSES)
+    sizes[:3] *= size.length
+    sizes[POSES : POSES + 3] *= size.speed
+    sizes[POSES + 3 :] /= size.time
+    return sizes
 
 
 def linearise(
@@ -204,7 +155,7 @@ def linearise(
 
     coulomb_friction: of the gears [N m]; scale: of the differences.
     """
-    bench = Bench(plant, coulomb_friction=coulomb_friction, slope=robot.friction.slope, period=period)
+    bench = Bench(plant, robot, coulomb_friction=coulomb_friction, slope=robot.friction.slope, period=period)
     a, b, c = bench.differences(motion, inputs, scale=scale)
     bench.start(motion, inputs)
     force = bench.force().reshape(LEGS, 3)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -39,6 +40,13 @@ class Outcome:
     wall: float  # s, the whole loop
     recording: Recording
     cause: Exception | None = None  # of a failure
+    every_step: Recording | None = None  # what is judged, of every macro-step; None: the recording has them all
+    finished: datetime = field(default_factory=lambda: datetime.now(UTC), compare=False)
+
+    @property
+    def judged(self) -> Recording:
+        """What figures are made of: a row per macro-step."""
+        return self.recording if self.every_step is None else self.every_step
 
     @property
     def realtime_factor(self) -> float:
@@ -62,9 +70,9 @@ def run(
         status, reason = INTERRUPTED, "interrupted"
     except Exception as error:  # a controller may raise anything: the rows before it are kept
         status, reason, cause = FAILED, str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}", error
-    wall, recording = perf_counter() - begin, recorder.recording
-    simulated = float(recording.time[-1] - schedule.times[0]) if len(recording.time) else 0.0
-    return Outcome(status, reason, simulated, wall, recording, cause)
+    wall, judged = perf_counter() - begin, recorder.judged
+    simulated = float(judged.time[-1] - schedule.times[0]) if len(judged.time) else 0.0
+    return Outcome(status, reason, simulated, wall, recorder.recording, cause, judged)
 
 
 def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
@@ -74,7 +82,9 @@ def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
         return {}
     six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift", "fallback")}
     shift = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2))  # x + i y in memory is x, y
-    return {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()} | {shift: shown.shift.view(float)}
+    planned = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
+    told = {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()}
+    return told | {shift: shown.shift.view(float), planned: shown.planned}
 
 
 def _loop(

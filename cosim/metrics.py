@@ -1,70 +1,113 @@
-"""Figures of merit of a walk, from a recording of the FMU's outputs over whole gait cycles after the first two.
+"""Figures of merit of a walk over whole gait cycles after the first two.
 
-A figure that the recording cannot give (per metre for a robot that stands, anything for a run shorter than three cycles) is NaN.
+Work, heat, slip and peaks are the plant's own integrals and maxima, so they do not depend on how
+often it is read. What is a distribution over time (forces, the friction cone, posture, feet) is of
+the rows given: a run gives one per macro-step, whatever it keeps. A figure that the recording
+cannot give (per metre for a robot that stands, anything for a run shorter than three cycles) is NaN.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.signals import foot_names, foot_vector_names, joint_names, vector_names
 from hexapod_cosim.cosim.support import stability_margins
-from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS
+from hexapod_cosim.cosim.walk import (
+    BRISTLE,
+    CONTACT_SHARE,
+    NONE,
+    TANH,
+    Array,
+    View,
+    Walk,
+    bearing_load,
+    body_height,
+    commanded_path,
+    real_feet,
+    robot_weight,
+)
+from hexapod_cosim.models import LEG_NAMES, Servo
 from hexapod_cosim.models.contact import sliding_velocity
 
-Array = NDArray[np.float64]
-
-SKIPPED_CYCLES = 2  # the start is no walk yet
-CONTACT_SHARE = 0.01  # of the weight: a foot with less does not stand
 TANH_LIMIT = 0.999  # atanh beyond it would call sliding a creep
-LOADING_TIME = 0.020  # s after touch-down
-LEAST_DISTANCE = 0.01  # m    less is standing, not walking
-SHOWN_CYCLES = 3  # in figures of what happens within a gait cycle
-ROUND_OFF = 1e-6  # s    of a recorded time
-FLAT = TERRAINS.index("flat") + 1  # the FMU's number of it
-TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("tanh", "bristle"))  # the FMU's numbers of them
+NEARLY_SLIDING = 0.9  # of the friction cone
+LIFT = 1e-3  # m    the work of lifting the robot by it is the least that books are measured by
 
-# name -> unit, whether less is better (None: neither), meaning
-METRICS: dict[str, tuple[str, bool | None, str]] = {
-    "slip_per_metre": ("m/m", True, "way slipped by all feet under load, per metre walked"),
-    "slip_net_per_metre": ("m/m", True, "the same, less the creep of the tanh friction law or what bristles give back"),
-    "path_error": ("m/m", True, "distance from the end of the commanded path, per metre walked"),
-    "yaw_drift": ("rad/m", True, "heading lost against the commanded one, per metre walked"),
-    "height_rms": ("m", True, "torso height above the ground, about its mean"),
-    "roll_rms": ("rad", True, "roll, about its mean"),
-    "pitch_rms": ("rad", True, "pitch, about its mean"),
-    "peak_force": ("BW", True, "largest foot normal force, in body weights"),
-    "force_p95": ("BW", True, "95th percentile of the normal force of feet under load"),
-    "loading_rate": ("BW/s", True, "95th percentile of the normal force's rate in the 20 ms after touch-down"),
-    "torque_rms": ("N m", True, "motor torque over all joints and time"),
-    "cost_of_transport": ("1", True, "positive motor work per weight and distance"),
-    "stability_margin": ("m", False, "least distance of the centre of mass from the support polygon's edge"),
-    "realtime_factor": ("1", None, "simulated over wall time of the whole loop"),
+
+class Metric(NamedTuple):
+    """What a figure is."""
+
+    unit: str
+    less_is_better: bool | None  # None: neither
+    meaning: str
+    # The least change, in the unit, that means anything: no one could measure less on the robot (a
+    # tenth of a millimetre, of a milliradian, the resolution of its force and torque sensing)
+    floor: float
+
+
+_TABLE: dict[str, Metric] = {
+    "slip_per_metre": Metric("m/m", True, "way slipped by all feet under load, per metre walked", 1e-4),
+    "slip_net_per_metre": Metric("m/m", True, "the same, less the creep of the tanh friction law or what bristles give back", 1e-4),
+    "cone_use_p50": Metric("1", True, "share of the friction cone that loaded feet use, median over time", 5e-3),
+    "cone_use_p95": Metric("1", True, "the same, 95th percentile", 5e-3),
+    "cone_use_over_90": Metric("1", True, "share of the time in which loaded feet use over 90 % of the cone", 5e-3),
+    "foot_error_stance": Metric("m", True, "feet on the ground from where the plan has them, torso frame, RMS", 1e-4),
+    "foot_error_swing": Metric("m", True, "feet in the air from where the plan has them, torso frame, RMS", 1e-4),
+    "path_error": Metric("m/m", True, "distance from the end of the commanded path, per metre walked", 1e-3),
+    "yaw_drift": Metric("rad/m", True, "heading lost against the commanded one, per metre walked", 1e-3),
+    "height_rms": Metric("m", True, "torso height above the ground, about its mean", 1e-4),
+    "roll_rms": Metric("rad", True, "roll, about its mean", 1e-4),
+    "pitch_rms": Metric("rad", True, "pitch, about its mean", 1e-4),
+    "peak_force": Metric("BW", True, "largest foot normal force, in body weights", 5e-3),
+    "force_p95": Metric("BW", True, "95th percentile of the normal force of feet under load", 5e-3),
+    "loading_rate": Metric("BW/s", True, "steepest rise of the force in 20 ms after touch-down, 95th percentile", 5e-2),
+    "torque_rms": Metric("N m", True, "motor torque over all joints and time", 5e-3),
+    "servo_load_max": Metric("1", True, "largest RMS torque of a servo over its continuous rating", 5e-3),
+    "heat": Metric("N2 m2 s/m", True, "integral of the sum of squared motor torques, per metre walked", 0.5),
+    "cost_of_transport": Metric("1", True, "positive motor work per weight and distance", 1e-3),
+    "electrical_cost": Metric("1", True, "positive motor work and copper loss per weight and distance", 5e-3),
+    "slip_per_radian": Metric("m/rad", True, "way slipped by all feet under load, per radian turned", 1e-4),
+    "path_error_per_radian": Metric("m/rad", True, "distance from the commanded place, per radian turned", 1e-3),
+    "yaw_drift_per_radian": Metric("rad/rad", True, "heading lost against the commanded one, per radian turned", 1e-3),
+    "heat_per_radian": Metric("N2 m2 s/rad", True, "integral of the sum of squared motor torques, per radian turned", 0.5),
+    "cost_per_radian": Metric("m/rad", True, "positive motor work per weight and angle turned", 1e-3),
+    "electrical_cost_per_radian": Metric("m/rad", True, "positive motor work and copper loss per weight and angle", 5e-3),
+    "stability_margin": Metric("m", False, "least distance of the centre of mass from the support polygon's edge", 1e-4),
+    "energy_residual": Metric("1", None, "what the energy books do not explain, in shares of the motors' work", 0.0),
+    "realtime_factor": Metric("1", None, "simulated over wall time of the whole loop", 0.0),
 }
+OF_THE_RUN = ("energy_residual", "realtime_factor")  # of any run, however short
+# of a robot that turns on the spot, in the place of what is per metre
+PER_RADIAN = {
+    "slip_per_metre": "slip_per_radian", "path_error": "path_error_per_radian", "yaw_drift": "yaw_drift_per_radian",
+    "heat": "heat_per_radian", "cost_of_transport": "cost_per_radian", "electrical_cost": "electrical_cost_per_radian",
+}  # fmt: skip
+# name -> unit, whether less is better (None: neither), meaning
+METRICS = {name: (each.unit, each.less_is_better, each.meaning) for name, each in _TABLE.items()}
+FLOORS = {name: each.floor for name, each in _TABLE.items()}
+DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
 
-# what all this and the warnings of a run look at; of controllers, those that tell
+PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
+# what the plant integrates or tracks for the metrics
+MEASURED_BY_PLANT = (
+    *(name for quantity in ("positive_work", "negative_work", "torque_squared") for name in joint_names(quantity)),
+    *(name for quantity in ("slip_distance", "peak_force", "landing_rate", "landings") for name in foot_names(quantity)),
+    "energy.residual",
+)
+# what metrics and the warnings of a run look at; of controllers, those that tell
 _JUDGED = (
     *vector_names("torso.position"), *vector_names("torso.quaternion", 4), "torso.roll", "torso.pitch", "torso.yaw",
-    *(name for quantity in ("angle", "speed", "torque") for name in joint_names(quantity)),
+    *joint_names("angle"), *MEASURED_BY_PLANT,
     *(name for quantity in ("normal_force", "tangential_force", "slip_speed", "contact") for name in foot_names(quantity)),
-    *foot_vector_names("position"), *(f"controller.{leg}.{flag}" for flag in ("unreachable", "fallback") for leg in LEG_NAMES),
+    *foot_vector_names("position"),
+    *(f"controller.{leg}.{flag}" for flag in ("swinging", "unreachable", "fallback") for leg in LEG_NAMES),
+    *PLANNED,
 )  # fmt: skip
 _JUDGED_BRISTLES = tuple(name for quantity in ("velocity", "bristle") for name in foot_vector_names(quantity))
-
-# name -> the least change, in the metric's unit, that means anything: less than this no one could measure on the robot
-# (a tenth of a millimetre, a tenth of a milliradian, the resolution of its force and torque sensing), so it reads "same"
-FLOORS: dict[str, float] = {
-    "slip_per_metre": 1e-4, "slip_net_per_metre": 1e-4, "path_error": 1e-3, "yaw_drift": 1e-3, "height_rms": 1e-4, "roll_rms": 1e-4,
-    "pitch_rms": 1e-4, "peak_force": 5e-3, "force_p95": 5e-3, "loading_rate": 5e-2, "torque_rms": 5e-3, "cost_of_transport": 1e-3,
-    "stability_margin": 1e-4, "realtime_factor": 0.0,
-}  # fmt: skip
-DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
 
 
 def judged_columns(*, bristles: bool) -> tuple[str, ...]:
@@ -72,193 +115,184 @@ def judged_columns(*, bristles: bool) -> tuple[str, ...]:
     return (*_JUDGED, *_JUDGED_BRISTLES) if bristles else _JUDGED
 
 
-@dataclass(frozen=True)
-class View:
-    """A run, as metrics and figures see it."""
-
-    recording: Recording
-    parameters: Mapping[str, float]  # of the FMU
-    period: float  # s    of the gait
-
-    @cached_property
-    def walk(self) -> Walk | None:
-        """Whole gait cycles after the first two; None when there is none."""
-        return _cut_walk(self)
-
-    def last_cycles(self) -> View:
-        """The end of the run."""
-        time = self.recording.time
-        begin = int(np.searchsorted(time, time[-1] - SHOWN_CYCLES * self.period))
-        return View(self.recording.rows(slice(begin, None)), self.parameters, self.period)
-
-
-@dataclass(frozen=True)
-class Walk:
-    """The part of a recording that is judged, and what it is measured by."""
-
-    recording: Recording
-    distance: float  # m    walked, NaN when it is standing
-    weight: float  # N
-    turned: Array  # rad    (rows,) commanded turn since the first row
-    heading: float  # rad    of the commanded path at the first row
-
-
-def compute_metrics(view: View, *, realtime_factor: float) -> dict[str, float]:
-    """All figures of METRICS."""
-    walk, parameters = view.walk, view.parameters
+def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict[str, float]:
+    """All figures of METRICS. Of the servo, the rating and the motor constant count."""
+    walk = view.walk
+    of_the_run = {"energy_residual": energy_residual(view), "realtime_factor": realtime_factor}
     if walk is None:
-        return dict.fromkeys(METRICS, np.nan) | {"realtime_factor": realtime_factor}
-    figures = _slip(walk, parameters) | _path(walk) | _posture(walk, parameters) | _force(walk) | _effort(walk)
+        return dict.fromkeys(METRICS, np.nan) | of_the_run
+    parameters = view.parameters
+    figures = _slip(walk, parameters) | _cone(walk, parameters) | _feet(walk, parameters)
+    figures |= _path(walk) | _posture(walk, parameters) | _force(walk) | _effort(walk, servo)
     margins = stability_margins(walk.recording, parameters)
     figures["stability_margin"] = float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
-    figures["realtime_factor"] = realtime_factor
+    figures |= of_the_run
     return {name: float(figures[name]) for name in METRICS}
 
 
-def _cut_walk(view: View) -> Walk | None:
-    recording, period = view.recording, view.period
-    time = recording.time - recording.time[0] if len(recording.time) else np.zeros(1)
-    cycles = int((time[-1] + ROUND_OFF) / period)
-    if cycles <= SKIPPED_CYCLES:
-        return None
-    begin, end = np.searchsorted(time, [SKIPPED_CYCLES * period - ROUND_OFF, cycles * period + ROUND_OFF])
-    part = recording.rows(slice(begin, end))
-    turned = _held_integral(part.time, part.column("command.yaw_rate"))
-    yaw = np.unwrap(part.column("torso.yaw"))
-    # the torso's yaw swings within a cycle: the commanded path sets out along its mean over the first one
-    first = part.time < part.time[0] + period - ROUND_OFF
-    heading = float(np.mean((yaw - turned)[first]))
-    return Walk(part, _distance(part, period), robot_weight(view.parameters), turned, heading)
+def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> list[str]:
+    """Metrics for a table of runs: per radian what a run turned on the spot, else per metre.
+
+    `net_slip`: whether that means anything, which it does not under the tanh law, whose own creep it inverts.
+    """
+
+    def given(name: str) -> bool:
+        values = [run.get(name) for run in runs.values()]
+        return any(value is not None and np.isfinite(value) for value in values)
+
+    turned = {metre: radian for metre, radian in PER_RADIAN.items() if given(radian)}
+    hidden = {radian for radian in PER_RADIAN.values() if radian not in turned.values()}
+    hidden |= {metre for metre in turned if not given(metre)}
+    hidden |= set() if net_slip else {"slip_net_per_metre"}
+    return [name for name in METRICS if name not in hidden]
 
 
-def robot_weight(parameters: Mapping[str, float]) -> float:
-    """Weight [N] of the robot that an FMU's parameters describe."""
-    mass = sum(value for name, value in parameters.items() if name.endswith(".mass"))
-    return float(mass * np.linalg.norm([parameters[name] for name in vector_names("gravity")]))
+def has_net_slip(parameters: Mapping[str, float]) -> bool:
+    """Whether slip_net_per_metre says more than that the tanh law is what it is."""
+    return parameters.get("friction.law", TANH) != TANH
 
 
-def _distance(part: Recording, period: float) -> float:
-    """Way of the torso from cycle to cycle, so that its bobbing within a cycle does not count."""
-    cycles = round((part.time[-1] - part.time[0]) / period)
-    marks = part.time[0] + period * np.arange(cycles + 1)
-    positions = np.column_stack([np.interp(marks, part.time, column) for column in part.vector("torso.position").T])
-    walked = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-    return walked if walked >= LEAST_DISTANCE else np.nan
+def energy_residual(view: View) -> float:
+    """Largest |energy.residual| of a run, over the work that its motors did or took; NaN without a row."""
+    recording = view.recording
+    if not len(recording.time):
+        return np.nan
+    residual = recording.column("energy.residual")
+    works = recording.columns([*joint_names("positive_work"), *joint_names("negative_work")])
+    work = float((works[-1] - works[0]).sum())
+    missing = float(np.abs(residual - residual[0]).max())
+    return missing / max(work, LIFT * robot_weight(view.parameters)) if missing else 0.0
 
 
-def _held_integral(time: Array, rate: Array) -> Array:
-    """Running integral of a rate that is held from each row to the next."""
-    return np.concatenate([[0.0], np.cumsum(rate[:-1] * np.diff(time))])
+def _per(walk: Walk, amount: float, name: str) -> dict[str, float]:
+    """An amount per metre, under its name, and its twin per radian; what the robot does not do is NaN."""
+    return {name: amount / walk.distance, PER_RADIAN[name]: amount / walk.angle}
 
 
 def _slip(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
     part = walk.recording
-    loaded = bearing_load(part, parameters)
-    slips = {"slip_per_metre": part.feet("slip_speed"), "slip_net_per_metre": _net_slip(part, parameters, loaded)}
-    return {name: _integral(part.time, np.where(loaded, value, 0.0)) / walk.distance for name, value in slips.items()}
+    net = np.where(bearing_load(part, parameters), _net_slip(part, parameters), 0.0).sum(axis=1)
+    slip = _per(walk, float(walk.gained(foot_names("slip_distance")).sum()), "slip_per_metre")
+    return slip | {"slip_net_per_metre": float(walk.weights @ net) * walk.duration / walk.distance}
 
 
-def _net_slip(part: Recording, parameters: Mapping[str, float], loaded: NDArray[np.bool_]) -> Array:
+def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
     """(rows, 6) slip speed less what the friction law makes of sticking: the tanh law's creep, a bristle's stretching and its return."""
-    mu, normal, speed = parameters["friction.mu"], part.feet("normal_force"), part.feet("slip_speed")
     if parameters.get("friction.law", TANH) == BRISTLE:
         sliding = sliding_velocity(parameters["friction.presliding"], part.foot_vectors("velocity"), part.foot_vectors("bristle"))
         return np.asarray(np.linalg.norm(sliding, axis=-1))
-    share = np.divide(part.feet("tangential_force"), mu * normal, out=np.zeros_like(normal), where=loaded & (mu > 0.0))
-    creep = np.arctanh(np.minimum(share, TANH_LIMIT)) / parameters["friction.slope"]
-    return np.maximum(speed - creep, 0.0)
+    creep = np.arctanh(np.minimum(cone_use(part, parameters), TANH_LIMIT)) / parameters["friction.slope"]
+    return np.maximum(part.feet("slip_speed") - creep, 0.0)
 
 
-def bearing_load(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.bool_]:
-    """(rows, 6) whether a foot bears more than CONTACT_SHARE of the robot's weight: only then can it slip."""
-    return np.asarray(recording.feet("normal_force") > CONTACT_SHARE * robot_weight(parameters))
+def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows, 6) tangential force in shares of the largest, mu f_n; 0 of feet without load, and without friction."""
+    largest = parameters["friction.mu"] * part.feet("normal_force")
+    loaded = bearing_load(part, parameters) & (largest > 0.0)
+    return np.divide(part.feet("tangential_force"), largest, out=np.zeros_like(largest), where=loaded)
 
 
-def slip_under_load(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6) speed along the ground [m/s], 0 of a foot that bears no load."""
-    return np.where(bearing_load(recording, parameters), recording.feet("slip_speed"), 0.0)
+def _cone(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
+    part, names = walk.recording, ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
+    loaded = bearing_load(part, parameters)
+    slippery = parameters["friction.mu"] == 0.0 or parameters.get("friction.law", TANH) == NONE
+    if slippery or not loaded.any():
+        return dict.fromkeys(names, np.nan)
+    use, weights = cone_use(part, parameters)[loaded], _spread(walk)[loaded]
+    over = float(weights[use > NEARLY_SLIDING].sum() / weights.sum())
+    return dict(zip(names, (*_percentiles(use, weights, (50.0, 95.0)), over), strict=True))
 
 
-def running_integral(time: Array, values: Array) -> Array:
-    """Of values (rows, ...) over time, 0 at the first row; the trapezoidal rule."""
-    steps = 0.5 * (values[1:] + values[:-1])
-    width = np.diff(time).reshape(-1, *(1 for _ in values.shape[1:]))
-    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps * width, axis=0)])
+def _spread(walk: Walk) -> Array:
+    """(rows, 6) the time that each row stands for, foot by foot."""
+    return np.broadcast_to(walk.weights[:, None], (len(walk.weights), len(LEG_NAMES)))
 
 
-def _integral(time: Array, values: Array) -> float:
-    """Over time, summed over everything else."""
-    return float(np.trapezoid(values.reshape(len(time), -1).sum(axis=1), time))
+def _percentiles(values: Array, weights: Array, wanted: tuple[float, ...]) -> list[float]:
+    """Of values that hold for shares of time: each sits in the middle of its share."""
+    order = np.argsort(values, kind="stable")
+    reached = np.cumsum(weights[order]) - 0.5 * weights[order]
+    places = np.array(wanted) / 100.0 * weights.sum()
+    return [float(value) for value in np.interp(places, reached, values[order])]
 
 
-def commanded_path(recording: Recording, *, heading: float | None = None) -> Array:
-    """(rows, 2) where the body command leads from the first row's position on, world x and y [m].
+def _feet(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
+    part, names = walk.recording, ("foot_error_stance", "foot_error_swing")
+    error = foot_errors(part, parameters)
+    if not len(error):
+        return dict.fromkeys(names, np.nan)
+    swinging = part.columns([f"controller.{leg}.swinging" for leg in LEG_NAMES]) > 0.5
+    square, weights = np.sum(error * error, axis=-1), _spread(walk)
+    return {name: _rms_of(square, np.where(those, weights, 0.0)) for name, those in zip(names, (~swinging, swinging), strict=True)}
 
-    `heading` [rad] is the direction it sets out in; by default the torso's own at the first row.
-    """
-    begin = recording.vector("torso.position")[0, :2]
-    heading = float(recording.column("torso.yaw")[0]) if heading is None else heading
-    angle = heading + _held_integral(recording.time, recording.column("command.yaw_rate"))
-    vx, vy = recording.column("command.vx"), recording.column("command.vy")
-    velocity = (vx * np.cos(angle) - vy * np.sin(angle), vx * np.sin(angle) + vy * np.cos(angle))
-    return begin + np.column_stack([_held_integral(recording.time, part) for part in velocity])
+
+def _rms_of(square: Array, weights: Array) -> float:
+    return float(np.sqrt((square * weights).sum() / weights.sum())) if weights.any() else np.nan
+
+
+def foot_errors(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows, 6, 3) real less planned place of each foot's centre, torso frame [m]; no rows when the controller does not tell."""
+    if not set(PLANNED) <= set(recording.names):
+        return np.zeros((0, len(LEG_NAMES), 3))
+    return real_feet(recording, parameters) - planned_feet(recording)
+
+
+def planned_feet(recording: Recording) -> Array:
+    """(rows, 6, 3) each foot's centre as the command plans it, torso frame [m]. Raises ColumnError when the controller does not tell."""
+    return recording.columns(PLANNED).reshape(-1, len(LEG_NAMES), 3)
 
 
 def _path(walk: Walk) -> dict[str, float]:
     part = walk.recording
-    end = commanded_path(part, heading=walk.heading)[-1]
+    missed = part.vector("torso.position")[-1, :2] - commanded_path(part, heading=walk.heading)[-1]
     yaw = np.unwrap(part.column("torso.yaw"))
-    return {
-        "path_error": float(np.linalg.norm(part.vector("torso.position")[-1, :2] - end)) / walk.distance,
-        "yaw_drift": abs(float(yaw[-1] - yaw[0] - walk.turned[-1])) / walk.distance,
-    }
+    lost = abs(float(yaw[-1] - yaw[0] - walk.turned[-1]))
+    return _per(walk, float(np.linalg.norm(missed)), "path_error") | _per(walk, lost, "yaw_drift")
 
 
 def _posture(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
     part = walk.recording
-    height = body_height(part, parameters)
-    return {"height_rms": float(np.std(height)), "roll_rms": _angle_rms(part, "torso.roll"), "pitch_rms": _angle_rms(part, "torso.pitch")}
-
-
-def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows,) height of the torso above the ground along z [m]."""
-    x, y, z = part.vector("torso.position").T
-    heading, incline = parameters.get("terrain.heading", 0.0), parameters.get("terrain.incline", 0.0)
-    slope = 0.0 if parameters.get("terrain.kind", FLAT) == FLAT else np.tan(incline)
-    ground: Array = parameters.get("terrain.height", 0.0) + slope * (x * np.cos(heading) + y * np.sin(heading))
-    return np.asarray(z - ground)
-
-
-def _angle_rms(part: Recording, name: str) -> float:
-    return float(np.std(np.unwrap(part.column(name))))
+    angles = {f"{name}_rms": walk.rms(np.unwrap(part.column(f"torso.{name}"))) for name in ("roll", "pitch")}
+    return {"height_rms": walk.rms(body_height(part, parameters))} | angles
 
 
 def _force(walk: Walk) -> dict[str, float]:
-    part = walk.recording
-    normal = part.feet("normal_force") / walk.weight
-    loaded = normal[normal > CONTACT_SHARE]
-    rates = loading_rates(part.time, normal, part.feet("contact") > 0.5)
+    normal = walk.recording.feet("normal_force") / walk.weight
+    loaded = normal > CONTACT_SHARE
+    rates = landing_rates(walk) / walk.weight
     return {
-        "peak_force": float(normal.max()),
-        "force_p95": float(np.percentile(loaded, 95)) if len(loaded) else np.nan,
+        "peak_force": float(walk.whole.rows(walk.steps()).feet("peak_force").max()) / walk.weight,
+        "force_p95": _percentiles(normal[loaded], _spread(walk)[loaded], (95.0,))[0] if loaded.any() else np.nan,
         "loading_rate": float(np.percentile(rates, 95)) if len(rates) else np.nan,
     }
 
 
-def loading_rates(time: Array, force: Array, contact: NDArray[np.bool_]) -> Array:
-    """Rates of a force (rows, feet) between rows that lie in the 20 ms after a touch-down, all feet together.
+def landing_rates(walk: Walk) -> Array:
+    """(landings,) steepest rise of the force [N/s] in the 20 ms after touch-down, of all feet's landings between begin and end.
 
-    A touch-down is a row in contact after one without; the rise from that last free row counts, for the foot touched in between.
+    A foot that touches down again within half a gait cycle has bounced: both are one landing, and the steeper rise counts.
     """
-    rate = np.diff(force, axis=0) / np.diff(time)[:, None]
-    touched = contact[1:] & ~contact[:-1]
-    last = np.where(touched, time[1:, None], -np.inf)
-    since = time[1:, None] - np.maximum.accumulate(last, axis=0)
-    return rate[since <= LOADING_TIME + ROUND_OFF]
+    found: list[float] = []
+    steps = walk.steps()
+    time, counts, rates = walk.whole.time, walk.whole.feet("landings"), walk.whole.feet("landing_rate")
+    for count, rate in zip(counts.T, rates.T, strict=True):
+        touched = 1 + np.flatnonzero(np.diff(count) > 0.0)
+        begins = touched[np.diff(time[touched], prepend=-np.inf) > 0.5 * walk.period]
+        ends = np.append(begins[1:], len(time))
+        judged = (begins >= steps.start) & (begins < steps.stop)
+        found += [float(rate[first:last].max()) for first, last in zip(begins[judged], ends[judged], strict=True)]
+    return np.array(found)
 
 
-def _effort(walk: Walk) -> dict[str, float]:
-    part = walk.recording
-    torque, speed = part.joints("torque"), part.joints("speed")
-    work = _integral(part.time, np.maximum(torque * speed, 0.0))
-    return {"torque_rms": float(np.sqrt(np.mean(torque**2))), "cost_of_transport": work / (walk.weight * walk.distance)}
+def _effort(walk: Walk, servo: Servo) -> dict[str, float]:
+    squares = walk.gained(joint_names("torque_squared"))  # N2 m2 s
+    work = float(walk.gained(joint_names("positive_work")).sum())  # J
+    square = float(squares.sum())
+    copper = square / servo.motor_constant**2  # J
+    return {
+        "torque_rms": float(np.sqrt(square / (len(squares) * walk.duration))),
+        "servo_load_max": float(np.sqrt(squares.max() / walk.duration)) / servo.torque_continuous,
+        **_per(walk, square, "heat"),
+        **_per(walk, work / walk.weight, "cost_of_transport"),
+        **_per(walk, (work + copper) / walk.weight, "electrical_cost"),
+    }

@@ -20,7 +20,7 @@ BOTH = {
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
 }
-MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "true"} | BOTH
+MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"} | BOTH
 # canInterpolateInputs: derivatives of inputs are taken whenever they are given, but some masters that connect sources without any
 # refuse an FMU that declares it, and none refuses one that does not
 CO_SIMULATION = {

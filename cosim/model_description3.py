@@ -28,7 +28,7 @@ CAPABILITIES = {
     "providesAdjointDerivatives": "false",
     "providesPerElementDependencies": "false",
 }
-MODEL_EXCHANGE = {"needsCompletedIntegratorStep": "false", "providesEvaluateDiscreteStates": "false"}
+MODEL_EXCHANGE = {"needsCompletedIntegratorStep": "true", "providesEvaluateDiscreteStates": "false"}
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
     "providesIntermediateUpdate": "false",

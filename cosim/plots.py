@@ -15,14 +15,16 @@ from matplotlib.patches import Patch
 
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.cosim.files import atomic_path
-from hexapod_cosim.cosim.metrics import Array, View, body_height, commanded_path, robot_weight, running_integral, slip_under_load
+from hexapod_cosim.cosim.metrics import planned_feet
 from hexapod_cosim.cosim.recorder import ColumnError
+from hexapod_cosim.cosim.walk import Array, View, body_height, commanded_path, real_feet, robot_weight, running_integral, slip_under_load
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.0},
     "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
 }
+PLAN = "0.7"  # grey of the path that is planned
 PLANNED = "0.85"  # grey of the swing that the gait plans
 LEAST_WIDTH = 2.0  # mm of the sideways axis: less would show round-off as a drift
 STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
@@ -64,6 +66,24 @@ def slip(views: Views) -> Figure:
     top.set_ylabel("slipped way [mm]")
     _label(axes[3:], "time [s]", axes[::3], "slip speed [mm/s]")
     _legend(figure, top)
+    return figure
+
+
+def feet(views: Views) -> Figure:
+    """Each foot's planned and real path in the torso's frame over the last cycles, seen from the side."""
+    figure = Figure(figsize=(WIDTH, 3.8))
+    axes = figure.subplots(2, 3, sharey=True)
+    for number, (label, view) in enumerate(views.items()):
+        end = view.last_cycles()
+        planned, real = planned_feet(end.recording), real_feet(end.recording, view.parameters)
+        for leg, axis in enumerate(axes.flat):
+            x, z = 1e3 * planned[:, leg, [0, 2]].T
+            axis.plot(x, z, color=PLAN, linewidth=2.2, label=None if number else "planned")
+            x, z = 1e3 * real[:, leg, [0, 2]].T
+            axis.plot(x, z, label=label, **STYLES[label])
+            axis.set_title(leg_title(leg))
+    _label(axes[-1], "x, torso frame [mm]", axes[:, 0], "z [mm]")
+    _legend(figure, axes.flat[0])
     return figure
 
 
@@ -218,6 +238,7 @@ class Drawing:
 FIGURES: dict[str, Drawing] = {
     "foot_forces": Drawing("Foot forces", "Normal force of each foot over the last gait cycles, in body weights.", foot_forces),
     "slip": Drawing("Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.", slip),
+    "feet": Drawing("Planned and real feet", "Each foot's path in the torso's frame over the last gait cycles, from the side.", feet),
     "posture": Drawing("Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", posture),
     "path": Drawing("Path of the torso", "The torso from above, its end marked by a dot, and where the command leads.", path),
     "torques": Drawing("Torques", "The largest absolute torque over the six legs, joint by joint, over the last gait cycles.", torques),

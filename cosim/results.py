@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from hexapod_cosim.cosim.accuracy import Accuracy, accuracy_of_table
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, claim_folder, clear_folder, read_json, write_json, write_text
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED
-from hexapod_cosim.cosim.metrics import View
 from hexapod_cosim.cosim.recordings import COMMANDS, read_recording, write_commands, write_recording
 from hexapod_cosim.cosim.run import Result
 from hexapod_cosim.cosim.toml_text import to_toml
+from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.models import HexapodError
 
 RESULTS, PARTIAL, METRICS_FILE, SCENARIO = "results", "results.partial", "metrics.json", "scenario.toml"
+ACCURACY = "accuracy"  # of metrics.json, where it was checked
 NEEDED = ("title", "control", "simulated", "wall", "realtime_factor", "finished", "gait_period", "parameters", "robot", "fmu", "versions",
           "platform", "warnings")  # of the facts, for a report  # fmt: skip
 ABOUT = ("title", "control", "robot", "fmu", "versions")  # of the facts, in Parquet
@@ -31,6 +32,7 @@ class Stored:
     metrics: Mapping[str, float | None]
     facts: Mapping[str, Any]
     scenario: str  # TOML
+    accuracy: Accuracy | None = None  # None: not checked
 
 
 class Folder:
@@ -68,6 +70,7 @@ def results_folder(path: Path) -> Iterator[Folder]:
 def write_result(result: Result, folder: Path) -> list[Path]:
     """Writes a run into a prepared folder; one that did not complete leaves `results.partial.*` and no figures. Returns the files, the
     scenario first and the recording next. Parquet, from which reports are made again, holds all columns; CSV those that outputs.csv names.
+    Commands are written where every macro-step is recorded: they hold from row to row.
     """
     facts, outputs, scenario = run_facts(result), result.scenario.outputs, to_toml(result.scenario.to_table())
     whole = result.outcome.recording
@@ -75,7 +78,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
     about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
     columns, stem = (outputs.csv, RESULTS) if result.completed else (("*",), PARTIAL)
     files = [folder / SCENARIO, *write_recording(whole, folder, stem, formats=outputs.formats, columns=columns, about=about)]
-    if result.completed and "csv" in outputs.formats:
+    if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)
         write_commands(whole, files[-1])
     if result.completed:
@@ -97,7 +100,7 @@ def run_facts(result: Result) -> dict[str, Any]:
         "simulated": outcome.simulated,
         "wall": outcome.wall,
         "realtime_factor": outcome.realtime_factor,
-        "finished": datetime.now(UTC).isoformat(timespec="seconds"),
+        "finished": outcome.finished.isoformat(timespec="seconds"),
         **result.facts,
         "parameters": dict(result.parameters),
     }
@@ -116,7 +119,9 @@ def read_result(folder: Path) -> Stored:
     if not isinstance(metrics, dict):
         raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
     view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
-    return Stored(view, metrics, facts, read_scenario(folder))
+    checked = metrics.pop(ACCURACY, None)
+    accuracy = None if checked is None else accuracy_of_table(checked, where=str(folder / METRICS_FILE))
+    return Stored(view, metrics, facts, read_scenario(folder), accuracy)
 
 
 def read_facts(folder: Path) -> Mapping[str, Any]:
@@ -145,3 +150,16 @@ def stored(result: Result) -> Stored:
     return Stored(
         View(result.outcome.recording, result.parameters, facts["gait_period"]), result.metrics, facts, to_toml(result.scenario.to_table())
     )
+
+
+def write_accuracy(folder: Path, metrics: Mapping[str, Any], accuracy: Mapping[str, Any]) -> None:
+    """Puts what --check-accuracy found beside a folder's metrics."""
+    write_json(folder / METRICS_FILE, {**metrics, ACCURACY: accuracy})
+
+
+def read_accuracies(folder: Path) -> dict[str, Accuracy]:
+    """By control, of a comparison's folder; empty where accuracy was not checked. Raises HexapodError."""
+    path = folder / METRICS_FILE
+    table = read_json(path)
+    checked = table.get(ACCURACY, {}) if isinstance(table, dict) else {}
+    return {control: accuracy_of_table(item, where=str(path)) for control, item in checked.items()}

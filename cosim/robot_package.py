@@ -11,6 +11,7 @@ from hexapod_cosim.cosim.controller_export import export_controller
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.platforms import choose_platforms
+from hexapod_cosim.cosim.scenario_records import GRAVITY_NAMES
 from hexapod_cosim.cosim.ssp import NOTHING, Experiment, export_ssp
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
@@ -83,6 +84,9 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
         component, _, variable = name.partition(".")
         if component not in {PLANT, CONTROLLER}:
             raise unknown_name("component", component, (PLANT, CONTROLLER), where=f"--set {text}")
+        if variable in GRAVITY_NAMES:
+            fix = "write gravity = [0, 0, -1.62] into the robot's file: gains and the standing pose follow from it"
+            raise HexapodError("gravity of one component alone", got=name, expected="the same for both", fix=fix, where=f"--set {text}")
         try:
             found.setdefault(component, {})[variable] = float(number)
         except ValueError as error:

@@ -17,13 +17,13 @@ from typing import Any
 from hexapod_cosim.controller import Controller, Gains, make_gait
 from hexapod_cosim.cosim.components import PLANT
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.doubts import describe_walk, doubts, idle_settings
+from hexapod_cosim.cosim.doubts import describe_walk, doubts, idle_settings, too_short
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.force_sensor import ForceSensor, SensorSettings
 from hexapod_cosim.cosim.interface import plant_roots
 from hexapod_cosim.cosim.master import COMPLETED, Outcome, Progress, insides, run
-from hexapod_cosim.cosim.metrics import View, compute_metrics
+from hexapod_cosim.cosim.metrics import MEASURED_BY_PLANT, compute_metrics, judged_columns
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.reach import check_commands
 from hexapod_cosim.cosim.recorder import Recorder, chosen_columns
@@ -33,7 +33,9 @@ from hexapod_cosim.cosim.schedule import Schedule, make_schedule
 from hexapod_cosim.cosim.signals import Signals
 from hexapod_cosim.cosim.start_values import parameter_values
 from hexapod_cosim.cosim.variation import Drawn, delayed, draw, initial_values
+from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
+from hexapod_cosim.models.records import Vector3
 
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
 WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
@@ -74,7 +76,10 @@ def simulate(
     with open_plant(scenario, fmu) as plant:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
-        recorder = Recorder(signals, plan.schedule.times, plan.schedule.rows, extra=insides(controller))
+        recorder = Recorder(
+            signals, plan.schedule.times, plan.schedule.rows, extra=insides(controller), every=scenario.every,
+            judged=judged_columns(bristles=True),
+        )  # fmt: skip
         chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")  # told before the run, not after it
         if begin is not None:
             begin()
@@ -111,6 +116,7 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
 def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
     """Puts the scenario's parameters and what was drawn over those of its robot; returns all of them, as they hold."""
     scenario = plan.scenario
+    _refuse_unmeasured(plant)
     plant.set_parameters(scenario.parameters)
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
@@ -118,17 +124,27 @@ def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
     return plant.parameters()
 
 
+def _refuse_unmeasured(plant: Fmu) -> None:
+    """Raises FmuError when an FMU does not measure what the metrics are made of."""
+    missing = sorted(set(MEASURED_BY_PLANT) - set(plant.names("output")))
+    if missing:
+        fix = "export it again with `hexapod export`"
+        expected = "the outputs that metrics are made of, which FMUs of earlier versions do not have"
+        raise FmuError("an FMU without measurements", got=f"no {missing[0]}", expected=expected, fix=fix, where=str(plant.path))
+
+
 def judge(plan: Plan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]) -> Result:
     """What came of a run; `facts` are those of `describe` and the controller's warnings."""
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
-    view = View(outcome.recording, parameters, setup.gait.period)
+    view = View(outcome.judged, parameters, setup.gait.period)
+    short = too_short(view) if outcome.status == COMPLETED else []
     found = {
-        "warnings": [*facts["warnings"], *idle_settings(scenario, setup.robot), *doubts(view, setup.robot)],
+        "warnings": [*facts["warnings"], *idle_settings(scenario, setup.robot), *doubts(view, setup.robot), *short],
         "gains": None if setup.gains is None else asdict(setup.gains),
         "walk": describe_walk(view, setup.robot),
         "drawn": None if drawn is None else drawn.as_facts(),
     }
-    metrics = compute_metrics(view, realtime_factor=outcome.realtime_factor)
+    metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
     return Result(scenario=scenario, outcome=outcome, metrics=metrics, parameters=parameters, facts={**facts, **found})
 
 
@@ -142,16 +158,19 @@ def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None
 
 
 def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
-    """The robot as its controller knows it: its own file with the scenario's servos. Ground, contact and payload it has to find out.
+    """The robot as its controller knows it: its own file with the scenario's servos and gravity.
+
+    Ground, contact and payload it has to find out.
 
     own: the scenario's robot, if it is at hand.
     """
-    return _with_servo(load_robot(scenario.robot), (own or scenario_robot(scenario)).servo)
+    own = own or scenario_robot(scenario)
+    return _told(load_robot(scenario.robot), own.servo, own.gravity)
 
 
 @lru_cache(maxsize=64)
-def _with_servo(robot: Robot, servo: Servo) -> Robot:
-    return robot if robot.servo == servo else replace(robot, servo=servo)
+def _told(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
+    return robot if (robot.servo, robot.gravity) == (servo, gravity) else replace(robot, servo=servo, gravity=gravity)
 
 
 def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:

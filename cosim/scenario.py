@@ -2,6 +2,10 @@
 
 A value is a number in SI or a quantity with its unit ("5 ms"). The settings of gait, terrain, contact, friction, servo, solver and
 baumgarte are those of robot files; a scenario gives only what differs from the robot's own.
+
+`gravity` is a number, along -z, or a vector in world axes, [m/s2]. Plant and controller both know
+it: the pose of rest, the gains' design, the planned loads and the weight in the metrics follow from
+it. The FMU's parameters gravity[1] to gravity[3] are entries of the same key.
 """
 
 from __future__ import annotations
@@ -14,11 +18,16 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.quantities import to_si
-from hexapod_cosim.cosim.scenario_checks import check_parameters, check_steps
+from hexapod_cosim.cosim.scenario_checks import check_interval, check_parameters, check_steps
 from hexapod_cosim.cosim.scenario_records import (
     FORMATS,
+    GRAVITY,
+    GRAVITY_NAMES,
+    GRAVITY_VECTOR,
     KEYS,
     PLAIN_KEYS,
     SECTIONS,
@@ -33,8 +42,12 @@ from hexapod_cosim.cosim.scenario_records import (
     Variation,
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
-from hexapod_cosim.models.schema import expect_table, read_given, refuse_unknown_keys, require, specs
+from hexapod_cosim.models.records import STATIC_LAWS
+from hexapod_cosim.models.schema import Number, expect_table, read_given, refuse_unknown_keys, require, specs
+from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.validation import check_settings
+
+NUMBER = Number(GRAVITY.unit)
 
 
 def list_scenarios() -> dict[str, Path]:
@@ -128,6 +141,7 @@ def scenario_from_table(table: Mapping[str, Any], *, where: str, given: Collecti
             title=_text(table, "title", Path(where).stem),
             robot=_text(table, "robot", "athena"),
             seed=_seed(table.get("seed", 0)),
+            gravity=_read_gravity(table["gravity"], "gravity") if "gravity" in table else None,
             settings={name: _read_setting(name, table[name], name) for name in SETTINGS if name in table},
             commands=_read_commands(table.get("command", {}), "command"),
             events=tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(_list(table.get("events", []), "events"))),
@@ -139,9 +153,33 @@ def scenario_from_table(table: Mapping[str, Any], *, where: str, given: Collecti
             where=where,
             **plain,
         )
+    scenario = _with_gravity_of_parameters(scenario)
     check_steps(scenario)
+    check_interval(scenario)
     check_parameters(scenario, given=given)
     return scenario
+
+
+def _read_gravity(value: Any, where: str) -> tuple[float, float, float]:
+    """A vector in world axes, or a number for gravity along -z [m/s2]."""
+    if isinstance(value, list | tuple):
+        x, y, z = GRAVITY_VECTOR.read(to_si(value, GRAVITY_VECTOR, where), where)
+        return x, y, z
+    return 0.0, 0.0, -GRAVITY.read(to_si(value, GRAVITY, where), where)
+
+
+def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:
+    """The scenario with the FMU's parameters gravity[1] to gravity[3] as entries of its gravity."""
+    names = [name for name in GRAVITY_NAMES if name in scenario.parameters]
+    if not names:
+        return scenario
+    gravity = list(load_robot(scenario.robot).gravity if scenario.gravity is None else scenario.gravity)
+    with _errors_of(scenario.where):
+        for name in names:
+            value = to_si(scenario.parameters[name], NUMBER, f"parameters.{name}")
+            gravity[GRAVITY_NAMES.index(name)] = NUMBER.read(value, f"parameters.{name}")
+    rest = {name: value for name, value in scenario.parameters.items() if name not in names}
+    return replace(scenario, gravity=(gravity[0], gravity[1], gravity[2]), parameters=rest)
 
 
 @contextmanager
@@ -209,7 +247,8 @@ def _read_outputs(table: Any, where: str) -> Outputs:
         fix, expected = 'write formats = ["parquet"]', "a list of one or both of " + ", ".join(FORMATS)
         raise ScenarioError("value not allowed", got=formats, expected=expected, fix=fix, where=f"{where}.formats")
     chosen = tuple(item for item in FORMATS if item in formats)
-    return Outputs(csv=tuple(patterns), formats=chosen, plots=_truth(plots, f"{where}.plots"))
+    interval = _record(Outputs, {key: table[key] for key in specs(Outputs) if key in table}, where).interval
+    return Outputs(csv=tuple(patterns), formats=chosen, plots=_truth(plots, f"{where}.plots"), interval=interval)
 
 
 def _truth(value: Any, where: str) -> bool:
@@ -245,11 +284,23 @@ def scenario_robot(scenario: Scenario) -> Robot:
     """
     own = load_robot(scenario.robot)
     changes = {name: replace(getattr(own, name), **dict(values)) for name, values in scenario.settings.items() if name != "gait"}
-    if "friction" in changes and "mu_static" not in scenario.settings["friction"]:
-        friction = changes["friction"]
-        changes["friction"] = replace(friction, mu_static=max(friction.mu_static, friction.mu))  # static is never below kinetic
-    robot = replace(own, **changes)
+    friction = changes.get("friction", own.friction)
+    if "mu_static" not in scenario.settings.get("friction", {}) and (friction.law not in STATIC_LAWS or friction.mu_static < friction.mu):
+        # the file's belongs to another law, or to less friction
+        changes["friction"] = replace(friction, mu_static=0.0)
+    robot = replace(own, **changes, gravity=own.gravity if scenario.gravity is None else scenario.gravity)
     if robot == own:
         return own
+    if scenario.gravity is not None:
+        _check_gravity(robot, where=f"{scenario.where}: gravity")
     check_settings(robot, where=f"{scenario.where} with robot {robot.name}")
     return robot
+
+
+def _check_gravity(robot: Robot, *, where: str) -> None:
+    """Raises ScenarioError for gravity that does not press the robot onto its ground."""
+    if np.array(robot.gravity) @ ground_normal(robot.terrain) < 0.0:
+        return
+    fix = "write gravity = 1.62, or a vector that points down: [0, 0, -1.62]"
+    expected = "gravity that presses the robot onto the ground [m/s2]"
+    raise ScenarioError("nothing stands under this gravity", got=list(robot.gravity), expected=expected, fix=fix, where=where)

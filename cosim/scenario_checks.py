@@ -27,6 +27,17 @@ def check_steps(scenario: Scenario) -> None:
         raise ScenarioError("not a whole number of macro-steps", got=scenario.duration, expected=expected, fix=fix, where=where)
 
 
+def check_interval(scenario: Scenario) -> None:
+    """Whole macro-steps between two rows of the recording. Raises ScenarioError."""
+    h, interval = scenario.macro_step, scenario.outputs.interval
+    every = scenario.every
+    if interval and abs(interval / h - every) > WHOLE_STEPS_TOLERANCE * every:
+        raise ScenarioError(
+            "not a whole number of macro-steps", got=interval, expected=f"a multiple of macro_step = {h:g} s",
+            fix=f"{every * h:g} is the nearest; 0 keeps every macro-step", where=f"{scenario.where}: outputs.interval",
+        )  # fmt: skip
+
+
 def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
     """Names in `parameters` are parameters of the robot's FMU; those in `given` were written as --set. Raises ScenarioError."""
     if not scenario.parameters:

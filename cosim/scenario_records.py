@@ -18,6 +18,9 @@ SETTINGS: dict[str, type[Any]] = {
     "gait": Gait, "terrain": Terrain, "contact": Contact, "friction": Friction, "servo": Servo, "solver": Solver, "baumgarte": Baumgarte,
 }  # fmt: skip
 UNUSED = {"gait": ("stride",)}  # the body velocity of the command says it
+GRAVITY = Number("m/s2", above=0.0)  # along -z; three numbers are a vector in world axes
+GRAVITY_VECTOR = Vector("m/s2", 3)
+GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)
 ALL_PARTS = Parts()
 MAX_STEPS = 1_000_000  # a row of the recording is about 3 kB, and all rows are in memory
@@ -81,6 +84,8 @@ class Outputs:
     csv: tuple[str, ...] = ("*",)  # patterns of variable names: the columns of results.csv; Parquet has all
     formats: tuple[str, ...] = FORMATS
     plots: bool = True
+    # between two rows of the recording; 0: every macro-step. Figures are of all macro-steps
+    interval: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,6 +99,7 @@ class Scenario:
     duration: Annotated[float, Number("s", above=0.0, default=10.0)] = 10.0
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1, default=0.005)] = 0.005
     seed: int = 0
+    gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
     settings: Mapping[str, Mapping[str, Any]]  # what differs from the robot's own, by section
     commands: tuple[Command, ...]  # in order of time
     events: tuple[Push | Fault, ...] = ()
@@ -110,6 +116,11 @@ class Scenario:
         return round(self.duration / self.macro_step)
 
     @property
+    def every(self) -> int:
+        """Macro-steps from one row of the recording to the next."""
+        return max(round(self.outputs.interval / self.macro_step), 1)
+
+    @property
     def pushes(self) -> tuple[Push, ...]:
         """The events that push."""
         return tuple(event for event in self.events if isinstance(event, Push))
@@ -122,6 +133,7 @@ class Scenario:
     def to_table(self) -> dict[str, Any]:
         """The scenario as tables of a file that says the same."""
         plain = {key: getattr(self, key) for key in ("title", "robot", *PLAIN_KEYS, "seed")}
+        plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
         lists = {"command": [_as_table(entry) for entry in self.commands], "events": [_as_table(entry) for entry in self.events]}
         tail = {"sensors": _as_table(self.sensors), "compliance": _as_table(self.compliance)}
@@ -132,7 +144,7 @@ class Scenario:
 
 PLAIN_KEYS = tuple(specs(Scenario))  # control, start, duration, macro_step
 SECTIONS = ("command", "sensors", "compliance", "variation", "outputs", "parameters", *SETTINGS)
-KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "events", *SECTIONS)
+KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
 
 
 def _as_table(record: Any) -> dict[str, Any]:

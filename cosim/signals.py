@@ -48,6 +48,7 @@ MEASURED = {
     "angular_velocity": vector_names("torso.angular_velocity"),
 }
 COMMANDED = {quantity: joint_names(quantity) for quantity in ("angle_ref", "speed_ref", "torque_ref")}
+ACCELERATION = joint_names("acceleration_ref")  # which plants made before have not
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 CONTACT = foot_names("contact")
 
@@ -64,14 +65,16 @@ class Signals:
         refuse_foreign(outputs, inputs, flags)
         seen = _first([name for names in MEASURED.values() for name in names], outputs)
         flagged = _first(CONTACT, flags)
-        written = [*(name for names in COMMANDED.values() for name in names), *PUSH]
+        planned = ACCELERATION if set(ACCELERATION) <= set(inputs) else []
+        written = [*(name for names in COMMANDED.values() for name in names), *PUSH, *planned]
         self.names = (*seen, *flagged, *written)
         self.values: NDArray[np.float64] = np.zeros(len(self.names))
         output_row, self._flag_row, input_row = np.split(self.values, np.cumsum([len(seen), len(flagged)]))
         self.outputs, self.inputs = plant.block(seen, output_row), plant.block(written, input_row)
         self.flags = plant.block(flagged)
         self._angle_ref, self._speed_ref, self._torque_ref = input_row[: 3 * LEGS * JOINTS].reshape(3, LEGS, JOINTS)
-        self.push: NDArray[np.float64] = input_row[3 * LEGS * JOINTS :]
+        self.push: NDArray[np.float64] = input_row[3 * LEGS * JOINTS : len(written) - len(planned)]
+        self._acceleration_ref = input_row[len(written) - len(planned) :].reshape(-1, LEGS, JOINTS)
         self._contact = np.zeros(LEGS, dtype=bool)
         self._touching = self.flags.values[:LEGS]
         self._sensor = sensor
@@ -106,6 +109,7 @@ class Signals:
         self._angle_ref[...] = command.angle_ref
         self._speed_ref[...] = command.speed_ref
         self._torque_ref[...] = command.torque_ref
+        self._acceleration_ref[...] = command.acceleration_ref
         self.inputs.set()
 
 

@@ -15,7 +15,7 @@ from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 FOLDER = "terminalsAndIcons"
 ICON = "icon.png"
-COMMANDS, STATES = ("angle_ref", "speed_ref", "torque_ref"), ("angle", "speed", "torque")
+COMMANDS, STATES = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref"), ("angle", "speed", "torque")
 BODY = ("vx", "vy", "yaw_rate", "height", "roll", "pitch")  # of a controller
 Group = tuple[str, str, tuple[str, ...]]  # name, meaning, members
 LEGS: tuple[Group, ...] = (("command", "joint commands", COMMANDS), ("state", "joint states", STATES))

@@ -72,7 +72,8 @@ class Walker:
         controller.initialise(scenario.start, scenario.start + scenario.duration)
         sensor = sensor_settings(scenario, plan.schedule)
         begin = thread_time()
-        outcome = master.run(plan.schedule, h=scenario.macro_step, sensor=sensor, progress=progress)
+        every = scenario.every if self._everything else 1  # what is judged is needed of every macro-step
+        outcome = master.run(plan.schedule, h=scenario.macro_step, every=every, sensor=sensor, progress=progress)
         self.loop_time = thread_time() - begin
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
         return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.warnings})
@@ -104,7 +105,8 @@ class Walker:
         if key not in self._masters:
             path = fmu or export_fmu(load_robot(name), self._folder / f"{len(self._masters)}.fmu")
             plant = self._open.enter_context(Fmu(path))
-            self._masters[key] = plant, NativeMaster(plant, controller, columns=columns)
+            judged = judged_columns(bristles=True)
+            self._masters[key] = plant, NativeMaster(plant, controller, columns=columns, judged=judged)
         return self._masters[key]
 
     def _told_controller(self, plan: Plan) -> Fmu:

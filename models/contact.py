@@ -93,8 +93,20 @@ def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
     return slip - sliding_velocity(friction.presliding, slip, bristle)
 
 
+def sliding_friction(friction: Friction, sliding: float) -> float:
+    """mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) of a foot that slides at p [m/s] (eq. 19).
+
+    Static at rest, kinetic well above v_s.
+    """
+    above = max(friction.mu_static - friction.mu, 0.0)
+    return friction.mu + above / (1.0 + (sliding / friction.stribeck_speed) ** 2)
+
+
 def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """(3,) f_t = -mu f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau db/dt / b_max (eq. 19).
+    """(3,) f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau db/dt / b_max (eq. 19).
+
+    p is the speed of what the foot slides and does not get back: a foot that sticks has static
+    friction however it swings.
 
     The spring leaves the damping a room of 1 - |u| (3 - u.u)/2, so that friction stays in its cone; u is cut to its presliding.
     """
@@ -103,7 +115,8 @@ def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array
     spring = u * (3.0 - u @ u) / 2.0
     room, push = 1.0 - float(np.linalg.norm(spring)), float(np.linalg.norm(d))
     damped = d * (room / math.hypot(room, push)) if push > 0.0 else d
-    return -friction.mu * normal * (spring + damped)
+    sliding = float(np.linalg.norm(sliding_velocity(friction.presliding, slip, bristle)))
+    return -sliding_friction(friction, sliding) * normal * (spring + damped)
 
 
 def friction_force(friction: Friction, normal: float, slip: Array, bristle: Array | None = None) -> Array:

@@ -42,7 +42,8 @@ class Command:
     torque_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # N m
     push_force: Array = field(default_factory=lambda: np.zeros(3))  # N
     push_torque: Array = field(default_factory=lambda: np.zeros(3))  # N m
-    age: float = 0.0  # s  since it was given: a kinematic drive follows angle_ref + speed_ref age
+    acceleration_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # rad/s2  kinematic
+    age: float = 0.0  # s  since it was given: a kinematic drive goes on from there (eq. 14)
 
 
 @dataclass(frozen=True)
@@ -153,10 +154,15 @@ def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, A
 
 
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
-    """(6, 3) s.(dw_j - dw_i) [rad/s2] that keeps a kinematically driven joint on q_ref + qd_ref age, with Baumgarte's terms."""
-    alpha, beta = robot.baumgarte.alpha, robot.baumgarte.beta
-    error = joint_angles(robot, body) - (command.angle_ref + command.speed_ref * command.age)
-    return -2.0 * alpha * (joint_speeds(robot, body) - command.speed_ref) - beta**2 * error
+    """(6, 3) s.(dw_j - dw_i) [rad/s2] that keeps a kinematically driven joint on its command.
+
+    The command is q_ref + qd_ref s + qdd_ref s^2/2, s its age; with Baumgarte's terms (eq. 14).
+    """
+    alpha, beta, age = robot.baumgarte.alpha, robot.baumgarte.beta, command.age
+    speed_ref = command.speed_ref + command.acceleration_ref * age
+    angle_ref = command.angle_ref + command.speed_ref * age + 0.5 * command.acceleration_ref * age**2
+    error = joint_angles(robot, body) - angle_ref
+    return command.acceleration_ref - 2.0 * alpha * (joint_speeds(robot, body) - speed_ref) - beta**2 * error
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ LEG_NAMES = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINT_NAMES = ("coxa", "femur", "tibia")
 CONTACT_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley", "constant_damping", "hertz")
 FRICTION_LAWS = ("tanh", "none", "bristle")
+STATIC_LAWS = ("bristle",)  # friction laws that tell static from kinetic friction
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
@@ -95,10 +96,13 @@ class Contact:
 class Friction:
     law: Annotated[str, Choice(FRICTION_LAWS)]
     mu: Annotated[float, Number("1", at_least=0.0)]
-    mu_static: Annotated[float, Number("1", at_least=0.0)]
+    # of a foot that sticks, bristle law; 0 or absent: mu
+    mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
     slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5, tanh law
     presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # b_max of eq. 18, bristle law; absent in a file: Mindlin
     bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]  # tau of eq. 19, bristle law
+    # v_s of eq. 19, bristle law
+    stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = 0.005
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +115,8 @@ class Servo:
     rotor_inertia: Annotated[float, Number("kg m2", at_least=0.0)]  # seen at the joint
     coulomb_friction: Annotated[float, Number("N m", at_least=0.0)]
     torque_continuous: Annotated[float, Number("N m", above=0.0)]  # above it, a warning
+    # at the joint: torque over the root of the copper loss; absent in a file: of an ideal motor
+    motor_constant: Annotated[float, Number("N m/sqrt(W)", above=0.0)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -149,7 +149,7 @@ def _section(table: Mapping[str, Any], name: str, where: str) -> Mapping[str, An
 def _read_friction(table: Mapping[str, Any], where: str, foot: Foot, contact: Contact, load: float) -> Friction:
     given = read_given(Friction, _section(table, "friction", where), where)
     if "presliding" not in given and "mu" in given:
-        given["presliding"] = mindlin_presliding(foot, contact.stiffness, given["mu"], load)
+        given["presliding"] = mindlin_presliding(foot, contact.stiffness, max(given["mu"], given.get("mu_static", 0.0)), load)
     return Friction(**require(Friction, given, where))
 
 
@@ -160,6 +160,9 @@ def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
         given.setdefault("inertia", box_inertia(given["mass"], given["size"]))
     if record is Contact and "stiffness" not in given:
         given["stiffness"] = hertz_stiffness(_read_section(table, "foot", where.replace("contact", "foot")))
+    if record is Servo and {"torque_max", "speed_max"} <= given.keys():
+        constant = ideal_motor_constant(given["torque_max"], given["speed_max"])
+        given.setdefault("motor_constant", constant)
     return record(**require(record, given, where))
 
 
@@ -200,6 +203,13 @@ def box_inertia(mass: float, size: Vector3) -> Vector6:
     """Inertia of a homogeneous box about its centre [kg m2]: xx yy zz xy xz yz."""
     x2, y2, z2 = (edge * edge for edge in size)
     return (mass / 12.0 * (y2 + z2), mass / 12.0 * (x2 + z2), mass / 12.0 * (x2 + y2), 0.0, 0.0, 0.0)
+
+
+def ideal_motor_constant(torque_max: float, speed_max: float) -> float:
+    """Stall torque [N m] over the root of the stall power [W] of a direct-current motor without
+    losses but copper, k_m = T_s/sqrt(T_s w_0), from its stall torque and no-load speed [rad/s].
+    """
+    return math.sqrt(torque_max / speed_max)
 
 
 def hertz_stiffness(foot: Foot) -> float:

@@ -3,6 +3,10 @@
 Tanh friction holds nothing at rest, so on level ground the feet spread until no tangential force is left. On a slope no such
 pose exists; the robot stands while it creeps, and friction at the creep's velocity carries what pulls it downhill. Under the
 bristle law it stands still there: what it has given way downhill, as one body, carries it instead.
+
+Where gravity pulls along the ground more than friction can hold, the robot slides. Then the pose is
+the one in which all bodies accelerate alike: the pose of rest under gravity less that acceleration.
+Without friction on level ground that acceleration is 0, and the pose is that of any other friction.
 """
 
 from __future__ import annotations
@@ -26,19 +30,20 @@ from hexapod_cosim.models.kinematics import (
     quaternion_product,
     rotation_matrix,
 )
-from hexapod_cosim.models.records import Array, Baumgarte, Gait, Robot, Solver
+from hexapod_cosim.models.records import STATIC_LAWS, Array, Baumgarte, Gait, Robot, Solver
 from hexapod_cosim.models.terrain import ground_normal
 
 RESIDUAL = 1e-9  # N and N m: some 1e4 times the rounding of forces of this size
 ITERATIONS = 60
 DIFFERENCE = 1e-7  # of the Jacobian's columns; Newton forgives its error
+LEVEL = 1e-12  # of gravity: less of it along the ground is rounding
 TORSO = 6  # of the unknowns, and of the residual
 UNKNOWNS = TORSO + LEGS * JOINTS
 
 
 @dataclass(frozen=True)
 class Standing:
-    """A pose of rest, torso above the world's origin, heading along x."""
+    """A pose of rest, or of sliding as one body; torso above the world's origin, heading along x."""
 
     position: Array  # (3,) m  torso's centre of mass
     quaternion: Array  # (4,)
@@ -46,6 +51,33 @@ class Standing:
     velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground and under the bristle law
     foot_force: Array  # (6, 3) N  ground on foot
     bristle: Array  # (6, 3) m  what the feet have given way, 0 but on a slope under the bristle law
+    slide: Array  # (3,) m/s2  acceleration of the whole robot along the ground, 0 where friction holds it
+
+
+def sliding(gravity: Array, normal: Array, mu: float, mu_static: float = 0.0) -> Array:
+    """(3,) acceleration [m/s2] with which a robot slides, 0 where friction holds it.
+
+    Gravity that does not press the robot onto the ground lets it fall, not slide.
+
+    Args:
+        gravity: (3,) [m/s2].
+        normal: (3,) of the ground, of unit length.
+        mu: the friction coefficient, 0 for the law `none`.
+        mu_static: that of feet that stick, mu if it is less.
+    """
+    press = -float(gravity @ normal)
+    pull = gravity + press * normal
+    size = float(np.linalg.norm(pull))
+    if press <= 0.0 or size <= LEVEL * press or size < max(mu, mu_static) * press:
+        return np.zeros(3)
+    return np.asarray(pull * (1.0 - mu * press / size))
+
+
+def _slide(robot: Robot) -> Array:
+    """(3,) the same of a robot on its own ground."""
+    mu = 0.0 if robot.friction.law == "none" else robot.friction.mu
+    mu_static = robot.friction.mu_static if robot.friction.law in STATIC_LAWS else 0.0
+    return sliding(np.array(robot.gravity), ground_normal(robot.terrain), mu, mu_static)
 
 
 def _standing_part(robot: Robot) -> Robot:
@@ -53,10 +85,23 @@ def _standing_part(robot: Robot) -> Robot:
     ground how strong its friction is, since it has nothing to hold.
     """
     friction, calm = robot.friction, Solver(method="rosw3", step=0.0, tolerance=1e-4, step_max=1.0, projection="none")
-    if robot.friction.law == "tanh" and robot.friction.mu > 0.0 and (robot.terrain.kind == "flat" or robot.terrain.incline == 0.0):
-        friction = replace(friction, mu=1.0, mu_static=1.0)
+    gravity, normal = np.array(robot.gravity), ground_normal(robot.terrain)
+    press = -float(gravity @ normal)
+    level = float(np.linalg.norm(gravity + press * normal)) <= LEVEL * press
+    if level and (friction.law != "bristle" or max(friction.mu, friction.mu_static) == 0.0):
+        friction = replace(friction, law="tanh", mu=1.0, mu_static=0.0)
     still = Gait(name="tripod", period=1.0, duty=0.5, stride=0.0, step_height=1.0)
     return replace(robot, solver=calm, gait=still, friction=friction, baumgarte=Baumgarte(alpha=0.0, beta=0.0))
+
+
+def _held(robot: Robot, slide: Array) -> Robot:
+    """A sliding robot seen from a frame that slides with it.
+
+    There gravity is less, and any friction above its own holds it.
+    """
+    mu = 1.0 if robot.friction.law == "none" or robot.friction.mu == 0.0 else 2.0 * robot.friction.mu
+    x, y, z = (np.array(robot.gravity) - slide).tolist()
+    return replace(robot, gravity=(x, y, z), friction=replace(robot.friction, law="tanh", mu=mu, mu_static=0.0))
 
 
 def settled(robot: Robot) -> tuple[Array, Array, Array]:
@@ -66,22 +111,24 @@ def settled(robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def standing(robot: Robot) -> Standing:
-    """Static equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has given way) and joint angles.
+    """Equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has given way) and joint angles.
 
     Servos in position or torque mode hold the stance by their PD law (a torque servo alone would not stand); kinematic ones exactly.
     Looked up when it was asked for before: the interface and every picture of a robot need it, and it is most of an export's time. Its
-    arrays are read-only. Raises RobotError when there is no such pose: servos too weak or soft, or a slope without friction.
+    arrays are read-only. Raises RobotError when there is no such pose: servos too weak or soft.
     """
     return _found(_standing_part(robot))
 
 
 @lru_cache(maxsize=64)
-def _found(robot: Robot) -> Standing:
+def _found(given: Robot) -> Standing:
+    slide = _slide(given)
+    robot = _held(given, slide) if slide.any() else given
     x = _start(robot)
     loads = _loads(robot, x)
     for _ in range(ITERATIONS):
         if np.max(np.abs(_residual(robot, loads))) < RESIDUAL:
-            pose = _standing(robot, x)
+            pose = _standing(robot, x) if not slide.any() else _sliding(given, _standing(robot, x), slide)
             for array in vars(pose).values():
                 array.flags.writeable = False
             return pose
@@ -91,7 +138,7 @@ def _found(robot: Robot) -> Standing:
 
 def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
     got = f"forces out of balance by {np.max(np.abs(residual)):.3g}"
-    fix = "raise servo.kp or servo.torque_max, change the stance, or give a slope more friction"
+    fix = "raise servo.kp or servo.torque_max, or change the stance"
     return RobotError("the robot does not stand", got=got, expected=f"a pose in balance to {RESIDUAL} N", fix=fix, where=robot.name)
 
 
@@ -225,4 +272,10 @@ def _standing(robot: Robot, x: Array) -> Standing:
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
     body = _bodies(robot, x)
     creep = np.zeros(3) if robot.friction.law == "bristle" else _velocity(robot, x)
-    return Standing(position, _attitude(x), angle, creep, _foot_forces(robot, body), _bristles(robot, body))
+    return Standing(position, _attitude(x), angle, creep, _foot_forces(robot, body), _bristles(robot, body), np.zeros(3))
+
+
+def _sliding(robot: Robot, pose: Standing, slide: Array) -> Standing:
+    """The pose of a robot that slides: without creep, its bristles stretched to the full downhill."""
+    way = robot.friction.presliding * slide / np.linalg.norm(slide) if robot.friction.law == "bristle" else np.zeros(3)
+    return replace(pose, velocity=np.zeros(3), bristle=np.tile(way, (LEGS, 1)), slide=slide)

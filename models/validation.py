@@ -11,7 +11,7 @@ import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
-from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array, Leg, Link, Robot
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, STATIC_LAWS, Array, Friction, Leg, Link, Robot
 from hexapod_cosim.models.schema import Vector, check_record
 
 # an inertia printed with four figures may miss the triangle inequality by rounding: a thin rod meets it with equality
@@ -134,10 +134,30 @@ def _check_laws(robot: Robot, at: str) -> None:
             fix="lower it",
             where=at + "servo.torque_continuous",
         )
-    if friction.mu_static < friction.mu:
-        expected = f"at least mu = {friction.mu:g}"
+    _check_static_friction(friction, at + "friction.mu_static")
+
+
+def _check_static_friction(friction: Friction, where: str) -> None:
+    """That it is not below the kinetic one, and that the law uses it."""
+    static, mu = friction.mu_static, friction.mu
+    if static in (0.0, mu):
+        return
+    if static < mu:
         raise RobotError(
-            "static friction below kinetic", got=friction.mu_static, expected=expected, fix="raise it", where=at + "friction.mu_static"
+            "static friction below kinetic",
+            got=static,
+            expected=f"at least mu = {mu:g}",
+            fix="raise it or leave it out",
+            where=where,
+        )
+    if friction.law not in STATIC_LAWS:
+        laws = " or ".join(STATIC_LAWS)
+        raise RobotError(
+            "static friction that has no effect",
+            got=f"{static:g} with the law {friction.law}",
+            expected=f"friction.law = {laws}" if laws else f"mu = {mu:g}: no law uses another",
+            fix="leave it out" + (f", or choose the law {laws}" if laws else ""),
+            where=where,
         )
 
 

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.cli import main
 LONGEST = (
     "test_docs", "test_long_walk", "test_walking", "test_endurance", "test_cli", "test_controller_design", "test_howto", "test_batch",
     "test_readme", "test_control_benchmark", "test_examples", "test_laws_impact", "test_platforms", "test_robot_package",
-    "test_cli_endings", "test_study_cluster", "test_study_store", "test_study_workers",
+    "test_cli_endings", "test_study_cluster", "test_study_store", "test_study_workers", "test_random_robots",
 )  # fmt: skip
 # what builds the same binaries for other platforms stays together
 TOGETHER = dict.fromkeys(("test_platforms", "test_platform_walks", "test_cross_build"), "platforms")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -92,8 +93,9 @@ tibia.stance = 1.8
 """
 
 
-def spider_urdf() -> str:
-    return BODY.format(legs="".join(_spider_leg(name) for name in NUMBERS))
+def spider_urdf(names: Iterable[str] = NUMBERS) -> str:
+    """With these legs."""
+    return BODY.format(legs="".join(_spider_leg(name) for name in names))
 
 
 def _spider_leg(name: str) -> str:
@@ -126,7 +128,7 @@ def spider_table() -> dict[str, Any]:
         table["links"][joint] |= {"angle_min": low, "angle_max": high}
     table["foot"]["radius"] = 0.012
     table["servo"] |= {"torque_max": 5.5, "speed_max": 6.0, "coulomb_friction": 0.04, "kp": 5.5 / 0.15, "kd": 0.02 * 5.5 / 0.15}
-    table["servo"] |= {"rotor_inertia": 0.01 / 40.0 * 5.5 / 0.15, "torque_continuous": 0.2 * 5.5}
+    table["servo"] |= {"rotor_inertia": 0.01 / 40.0 * 5.5 / 0.15, "torque_continuous": 0.2 * 5.5, "motor_constant": math.sqrt(5.5 / 6.0)}
     return table | {"name": "spider"}
 
 

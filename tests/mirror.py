@@ -34,7 +34,7 @@ HxDefinition = record(
     ("leg", HxLeg * LEGS),
     ("foot_radius", Real),
     ("contact", record("Contact", ("law", ct.c_int), *reals("stiffness restitution damping_factor impact_speed_floor"))),
-    ("friction", record("Friction", ("law", ct.c_int), *reals("mu slope presliding bristle_damping"))),
+    ("friction", record("Friction", ("law", ct.c_int), *reals("mu slope presliding bristle_damping mu_static stribeck_speed"))),
     ("servo", record("Servo", ("mode", ct.c_int), *reals("kp kd torque_max speed_max rotor_inertia coulomb_friction"))),
     ("baumgarte", record("Baumgarte", *reals("alpha beta"))),
     ("gravity", Vector3),
@@ -60,6 +60,7 @@ HxInput = record(
     ("torque_ref", PerJoint),
     ("push_force", Vector3),
     ("push_torque", Vector3),
+    ("acceleration_ref", PerJoint),
 )
 HxCoordinates = record(
     "HxCoordinates",
@@ -78,6 +79,9 @@ HxOutput = record(
     ("angle", PerJoint),
     ("speed", PerJoint),
     ("torque", PerJoint),
+    ("positive_work", PerJoint),
+    ("negative_work", PerJoint),
+    ("torque_squared", PerJoint),
     ("reaction_force", JointVectors),
     ("reaction_torque", JointVectors),
     (
@@ -93,6 +97,12 @@ HxOutput = record(
             ("bristle", LegVectors),
             ("penetration", PerLeg),
             ("impact_speed", PerLeg),
+            ("slip_distance", PerLeg),
+            ("impulse", PerLeg),
+            ("peak_force", PerLeg),
+            ("peak_force_rate", PerLeg),
+            ("landing_rate", PerLeg),
+            ("landings", PerLeg),
             ("contact", ct.c_int * LEGS),
         ),
     ),
@@ -108,7 +118,13 @@ HxOutput = record(
         ),
     ),
     ("imu", record("ImuOutput", ("specific_force", Vector3), ("angular_velocity", Vector3))),
-    ("energy", record("EnergyOutput", *reals("kinetic potential actuator_work push_work dissipated residual"))),
+    (
+        "energy",
+        record(
+            "EnergyOutput",
+            *reals("kinetic potential actuator_work push_work dissipated contact_loss friction_loss gear_loss residual"),
+        ),
+    ),
     ("constraint", record("ConstraintOutput", *reals("position_error velocity_error"))),
     ("solver", record("SolverOutput", *reals("evaluations steps rejected touchdowns"))),
 )

@@ -12,6 +12,7 @@ from hexapod_cosim.controller import BodyCommand, Measurement
 from hexapod_cosim.cosim.controller_interface import ControllerSetup, load_controller_interface
 
 Flags = ct.c_int * LEGS
+COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
 HxRange = record(
     "HxRange", ("name", ct.c_char_p), ("unit", ct.c_char_p), ("min", Real), ("max", Real), ("offset", ct.c_size_t), ("is_int", ct.c_int)
 )
@@ -20,7 +21,8 @@ HxControllerInput = record(
 )
 HxControllerOutput = record(
     "HxControllerOutput", ("angle_ref", PerJoint), ("speed_ref", PerJoint), ("torque_ref", PerJoint), ("swinging", Flags),
-    ("unreachable", Flags), ("fallback", Flags), ("shift", (Real * 2) * LEGS), ("lift", Real * LEGS),
+    ("unreachable", Flags), ("fallback", Flags), ("shift", (Real * 2) * LEGS), ("lift", Real * LEGS), ("planned", (Real * 3) * LEGS),
+    ("acceleration_ref", PerJoint),
 )  # fmt: skip
 
 
@@ -141,5 +143,5 @@ class NativeController:
 
 
 def commands(out: Any) -> np.ndarray:
-    """(3, 6, 3) angle_ref, speed_ref and torque_ref, copied."""
-    return np.array([np.ctypeslib.as_array(getattr(out, name)) for name in ("angle_ref", "speed_ref", "torque_ref")])
+    """(4, 6, 3) angle_ref, speed_ref, torque_ref and acceleration_ref, copied."""
+    return np.array([np.ctypeslib.as_array(getattr(out, name)) for name in COMMANDS])

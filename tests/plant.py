@@ -46,6 +46,7 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_plant_destroy": (None, [plant]),
         "hx_plant_reset": (status, [plant, ct.POINTER(HxDefinition), Real]),
         "hx_plant_step": (status, [plant, ct.POINTER(HxInput), Real]),
+        "hx_plant_step_ramp": (status, [plant, ct.POINTER(HxInput), ct.POINTER(HxInput), Real]),
         "hx_plant_output": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxOutput)]),
         "hx_plant_time": (Real, [plant]),
         "hx_plant_message": (ct.c_char_p, [plant]),
@@ -171,7 +172,7 @@ def _put_settings(d: Any, robot: Robot) -> None:
 def inputs(command: Command) -> Any:
     """The HxInput of a command; its age is the plant's business."""
     i: Any = HxInput()
-    for name in ("angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque"):
+    for name in ("angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque", "acceleration_ref"):
         put(getattr(i, name), getattr(command, name))
     return i
 
@@ -213,6 +214,10 @@ class Plant:
     def step(self, t_end: float, command: Command | None = None) -> None:
         """Integrates to t_end [s] under a command (default: hold the stance)."""
         self._check(self.core.hx_plant_step(self.handle, inputs(command or self.hold()), t_end))
+
+    def step_ramp(self, t_end: float, command: Command, rate: Command) -> None:
+        """Integrates to t_end [s] under a command that changes at a rate, per second."""
+        self._check(self.core.hx_plant_step_ramp(self.handle, inputs(command), inputs(rate), t_end))
 
     def step_to_event(self, t_end: float, command: Command, *, stop: bool = True) -> bool:
         """Integrates to t_end [s], or to the next event if `stop`; whether there was one."""

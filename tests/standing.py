@@ -45,7 +45,7 @@ def plan(laws: Compliance, steps: int, *, robot: Robot = ROBOT, standing: str = 
     rows = np.tile(stands.astype(float), (steps, 1))
     shares = support.shares(np.tile(home, (steps, 1)), rows, demand)
     air = 1.0 - rows
-    laws.plan(demand, shares, height=height * air, rise=rise * air, swinging=~stands)
+    laws.plan(demand, shares, feet=np.tile(home, (steps, 1)), height=height * air, rise=rise * air, swinging=~stands)
 
 
 def shared(laws: Compliance) -> np.ndarray:

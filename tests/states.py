@@ -131,6 +131,7 @@ def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:
         torque_ref=size * rng.normal(0.0, 1.0, (LEGS, JOINTS)),
         push_force=size * rng.normal(0.0, 20.0, 3),
         push_torque=size * rng.normal(0.0, 2.0, 3),
+        acceleration_ref=size * rng.normal(0.0, 20.0, (LEGS, JOINTS)),
     )
 
 

@@ -12,8 +12,8 @@ import pytest
 from browser import FLAGS, FULL, Launcher, Opened, find_chromium, launcher
 
 from hexapod_cosim.cosim.cli import main
-from hexapod_cosim.cosim.metrics import robot_weight
 from hexapod_cosim.cosim.results import read_result
+from hexapod_cosim.cosim.walk import robot_weight
 from hexapod_cosim.models import LEG_NAMES, load_robot
 from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
 
@@ -23,7 +23,7 @@ PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/6
 PACKED_FORCE = 1e-3  # body weights    forces in steps of 1/65535 of their ranges, the hardest landing's included
 LEAST_FORCE = 0.01  # body weights that have an arrow
 TICK = 1e-6  # s    of the packed times
-PLOTS = 6 + 7 + 4 + 3 + 4 + 2  # forces, slip, height and attitude, torques, energies, footfall
+PLOTS = 6 + 7 + 4 + 3 + 4 + 2 + 6  # forces, slip, height and attitude, torques, energies, footfall, feet against their plan
 SMALLEST_TEXT = 11  # px
 TALLEST_BAR = 90  # px    on a phone
 BRIGHT, DIM = 200, 60  # of 255

@@ -50,7 +50,7 @@ def test_names_are_offered_where_they_go(offered: Ask) -> None:
 def test_keys_of_set_are_those_of_the_scenario_and_of_the_fmu(offered: Ask) -> None:
     assert offered("simulate", "--set", "dura") == ["duration="]
     assert {"gait.name=", "gait.period="} <= set(offered("compare", "--set", "gait."))
-    assert offered("simulate", "--set", "gravity") == ["gravity[1]=", "gravity[2]=", "gravity[3]="]
+    assert offered("simulate", "--set", "gravity") == ["gravity=", "gravity[1]=", "gravity[2]=", "gravity[3]="]
     assert offered("simulate", "--set", "LF.coxa.m") == ["LF.coxa.mass="]
     assert offered("simulate", "--set", "torso.push") == []  # an input
     assert offered("design", "--set", "phase") == ["phase_margin="]

@@ -8,6 +8,8 @@ import re
 import signal
 import subprocess
 import time
+from collections.abc import Generator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,9 @@ from command import COMMAND, QUICK, Call, assert_refused, settings
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.recordings import read_csv, write_commands
+from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import Summary, refused
+from hexapod_cosim.models import HexapodError
 
 PARTIAL = {"results.partial.csv", "results.partial.parquet", "run.json", "scenario.toml"}
 # an explicit method of fixed step without error control has nowhere to go under an endless force
@@ -135,9 +140,45 @@ def test_a_refused_run_leaves_the_earlier_results(call: Call, tmp_path: Path) ->
 def test_a_torso_that_sinks_has_fallen(call: Call, tmp_path: Path) -> None:
     arguments = ["simulate", "stand", "-o", tmp_path / "out", "--json", *settings("servo.mode=torque", "duration=2", "outputs.plots=false")]
     code, out, err = call(*arguments)
-    assert code == 0
-    assert "the robot fell at" in err
+    assert code == 3  # falls have an exit code of their own
+    assert "warning: kinematic: the robot fell at" in err
     assert json.loads(out)["walk"]["upright"] is False
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
+    assert {"metrics.json", "results.parquet"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.parametrize(("upright", "code"), [((True, True), 0), ((False, True), 3), ((True, False), 3), ((False, False), 3)])
+def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, upright: tuple[bool, bool], code: int
+) -> None:
+    def others(scenarios: Sequence[Scenario], **_: object) -> Generator[Summary, None, None]:
+        for scenario in scenarios:
+            stands = upright[("kinematic", "compliant").index(scenario.control)]
+            yield replace(refused(scenario, HexapodError("")), status="completed", upright=stands, warnings=() if stands else ("it fell",))
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.compare_command.run_batch", others)
+    returned, out, _ = call("compare", "stand", "-o", tmp_path / "out", "--seeds", "2", "--json", "--set", "duration=0.2")
+    assert returned == code
+    assert json.loads(out)["walked"] == {"kinematic": 1 + upright[0], "compliant": 1 + upright[1]}
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+@pytest.mark.parametrize(("modes", "code"), [(["torque"], 3), (["position", "torque"], 0)])
+def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
+    call: Call, tmp_path: Path, modes: list[str], code: int
+) -> None:
+    text = f'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n[factors]\nservo.mode = {json.dumps(modes)}\n'
+    (tmp_path / "sinks.toml").write_text(text)
+    returned, out, _ = call("study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json")
+    assert returned == code, out
+
+
+def test_the_exit_codes_are_told_by_help(call: Call) -> None:
+    said = " ".join(call("--help")[1].split())
+    assert "0 success; 1 an error" in said
+    assert "3 the robot fell" in said
+    for command in ("simulate", "compare", "study"):
+        assert "xit code 3" in " ".join(call(command, "--help")[1].split())
 
 
 def test_what_has_no_effect_is_told(call: Call, tmp_path: Path) -> None:

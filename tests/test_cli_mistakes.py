@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -29,7 +30,7 @@ from hexapod_cosim.cosim.cli import main
         (["simulate", "--fmu", "missing.fmu"], ["no such FMU", "missing.fmu", "hexapod export"]),
         (["compare", "walk_flt"], ["unknown scenario"]),
         (["compare", "--seeds", "0"], ["--seeds: ", "got 0", "1 to"]),
-        (["report", "."], ["not a results folder"]),
+        (["report", "."], ["not a results folder", "got '.'", "`hexapod simulate`, `hexapod compare` or `hexapod study`"]),
         (["validate", "missing.fmu"], ["no such FMU"]),
         (["export", "--robot", "atena"], ["unknown robot", "did you mean 'athena'"]),
         (["simulate", "--set", "fricton.mu=1"], ["--set fricton.mu", "did you mean 'friction.mu'"]),
@@ -104,3 +105,69 @@ def test_an_unexpected_error_is_one_line_with_a_hint(call: Call, monkeypatch: py
     assert_refused(call("simulate"), "unexpected ZeroDivisionError: by nought", "--debug")
     with pytest.raises(ZeroDivisionError):
         main(["--debug", "simulate"])
+
+
+# with --json: the same paragraph on stderr, and an object on stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "expected"),
+    [
+        (
+            ["simulate", "walk_flt"], 1,
+            {"what": "unknown scenario", "got": "walk_flt", "fix": "did you mean 'walk_flat'?", "where": None},
+        ),
+        (["simulate", "--set", "macro_step=0"], 1, {"got": 0, "expected": "a finite number > 0 and <= 0.1 [s]"}),
+        (["simulate", "--speed", "3"], 2, {"what": "not understood", "got": "No such option: --speed (Possible options: --set)"}),
+        (["compare", "--seeds", "0"], 1, {"got": 0, "expected": "1 to 10000", "fix": "write --seeds 10", "where": "--seeds"}),
+        (["study", "nothing.toml"], 1, {"where": "nothing.toml"}),
+        (["report", "."], 1, {"what": "not a results folder", "got": "."}),
+        (["design", "--robot", "atena"], 1, {"what": "unknown robot", "got": "atena"}),
+        (["export", "--fmi", "7"], 1, {"got": 7}),
+        (["list", "robot"], 1, {"what": "unknown list", "got": "robot", "fix": "did you mean 'robots'?"}),
+        (["validate", "missing.fmu"], 1, {"fmu": "missing.fmu", "valid": False, "what": "no such FMU"}),
+        (["simulat"], 2, {"what": "not understood"}),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)  # fmt: skip
+def test_with_json_an_error_is_an_object_on_stdout_and_the_paragraph_on_stderr(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, expected: dict[str, object]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    returned, out, err = call(*arguments, "--json")
+    told = json.loads(out)
+    assert returned == code
+    assert {"error", "what", "got", "expected", "fix", "where", "exit_code"} <= told.keys()
+    assert told["exit_code"] == code
+    assert err == f"hexapod: {told['error']}\n"
+    assert all(part in told["error"] for part in (told["what"], told["expected"] or "", told["fix"] or ""))
+    assert {key: told[key] for key in expected} == expected
+
+
+def test_with_json_an_unexpected_error_is_an_object_too(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def burst(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("by nought")
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.load_scenario", burst)
+    code, out, _ = call("simulate", "--json")
+    told = json.loads(out)
+    assert (code, told["exit_code"], told["what"]) == (1, 1, None)
+    assert told["error"].startswith("unexpected ZeroDivisionError: by nought")
+
+
+def test_with_json_an_interrupt_is_an_object_too(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.load_scenario", interrupted)
+    code, out, err = call("simulate", "--json")
+    assert (code, err) == (130, "hexapod: interrupted\n")
+    assert json.loads(out)["exit_code"] == 130
+
+
+def test_with_json_an_unsound_fmu_is_one_object_with_its_problems_and_the_error(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "plain.fmu").write_text("no archive")
+    code, out, _ = call("validate", tmp_path / "plain.fmu", "--json")
+    told = json.loads(out)
+    assert (code, told["valid"], told["exit_code"]) == (1, False, 1)
+    assert told["problems"] == [told["error"]]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +16,7 @@ import pytest
 from command import COMMAND, QUICK, Call, assert_refused
 from typer.main import get_command
 
+from hexapod_cosim.cosim.cli import main
 from hexapod_cosim.cosim.cli import terminal as terminal_module
 from hexapod_cosim.cosim.cli.app import app
 from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
@@ -130,6 +133,112 @@ def test_columns_of_a_table_are_aligned(call: Call) -> None:
     head, *rows = table.splitlines()
     start = head.index("about")
     assert all(row[start - 1] == " " and row[start] != " " for row in rows)
+
+
+# narrow terminals
+
+
+@pytest.fixture
+def narrow(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Terminal]:
+    """Puts a terminal of 60 columns in the place of a stream, from within a test."""
+
+    def install(name: str) -> Terminal:
+        terminal = Terminal()
+        monkeypatch.setenv("COLUMNS", "60")
+        monkeypatch.setattr(sys, name, terminal)
+        return terminal
+
+    return install
+
+
+def plain(text: str) -> list[str]:
+    """Its lines without colours and trailing blanks."""
+    return [line.rstrip() for line in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text).splitlines()]
+
+
+def lines_of(screen: Terminal) -> list[str]:
+    return plain(screen.getvalue())
+
+
+@pytest.mark.parametrize("what", ["robots", "scenarios", "studies", "gaits", "terrains", "laws"])
+def test_every_list_fits_sixty_columns_and_loses_nothing(call: Call, narrow: Callable[[str], Terminal], what: str) -> None:
+    _, wide, _ = call("list", what)
+    screen = narrow("stdout")
+    main(["list", what])
+    shown = lines_of(screen)
+    assert max(map(len, shown)) <= 60
+    assert sorted(" ".join(shown).split()) == sorted(wide.split())
+
+
+def test_a_table_too_wide_goes_on_below_its_first_column(narrow: Callable[[str], Terminal]) -> None:
+    screen = narrow("stdout")
+    names = ["metric", "unit", "kinematic", "compliant", "change", "95 % interval", ""]
+    slip = ["slip_per_metre", "m/m", "0.3042", "0.02133", "-93.0 %", "-93.4 to -92.6 %", "better"]
+    rows = [slip, ["peak_force", "BW", "0.65", "0.51", "", "", "same"]]
+    terminal_module.show_table(names, rows, right=[2, 3, 4, 5])
+    assert lines_of(screen) == [
+        "metric          unit  kinematic  compliant   change",
+        "slip_per_metre  m/m      0.3042    0.02133  -93.0 %",
+        "peak_force      BW         0.65       0.51",
+        "",
+        "metric             95 % interval",
+        "slip_per_metre  -93.4 to -92.6 %  better",
+        "peak_force                        same",
+    ]
+
+
+@pytest.mark.parametrize("say", [terminal_module.warn, terminal_module.show_text])
+def test_sentences_are_broken_between_words_on_a_terminal_and_not_in_a_pipe(
+    capsys: pytest.CaptureFixture[str], narrow: Callable[[str], Terminal], say: Callable[[str], None]
+) -> None:
+    text = "kinematic: servo LM.femur works at 1.24 N m RMS, above the limit; see /a/path/that/no/one/may/break/for/it/is/one/word/and/long"
+    say(text)
+    piped = "".join(capsys.readouterr())
+    assert piped.count("\n") == 1
+    screen = narrow("stderr" if say is terminal_module.warn else "stdout")
+    say(text)
+    shown = lines_of(screen)
+    assert all(len(line) <= 60 for line in shown if "/a/path" not in line)
+    assert " ".join(" ".join(shown).split()) == piped.strip()
+
+
+def test_an_error_is_broken_between_words_on_a_terminal(narrow: Callable[[str], Terminal]) -> None:
+    screen = narrow("stderr")
+    assert main(["simulate", "walk_flt"]) == 1
+    shown = lines_of(screen)
+    assert max(map(len, shown)) <= 60
+    assert " ".join(" ".join(shown).split()).endswith("wave; did you mean 'walk_flat'?")
+
+
+def test_a_bar_of_progress_stays_on_its_line(narrow: Callable[[str], Terminal]) -> None:
+    screen = narrow("stderr")
+    with progress_bar("kinematic", 8.0) as tell:
+        assert tell is not None
+        tell(0.0)
+        tell(8.0)
+    last = [line for line in lines_of(screen) if line][-1]
+    assert last.startswith("kinematic")
+    assert "x real time in 0:0" in last
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
+def test_a_table_fits_a_real_terminal_of_sixty_columns() -> None:
+    import fcntl  # noqa: PLC0415  Unix only
+    import pty  # noqa: PLC0415
+    import termios  # noqa: PLC0415
+
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 60, 0, 0))
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {"TERM": "xterm"}
+    done = subprocess.Popen([*COMMAND, "list", "gaits"], stdout=theirs, env=environment)
+    os.close(theirs)
+    shown = b""
+    while chunk := _read(ours):
+        shown += chunk
+    assert done.wait() == 0
+    lines = plain(shown.decode().replace("\r", ""))
+    assert max(map(len, lines)) <= 60
+    assert [line.split()[-1] for line in lines] == ["RR", "0", "0.6667", "0.6667", "0"]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -10,12 +11,13 @@ import control
 import numpy as np
 import pytest
 
-from hexapod_cosim.controller import Gains, GainsError, Requirements, SuspensionGains, load_gains, save_gains
+from hexapod_cosim.controller import Gains, GainsError, LegSolver, Requirements, SuspensionGains, load_gains, save_gains
+from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
 from hexapod_cosim.controller.design.closed import PLACES, closed_loop, disturbed, spectral_radius, splay
 from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps, sampled_slip_law, slip_law, slip_response
 from hexapod_cosim.controller.design.loci import all_loci, critical_size, eigenloci, frequencies, loop_margins, quick_margins, response
-from hexapod_cosim.controller.design.standing import answers, axes_of, relieved, squeeze
+from hexapod_cosim.controller.design.standing import answers, axes_of, relieved, squeeze_matrix
 from hexapod_cosim.cosim.design import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
 
@@ -91,18 +93,24 @@ def test_the_eigenloci_are_the_characteristic_function_of_all_feet(gains: Gains)
     robot, plant, omega = load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], np.array([1.0, 30.0, 200.0])
     loads, _ = answers(robot, plant)
     flat, _ = axes_of(3)
-    whole = squeeze(plant) @ response(relieved(robot, plant), omega)[:, flat][:, :, flat] * np.repeat(loads, 2)
+    whole = squeeze_matrix(robot, plant) @ response(relieved(robot, plant), omega)[:, flat][:, :, flat] * np.repeat(loads, 2)
     for law in (1.0, 2.0 - 3.0j):
         expected = np.linalg.det(np.eye(6) - law * whole)
         np.testing.assert_allclose(np.prod(1.0 + law * eigenloci(robot, plant, omega)[0], axis=0), expected, rtol=1e-9)
 
 
-def test_the_common_push_of_all_feet_is_no_squeeze() -> None:
-    plant = plants_of("athena")[NOMINAL]
-    normal = plant.force[plant.standing, 2]
-    common = np.outer(normal, [0.3, -2.0]).reshape(-1)
-    np.testing.assert_allclose(squeeze(plant) @ common, 0.0, atol=1e-12)
-    np.testing.assert_allclose((squeeze(plant) @ np.arange(6.0)).reshape(3, 2).sum(axis=0), 0.0, atol=1e-12)
+@pytest.mark.parametrize(("name", "feet"), [(NOMINAL, 3), ("six legs, load 1, gears slip", 6)])
+def test_the_common_push_and_twist_of_all_feet_are_no_squeeze_and_have_no_locus(name: str, feet: int) -> None:
+    robot, plant = load_robot("athena"), plants_of("athena")[name]
+    normal, matrix = plant.force[plant.standing, 2], squeeze_matrix(robot, plant)
+    places = LegSolver(robot).forward(plant.angle)[plant.standing, :2]
+    turned = (places - normal @ places / normal.sum()) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    for common in (np.outer(normal, [0.3, -2.0]), normal[:, None] * turned):
+        np.testing.assert_allclose(matrix @ common.reshape(-1), 0.0, atol=1e-12)
+    left = (matrix @ np.arange(2.0 * feet)).reshape(feet, 2)
+    np.testing.assert_allclose(left.sum(axis=0), 0.0, atol=1e-12)
+    assert abs((places[:, 0] * left[:, 1] - places[:, 1] * left[:, 0]).sum()) < 1e-12
+    assert np.linalg.matrix_rank(matrix) == 2 * feet - 3 == len(eigenloci(robot, plant, np.array([1.0]))[0])
 
 
 def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
@@ -195,6 +203,7 @@ def test_sections_that_need_no_design_come_from_the_requirements(gains: Gains) -
     assert gains.support.handover_time == needs.handover_time
     assert gains.limits.torque == needs.torque_share * robot.servo.torque_max
     assert gains.slip.limit == needs.slip_limit
+    assert gains.slip.derivative_time == 0.010  # s    two periods
     share = robot.total_mass * 9.81 / 3.0
     assert share / gains.suspension.stiffness == pytest.approx(needs.deflection)
 
@@ -217,6 +226,19 @@ def test_a_stiffer_robot_gets_gains_of_its_own() -> None:
 def test_saved_gains_are_loaded_to_the_last_bit(gains: Gains, tmp_path: Path) -> None:
     assert load_gains(save_gains(gains, tmp_path / "gains.toml")) == gains
     assert [path.name for path in tmp_path.iterdir()] == ["gains.toml"]
+
+
+def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
+    gains = replace(designed("athena"), caveats=("the design leaves out a: b", 'and "c"'))
+    path = save_gains(gains, tmp_path / "gains.toml")
+    assert load_gains(path) == gains
+    assert gains_warnings(load_robot("athena"), gains, PERIOD) == ("the design leaves out a: b", 'and "c"')
+    path.write_text(path.read_text(encoding="utf-8").replace("caveats = [", "caveats = [1.0, "), encoding="utf-8")
+    with pytest.raises(GainsError, match=r"caveats: wrong type: got 1\.0, expected a text"):
+        load_gains(path)
+    path.write_text(re.sub("caveats = .*", 'caveats = "a"', path.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(GainsError, match="caveats: wrong type: got 'a', expected a list of texts"):
+        load_gains(path)
 
 
 @pytest.mark.parametrize(
@@ -250,6 +272,8 @@ def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
     ("setting", "message"),
     [
         ("deflection=0.2", "misses its phase_margin of the suspension: got .*, expected at least 60"),
+        ("slip_rejection=0.05", "misses its slip_rejection: got 0.09., expected at most 0.05"),
+        ("bandwidth=40", "misses its bandwidth: got 27.4.., expected at least 40"),
         ("frequency=0", "frequency: impossible requirement"),
         ("force_delay=-1", "force_delay: impossible requirement: got -1.0, expected a number >= 0"),
         ("phase_margn=50", "unknown requirement.*did you mean 'phase_margin'"),
@@ -257,8 +281,9 @@ def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
     ],
 )
 def test_requirements_that_cannot_be_met_are_told_by_name(setting: str, message: str) -> None:
+    robot = load_robot("athena")
     with pytest.raises(GainsError, match=message):
-        design_gains(load_robot("athena"), PERIOD, plants=plants_of("athena"), requirements=read_requirements([setting]))
+        design_gains(robot, PERIOD, plants=plants_of("athena"), requirements=read_requirements([setting], robot))
 
 
 def test_a_robot_a_period_or_plants_that_do_not_fit_are_refused() -> None:

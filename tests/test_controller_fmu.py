@@ -25,11 +25,12 @@ from hexapod_cosim.cosim.run import known_robot, make_sensor, open_plant
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import make_schedule
-from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, Signals, vector_names
+from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, Signals, joint_names, vector_names
 from hexapod_cosim.cosim.validation import find_problems
 from hexapod_cosim.models import LEG_NAMES, FmuError, HexapodError, load_robot
 
 ANGLE, SPEED = 1e-12, 1e-12  # rad; of a servo's largest
+ACCELERATION = 3e-12  # of what turns a servo's largest speed round within a period
 TORQUE = 3e-12  # of a servo's largest: tests/test_native_controller.py says why
 CLOSED = 1e-12  # rad    of joint commands when both walk a plant of their own, whose motion answers to their last bits
 MOTION = 1e-12  # m    of the torso, in the same walks
@@ -52,18 +53,20 @@ def packed(setup: ControllerSetup, folder: Path, *, start: float = 0.0, stop: fl
 
 
 class Both:
-    """The Python controller at work, the FMU told the same: the largest differences of angle, speed and torque."""
+    """The Python controller at work, the FMU told the same: the largest differences of all joint commands."""
 
     def __init__(self, setup: ControllerSetup, fmu: Fmu) -> None:
         self.lead, self.other, self.fallback = setup.build(), FmuController(fmu, period=setup.period), False
-        self.worst, self.scale = np.zeros(3), np.array([1.0, setup.robot.servo.speed_max, setup.robot.servo.torque_max])
+        self.worst, self.scale = np.zeros(4), np.array([1.0, setup.robot.servo.speed_max, setup.robot.servo.torque_max, 1.0])
+        self.scale[3] = 2.0 * setup.robot.servo.speed_max / setup.period
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         ours, theirs = self.lead.step(t, command, measurement), self.other.step(t, command, measurement)
-        gaps = [np.abs(getattr(ours, name) - getattr(theirs, name)).max() for name in COMMANDED]
+        gaps = [np.abs(getattr(ours, name) - getattr(theirs, name)).max() for name in (*COMMANDED, "acceleration_ref")]
         self.worst = np.maximum(self.worst, gaps / self.scale)
         for flag in ("swinging", "unreachable", "fallback"):
             np.testing.assert_array_equal(getattr(self.other.diagnostics, flag), getattr(self.lead.diagnostics, flag))
+        np.testing.assert_allclose(self.other.diagnostics.planned, self.lead.diagnostics.planned, atol=1e-12)
         self.fallback |= bool(self.lead.diagnostics.fallback.any())
         return ours
 
@@ -101,7 +104,7 @@ def test_told_the_same_it_commands_the_same(tmp_path: Path, name: str, settings:
     with packed(setup, tmp_path, start=scenario.start) as fmu:
         both = Both(setup, fmu)
         walked(scenario, both)
-    assert (both.worst <= [ANGLE, SPEED, TORQUE]).all(), both.worst
+    assert (both.worst <= [ANGLE, SPEED, TORQUE, ACCELERATION]).all(), both.worst
     assert falls_back is None or both.fallback == falls_back
 
 
@@ -162,7 +165,7 @@ def test_its_variables_have_the_plants_names_units_and_directions_reversed(fmu: 
     with Fmu(athena_fmu) as plant:
         names = [name for name in fmu.variables if not name.startswith("command.")]
         sensed = [name for name in names if fmu.variables[name].causality == "input"]
-        given = [name for names in COMMANDED.values() for name in names]
+        given = [*(name for names in COMMANDED.values() for name in names), *joint_names("acceleration_ref")]
         assert set(sensed) == {name for key in ("angle", "foot_force", "quaternion") for name in MEASURED[key]}
         assert {plant.variables[name].causality for name in sensed} == {"output"}
         assert {(plant.variables[name].causality, fmu.variables[name].causality) for name in given} == {("input", "output")}
@@ -206,8 +209,8 @@ def test_outputs_follow_inputs_at_once_where_the_description_says_so_and_nowhere
     swinging, before = fmu.block([f"{leg}.swinging" for leg in LEG_NAMES]), flags.values.copy()
     swinging.get()
     standing = LEG_NAMES[swinging.values.tolist().index(0)]
-    force, turn = fmu.block([f"{standing}.foot.force[1]"]), fmu.block(["torso.quaternion[2]"])
-    for block, value in ((force, 4.0), (turn, 0.02)):
+    force, turn = fmu.block([f"{standing}.foot.force[3]"]), fmu.block(["torso.quaternion[2]"])
+    for block, value in ((force, 12.0), (turn, 0.02)):
         block.get()
         old = block.values.copy()
         block.values[:] = value

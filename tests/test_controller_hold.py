@@ -11,7 +11,7 @@ from gains import HOLD, PERIOD
 from standing import HOME
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.hold import LOADED, Hold, Sight, fit_plane
+from hexapod_cosim.controller.hold import Hold, Sight, fit_plane
 
 LEVEL = [-0.12] * 6  # m    planned heights of the feet
 LOADS = [0.5] * 6  # of a third of the weight
@@ -62,14 +62,14 @@ def test_a_plane_through_points_is_found_whatever_their_weights() -> None:
     generator = np.random.default_rng(2)
     for _ in range(20):
         c, along, across = generator.normal(size=3)
-        weights = generator.uniform(LOADED + 0.01, 2.0, 6)
+        weights = generator.uniform(0.31, 2.0, 6)
         height = c + along * HOME.real + across * HOME.imag
         np.testing.assert_allclose(plane(height, weights), (c, along, across), atol=EXACT)
 
 
 def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
     generator = np.random.default_rng(3)
-    height, weights = generator.normal(size=6), generator.uniform(LOADED + 0.01, 2.0, 6)
+    height, weights = generator.normal(size=6), generator.uniform(0.31, 2.0, 6)
     base, root = np.column_stack([np.ones(6), HOME.real, HOME.imag]), np.sqrt(weights)
     expected = np.linalg.lstsq(base * root[:, None], height * root, rcond=None)[0]
     np.testing.assert_allclose(plane(height, weights), expected, atol=EXACT)
@@ -77,7 +77,7 @@ def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
 
 def test_feet_in_the_air_tell_nothing_and_two_or_three_in_a_line_no_plane() -> None:
     height = [5.0, 0.0, 5.0, 0.0, 5.0, 0.0]
-    assert fit_plane(HOME.tolist(), height, [0.9 * LOADED, 1.0, 0.0, 1.0, 0.0, 1.0]) == pytest.approx((0.0, 0.0, 0.0), abs=EXACT)
+    assert fit_plane(HOME.tolist(), height, [0.29, 1.0, 0.0, 1.0, 0.0, 1.0]) == pytest.approx((0.0, 0.0, 0.0), abs=EXACT)
     assert fit_plane(HOME.tolist(), height, [0.0, 1.0, 0.0, 0.0, 1.0, 0.0]) is None
     assert fit_plane([0j, 0.1 + 0.1j, 0.2 + 0.2j, 0j, 0j, 0j], height, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) is None
 
@@ -130,6 +130,25 @@ def test_corrections_of_the_posture_have_limits() -> None:
     for _ in range(60):
         hold.look(sight(height=seen_heights(0.0, 0.4, 0.0), tilt=(0.4, 0.0)))
     np.testing.assert_allclose(hold.lift, HOLD.angle_limit * HOME.imag, atol=EXACT)
+
+
+def test_a_foot_counts_from_three_tenths_of_a_third_of_the_weight_on() -> None:
+    height = [0.003, 0.0, 0.0, 0.0, 0.0, 0.0]
+    for load, counts in ((0.29, False), (0.31, True)):
+        found = fit_plane(HOME.tolist(), height, [load, 1.0, 1.0, 1.0, 1.0, 1.0])
+        assert found is not None
+        assert (max(map(abs, found)) > 1e-5) is counts
+        hold = make()
+        for k in range(2):
+            hold.look(sight(plane=(HOME - 0.01 * k).tolist(), load=[load] * 6))
+        assert (abs(hold.way) > 1e-3) is counts
+
+
+def test_three_feet_span_a_plane_from_a_determinant_of_a_millionth_on() -> None:
+    """m4, of the covariance of three feet at 0, a and i b: a^2 b^2/27."""
+    for b, spans in ((0.0515, False), (0.0525, True)):
+        found = fit_plane([0j, 0.1 + 0j, 1j * b, 0j, 0j, 0j], [0.01] * 6, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        assert (found is not None) is spans
 
 
 def walk(

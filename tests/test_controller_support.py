@@ -11,7 +11,7 @@ from gains import make_gains, weight
 from hexapod_cosim.controller import LegSolver, make_gait
 from hexapod_cosim.controller.gains import SupportGains
 from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
-from hexapod_cosim.controller.support import RIDGE, Shares, Support, torques
+from hexapod_cosim.controller.support import Shares, Support, torques
 from hexapod_cosim.models import GAITS, Robot, load_robot
 
 ROBOT = load_robot("athena")
@@ -19,8 +19,8 @@ WEIGHT = weight(ROBOT)
 HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 REST = InverseDynamics(ROBOT, LegSolver(ROBOT), period=0.005).rest()
 CLOCKS = np.linspace(0.0, 1.0, 1000, endpoint=False) + 1e-7  # cycles
-ALL = np.ones(6, dtype=bool)
-RIDGED = 10.0 * RIDGE * WEIGHT  # N, N m    what the ridge takes from the balance
+ALL, NONE = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
+RIDGED = 1e-8 * WEIGHT  # N, N m    ten times what the ridge of 1e-9 takes from the balance
 BALANCED = ("111111", "101010", "010101", "110111", "101101", "011110")
 
 
@@ -47,7 +47,7 @@ def phases(gait: str) -> np.ndarray:
 @pytest.mark.parametrize("gait", GAITS)
 def test_a_leg_is_active_in_its_stance_and_hands_over_half_before_and_half_after(gait: str) -> None:
     support, timing, phase = make(gait), make_gait(ROBOT, gait), phases(gait)
-    active = support.activation(phase, ALL, walking=True)
+    active = support.activation(phase, NONE, NONE, walking=True)
     half = 0.5 * make_gains(ROBOT).support.handover_time / timing.period
     from_begin, to_end = (phase + 0.5) % 1.0 - 0.5, (phase - timing.duty + 0.5) % 1.0 - 0.5
     inside = (phase > half) & (phase < timing.duty - half)
@@ -61,14 +61,14 @@ def test_a_leg_is_active_in_its_stance_and_hands_over_half_before_and_half_after
 
 
 def test_what_one_tripod_gives_up_the_other_takes() -> None:
-    active = make("tripod").activation(phases("tripod"), ALL, walking=True)
+    active = make("tripod").activation(phases("tripod"), NONE, NONE, walking=True)
     np.testing.assert_allclose(active[:, :3].sum(axis=1) + active[:, 3:].sum(axis=1), 3.0, atol=1e-9)
     np.testing.assert_allclose(active[:, 0] + active[:, 1], 1.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_hand_overs_are_smooth(gait: str) -> None:
-    active = make(gait).activation(phases(gait), ALL, walking=True)
+    active = make(gait).activation(phases(gait), NONE, NONE, walking=True)
     width = 0.05 / make_gait(ROBOT, gait).period  # cycles
     slope = np.diff(active, axis=0) * len(CLOCKS)
     assert np.abs(slope).max() < 1.9 / width  # a quintic's steepest is 1.875
@@ -77,19 +77,21 @@ def test_hand_overs_are_smooth(gait: str) -> None:
 
 def test_a_hand_over_is_never_longer_than_stance_or_swing() -> None:
     support = make("wave", handover=10.0)
-    active = support.activation(phases("wave"), ALL, walking=True)
+    active = support.activation(phases("wave"), NONE, NONE, walking=True)
     assert active.max() == pytest.approx(1.0, abs=1e-6)
     assert active.min() == pytest.approx(0.0, abs=1e-6)
 
 
 def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
     support, phase = make(), phases("tripod")
-    assert (support.activation(phase, ALL, walking=False) == 1.0).all()
-    stays = support.activation(phase, ~ALL, walking=True)
-    steps = support.activation(phase, ALL, walking=True)
-    swinging = phase >= 0.5
-    assert (stays[swinging] == 1.0).all()
-    np.testing.assert_array_equal(stays[~swinging], steps[~swinging])
+    assert (support.activation(phase, NONE, NONE, walking=False) == 1.0).all()
+    assert (support.activation(phase, ALL, ALL, walking=True) == 1.0).all()
+    stayed, stays, steps = (support.activation(phase, *flags, walking=True) for flags in ((ALL, NONE), (NONE, ALL), (NONE, NONE)))
+    early, late = phase < 0.25, (phase > 0.25) & (phase < 0.5)
+    assert (stayed[early | (phase >= 0.5)] == 1.0).all()  # it need not take up what it never gave up
+    np.testing.assert_array_equal(stayed[late], steps[late])
+    assert (stays[late] == 1.0).all()
+    np.testing.assert_array_equal(stays[early], steps[early])
 
 
 @pytest.mark.parametrize("standing", BALANCED)
@@ -133,6 +135,24 @@ def test_two_feet_or_one_carry_what_they_can_without_their_moment(standing: str,
     assert least * WEIGHT < normal.sum() < 1.001 * WEIGHT
     assert not normal[legs(standing)[0] == 0.0].any()
     assert normal.min() >= 0.0
+
+
+def test_the_ridge_takes_a_billionth_of_the_weight_from_feet_on_a_line_and_hardly_active_feet_carry_it() -> None:
+    """S = sum a (1, y^2), ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force W S_00/(S_00 + ridge)."""
+    feet, y = np.array([[0.1j, -0.1j, 0j, 0j, 0j, 0j]]), 0.1
+    for active, lost in ((1.0, 1e-9 * (1.0 + y * y)), (1e-6, 0.5e-6 + 1e-9 * (1.0 + y * y))):
+        normal = make().normal(feet, np.array([[active, active, 0.0, 0.0, 0.0, 0.0]]), demand())
+        assert 1.0 - normal.sum() / WEIGHT == pytest.approx(lost, rel=1e-3)
+
+
+def test_feet_within_a_centimetre_take_no_moment_about_the_vertical_and_a_millionth_of_a_newton_is_no_load() -> None:
+    for reach, turns in ((0.0099, False), (0.0101, True)):
+        feet = np.array([[reach * 1j, -reach * 1j, 0j, 0j, 0j, 0j]])
+        shares = make().shares(feet, legs("110000"), demand(twist=0.4))
+        assert bool(shares.push.any()) is turns
+    for load, part in ((0.5e-6, 0.5), (1.0e-6, 1.0), (3e-6, 1.0)):
+        shares = make().shares(HOME[None], legs("111111"), demand(push=2.0 + 0j, load=load))
+        assert shares.push.sum().real == pytest.approx(2.0 * part, rel=0.01)
 
 
 def test_no_foot_at_all_is_asked_for_nothing() -> None:

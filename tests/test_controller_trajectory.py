@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import astuple, fields
+from dataclasses import astuple, fields, replace
 
 import numpy as np
 import pytest
@@ -116,6 +116,29 @@ def test_a_swing_that_ends_within_a_period_still_lands_on_its_point() -> None:
     slow, quick = record(advance(coarse, TWIST, 300)), record(advance(fine, TWIST, 2100))
     standing = ~slow["swinging"][-1]
     np.testing.assert_allclose(slow["plane"][-1][standing], quick["plane"][-1][standing], atol=1e-9)
+
+
+@pytest.mark.parametrize(("progress", "follows"), [(0.4, True), (0.74, True), (0.77, False)])
+def test_a_foot_follows_a_new_command_up_to_three_quarters_of_its_swing(progress: float, follows: bool) -> None:
+    paths = make_paths()
+    for _ in advance(paths, STRAIGHT, 2000):
+        if paths.steps.progress[paths.at].max() >= progress and paths.steps.progress[paths.at].max() < progress + 0.01:
+            break
+    leg = int(paths.steps.progress[paths.at].argmax())
+    before = paths.steps.goal[paths.at, leg]
+    next(advance(paths, TWIST, 1))
+    assert bool(abs(paths.steps.goal[paths.at, leg] - before) > 1e-4) is follows
+
+
+@pytest.mark.parametrize(("away", "steps"), [(0.9e-9, False), (1.1e-9, True)])
+def test_a_foot_within_a_nanometre_of_its_stance_position_stays_where_it_is(away: float, steps: bool) -> None:
+    paths = make_paths()
+    for _ in advance(paths, STRAIGHT, 1):
+        pass
+    paths.steps.plane[paths.at], paths.steps.goal[paths.at] = paths.home + away, paths.home + away
+    paths.steps = replace(paths.steps, swinging=np.zeros_like(paths.steps.swinging))
+    next(advance(paths, REST, 1, going=False))
+    assert paths.walking is steps
 
 
 @pytest.mark.parametrize("name", GAITS)

@@ -10,6 +10,7 @@ from controllers import make, obey, run, squeezed
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import BodyCommand, Controller, ControllerError, Measurement, Parts, make_gait
+from hexapod_cosim.controller.kinematics import Joints, LegSolver
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
 
@@ -74,6 +75,40 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
     assert compared > 600
     # rolling is solved by one Newton step, chords lack h^2/24 of an arc and headings turn meanwhile; the body moves at 50 mm/s
     assert worst < 3e-4
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_speed_and_acceleration_lead_from_each_angle_to_the_next(gait: str) -> None:
+    """q + qd h + qdd h^2/2 is the next q, but where a leg lifts off or touches down next.
+
+    There qdd is that of the period before, and misses by its change, h^3/3 of up to 4e4 rad/s3 in the
+    quick swings of the wave gait.
+    """
+    controller, missed, accelerations = make(gait=make_gait(load_robot("athena"), gait)), [], []
+    before = None
+    for k in range(1200):
+        out = controller.step(k * PERIOD, BodyCommand(vx=0.05, yaw_rate=0.1), Measurement())
+        if before is not None:
+            missed.append(np.abs(out.angle_ref - before).max())
+        before = out.angle_ref + PERIOD * out.speed_ref + 0.5 * PERIOD**2 * out.acceleration_ref
+        accelerations.append(np.abs(out.acceleration_ref).max())
+    exact = np.array(missed) < 1e-12
+    assert exact.mean() > 0.95
+    assert max(missed) < 2e-3  # rad
+    assert 5.0 < max(accelerations) < 200.0  # rad/s2
+
+
+def test_a_joint_that_its_limits_hold_has_no_acceleration_and_none_has_more_than_turns_it_round() -> None:
+    legs = LegSolver(load_robot("athena"))
+    angle, speed = np.zeros((3, 6, 3)), np.zeros((3, 6, 3))
+    angle[1] = 0.1
+    speed[0, 0, 0], angle[0, 1, 1], angle[0, 2, 2] = legs.speed_max, legs.angle_max[1, 1], legs.angle_min[2, 2]
+    joints = Joints(angle, speed, np.zeros((3, 6), dtype=np.bool_))
+    found = legs.accelerations(joints, 0.01)
+    assert found[0, 0, 0] == found[0, 1, 1] == found[0, 2, 2] == 0.0
+    assert found[0, 3, 0] == pytest.approx(2.0 * legs.speed_max / 0.01)  # 2 (0.1 rad)/(10 ms)^2 = 2000 rad/s2 would be more
+    assert legs.accelerations(Joints(angle, speed, joints.unreachable), 0.1)[0, 3, 0] == pytest.approx(20.0)
+    assert not legs.accelerations(Joints(angle[:1], speed[:1], joints.unreachable[:1]), 0.01).any()
 
 
 @pytest.mark.parametrize("compliant", [False, True])
@@ -190,6 +225,28 @@ def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
     np.testing.assert_allclose(moved[:, 2], shown.lift, atol=0.1 * np.abs(shown.lift).max())
 
 
+def test_the_planned_feet_are_where_kinematic_control_sends_them() -> None:
+    """Walking, turning and leaning: the commanded angles put each foot's centre on the plan, so what compliance adds is not in it."""
+    controller, robot = make(), load_robot("athena")
+    stance = foot_positions(robot, robot.stance)
+    farthest = 0.0
+    for k in range(600):
+        out = controller.step(k * PERIOD, BodyCommand(vx=0.06, yaw_rate=0.1, height=0.01, roll=0.04, pitch=-0.03), Measurement())
+        np.testing.assert_allclose(foot_positions(robot, out.angle_ref), controller.diagnostics.planned, atol=1e-9)
+        farthest = max(farthest, float(np.abs(controller.diagnostics.planned - stance).max()))
+    assert farthest > 0.03
+
+
+def test_the_planned_feet_are_the_same_under_both_controls() -> None:
+    """A squeezed, compliant robot moves its feet; the plan of a command that the path is not held to does not move."""
+    kinematic, compliant = make(), make(compliant=True)
+    for k in range(60):
+        for controller in (kinematic, compliant):
+            out = controller.step(k * PERIOD, BodyCommand(), squeezed())
+        np.testing.assert_allclose(compliant.diagnostics.planned, kinematic.diagnostics.planned, atol=1e-12)
+    assert np.abs(foot_positions(load_robot("athena"), out.angle_ref) - compliant.diagnostics.planned).max() > 2e-4
+
+
 def test_forces_are_judged_in_the_torsos_axes() -> None:
     """Turning robot and forces together in the world changes nothing."""
     yaw, straight = 0.7, squeezed()
@@ -226,6 +283,16 @@ def test_the_buffers_are_reused() -> None:
     controller = make()
     first = controller.step(0.0, BodyCommand(), Measurement())
     assert controller.step(PERIOD, BodyCommand(), Measurement()) is first
+
+
+def test_what_leads_back_to_the_way_is_led_over_in_a_tenth_of_a_second() -> None:
+    compliant = make(compliant=True).compliant
+    assert compliant is not None
+    compliant.hold.velocity, compliant.hold.yaw_rate = 0.01 - 0.004j, 0.02
+    v, yaw_rate = compliant.steer(np.zeros(31, dtype=np.complex128), np.zeros(31), moves=True, afresh=True)
+    part = np.minimum(np.arange(31) / 20.0, 1.0)  # periods of 5 ms
+    np.testing.assert_allclose(v, part * (0.01 - 0.004j), atol=1e-12)
+    np.testing.assert_allclose(yaw_rate, part * 0.02, atol=1e-12)
 
 
 @pytest.mark.parametrize("t", [PERIOD, 2.5 * PERIOD, float("nan")])

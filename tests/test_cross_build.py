@@ -53,7 +53,7 @@ def test_without_the_compiler_the_error_says_how_to_get_it(call: Call, monkeypat
     code, _, err = call("export", "--platforms", "all", "-o", tmp_path / "a.fmu")
     find_compiler.cache_clear()
     assert code != 0
-    assert "pip install 'hexapod-cosim[platforms]'" in err
+    assert ".venv/bin/python -m pip install -e '.[platforms]'" in err
     assert "Traceback" not in err
     assert list(tmp_path.iterdir()) == []
 

@@ -14,8 +14,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
 
+import numpy as np
 import pytest
 from pages import blocks, commands, run
+
+from hexapod_cosim.models import JOINT_NAMES, load_robot
+from hexapod_cosim.models.kinematics import foot_positions
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -90,7 +94,7 @@ def test_the_site_needs_no_network(site: Path) -> None:
 def test_formulas_are_mathml_and_numbered(site: Path) -> None:
     text = (site / "equations.html").read_text(encoding="utf-8")
     assert text.count("<math") > 200
-    assert {int(number) for number in re.findall(r'id="eq-(\d+)"', text)} == set(range(1, 22))
+    assert {int(number) for number in re.findall(r'id="eq-(\d+)"', text)} == set(range(1, 24))
     assert "\\tag" not in re.sub(r'alttext="[^"]*"', "", text)
 
 
@@ -154,7 +158,7 @@ def headings(page: Path) -> set[str]:
 
 def test_every_equation_that_the_code_cites_exists() -> None:
     known = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", (DOCS / "equations.md").read_text(encoding="utf-8"))}
-    assert known == set(range(1, 22))
+    assert known == set(range(1, 24))
     texts = [path.read_text(encoding="utf-8") for path in CODE]
     cited = {int(number) for text in texts for group in CITED.findall(text) for number in re.findall(r"\d+", group)}
     assert {1, 4, 5, 15, 20} <= cited <= known
@@ -174,6 +178,32 @@ def test_the_tutorial_works_as_typed_from_top_to_bottom(reader: Path) -> None:
                 run(reader, *shlex.split(line.replace("--show-plot", "")))
                 done += 1
     assert done >= 11
+
+
+SIDES = {"L": 1, "R": 2}  # column of the tutorial's table by a leg's first letter
+
+
+@pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
+def test_the_tutorial_says_where_each_joint_moves_a_foot(name: str) -> None:
+    """Against the feet's positions a small angle away from the standing pose, by their kinematics."""
+    robot = load_robot(name)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in (DOCS / "tutorial.md").read_text("utf-8").splitlines()]
+    told = {row[0]: row for row in rows if row[0] in JOINT_NAMES}
+    assert list(told) == ["coxa", "femur", "tibia"]
+    pose = np.array([leg.stance for leg in robot.legs])
+    standing = foot_positions(robot, pose)
+    for k, leg in enumerate(robot.legs):
+        outwards = standing[k] - np.array(leg.hip_position)
+        outwards[2] = 0.0
+        outwards /= np.linalg.norm(outwards)
+        directions = {"forwards": np.array([1.0, 0.0, 0.0]), "up": np.array([0.0, 0.0, 1.0]), "outwards": outwards}
+        directions |= {"backwards": -directions["forwards"], "down": -directions["up"], "inwards": -outwards}
+        for j, joint in enumerate(JOINT_NAMES):
+            turned = pose.copy()
+            turned[k, j] += 0.01
+            moved = foot_positions(robot, turned)[k] - standing[k]
+            for word in told[joint][SIDES[leg.name[0]]].split(" and "):
+                assert moved @ directions[word] > 1e-4, f"{leg.name}.{joint}: {word}"
 
 
 def test_the_controller_of_the_page_lowers_the_roll(reader: Path) -> None:
@@ -200,13 +230,15 @@ def test_the_sweep_of_the_page_on_clusters_leaves_a_table(reader: Path) -> None:
 
 
 def test_the_steps_to_a_new_contact_law_fit_the_code(tmp_path: Path) -> None:
-    """Applied to a copy: the C compiles and has the law under the number that the interface gives it, and the twin agrees."""
+    """Applied to a copy as a reader applies them in a clone: the C compiles, has the law under its number, and the twin agrees."""
     for folder in ("plant_fmu", "models", "tests"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
     patches = [text for kind, text in blocks(DOCS / "howto" / "contact-law.md") if kind == "diff"]
     assert len(patches) == 7
+    subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
     for patch in patches:
-        subprocess.run(["git", "apply", "--unidiff-zero", "-"], cwd=tmp_path, input=patch, text=True, check=True)
+        done = subprocess.run(["git", "apply", "-"], cwd=tmp_path, input=patch, text=True, capture_output=True, check=False)
+        assert done.returncode == 0, f"{done.stderr}\n{patch}"
     table = tomllib.loads((tmp_path / "plant_fmu" / "interface.toml").read_text(encoding="utf-8"))["enumeration"]["ContactLaw"]
     items = [name for name in table if name != "prefix"]
     assert items[-1] == "hu_guo"

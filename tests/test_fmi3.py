@@ -60,7 +60,7 @@ def test_what_is_declared_is_what_these_tests_hold_it_to() -> None:
     offered = {name for name, value in declared.items() if value == "true"} | set(EVENTS)
     assert offered == {
         "canGetAndSetFMUState", "canSerializeFMUState", "canHandleVariableCommunicationStepSize", "mightReturnEarlyFromDoStep",
-        "hasEventMode",
+        "hasEventMode", "needsCompletedIntegratorStep",
     }  # fmt: skip
 
 

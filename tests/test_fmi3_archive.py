@@ -150,7 +150,7 @@ def test_dependencies_are_those_of_the_elements(exported3: Path) -> None:
 def test_discrete_variables_are_those_that_change_at_events(exported3: Path) -> None:
     description = fmpy.read_model_description(str(exported3))
     discrete = {variable.name for variable in description.modelVariables if variable.variability == "discrete"}
-    assert discrete == {"foot.contact", "foot.impact_speed", "solver.touchdowns"}
+    assert discrete == {"foot.contact", "foot.impact_speed", "foot.landings", "solver.touchdowns"}
 
 
 def test_directional_derivatives_of_arrays_are_fmi_2_s_of_elements(running3: Plant3, running: Plant) -> None:

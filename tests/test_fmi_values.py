@@ -31,8 +31,9 @@ def test_a_value_out_of_range_is_refused_with_the_range(plant: Plant, name: str,
 
 
 LIMITED = [variable for variable in ATHENA.of_causality("input", "parameter") if variable.type == "Real"]
-# what a limit would break though each number may be what it is: an impossible inertia, a law that divides by the restitution
-RELATED = [variable.name for variable in LIMITED if ".inertia_" in variable.name] + ["contact.restitution"]
+# what a limit would break though each number may be what it is: an impossible inertia, a law that divides by the restitution,
+# static friction under a law that has none
+RELATED = [*(variable.name for variable in LIMITED if ".inertia_" in variable.name), "contact.restitution", "friction.mu_static"]
 
 
 def started(plant: Plant) -> int:

@@ -135,6 +135,64 @@ def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(co
     assert output.solver.touchdowns > 0
 
 
+ACCELERATION = np.tile([30.0, -40.0, 25.0], (6, 1))  # rad/s2
+
+
+def in_flight(**baumgarte: float) -> Robot:
+    return changed(driven(load_robot("athena")), solver=FLIGHT, baumgarte=baumgarte)
+
+
+@pytest.mark.parametrize("baumgarte", [{}, {"alpha": 0.0, "beta": 0.0}, {"alpha": 5.0, "beta": 80.0}], ids=str)
+def test_a_drive_told_its_acceleration_stays_on_its_parabola(core: ct.CDLL, baumgarte: dict[str, float]) -> None:
+    """From rest by 30 rad/s2 for 20 ms: 6 mrad and 0.6 rad/s; then from there, with that speed, as far again and two such ways more."""
+    robot = in_flight(**baumgarte)
+    plant, way = Plant(core, robot), ACCELERATION / 30.0
+    plant.step(0.02, Command(angle_ref=robot.stance, acceleration_ref=ACCELERATION))
+    output = plant.output()
+    assert output.angle - robot.stance == pytest.approx(0.006 * way, abs=1e-9)
+    assert output.speed == pytest.approx(0.6 * way, abs=1e-7)
+    plant.step(0.04, Command(angle_ref=output.angle, speed_ref=output.speed, acceleration_ref=ACCELERATION))
+    assert plant.output().angle - robot.stance == pytest.approx(0.024 * way, abs=1e-9)
+
+
+def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared(core: ct.CDLL) -> None:
+    """What importers get that leave acceleration_ref at 0: 30 rad/s2 over (100/s)^2 are 3 mrad, once the drive has settled."""
+    robot, h = in_flight(alpha=100.0, beta=100.0), 1e-4
+    plant, lag = Plant(core, robot), {}
+    for k in range(1500):
+        t = k * h
+        angle, speed = robot.stance + 0.5 * ACCELERATION * t**2, ACCELERATION * t
+        plant.step(t + h, Command(angle_ref=angle, speed_ref=speed))
+        lag[k] = angle + speed * h - plant.output().angle
+    assert lag[1499] == pytest.approx(ACCELERATION / 1e4, rel=0.02)  # h is 1 % of the drive's time
+
+
+@pytest.mark.parametrize("mode", ["position", "torque"])
+def test_a_servo_does_not_look_at_acceleration_ref(core: ct.CDLL, mode: str) -> None:
+    robot = changed(load_robot("athena"), servo={"mode": mode})
+    told, untold = Plant(core, robot), Plant(core, robot)
+    command = random_command(robot, 4, size=0.2)
+    told.step(0.01, command)
+    untold.step(0.01, replace(command, acceleration_ref=np.zeros((6, 3))))
+    assert np.array_equal(told.bodies, untold.bodies)
+
+
+def test_a_rate_of_an_input_takes_the_place_of_the_input_above_it(core: ct.CDLL) -> None:
+    """speed_ref that grows is acceleration_ref; acceleration_ref that grows moves the drive by t^3/6 of its rate."""
+    robot = in_flight(alpha=5.0, beta=80.0)
+    plants = [Plant(core, robot) for _ in range(3)]
+    none, speed = np.zeros((6, 3)), 0.1 * ACCELERATION
+    begin = Command(angle_ref=robot.stance, speed_ref=speed)
+    for plant in plants:
+        plant.bodies = Plant(core, robot, speed=speed).bodies
+    plants[0].step(0.02, replace(begin, acceleration_ref=ACCELERATION))
+    plants[1].step_ramp(0.02, begin, Command(angle_ref=none, speed_ref=ACCELERATION))
+    plants[2].step_ramp(0.02, begin, Command(angle_ref=none, acceleration_ref=ACCELERATION / 0.02))
+    way = ACCELERATION / 30.0
+    for plant, parabola in zip(plants, (0.006, 0.006, 0.002), strict=True):  # 30 t^2/2, and 1500 t^3/6
+        assert plant.output().angle - robot.stance == pytest.approx((0.06 + parabola) * way, abs=1e-8)
+
+
 def test_a_drive_off_its_reference_returns_at_the_rate_of_its_stabilisation(core: ct.CDLL) -> None:
     """alpha = beta: critically damped, error (1 + alpha t) exp(-alpha t)."""
     robot = changed(driven(load_robot("athena")), solver=FLIGHT)

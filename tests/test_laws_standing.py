@@ -184,12 +184,13 @@ def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str,
 
 
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_the_books_close_in_proportion_to_the_tolerance(core: ct.CDLL, law: str) -> None:
+def test_the_books_close_with_the_tolerance(core: ct.CDLL, law: str) -> None:
+    """Steps of an order of 3 shorten by 10 for a tolerance of a thousandth; works of order 2 in the step (eq. 22) gain 100."""
     robot, residuals = changed(load_robot("athena"), friction={"law": law}), []
-    for tolerance in (1e-4, 1e-6):
+    for tolerance in (1e-3, 1e-6):
         seen = marched(core, changed(robot, solver={"tolerance": tolerance}), duration=0.5)
         residuals.append(max(abs(output.energy.residual) for output in seen))
-    assert residuals[1] < 0.1 * residuals[0]
+    assert residuals[1] < 0.03 * residuals[0]
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -14,7 +14,6 @@ from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Mea
 from hexapod_cosim.cosim.doubts import describe_walk
 from hexapod_cosim.cosim.fmu import Fmu, StepError
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, insides, run
-from hexapod_cosim.cosim.metrics import View
 from hexapod_cosim.cosim.recorder import Recorder, Recording
 from hexapod_cosim.cosim.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.run import Result, adopt_settings, make_sensor, simulate
@@ -22,6 +21,7 @@ from hexapod_cosim.cosim.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario_records import Push, Scenario
 from hexapod_cosim.cosim.schedule import make_schedule, push_rows
 from hexapod_cosim.cosim.signals import MEASURED, Signals, joint_names
+from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.models import FmuError, HexapodError, RobotError, load_robot
 
 SHORT = ("duration=0.5", "outputs.plots=false")
@@ -126,7 +126,9 @@ class Cautious(FakeController):
         super().__init__()
         six, never = np.zeros(6), np.zeros(6, dtype=np.bool_)
         plane = np.zeros(6, dtype=np.complex128)
-        self.diagnostics = Diagnostics(swinging=never, shift=plane, lift=six, unreachable=never, fallback=never.copy())
+        self.diagnostics = Diagnostics(
+            swinging=never, planned=np.zeros((6, 3)), shift=plane, lift=six, unreachable=never, fallback=never.copy()
+        )
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         self.diagnostics.fallback[4] = t > 0.0749
@@ -196,6 +198,18 @@ def test_force_noise_is_seeded_unbiased_and_of_the_size_asked_for() -> None:
 def test_a_plant_that_lacks_a_variable_is_refused_by_its_name() -> None:
     with pytest.raises(FmuError, match=r"not a hexapod plant: got 'no LM.femur.angle_ref'"):
         Signals(FakePlant(missing=["LM.femur.angle_ref"]))
+
+
+def test_a_plant_made_before_acceleration_ref_is_driven_without_it() -> None:
+    old = FakePlant(missing=joint_names("acceleration_ref"))
+    signals = Signals(old)
+    assert not [name for name in signals.names if name.endswith(".acceleration_ref")]
+    signals.push[:] = np.arange(6.0)
+    signals.write(JointCommand(angle_ref=np.full((6, 3), 0.5), acceleration_ref=np.full((6, 3), 7.0)))
+    assert (old.values["RR.tibia.angle_ref"], old.values["torso.push_torque[3]"]) == (0.5, 5.0)
+    new = FakePlant()
+    Signals(new).write(JointCommand(acceleration_ref=np.full((6, 3), 7.0)))
+    assert new.values["RR.tibia.acceleration_ref"] == 7.0
 
 
 def test_a_recording_survives_its_csv_file_bit_for_bit(tmp_path: Path) -> None:

@@ -9,20 +9,24 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from gains import PERIOD, make_gains
-from native_controller import HxControllerInput, NativeController, NativeError, commands
+from native_controller import COMMANDS, HxControllerInput, NativeController, NativeError, commands
 from scipy.linalg import expm
 
-from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, Parts, make_gait
+from hexapod_cosim.controller import BodyCommand, Controller, Gait, LegSolver, Measurement, Parts, make_gait
+from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
+from hexapod_cosim.controller.slip_pid import squeeze
+from hexapod_cosim.controller.support import Support
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 
 ROBOTS = ("athena", "phantomx_mk4")
-ALL_PARTS = Parts()
+ALL_PARTS, NO_FALLBACK = Parts(), Parts(fallback=False)
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # 1    of a servo's largest
 # 1    of a servo's largest: accelerations are second differences, which make of the paths' last bits 4e-16 m / h^2 = 2e-11 m/s2; times
 # the robot's mass and the legs' length that is some 1e-12 N m in either controller, of servos of 3 and 6 N m
 TORQUE = 3e-12
+ACCELERATION = 3e-12  # of what turns a servo's largest speed round within a period; a second difference, too
 STEPS = 2000  # a walk of 10 s
 Sense = Callable[[Controller, int, Measurement], None]
 
@@ -67,23 +71,25 @@ class Ground:
 
 
 def differences(core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """Largest differences of angle, speed and torque over a walk, in units of ANGLE's rad and of the servo's largest; (steps, 6) fallback.
+    """Largest differences of angle, speed, torque and acceleration over a walk, in rad and of the servo's largest; (steps, 6) fallback.
 
     Diagnostics must be the same at every step.
     """
     reference, native = setup.build(), NativeController(core, setup)
-    measurement, worst, fallback = Measurement(angle=setup.robot.stance.copy()), np.zeros(3), []
-    shown, scale = reference.diagnostics, np.array([1.0, setup.robot.servo.speed_max, setup.robot.servo.torque_max])
+    measurement, worst, fallback = Measurement(angle=setup.robot.stance.copy()), np.zeros(4), []
+    speed_max, torque_max = setup.robot.servo.speed_max, setup.robot.servo.torque_max
+    shown, scale = reference.diagnostics, np.array([1.0, speed_max, torque_max, 2.0 * speed_max / setup.period])
     for k in range(steps):
         t = k * setup.period
         expected = reference.step(t, program(t), measurement)
         out = native.step(t, program(t), measurement)
-        gap = np.abs(commands(out) - [expected.angle_ref, expected.speed_ref, expected.torque_ref])
+        gap = np.abs(commands(out) - [getattr(expected, name) for name in COMMANDS])
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         for flag in ("swinging", "unreachable", "fallback"):
             assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), f"{flag} at step {k}"
         np.testing.assert_allclose(np.ctypeslib.as_array(out.shift), shown.shift.view(np.float64).reshape(6, 2), atol=1e-12)
         np.testing.assert_allclose(np.ctypeslib.as_array(out.lift), shown.lift, atol=1e-12)
+        np.testing.assert_allclose(np.ctypeslib.as_array(out.planned), shown.planned, atol=1e-12)
         fallback.append(shown.fallback.copy())
         sense(reference, k, measurement)
     return worst, np.array(fallback)
@@ -96,8 +102,8 @@ WALKS = [
 
 
 def close(worst: np.ndarray) -> bool:
-    print("largest differences of angle [rad], speed and torque [of the servo's largest]:", worst)
-    return bool((worst <= [ANGLE, SPEED, TORQUE]).all())
+    print("largest differences of angle [rad], speed, torque and acceleration [of the servo's largest]:", worst)
+    return bool((worst <= [ANGLE, SPEED, TORQUE, ACCELERATION]).all())
 
 
 @pytest.mark.parametrize(("name", "gait", "compliant"), WALKS)
@@ -118,6 +124,17 @@ def dead_and_stuck(force: np.ndarray, step: int) -> None:
 def dragged(force: np.ndarray, step: int) -> None:
     if 500 <= step < 560 or 900 <= step < 1000:
         force[:, 0] += 0.8 * force[:, 2]  # the whole robot slides
+    if 1400 <= step < 1500:
+        force[:, 0] += 0.8 * force[:, 2]
+        force *= 0.4  # and has hardly met the ground
+
+
+def barely_met(force: np.ndarray, step: int) -> None:
+    """The whole robot slides on feet that carry 0.4, then 0.6 of its weight."""
+    for begin, share in ((500, 0.4), (900, 0.6)):
+        if begin <= step < begin + 40:
+            force *= share
+            force[:, 0] += 0.8 * force[:, 2]
 
 
 def uneven(force: np.ndarray, step: int) -> None:
@@ -125,11 +142,19 @@ def uneven(force: np.ndarray, step: int) -> None:
         force[:, 2] += 5.0  # ground in mid-swing, not for long
     if step % 170 < 12:
         force[2] = 0.0  # and none under a leg that stands
+    if 1000 <= step < 1180:
+        force *= 2.0
+        force[4] = 0.0  # no ground for long, while the others carry its load
     if 600 <= step < 800:
         force[:, 1] += [9.0, -9.0, 9.0, -9.0, 9.0, -9.0]  # squeezed beyond all limits
 
 
-@pytest.mark.parametrize("spoil", [dead_and_stuck, dragged, uneven])
+def heavy(force: np.ndarray, step: int) -> None:
+    if step >= 300:
+        force *= 2.1 if step < 900 else 4.2 if step < 1300 else 1.0  # more than servos carry, far more, and what was planned
+
+
+@pytest.mark.parametrize("spoil", [dead_and_stuck, dragged, barely_met, uneven, heavy])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_same_step(
     controller_core: ct.CDLL, name: str, spoil: Callable[[np.ndarray, int], None]
@@ -145,12 +170,34 @@ def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_
     assert fallback.any() or spoil is uneven
 
 
+@pytest.mark.parametrize(
+    ("gait", "bump", "parts"), [("tripod", 0.02, ALL_PARTS), ("wave", 0.02, ALL_PARTS), ("tripod", 0.039, NO_FALLBACK)]
+)
+def test_ground_that_is_met_early_is_answered_at_the_same_step(controller_core: ct.CDLL, gait: str, bump: float, parts: Parts) -> None:
+    """By all feet at 12 mm, by one higher, then by none: soft ground with a bump on it, and a torso
+    that has come up again. Without fallback a bump as high as the limit of what feet are held up.
+    """
+    ground = Ground()
+
+    def sense(controller: Controller, step: int, measurement: Measurement) -> None:
+        ground(controller, step, measurement)
+        compliant, met = controller.compliant, np.where(np.arange(6) == 2, bump, 0.012 if parts is ALL_PARTS else 0.0)
+        assert compliant is not None
+        height = compliant.laws._plan.height[compliant._at]
+        if step < 1400:
+            measurement.foot_force[(height > 0.0) & (height < met), 2] = 4.0
+
+    worst, _ = differences(controller_core, setup_of(gait=gait, parts=parts), sense=sense)
+    assert close(worst)
+
+
 def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
     setup = setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
-    worst, fallback = differences(controller_core, replace(setup, robot=slow, gains=make_gains(slow)), sense=Ground())
+    worst, fallback = differences(controller_core, replace(setup, robot=slow, gains=make_gains(slow)), sense=Ground(), steps=2600)
     assert close(worst)
     assert fallback.all(axis=1).any()
+    assert not fallback[-1].any()
 
 
 @pytest.mark.parametrize("part", [item.name for item in fields(Parts)])
@@ -353,6 +400,46 @@ def test_absurd_commands_end_in_finite_joint_commands(controller_core: ct.CDLL) 
 
 
 # ------------------------------------------------------------------------------------------------ pieces
+
+
+def scattered(generator: np.random.Generator, reach: float) -> np.ndarray:
+    """(6, 2) feet whose root mean square distance from their centre is this [m]."""
+    feet = generator.normal(size=(6, 2))
+    return np.asarray(feet * reach / np.sqrt(((feet - feet.mean(axis=0)) ** 2).sum() / 6.0))
+
+
+def pointers(*arrays: np.ndarray) -> list[ct.c_void_p]:
+    return [array.ctypes.data_as(ct.c_void_p) for array in arrays]
+
+
+@pytest.mark.parametrize("load", [1.0, 0.3e-6, 0.12e-6, 0.0])
+@pytest.mark.parametrize("reach", [0.2, 0.0101, 0.0099])
+def test_the_squeeze_is_the_same_down_to_feet_without_load_or_that_stand_together(
+    controller_core: ct.CDLL, load: float, reach: float
+) -> None:
+    generator = np.random.default_rng(6)
+    for _ in range(10):
+        found, feet, normal = generator.normal(size=(6, 2)), scattered(generator, reach), np.full(6, load)
+        expected = squeeze(np.asarray(found @ [1.0, 1.0j], dtype=np.complex128), normal, feet @ [1.0, 1.0j])
+        controller_core.hx_probe_squeeze(*pointers(normal, feet, found))
+        np.testing.assert_allclose(found @ [1.0, 1.0j], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("load", "reach"), [(50.0, 0.2), (50.0, 0.0125), (50.0, 0.0101), (50.0, 0.0099), (1.5e-6, 0.2), (0.6e-6, 0.2)])
+def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(controller_core: ct.CDLL, load: float, reach: float) -> None:
+    robot, generator = load_robot("athena"), np.random.default_rng(7)
+    rest = InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
+    support, none = Support(robot, make_gait(robot), make_gains(robot).support, rest=rest), np.zeros((1, 6, 3))
+    for active in (np.ones(6), generator.uniform(0.0, 1.0, 6), np.full(6, 1e-6)):
+        feet, asked, found = scattered(generator, reach), np.array([0.3, -0.2, load, 0.0, 0.0, 0.4]), np.empty((6, 3))
+        controller_core.hx_probe_shares(*pointers(feet, active, asked, found))
+        demand = Demand(
+            none, np.zeros((1, 6, 3, 3)), push=np.array([0.3 - 0.2j]), weight=np.array([load]),
+            moment=np.zeros(1, dtype=np.complex128), twist=np.array([0.4]),
+        )  # fmt: skip
+        expected = support.shares((feet @ [1.0, 1.0j])[None], active[None], demand).forces(0)[:, :3]
+        scale = np.abs(expected).max(axis=0)  # of pushes and of loads
+        np.testing.assert_allclose(found / scale, expected / scale, atol=1e-9)  # a system of condition 1e6 at most
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.999999, 1.0, 1.000001, 3.0, 1e4])

@@ -243,10 +243,13 @@ def test_friction_is_the_twins_through_its_limit_at_rest(core: ct.CDLL) -> None:
         assert per_speed == pytest.approx(math.tanh(60.0 * speed) / speed if speed else 60.0, rel=SAME)
 
 
+@pytest.mark.parametrize("static", [{}, {"mu_static": 1.1, "stribeck_speed": 0.3}], ids=["one coefficient", "static"])
 @pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
-def test_bristles_and_their_force_are_the_twins(core: ct.CDLL, terrain: dict[str, Any]) -> None:
+def test_bristles_and_their_force_are_the_twins(core: ct.CDLL, terrain: dict[str, Any], static: dict[str, float]) -> None:
     """Slack, stretched, sliding and overstretched bristles, along the slip and against it; an open foot's do not move."""
-    robot = changed(lopsided(7), terrain=terrain, contact={"impact_speed_floor": 2.0}, friction={"law": "bristle", "bristle_damping": 1e-3})
+    robot = changed(
+        lopsided(7), terrain=terrain, contact={"impact_speed_floor": 2.0}, friction={"law": "bristle", "bristle_damping": 1e-3} | static
+    )
     plant, body = drifted(core, robot, 7)
     damping, rng, seen = contact_damping(robot.contact, 0.0), np.random.default_rng(10), set()
     for size in (0.0, 0.3, 0.8, 0.8, 0.99, 0.99, 1.0, 1.2, 1.2):

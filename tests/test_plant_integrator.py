@@ -88,7 +88,15 @@ def sliding() -> Problem:
     return replace(problem, robot=changed(problem.robot, friction=friction), start=start, bristles=1.0)
 
 
-PROBLEMS = {"tumbling": tumbling(), "driven": driven(), "pressed": pressed(), "stuck": stuck(), "sliding": sliding()}
+def weakening() -> Problem:
+    """The same with static friction above kinetic, at speeds at which friction falls from one to the other."""
+    problem = sliding()
+    return replace(problem, robot=changed(problem.robot, friction={"mu_static": 0.3, "stribeck_speed": 0.3}))
+
+
+PROBLEMS = {
+    "tumbling": tumbling(), "driven": driven(), "pressed": pressed(), "stuck": stuck(), "sliding": sliding(), "weakening": weakening(),
+}  # fmt: skip
 
 
 def started(core: ct.CDLL, problem: Problem, **solver: Any) -> Plant:
@@ -121,7 +129,7 @@ def test_each_method_has_its_order(core: ct.CDLL, method: str, problem: Problem)
     assert errors[-1] < 1e-3
 
 
-@pytest.mark.parametrize("name", ["pressed", "stuck", "sliding"])
+@pytest.mark.parametrize("name", ["pressed", "stuck", "sliding", "weakening"])
 def test_no_foot_lands_or_leaves_while_pressed_and_bristles_stay_stuck_or_sliding(core: ct.CDLL, name: str) -> None:
     """What the order of those problems rests on."""
     problem, stretched = PROBLEMS[name], []

@@ -55,13 +55,13 @@ BAD_NUMBERS = (math.nan, math.inf, -math.inf)
 
 
 @pytest.mark.parametrize("number", BAD_NUMBERS)
-@pytest.mark.parametrize("name", ["angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque"])
+@pytest.mark.parametrize("name", ["angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque", "acceleration_ref"])
 @pytest.mark.parametrize("last", [False, True])
 def test_an_input_that_is_no_number_is_refused(core: ct.CDLL, name: str, number: float, last: bool) -> None:
     plant = midway(core)
     values = {"angle_ref": plant.robot.stance} | {name: np.array(getattr(plant.hold(), name))}
     values[name].ravel()[-1 if last else 0] = number
-    pattern = rf"{name}(\[\d\])?: got -?(nan|inf), expected \S+ to \S+ (rad|rad/s|N\.m|N)$"
+    pattern = rf"{name}(\[\d\])?: got -?(nan|inf), expected \S+ to \S+ (rad|rad/s2?|N\.m|N)$"
     refused(plant, lambda: plant.step(plant.time + MACRO, Command(**values)), INVALID_ARGUMENT, pattern)
 
 
@@ -125,6 +125,13 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ("friction.slope", math.nan, r"friction\.slope: got -?nan"),
     ("friction.presliding", 0.0, r"friction\.presliding: got 0, expected 1e-07 to 1 m"),
     ("friction.bristle_damping", -0.1, r"friction\.bristle_damping: got -0\.1"),
+    ("friction.mu_static", 0.1, r"friction\.mu_static: got 0\.1, expected at least friction\.mu, or 0"),
+    (
+        "friction.mu_static",
+        0.8,
+        r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with this friction\.law; the bristle law alone",
+    ),
+    ("friction.stribeck_speed", 0.0, r"friction\.stribeck_speed: got 0, expected 1e-06 to 100 m/s"),
     ("servo.mode", 4, r"servo\.mode: got 4, expected 1 to 3"),
     ("servo.kp", -1.0, r"servo\.kp: got -1"),
     ("servo.kd", -1.0, r"servo\.kd: got -1"),

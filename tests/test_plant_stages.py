@@ -133,9 +133,11 @@ class StuckStages(DenseStages):
         return nu, a + u, self.bristle_rate + np.einsum("lij,i->lj", grips, s_v + z * (a + u))
 
 
+@pytest.mark.parametrize("static", [0.0, 0.9])
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
-def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(core: ct.CDLL, method: str) -> None:
-    h, robot = 2e-3, changed(load_robot("athena"), solver={"method": method, "step": 2e-3}, friction={"law": "bristle"})
+def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(core: ct.CDLL, method: str, static: float) -> None:
+    h, friction = 2e-3, {"law": "bristle", "mu_static": static}
+    robot = changed(load_robot("athena"), solver={"method": method, "step": h}, friction=friction)
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
     body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
     u = np.random.default_rng(3).uniform(-0.3, 0.3, (6, 3)) * [1.0, 1.0, 0.0]
@@ -153,7 +155,7 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(core: ct.CDLL,
     put(plant, body, b)
     damping = standing_damping(robot, body)
     load = [normal_force(robot.contact, damping[leg], foot.penetration, 0.0) for leg, foot in enumerate(foot_contacts(robot, body))]
-    G_b = -robot.friction.mu * np.array(load) * (3.0 - np.sum(u * u, axis=1)) / (2.0 * robot.friction.presliding)
+    G_b = -(static or 0.7) * np.array(load) * (3.0 - np.sum(u * u, axis=1)) / (2.0 * robot.friction.presliding)
     stages = StuckStages(robot, law_slopes(robot, command, body), rate, h * m.gamma, G_b, np.zeros((6, 3)))
     k, nu, alpha, k_b = np.zeros((7, 247)), np.zeros((7, 114)), np.zeros((7, 114)), np.zeros((7, 6, 3))
     for i in range(m.stages):

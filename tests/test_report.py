@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.batch import Summary
 from hexapod_cosim.cosim.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.report.headline import cards, headline, plain_headline
+from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 
 
 def comparison(after: Mapping[str, float], *, seeds: int = 4, before: Mapping[str, float] | None = None) -> Comparison:
@@ -34,12 +34,32 @@ def sentence(result: Comparison) -> str:
 
 
 def test_the_headline_tells_gains_and_costs_and_marks_them() -> None:
-    result = comparison({"slip_per_metre": 0.25, "torque_rms": 1.5})
-    assert sentence(result) == "Against kinematic control, compliant walks with 75 % less slip, and costs 50 % more motor torque."
+    result = comparison({"slip_per_metre": 0.25, "roll_rms": 0.5, "servo_load_max": 1.5})
+    assert sentence(result) == (
+        "Against kinematic control, compliant walks with 50 % less rolling and 75 % less slip, "
+        "and costs 50 % more torque on the hottest servo."
+    )
     assert [(part.text, part.verdict) for part in headline(result) if part.verdict] == [
+        ("50 % less rolling", "better"),
         ("75 % less slip", "better"),
-        ("50 % more motor torque", "worse"),
+        ("50 % more torque on the hottest servo", "worse"),
     ]
+
+
+def test_slip_which_an_assumed_slope_makes_comes_last_and_is_told_to_be_that() -> None:
+    assert [card.name for card in cards(comparison({}))][-1] == "slip per metre"
+    assert "friction.slope" in creep_note({"friction.law": 1.0})
+    assert creep_note({"friction.law": 3.0}) == ""  # bristles hold a foot
+
+
+def test_the_headline_of_a_robot_that_turns_on_the_spot_is_per_radian() -> None:
+    turned = dict.fromkeys(("slip_per_metre", "cost_of_transport", "electrical_cost", "heat", "path_error", "yaw_drift"), math.nan)
+    result = comparison(turned | {"slip_per_radian": 0.25, "cost_per_radian": 2.0}, before=turned)
+    assert sentence(result) == (
+        "Against kinematic control, compliant walks with 75 % less slip, and costs 2.0 times the motor work per radian."
+    )
+    assert ("slip per radian", "1.00 → 0.250 mm/rad") not in [(card.name, card.values) for card in cards(result)]
+    assert ("slip per radian", "1000 → 250 mm/rad") in [(card.name, card.values) for card in cards(result)]
 
 
 def test_the_headline_names_no_gain_where_there_is_none() -> None:
@@ -78,17 +98,17 @@ def test_the_headline_tells_what_was_too_short_from_what_is_the_same() -> None:
 
 def test_cards_show_units_that_people_read_and_the_interval() -> None:
     before, after = {"slip_per_metre": 0.3, "height_rms": 9.1e-4}, {"slip_per_metre": 0.03, "height_rms": 4.56e-5}
-    slip, height, *_ = cards(comparison(after, before=before))
+    height, *_, slip = cards(comparison(after, before=before))
     assert (slip.change, slip.values, slip.interval) == ("−90.0 %", "300 → 30.0 mm/m", "(−90.0 to −90.0 %)")
     assert (height.change, height.values, height.verdict) == ("−95.0 %", "0.910 → 0.046 mm", "better")
     assert all(card.interval == "" for card in cards(comparison({"slip_per_metre": 0.5}, seeds=1)))
 
 
-def test_a_single_run_is_told_in_speed_and_slip() -> None:
+def test_a_single_run_is_told_in_speed_feet_and_cost() -> None:
     facts = {"control": "compliant", "simulated": 10.0, "walk": {"mean_speed": 0.0801}}
-    (part,) = plain_headline({"slip_per_metre": 0.0214}, facts)
-    assert part.text == "Compliant control, 10 s: 80.1 mm/s, 21.4 mm of slip per metre walked."
-    (part,) = plain_headline({"slip_per_metre": None}, facts)
+    (part,) = plain_headline({"foot_error_stance": 0.00214, "cost_of_transport": 0.4239}, facts)
+    assert part.text == "Compliant control, 10 s: 80.1 mm/s, standing feet 2.14 mm from their plan, cost of transport 0.424."
+    (part,) = plain_headline({"foot_error_stance": None}, facts | {"walk": {}})
     assert part.text == "Compliant control, 10 s."
 
 
@@ -101,7 +121,9 @@ def test_without_the_viewer_a_report_has_its_tables_and_says_how_to_get_the_rest
     assert code == 0
     assert "<script" not in page
     assert "HX_VIEWER" in page
-    assert all(f"<code>{name}</code>" in page for name in METRICS)
+    told = {name for name in METRICS if "_per_radian" not in name} - {"slip_net_per_metre"}
+    assert all(f"<code>{name}</code>" in page for name in told)
+    assert "_per_radian" not in page  # it did not turn
 
 
 def test_a_page_has_nothing_from_elsewhere_and_forbids_it(call: Call, tmp_path: Path) -> None:

@@ -108,6 +108,16 @@ def test_a_heavier_torso_gets_its_own_inertia_and_a_softer_foot_its_own_stiffnes
     assert robot.contact.stiffness == pytest.approx(before.contact.stiffness / 5.0)
 
 
+def test_the_motor_constant_is_the_data_sheets_or_else_an_ideal_motors() -> None:
+    """MX-64: 6.0 N m at stall from 12 V and 4.1 A. An ideal motor takes at stall its torque times its no-load speed."""
+    assert load_robot("athena").servo.motor_constant == pytest.approx(6.0 / math.sqrt(12.0 * 4.1), rel=1e-3)
+    table = athena_table()
+    del table["servo"]["motor_constant"]
+    put(table, "servo.torque_max", 5.0)
+    put(table, "servo.speed_max", 3.2)
+    assert robot_from_table(table, where="a").servo.motor_constant == pytest.approx(1.25)  # sqrt(5.0 / 3.2)
+
+
 def test_robots_are_frozen_comparable_and_picklable() -> None:
     robot = load_robot("athena")
     with pytest.raises(dataclasses.FrozenInstanceError):
@@ -156,6 +166,8 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ("restitution 0", lambda t: put(t, "contact.restitution", 0.0), ["contact.restitution", "> 0", "hertz"]),
     ("no floor", lambda t: put(t, "contact.impact_speed_floor", 0.0), ["contact.impact_speed_floor", "> 0 [m/s]"]),
     ("friction order", lambda t: put(t, "friction.mu_static", 0.1), ["friction.mu_static", "at least mu = 0.7"]),
+    ("idle static friction", lambda t: put(t, "friction.mu_static", 0.8),
+     ["friction.mu_static", "has no effect", "got '0.8 with the law tanh'", "leave it out"]),
     ("presliding 0", lambda t: put(t, "friction.presliding", 0.0), ["friction.presliding", "got 0.0", ">= 1e-07"]),
     ("bristles that pull", lambda t: put(t, "friction.bristle_damping", -1.0), ["friction.bristle_damping", "got -1.0"]),
     ("continuous torque", lambda t: put(t, "servo.torque_continuous", 7.0), ["servo.torque_continuous", "torque_max = 6"]),

@@ -14,7 +14,7 @@ from gains import PERIOD, make_gains
 from hexapod_cosim.controller import make_gait
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.robot_package import CONTROLLER, PLANT, export_package, read_values
-from hexapod_cosim.cosim.signals import COMMANDED, MEASURED
+from hexapod_cosim.cosim.signals import ACCELERATION, COMMANDED, MEASURED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 from tools.importers import late
 from tools.importers.compare import judged
@@ -56,7 +56,7 @@ def plant(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_what_the_controller_looks_at_and_says_is_connected(package: Path) -> None:
     connections = read_ssd(str(package), validate=True).system.connections
-    joints = {name for names in COMMANDED.values() for name in names}
+    joints = {name for names in (*COMMANDED.values(), ACCELERATION) for name in names}
     looked_at = {*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]}
     assert {one.startConnector for one in connections if one.startElement == CONTROLLER} == joints
     assert {one.startConnector for one in connections if one.startElement == PLANT} == looked_at

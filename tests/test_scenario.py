@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from hexapod_cosim.controller import Controller, Parts, make_gait
+from hexapod_cosim.cosim.run import known_robot
 from hexapod_cosim.cosim.scenario import list_scenarios, load_scenario, scenario_from_table, scenario_robot
 from hexapod_cosim.cosim.scenario_records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.toml_text import to_toml
@@ -69,17 +70,79 @@ def test_units_reach_into_commands_events_and_settings() -> None:
 
 
 def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
-    overrides = ["robot=phantomx_mk4", "contact.law=hertz", "LF.femur.mass=0.3", "gravity[3]=-1.62", "outputs.csv=['torso.*']"]
+    overrides = ["robot=phantomx_mk4", "contact.law=hertz", "LF.femur.mass=0.3", "outputs.csv=['torso.*']"]
     scenario = load_scenario("walk_flat", overrides=overrides)
     assert scenario.robot == "phantomx_mk4"
     assert scenario.settings["contact"] == {"law": "hertz"}
-    assert scenario.parameters == {"LF.femur.mass": 0.3, "gravity[3]": -1.62}
+    assert scenario.parameters == {"LF.femur.mass": 0.3}
     assert scenario.outputs.csv == ("torso.*",)
 
 
-def test_static_friction_follows_a_higher_kinetic_one() -> None:
+@pytest.mark.parametrize(
+    ("overrides", "gravity"),
+    [
+        (["gravity=1.62"], (0.0, 0.0, -1.62)),
+        (["gravity=3.71 m/s2"], (0.0, 0.0, -3.71)),
+        (["gravity=[0.5, 0, -1.5]"], (0.5, 0.0, -1.5)),
+        (["gravity[3]=-1.62"], (0.0, 0.0, -1.62)),
+        (["gravity[1]=0.5"], (0.5, 0.0, -9.81)),
+        (["gravity=3.71", "gravity[2]=0.1"], (0.0, 0.1, -3.71)),
+    ],
+)
+def test_gravity_is_a_number_a_vector_or_an_fmu_parameter_and_all_are_one_key(
+    overrides: list[str], gravity: tuple[float, float, float]
+) -> None:
+    scenario = load_scenario("walk_flat", overrides=overrides)
+    assert scenario.gravity == gravity
+    assert scenario.parameters == {}
+    assert scenario_robot(scenario).gravity == known_robot(scenario).gravity == gravity
+    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+
+
+def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
+    scenario = load_scenario("walk_flat")
+    assert scenario.gravity is None
+    assert scenario_robot(scenario).gravity == (0.0, 0.0, -9.81)
+    assert "gravity" not in scenario.to_table()
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("gravity=-1.62", r"walk_flat\.toml: gravity: value not allowed: got -1\.62, expected a finite number > 0 \[m/s2\]"),
+        ("gravity=0", r"gravity: value not allowed: got 0, expected a finite number > 0"),
+        ("gravity=[0, -1.62]", r"gravity: wrong length: got \[0, -1\.62\], expected 3 numbers \[m/s2\]"),
+        ("gravity=1.62 m", r"gravity: wrong unit: got '1\.62 m', expected a value in m/s2"),
+        ("gravity[3]=low", r"parameters\.gravity\[3\]: wrong type: got 'low'"),
+    ],
+)
+def test_impossible_gravity_is_refused(override: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("walk_flat", overrides=[override])
+
+
+@pytest.mark.parametrize("override", ["gravity=[0, 0, 1.62]", "gravity[3]=1.62", "gravity=[0, 0, 0]"])
+def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(override: str) -> None:
+    scenario = load_scenario("walk_flat", overrides=[override])
+    with pytest.raises(ScenarioError, match=r"gravity: nothing stands under this gravity: .* write gravity = 1\.62"):
+        scenario_robot(scenario)
+
+
+def test_static_friction_is_the_kinetic_one_unless_said() -> None:
     robot = scenario_robot(load_scenario("walk_flat", overrides=["friction.mu=0.9"]))
-    assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.9)
+    assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.0)
+
+
+@pytest.mark.parametrize("law", ["tanh", "none"])
+def test_static_friction_is_refused_where_it_has_no_effect(law: str) -> None:
+    scenario = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"])
+    message = rf"friction\.mu_static: static friction that has no effect: got '0\.8 with the law {law}', expected friction\.law = bristle"
+    with pytest.raises(RobotError, match=message):
+        scenario_robot(scenario)
+    sticks = load_scenario("walk_flat", overrides=["friction.law=bristle", "friction.mu_static=0.8"])
+    assert scenario_robot(sticks).friction.mu_static == 0.8
+    same = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"])  # the kinetic one's
+    assert scenario_robot(same).friction.mu_static == 0.7
 
 
 def test_a_first_command_later_than_the_start_is_preceded_by_standing() -> None:
@@ -133,6 +196,10 @@ MISTAKES = {
     "macro_step=0.003": ["duration", "multiple of macro_step = 0.003", "9.999"],
     "duration=1e9": ["walk_flat.toml: duration: ", "too many macro-steps", "at most 1000000 macro-steps, 5000 s", "lengthen macro_step"],
     "duration=1e308": ["too many macro-steps"],
+    "outputs.interval=0.012": ["outputs.interval", "got 0.012", "multiple of macro_step = 0.005", "0.01 is the nearest"],
+    "outputs.interval=0.001": ["outputs.interval", "multiple of macro_step = 0.005", "0.005 is the nearest"],
+    "outputs.interval=-0.01": ["outputs.interval", "got -0.01", ">= 0"],
+    "outputs.interval=often": ["outputs.interval", "'often'"],
     "macro_step=1e-9": ["too many macro-steps", "0.001 s with macro_step = 1e-09 s"],
     "macro_step=5e-324": ["too many macro-steps"],
     "fricton.mu=1": ["--set fricton.mu: ", "did you mean 'friction.mu'"],

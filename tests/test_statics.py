@@ -124,10 +124,66 @@ def test_servos_that_cannot_hold_the_robot_are_refused(servo: dict[str, float]) 
         settled(replace(robot, servo=replace(robot.servo, **servo)))  # type: ignore[arg-type]
 
 
+FRICTIONLESS = {"none": {"law": "none"}, "tanh": {"law": "tanh", "mu": 0.0}, "bristle": {"law": "bristle", "mu": 0.0}}
+
+
+def with_friction(robot: Robot, **friction: object) -> Robot:
+    return replace(robot, friction=replace(robot.friction, **friction))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("friction", FRICTIONLESS.values(), ids=FRICTIONLESS)
+@pytest.mark.parametrize("mode", ["position", "kinematic"])
+def test_on_level_ground_the_robot_stands_without_friction_as_with_it(friction: dict[str, object], mode: str) -> None:
+    """The servos hold it: no foot pushes along the ground in the pose of rest."""
+    robot = robot_on("athena", mode=mode)
+    slippery = with_friction(robot, **friction)
+    pose, held = standing(slippery), standing(robot)
+    assert pose.angle == pytest.approx(held.angle, abs=1e-12)
+    assert pose.position == pytest.approx(held.position, abs=1e-12)
+    assert not pose.slide.any()
+    body = bodies(slippery, pose)
+    result = accelerations(slippery, body, Command(angle_ref=robot.stance), standing_damping(slippery, body))
+    assert float(np.max(np.abs(result.dv))) < AT_REST
+
+
+@pytest.mark.parametrize("friction", [*FRICTIONLESS.values(), {"mu": 0.2}, {"law": "bristle", "mu": 0.2}], ids=str)
+@pytest.mark.parametrize("mode", ["position", "kinematic"])
+def test_a_slope_steeper_than_friction_holds_lets_the_robot_slide_as_one_body(friction: dict[str, float | str], mode: str) -> None:
+    """All bodies accelerate by g (sin a - mu cos a) downhill, and none turns: of a slope of 0.4 rad, 3.8202 or 2.0131 m/s2."""
+    robot = with_friction(robot_on("athena", mode=mode, kind="slope", incline=0.4), **friction)
+    pose = standing(robot)
+    downhill = -np.array([math.cos(0.7) * math.cos(0.4), math.sin(0.7) * math.cos(0.4), math.sin(0.4)])
+    size = 2.0131 if friction.get("mu") == 0.2 else 3.8202
+    assert pose.slide == pytest.approx(size * downhill, abs=1e-4)
+    fast = 10.0 * downhill if robot.friction.law == "tanh" else np.zeros(3)  # m/s  tanh friction is all there
+    body = body_states(robot, pose.position, pose.quaternion, fast, np.zeros(3), pose.angle, np.zeros((6, 3)))
+    result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle)
+    assert float(np.max(np.abs(result.dv - np.concatenate([pose.slide, np.zeros(3)])))) < AT_REST
+
+
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_a_slope_steeper_than_the_friction_angle_is_refused(law: str) -> None:
-    with pytest.raises(RobotError, match="give a slope more friction"):
-        settled(robot_on("athena", kind="slope", incline=math.atan(0.75), law=law))
+@pytest.mark.parametrize(("share", "slides"), [(0.9999, False), (1.0001, True)])
+def test_a_robot_slides_from_the_friction_angle_on(law: str, share: float, slides: bool) -> None:
+    pose = standing(robot_on("athena", kind="slope", incline=math.atan(share * 0.7), law=law))
+    assert pose.slide.any() == slides
+
+
+@pytest.mark.parametrize(("incline", "slides"), [(0.5, False), (0.6, True)])
+def test_bristles_hold_the_robot_up_to_their_static_friction_and_let_it_slide_with_kinetic(incline: float, slides: bool) -> None:
+    """0.3 and 0.6: tan 0.5 = 0.546, tan 0.6 = 0.684, where it slides at 9.81 (sin 0.6 - 0.3 cos 0.6) = 3.1101 m/s2."""
+    robot = with_friction(robot_on("athena", kind="slope", incline=incline, law="bristle"), mu=0.3, mu_static=0.6)
+    pose = standing(robot)
+    assert float(np.linalg.norm(pose.slide)) == pytest.approx(3.1101 if slides else 0.0, abs=1e-4)
+    if not slides:
+        body = bodies(robot, pose)
+        result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle)
+        assert float(np.max(np.abs(result.dv))) < AT_REST
+
+
+def test_gravity_that_leans_makes_a_slope_of_level_ground() -> None:
+    leaning = replace(with_friction(robot_on("athena"), mu=0.1), gravity=(2.0, 0.0, -9.6))
+    assert standing(leaning).slide == pytest.approx([2.0 - 0.96, 0.0, 0.0], abs=1e-12)
+    assert not standing(replace(leaning, friction=replace(leaning.friction, mu=0.3))).slide.any()
 
 
 def test_a_robot_with_an_uneven_load_leans_towards_it() -> None:

@@ -43,7 +43,10 @@ def point(number: int, values: Mapping[str, Any], slips: Mapping[str, float], *,
     return Point(
         number=number, case="walk_flat", values=values, held_out=False, pairs=pairs, means=means,
         runs=dict.fromkeys(slips, runs), walked=dict.fromkeys(slips, walked),
-        changes={name: made_change(name, before=before, after=after, half_width=math.nan, pairs=pairs) for name in FIGURES},
+        changes={
+            name: made_change(name, before=before, after=after, half_width=math.nan, log_half_width=math.nan, pairs=pairs)
+            for name in FIGURES
+        },
     )  # fmt: skip
 
 

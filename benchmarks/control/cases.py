@@ -61,6 +61,17 @@ def sticking() -> list[Case]:
     return [judged_walk("all parts", *law), judged_walk(alone.name, *law, *alone.settings)]
 
 
+def model_errors() -> list[Case]:
+    """The judged walk on plants that are not the controller's model: with all parts, and without the slip PID."""
+    entries = [entry for entry in DATA["robustness"]["cases"] if entry.get("model_error")]
+    off = f"{SWITCH}slip_pid=false"
+    return [
+        judged_walk(f"{entry['name']}, {name}", *entry["settings"], *settings)
+        for entry in entries
+        for name, settings in (("all parts", ()), ("all but slip_pid", (off,)))
+    ]
+
+
 def robustness() -> list[Case]:
     """The judged walk with something wrong."""
     return [judged_walk(entry["name"], *entry["settings"]) for entry in DATA["robustness"]["cases"]]

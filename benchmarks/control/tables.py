@@ -16,9 +16,9 @@ from hexapod_cosim.models import HexapodError
 
 # metric -> heading of its column
 COLUMNS = {
-    "slip_per_metre": "slip", "slip_net_per_metre": "net slip", "peak_force": "peak force", "loading_rate": "loading rate",
+    "slip_per_metre": "slip", "foot_error_stance": "feet, stance", "peak_force": "peak force", "loading_rate": "loading rate",
     "path_error": "path error", "yaw_drift": "yaw drift", "height_rms": "height", "roll_rms": "roll", "pitch_rms": "pitch",
-    "torque_rms": "torque", "cost_of_transport": "cost",
+    "cost_of_transport": "cost", "electrical_cost": "electrical cost", "servo_load_max": "hottest servo",
 }  # fmt: skip
 # metric -> heading, and what the figure is multiplied by for people
 PLAIN = {
@@ -58,7 +58,8 @@ def cell(name: str, change: Change) -> str:
         return "-"
     if not math.isfinite(change.relative):
         return "≈ 0" if change.verdict == SAME else f"{change.after:.2g} {METRICS[name][0]}"
-    percent, width = 100.0 * change.relative, 100.0 * change.half_width / change.scale
+    low, high = change.interval
+    percent, width = 100.0 * change.relative, 50.0 * (high - low)
     shown = f" ± {width:.{int(width < 10.0)}f}" if math.isfinite(width) and width >= 1.0 else ""
     return ("≈ " if change.verdict == SAME else "") + f"{round(percent):+d}{shown} %"
 

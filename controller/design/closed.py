@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from hexapod_cosim.controller.design.laws import Laws, delay
-from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze
+from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze_matrix
 from hexapod_cosim.controller.kinematics import Array, LegSolver
 from hexapod_cosim.models import Robot
 
@@ -26,7 +26,7 @@ def compliant_law(robot: Robot, plant: StandingPlant, laws: Laws) -> control.Sta
     count, period = len(loads), laws.period
     flat, up = axes_of(count)
     order = np.eye(3 * count)[[*flat, *up]]
-    seen, told = block_diag(squeeze(plant), np.eye(count)) @ order, order.T * np.concatenate([np.repeat(loads, 2), vertical])
+    seen, told = block_diag(squeeze_matrix(robot, plant), np.eye(count)) @ order, order.T * np.concatenate([np.repeat(loads, 2), vertical])
     pid, spring = laws.systems
     both = control.append(parallel(pid, 2 * count), parallel(spring, count))
     late = parallel(delay(laws.delays, period=period), 3 * count)
@@ -39,11 +39,13 @@ def closed_loop(robot: Robot, plant: StandingPlant, laws: Laws) -> control.State
 
 
 def splay(robot: Robot, plant: StandingPlant) -> Array:
-    """(3 n) horizontal forces of unit length with which the standing legs splay against each other: outwards, less the common push."""
+    """(3 n) horizontal forces of unit length with which the standing legs splay against each other: outwards, less the common push
+    and twist.
+    """
     feet = LegSolver(robot).forward(plant.angle)[plant.standing]
     flat, _ = axes_of(len(feet))
     forces = np.zeros(feet.size)
-    forces[flat] = squeeze(plant) @ (feet[:, :2] / np.linalg.norm(feet[:, :2], axis=1)[:, None]).reshape(-1)
+    forces[flat] = squeeze_matrix(robot, plant) @ (feet[:, :2] / np.linalg.norm(feet[:, :2], axis=1)[:, None]).reshape(-1)
     return np.asarray(forces / np.linalg.norm(forces))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze
+from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze_matrix
 from hexapod_cosim.controller.kinematics import Array
 from hexapod_cosim.models import Robot
 
@@ -27,9 +27,9 @@ SLOWEST = 0.1  # rad/s
 RANK = 1e-6  # 1    of a singular value
 
 
-def frequencies(period: float, count: int) -> Array:
+def frequencies(period: float, count: int, *, slowest: float = SLOWEST) -> Array:
     """rad/s    a logarithmic grid up to the Nyquist frequency"""
-    return np.geomspace(SLOWEST, math.pi / period * 0.999, count)
+    return np.geomspace(slowest, math.pi / period * 0.999, count)
 
 
 def response(system: control.StateSpace, omega: Array) -> Response:
@@ -41,14 +41,14 @@ def response(system: control.StateSpace, omega: Array) -> Response:
 
 
 def eigenloci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Response, Response]:
-    """Of a standing plant, as loops of negative feedback: tangential (2 n - 2, frequencies) and vertical (n, frequencies) [N/m].
+    """Of a standing plant, as loops of negative feedback: tangential (2 n - 3, frequencies) and vertical (n, frequencies) [N/m].
 
-    The common push of all feet is no squeeze and has no locus.
+    The common push and twist of all feet are no squeeze and have no locus.
     """
     answer = response(relieved(robot, plant), omega)
     loads, vertical = answers(robot, plant)
     flat, up = axes_of(len(loads))
-    fight = squeeze(plant)
+    fight = squeeze_matrix(robot, plant)
     left, size, _ = np.linalg.svd(fight)
     basis = left[:, size > RANK]
     tangential = basis.T @ fight @ answer[:, flat][:, :, flat] * np.repeat(loads, 2) @ basis

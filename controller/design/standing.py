@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller.compliance import LARGEST_LOAD
 from hexapod_cosim.controller.gains import TRIPOD_LEGS
 from hexapod_cosim.controller.kinematics import LEGS, Array, LegSolver, Mask
+from hexapod_cosim.controller.slip_pid import squeeze
 from hexapod_cosim.models import Robot
 
 Places = NDArray[np.int_]
@@ -57,11 +58,12 @@ def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
     return control.ss(system.A, system.B[:, :ANGLES] @ told[:, chosen], system.C[:FORCES][chosen], 0, system.dt)
 
 
-def squeeze(plant: StandingPlant) -> Array:
-    """(2 n, 2 n) e = S f, e_i = f_i - (n_i / sum n) sum f: the horizontal forces of the standing feet less their common push."""
-    normal = plant.force[plant.standing, 2]
-    common = np.outer(normal / normal.sum(), np.ones(len(normal)))
-    return np.asarray(np.kron(np.eye(len(normal)) - common, np.eye(2)), dtype=np.float64)
+def squeeze_matrix(robot: Robot, plant: StandingPlant) -> Array:
+    """(2 n, 2 n) e = S f: the horizontal forces of the standing feet less their common push and twist, by the law that runs."""
+    normal, feet = plant.force[plant.standing, 2], LegSolver(robot).forward(plant.angle)[plant.standing]
+    places = feet[:, 0] + 1j * feet[:, 1]
+    columns = [squeeze(unit[::2] + 1j * unit[1::2], normal, places) for unit in np.eye(2 * len(normal))]
+    return np.column_stack([np.column_stack([column.real, column.imag]).reshape(-1) for column in columns])
 
 
 def answers(robot: Robot, plant: StandingPlant) -> tuple[Array, Array]:

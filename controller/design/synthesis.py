@@ -8,15 +8,27 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import fields
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from hexapod_cosim.controller.design.laws import Laws, delay_response, delay_steps, sampled_suspension, slip_response
-from hexapod_cosim.controller.design.loci import Loci, Plants, Response, all_loci, critical_size, frequencies, quick_margins, response
-from hexapod_cosim.controller.design.standing import weight_share
-from hexapod_cosim.controller.design.verify import verify
+from hexapod_cosim.controller.design.loci import (
+    SLOWEST,
+    Loci,
+    LoopMargins,
+    Plants,
+    Response,
+    all_loci,
+    critical_size,
+    frequencies,
+    quick_margins,
+    response,
+)
+from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
+from hexapod_cosim.controller.design.verify import Judge, nominal, support_torque, verify
 from hexapod_cosim.controller.gains import (
     POSITIVE,
     Gains,
@@ -28,32 +40,44 @@ from hexapod_cosim.controller.gains import (
     SupportGains,
     SuspensionGains,
 )
-from hexapod_cosim.models import Robot
+from hexapod_cosim.controller.size import requirements_for, size_of
+from hexapod_cosim.models import LEG_NAMES, Robot
 
-LEADS = (0.0, 0.001, 0.003, 0.01, 0.1)  # s    tried kp/ki
-CURVATURES = (0.0, 1e-5, 2e-5, 5e-5, 2e-4, 5e-4)  # s2    tried kd/ki
+LEADS = (0.0, 0.001, 0.003, 0.01, 0.1)  # s    tried kp/ki, by the robot's size
+CURVATURES = (0.0, 1e-5, 2e-5, 5e-5, 2e-4, 5e-4)  # s2    tried kd/ki, by its square
 DERIVATIVE_PERIODS = 2.0  # 1    filter of the derivative in controller periods
 SEARCHED, FINER = 100, 4  # frequencies, and how many times as many with the laws, which turn faster
 FREQUENCY_STEPS, FREQUENCY_FACTOR = 24, 0.85  # 1    how far the suspension's frequency may give way
 SAFETY, SPARE = 0.98, 0.5  # 1, deg    the search's frequencies may miss the worst by a hair
+BACK_OFF, BACK_OFFS = 0.95, 40  # 1    of the gain where they miss it by more, and how often
 TINY = 1e-9  # 1    size of a loop that stops nothing
 SAME = 1e-9  # relative, of periods
 
 
-def design_gains(robot: Robot, period: float, *, plants: Plants, requirements: Requirements | None = None) -> Gains:
+def design_gains(
+    robot: Robot, period: float, *, plants: Plants, requirements: Requirements | None = None, left_out: Sequence[str] = ()
+) -> Gains:
     """Gains of a robot for a controller period [s] from its standing plants, by name.
 
-    Raises GainsError when no gains meet the requirements: which one is missed, what was reached, what was asked for.
+    requirements: by default those for its size;  left_out: stances that there are no plants of,
+    and why; those in which its servos do not carry it are added. Raises GainsError when no gains
+    meet the requirements: which one is missed, what was reached, what was asked for.
     """
-    needs = Requirements() if requirements is None else requirements
+    needs = requirements_for(robot) if requirements is None else requirements
     _check(robot, needs, plants, period=period)
-    tangential, vertical = (loci.finer(FINER) for loci in all_loci(robot, plants, frequencies(period, SEARCHED)))
-    slip, binding = design_slip(tangential, needs, period=period)
+    plants, too_heavy = carried(robot, plants, needs)
+    time = size_of(robot).time
+    omega = frequencies(period, SEARCHED, slowest=SLOWEST / time)
+    tangential, vertical = (loci.finer(FINER) for loci in all_loci(robot, plants, omega))
+    slip, binding = design_slip(tangential, needs, period=period, time=time)
     suspension = design_suspension(robot, vertical, needs, period=period)
-    laws = Laws(slip=slip, suspension=suspension, period=period, delays=delay_steps(needs, period=period))
-    margins = verify(robot, plants, (tangential, vertical), laws, needs, binding=binding)
+    judge, late = Judge(robot, plants, period=period), delay_steps(needs, period=period)
+    laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
+    laws, reached = _backed_off(judge, tangential, laws, needs)
+    margins, shortfalls = verify(robot, plants, judge, vertical, laws, needs, slip=reached, binding=binding)
     return Gains(
-        robot=robot.name, robot_hash=robot.hash, period=period, requirements=needs, slip=slip, suspension=suspension, margins=margins,
+        robot=robot.name, robot_hash=robot.hash, period=period, requirements=needs, slip=laws.slip, suspension=suspension, margins=margins,
+        caveats=(*(f"the design leaves out {text}" for text in (*left_out, *too_heavy)), *shortfalls),
         support=_taken(SupportGains, needs), hold=_taken(HoldGains, needs),
         limits=LimitGains(speed=needs.speed_share * robot.servo.speed_max, torque=needs.torque_share * robot.servo.torque_max),
     )  # fmt: skip
@@ -82,11 +106,56 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
             raise GainsError("a plant sampled otherwise", got=plant.system.dt, expected=f"{period} s", fix="sample it anew", where=name)
 
 
-def design_slip(loci: Loci, needs: Requirements, *, period: float) -> tuple[SlipGains, str]:
-    """Among shapes kp/ki, kd/ki the one with the largest ki at which every locus keeps its margins; and what stopped that ki."""
+def _backed_off(judge: Judge, loci: Loci, laws: Laws, needs: Requirements) -> tuple[Laws, LoopMargins]:
+    """Laws whose tangential loops keep their margins by python-control's judgement; and these.
+
+    The search's frequencies may step over a resonance: then the gain gives way.
+    """
+    for _ in range(BACK_OFFS):
+        found = judge.worst(loci, 0, laws)
+        if found.phase >= needs.phase_margin and found.gain >= needs.gain_margin:
+            return laws, found
+        slip = laws.slip
+        laws = replace(laws, slip=replace(slip, kp=BACK_OFF * slip.kp, ki=BACK_OFF * slip.ki, kd=BACK_OFF * slip.kd))
+    return laws, judge.worst(loci, 0, laws)
+
+
+def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, tuple[str, ...]]:
+    """The plants of stances in which the servos carry the robot within their share of torque.
+
+    And texts that say in which they do not. Raises GainsError when they carry it in none.
+    """
+    most = needs.torque_share * robot.servo.torque_max
+    torque = {_legs(plant): support_torque(robot, {name: plant}) for name, plant in plants.items() if nominal(robot, plant)}
+    able = {name: plant for name, plant in plants.items() if torque.get(_legs(plant), 0.0) <= most}
+    if not any(nominal(robot, plant) for plant in able.values()):
+        fix = "stronger servos, less weight, or feet closer to the hips"
+        got, expected = (
+            f"{min(torque.values()):.3g} N m",
+            f"at most {most:.3g} N m, torque_share x servo.torque_max, of a servo in some stance",
+        )
+        raise GainsError("the servos do not carry the robot", got=got, expected=expected, fix=fix, where=f"robot {robot.name}")
+    expected = f"at most {most:.3g} N m, torque_share x servo.torque_max"
+    return able, tuple(
+        f"{legs}: the servos do not carry the robot (got {value:.3g} N m, expected {expected})"
+        for legs, value in torque.items()
+        if value > most
+    )
+
+
+def _legs(plant: StandingPlant) -> str:
+    return "standing on " + " ".join(leg for leg, stands in zip(LEG_NAMES, plant.standing, strict=True) if stands)
+
+
+def design_slip(loci: Loci, needs: Requirements, *, period: float, time: float = 1.0) -> tuple[SlipGains, str]:
+    """Among shapes kp/ki, kd/ki the one with the largest ki at which every locus keeps its margins.
+
+    And what stopped that ki. time: of the robot's size (size.py), which the shapes go with.
+    """
     late = delay_response(delay_steps(needs, period=period), loci.omega, period=period)
     best, binding = slip_gains(0.0, 0.0, 0.0, needs, period=period), "no integral action is possible"
-    for lead, curvature in itertools.product(LEADS, CURVATURES):
+    leads, curvatures = [time * lead for lead in LEADS], [time * time * bend for bend in CURVATURES]
+    for lead, curvature in itertools.product(leads, curvatures):
         shape = slip_gains(1.0, lead, curvature, needs, period=period)
         loops = loci.values * slip_response(shape, loci.omega, period=period) * late
         most, stopped = _largest_gain(loops, needs, loci)

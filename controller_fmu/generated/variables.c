@@ -144,6 +144,42 @@ static const hxVariable outputs[] = {
     {"RF.lift", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.lift[3]), HX_REAL, 0},
     {"RM.lift", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.lift[4]), HX_REAL, 0},
     {"RR.lift", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.lift[5]), HX_REAL, 0},
+    {"LF.planned[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[0][0]), HX_REAL, 18},
+    {"LF.planned[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[0][1]), HX_REAL, 0},
+    {"LF.planned[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[0][2]), HX_REAL, 0},
+    {"LM.planned[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[1][0]), HX_REAL, 0},
+    {"LM.planned[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[1][1]), HX_REAL, 0},
+    {"LM.planned[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[1][2]), HX_REAL, 0},
+    {"LR.planned[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[2][0]), HX_REAL, 0},
+    {"LR.planned[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[2][1]), HX_REAL, 0},
+    {"LR.planned[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[2][2]), HX_REAL, 0},
+    {"RF.planned[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[3][0]), HX_REAL, 0},
+    {"RF.planned[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[3][1]), HX_REAL, 0},
+    {"RF.planned[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[3][2]), HX_REAL, 0},
+    {"RM.planned[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[4][0]), HX_REAL, 0},
+    {"RM.planned[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[4][1]), HX_REAL, 0},
+    {"RM.planned[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[4][2]), HX_REAL, 0},
+    {"RR.planned[1]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[5][0]), HX_REAL, 0},
+    {"RR.planned[2]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[5][1]), HX_REAL, 0},
+    {"RR.planned[3]", "m", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.planned[5][2]), HX_REAL, 0},
+    {"LF.coxa.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[0][0]), HX_REAL, 18},
+    {"LF.femur.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[0][1]), HX_REAL, 0},
+    {"LF.tibia.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[0][2]), HX_REAL, 0},
+    {"LM.coxa.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[1][0]), HX_REAL, 0},
+    {"LM.femur.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[1][1]), HX_REAL, 0},
+    {"LM.tibia.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[1][2]), HX_REAL, 0},
+    {"LR.coxa.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[2][0]), HX_REAL, 0},
+    {"LR.femur.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[2][1]), HX_REAL, 0},
+    {"LR.tibia.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[2][2]), HX_REAL, 0},
+    {"RF.coxa.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[3][0]), HX_REAL, 0},
+    {"RF.femur.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[3][1]), HX_REAL, 0},
+    {"RF.tibia.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[3][2]), HX_REAL, 0},
+    {"RM.coxa.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[4][0]), HX_REAL, 0},
+    {"RM.femur.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[4][1]), HX_REAL, 0},
+    {"RM.tibia.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[4][2]), HX_REAL, 0},
+    {"RR.coxa.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[5][0]), HX_REAL, 0},
+    {"RR.femur.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[5][1]), HX_REAL, 0},
+    {"RR.tibia.acceleration_ref", "rad/s2", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.acceleration_ref[5][2]), HX_REAL, 0},
 };
 
 static const hxVariable parameters[] = {
@@ -468,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{beca536b-6fcd-4cf4-9977-58ebbe55def1}";
+const char hx_default_guid[] = "{7e6b92eb-d02d-4494-9ce4-cfbf94b84685}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -10,7 +10,7 @@ static const double settled_share = 0.5; /* 1  of the weight: feet that carry le
 static const double joints_follow = 0.35, joints_do_not = 0.45; /* 1  share of the time in which paths ask more speed than a servo has */
 static const double gripped = 0.99; /* 1  of its share: a leg with more carries it */
 static const double largest_load = 2.0; /* 1  in thirds of the weight: the design's margins hold up to it */
-static const double least_scale = 0.5, largest_scale = 2.0; /* 1  measured over modelled weight that the support believes */
+static const double least_scale = 0.5, largest_scale = 3.0; /* 1  measured over modelled weight that the support believes */
 static const double high_share = 0.25; /* 1  of the step height: a foot planned higher is certainly in the air */
 
 enum { HX_TRIPOD_LEGS = 3 }; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
@@ -32,6 +32,7 @@ void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianc
   model->share = model->weight / HX_TRIPOD_LEGS;
   model->settled = settled_share * model->weight;
   hx_watch_compile(model->weight, cycle, period, &model->watch);
+  hx_burden_compile(definition, &model->burden);
   model->softness = 1.0 / definition->servo.kp;
   model->high = high_share * definition->gait.step_height;
   model->tracking = fmin(period / gains->slip.tracking_time, 1.0);
@@ -39,7 +40,8 @@ void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianc
   model->follow_load = 1.0 - model->memory;
   model->follow_cycle = 1.0 - exp(-period / cycle);
   model->follow_weight = 1.0 - exp(-period / gains->support.weight_time);
-  model->calm = (int64_t)nearbyint(calm_cycles * cycle / period);
+  const double calm = nearbyint(calm_cycles * cycle / period);
+  model->calm = (int64_t)calm;
   model->largest = gains->slip.limit * model->share;
   model->deepest = gains->suspension.limit;
   model->most = gains->limits.torque;
@@ -49,13 +51,15 @@ void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianc
 void hx_compliance_reset(hxCompliance *laws) {
   memset(laws, 0, sizeof *laws);
   laws->trust = 1.0;
+  hx_landings_reset(&laws->landings);
+  hx_burden_reset(&laws->burden);
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
 }
 
 void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand, const double height[HX_LEGS], const double rise[HX_LEGS],
                         hxPlan *plan) {
   const double supports = model->parts.support ? 1.0 : 0.0;
-  plan->weight = 0.0;
+  plan->weight = plan->needed = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double f[3] = {plan->shares.push[leg].x, plan->shares.push[leg].y, plan->shares.normal[leg]};
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -63,11 +67,12 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand, 
       for (int i = 0; i < 3; ++i) plan->lever[leg][joint][i] = lever[i];
       plan->own[leg][joint] = supports * demand->torque[leg][joint];
       plan->carry[leg][joint] = -supports * (lever[0] * f[0] + lever[1] * f[1] + lever[2] * f[2]);
+      plan->needed = fmax(plan->needed, fabs(plan->carry[leg][joint]));
     }
     plan->weight += plan->shares.normal[leg];
     plan->standing[leg] = plan->shares.activation[leg] >= 1.0;
     plan->well_up[leg] = height[leg] > hx_early;
-    plan->high[leg] = height[leg] > model->high;
+    plan->height[leg] = height[leg];
     plan->falling[leg] = plan->well_up[leg] ? fmax(-model->period * rise[leg], 0.0) : 0.0;
   }
 }
@@ -85,13 +90,15 @@ static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompl
   }
 }
 
-static void doubt(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
+/* met: height at which feet meet the ground without any bump [m] */
+static void doubt(const hxComplianceModel *model, const hxPlan *plan, const double met[HX_LEGS], double force[HX_LEGS][3],
+                  hxCompliance *laws) {
   hxExpected expected;
   double total = 0.0;
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     expected.standing[leg] = plan->standing[leg];
-    expected.high[leg] = plan->high[leg];
+    expected.high[leg] = plan->height[leg] > model->high + met[leg];
     total += laws->touching[leg] ? force[leg][2] : 0.0;
   }
   hx_watch_look(&model->watch, laws->touching, total, &expected, &laws->watch);
@@ -103,21 +110,27 @@ static void doubt(const hxComplianceModel *model, const hxPlan *plan, double for
   if (doubted) replace_forces(plan, force, laws);
 }
 
-static void meet_ground(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
+static void meet_ground(const hxComplianceModel *model, const hxPlan *plan, const double met[HX_LEGS], hxCompliance *laws) {
   hxMeeting meeting[HX_LEGS];
+  int early[HX_LEGS];
   laws->slack = 1;
-  for (int leg = 0; leg < HX_LEGS; ++leg)
-    meeting[leg] = (hxMeeting){laws->touching[leg], plan->falling[leg], plan->swinging[leg], plan->standing[leg]};
+  hx_landings_early(&laws->landings, met, plan->height, early);
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double falling = early[leg] ? plan->falling[leg] : 0.0;
+    meeting[leg] = (hxMeeting){laws->touching[leg], falling, plan->swinging[leg], plan->standing[leg]};
+  }
   hx_touchdown_step(model->period, meeting, &laws->touchdown);
 }
 
 /* Feet that touch and should not, or the other way round: ground met early or late, or a sensor that is wrong. */
 static void wonder(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
-  if (model->parts.fallback) doubt(model, plan, force, laws);
+  double met[HX_LEGS];
+  hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
+  if (model->parts.fallback) doubt(model, plan, met, force, laws);
   if (laws->trust < 1.0)
     memset(&laws->touchdown, 0, sizeof laws->touchdown);
   else if (model->parts.touchdown)
-    meet_ground(model, plan, laws);
+    meet_ground(model, plan, met, laws);
 }
 
 static int surprised(const hxPlan *plan, const hxCompliance *laws) {
@@ -139,14 +152,14 @@ static void judge(const hxComplianceModel *model, const hxPlan *plan, double dra
     laws->sliding = model->calm;
   else if (laws->sliding)
     --laws->sliding;
-  const double goal = laws->sliding || laws->outrun ? 0.0 : 1.0;
+  const double goal = laws->sliding || laws->outrun || laws->burden.overburdened ? 0.0 : 1.0;
   if (laws->trust == goal) return;
   laws->trust += model->follow_load * (goal - laws->trust);
   if (fabs(goal - laws->trust) < 1.0 - gripped) laws->trust = goal;
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Inputs of the laws from the forces felt, tangential ones beyond the plan's: f_t - (f_n / sum f_n) sum f_t, f_n, load.
+/* Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze of these, f_n, load.
  * Returns sum f_n [N]. */
 static double mix(const hxComplianceModel *model, const hxPlan *plan, const double force[HX_LEGS][3], hxFootInput input[HX_LEGS],
                   hxCompliance *laws) {
@@ -162,9 +175,9 @@ static double mix(const hxComplianceModel *model, const hxPlan *plan, const doub
   }
   const double share = total > load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback) judge(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0, laws);
+  hx_slip_squeeze(normal, plan->feet, felt);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const hxPlane beyond = hx_sub(felt[leg], hx_scaled(common, normal[leg] * share));
-    input[leg].push = model->parts.slip_pid ? beyond : hx_plane(0.0, 0.0);
+    input[leg].push = model->parts.slip_pid ? felt[leg] : hx_plane(0.0, 0.0);
     input[leg].excess = normal[leg];
     input[leg].load = normal[leg] * (1.0 / model->share);
   }
@@ -173,10 +186,14 @@ static double mix(const hxComplianceModel *model, const hxPlan *plan, const doub
 
 /* measured over planned weight, and what the suspensions are to give way to */
 static void weigh(const hxComplianceModel *model, const hxPlan *plan, double total, hxFootInput input[HX_LEGS], hxCompliance *laws) {
-  const double scale = hx_clamp(total / fmax(plan->weight, load_floor), least_scale, largest_scale);
+  const double ratio = total / fmax(plan->weight, load_floor), scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
-  if (!doubted) laws->scale += model->follow_weight * (scale - laws->scale);
+  if (!doubted) {
+    laws->scale += model->follow_weight * (scale - laws->scale);
+    hx_burden_weigh(&model->burden, ratio, &laws->burden);
+  }
+  hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int live = model->parts.suspension && plan->shares.activation[leg] > 0.0;
     input[leg].excess = live ? input[leg].excess - laws->scale * plan->shares.normal[leg] : 0.0;
@@ -206,6 +223,7 @@ static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws
 /* The laws one period on, limited, and the forces that come of them. */
 static void answer_forces(const hxComplianceModel *model, const hxPlan *plan, const hxFootInput input[HX_LEGS], double answer[HX_LEGS][3],
                           hxCompliance *laws) {
+  const double freedom = model->parts.support ? laws->burden.freedom : 1.0, kept = 1.0 - (1.0 - freedom) * model->follow_load;
   double answers = 0.0, deflections = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hx_foot_law_step(&model->law, &input[leg], &laws->law[leg]);
@@ -219,15 +237,14 @@ static void answer_forces(const hxComplianceModel *model, const hxPlan *plan, co
     hxFootLaw *law = &laws->law[leg];
     const double (*lever)[3] = plan->lever[leg];
     const double vertical = lever[0][2] * lever[0][2] + lever[1][2] * lever[1][2] + lever[2][2] * lever[2][2];
-    const hxPlane given = hx_scaled(law->answer, fmin(law->load, largest_load));
+    const hxPlane given = hx_scaled(law->answer, freedom * fmin(law->load, largest_load));
     answer[leg][0] = given.x;
     answer[leg][1] = given.y;
     answer[leg][2] = law->deflection / (model->softness * vertical); /* z/C_zz, C = J kp^-1 J^T */
-    /* a foot in the air forgets, within the time in which a leg gives up its load */
-    if (plan->swinging[leg] && !laws->touching[leg]) {
-      law->x.integral *= model->memory;
-      law->y.integral *= model->memory;
-    }
+    /* a foot in the air forgets, within the time in which a leg gives up its load; and all do what they may not take away */
+    const double left = plan->swinging[leg] && !laws->touching[leg] ? kept * model->memory : kept;
+    law->x.integral *= left;
+    law->y.integral *= left;
   }
 }
 
@@ -252,10 +269,11 @@ static void limit_joint(const hxComplianceModel *model, double wanted, double *b
   *torque = hx_clamp(*torque, -model->most, model->most);
 }
 
-/* bend = J^T f/kp, limited in rate; torque = own + scale x carry, limited */
+/* bend = J^T f/kp, limited in rate; torque = own + strength x scale x carry, limited */
 static void actuate(const hxComplianceModel *model, const hxPlan *plan, const double answer[HX_LEGS][3], hxCompliance *laws) {
+  const double strength = model->parts.limits ? laws->burden.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int joint = 0; joint < HX_JOINTS; ++joint) laws->torque[leg][joint] = plan->carry[leg][joint] * laws->scale;
+    for (int joint = 0; joint < HX_JOINTS; ++joint) laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
   if (laws->slack) take_up(model, plan, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double *f = answer[leg];
@@ -276,6 +294,7 @@ void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan, doub
   double normal[HX_LEGS], answer[HX_LEGS][3];
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];
   hx_contact_detect(model->weight, normal, laws->touching);
+  hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
   if (surprised(plan, laws)) wonder(model, plan, force, laws);
   const double total = mix(model, plan, (const double (*)[3])force, input, laws);
   weigh(model, plan, total, input, laws);

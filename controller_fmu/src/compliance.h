@@ -3,9 +3,11 @@
 #ifndef HX_COMPLIANCE_H
 #define HX_COMPLIANCE_H
 
+#include "burden.h"
 #include "contact_detection.h"
 #include "foot_law.h"
 #include "hexapod/inside.h"
+#include "landing.h"
 #include "support.h"
 #include "touchdown.h"
 
@@ -15,6 +17,7 @@ typedef struct hxComplianceModel {
   hxParts parts;
   hxFootLawModel law;
   hxWatchModel watch;
+  hxBurdenModel burden;
   double period;                       /* s */
   double weight, share, settled;       /* N       of the robot; a third of it; what feet that have met the ground carry together */
   double softness;                     /* rad/N m of the servos */
@@ -31,10 +34,12 @@ typedef struct hxPlan {
   double carry[HX_LEGS][HX_JOINTS];     /* N m  and for the planned load */
   double lever[HX_LEGS][HX_JOINTS][3];  /* m    J^T of the contact points */
   hxShares shares;
+  hxPlane feet[HX_LEGS];                /* m    contact points */
   double weight;                        /* N    of all shares */
   int standing[HX_LEGS];                /* carries its whole share */
   int well_up[HX_LEGS];                 /* well above the ground: in the air even if it is met early */
-  int high[HX_LEGS];                    /* so high that it cannot touch */
+  double height[HX_LEGS];               /* m    of the paths over their ends */
+  double needed;                        /* N m  largest of carry */
   int swinging[HX_LEGS];
   double falling[HX_LEGS];              /* m    by which feet well above the ground come down in a period */
   int hurried;                          /* some joint is asked for more speed than its servo has */
@@ -44,6 +49,8 @@ typedef struct hxCompliance {
   hxFootLaw law[HX_LEGS];
   hxWatch watch;
   hxTouchdown touchdown;
+  hxLandings landings;
+  hxBurden burden;
   int touching[HX_LEGS];
   double bend[HX_LEGS][HX_JOINTS];    /* rad  corrections of the joints' angles */
   double torque[HX_LEGS][HX_JOINTS];  /* N m  for the servos */

@@ -33,7 +33,10 @@ static void lower(const hxControllerModel *model, const hxPaths *paths, hxRow *r
   const hxSupportModel *support = &model->laws.support;
   for (int k = 0; k < HX_LEGS; ++k) {
     row->lowering[k] = 0.0;
-    row->activation[k] = model->compliant ? hx_support_activation(support, row->steps.phase[k], paths->swinging[k], paths->walking) : 1.0;
+    if (model->compliant)
+      row->activation[k] = hx_support_activation(support, row->steps.phase[k], paths->stayed[k], paths->stays[k], paths->walking);
+    else
+      row->activation[k] = 1.0;
   }
   if (model->compliant && model->laws.laws.parts.support) hx_support_lowering(support, row->steps.plane, row->activation, row->lowering);
   for (int k = 0; k < HX_LEGS; ++k) row->height[k] = row->steps.height[k] - row->lowering[k];
@@ -108,6 +111,16 @@ static double rate_of(const hxControllerState *state, double before, double now,
   return state->has_before ? (now - before) / period : 0.0;
 }
 
+/* the foot's centre as the command plans it: on its path, rolling, not lowered into the ground */
+static void show_planned(const hxRow *now, int k, double planned[3]) {
+  hxPlane plane = hx_add(now->steps.plane[k], now->shift[k]);
+  double height = now->steps.height[k];
+  hx_posture_see_place(&now->posture, &plane, &height);
+  planned[0] = plane.x;
+  planned[1] = plane.y;
+  planned[2] = height;
+}
+
 static void follow_paths(const hxControllerModel *model, hxControllerState *state) {
   const hxRow *before = row_at(state, -1), *now = row_at(state, 0), *after = row_at(state, 1);
   hxControllerOutput *output = &state->output;
@@ -121,6 +134,10 @@ static void follow_paths(const hxControllerModel *model, hxControllerState *stat
     hx_posture_see(&now->posture, &plane, &height, &velocity, &rise);
     output->unreachable[k] = hx_leg_solve(&model->leg[k], &now->pose[k], velocity, rise, output->angle_ref[k], output->speed_ref[k]);
     output->swinging[k] = state->paths.swinging[k];
+    show_planned(now, k, output->planned[k]);
+    const hxPose *neighbour = state->has_after ? &after->pose[k] : state->has_before ? &before->pose[k] : NULL;
+    hx_leg_accelerations(&model->leg[k], neighbour, state->has_after ? model->period : -model->period, output->angle_ref[k],
+                         output->speed_ref[k], output->acceleration_ref[k]);
   }
 }
 
@@ -133,7 +150,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
                            {before ? before->pose : NULL, now->pose, after ? after->pose : NULL}};
   const hxControllerOutput *output = &state->output;
   hxPlan *plan = &stance->plan;
-  hxPlane feet[HX_LEGS];
+  hxPlane *feet = plan->feet;
   double height[HX_LEGS];
   hxDemand demand;
   hx_dynamics_demand(&model->laws.dynamics, model->leg, &motion, output->speed_ref, &now->posture, &demand);

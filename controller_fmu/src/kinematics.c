@@ -92,3 +92,16 @@ int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, 
   }
   return missed;
 }
+
+void hx_leg_accelerations(const hxLegModel *model, const hxPose *neighbour, double ahead, const double angle[HX_JOINTS],
+                          const double speed[HX_JOINTS], double acceleration[HX_JOINTS]) {
+  const double most = 2.0 * model->speed_max / fabs(ahead);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    const double low = model->angle_min[joint], high = model->angle_max[joint];
+    const int held = angle[joint] <= low || angle[joint] >= high || fabs(speed[joint]) >= model->speed_max;
+    acceleration[joint] = 0.0;
+    if (held || !neighbour) continue;
+    const double way = hx_clamp(neighbour->angle[joint], low, high) - angle[joint] - ahead * speed[joint];
+    acceleration[joint] = hx_clamp(2.0 * way / (ahead * ahead), -most, most);
+  }
+}

@@ -53,6 +53,12 @@ void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity
 int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise, double angle[HX_JOINTS],
                  double speed[HX_JOINTS]);
 
+/* rad/s2  that lead the joints to the angles of a neighbouring step, `ahead` [s] of this one (< 0:
+ * that led from there); none without a neighbour. A joint that its limits hold, of angle or of
+ * speed, has none, and none has more than turns its speed round in that time. */
+void hx_leg_accelerations(const hxLegModel *model, const hxPose *neighbour, double ahead, const double angle[HX_JOINTS],
+                          const double speed[HX_JOINTS], double acceleration[HX_JOINTS]);
+
 HX_HIDDEN_END
 
 #endif

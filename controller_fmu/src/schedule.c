@@ -16,7 +16,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
-static const uint64_t saved_version = 1;
+static const uint64_t saved_version = 2;
 static const double clock_tolerance = 0.01; /* 1  of a period: a tick this much after the present time is due */
 
 static uint64_t checksum(const hxSaved *saved) { return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model)); }
@@ -60,7 +60,8 @@ static int is_finite(const hxControllerOutput *output) {
   double sum = 0.0; /* anything that is not finite makes it so */
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      sum += 0.0 * output->angle_ref[leg][joint] + 0.0 * output->speed_ref[leg][joint] + 0.0 * output->torque_ref[leg][joint];
+      sum += 0.0 * output->angle_ref[leg][joint] + 0.0 * output->speed_ref[leg][joint] + 0.0 * output->torque_ref[leg][joint] +
+             0.0 * output->acceleration_ref[leg][joint];
   return sum == 0.0;
 }
 

@@ -4,6 +4,7 @@
 
 #include "hexapod/controller.h"
 #include "hexapod/inside.h"
+#include "plane.h"
 
 HX_HIDDEN_BEGIN
 
@@ -20,6 +21,10 @@ typedef struct hxSlipState {
   double integral;  /* N */
   double slope;     /* N   filtered derivative */
 } hxSlipState;
+
+/* Tangential forces d on feet that carry normal forces [N] at these places [m], less what pushes and turns the body as one, shared by load:
+ * e = d - (n / sum n) (D + i w (p - c)), with neither a sum nor a moment about the vertical. */
+void hx_slip_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
 
 /* One period on under a force [N]; returns the answer [N]. */
 double hx_slip_pid_step(const hxSlipPid *pid, double force, hxSlipState *state);

@@ -27,11 +27,13 @@ static double smooth(double x) {
   return y * y * y * (10.0 + y * (6.0 * y - 15.0));
 }
 
-double hx_support_activation(const hxSupportModel *model, double phase, int swinging, int walking) {
-  /* a leg that has nowhere to step stays */
-  if (!walking || (phase >= model->duty && !swinging)) return 1.0;
+double hx_support_activation(const hxSupportModel *model, double phase, int stayed, int stays, int walking) {
+  /* a leg that stayed where it was has neither given up its load nor takes it up again */
+  if (!walking || (stayed && phase >= model->duty)) return 1.0;
   const double half = 0.5 * model->handover, since = fmod(phase + half, 1.0); /* cycles since the activation began to rise */
-  return fmin(smooth(since / model->handover), smooth((model->duty + 2.0 * half - since) / model->handover));
+  const double rising = stayed ? 1.0 : smooth(since / model->handover);
+  const double falling = stays ? 1.0 : smooth((model->duty + 2.0 * half - since) / model->handover);
+  return fmin(rising, falling);
 }
 
 /* x of S x = b, S symmetric and positive definite: x = L^-T D^-1 L^-1 b */

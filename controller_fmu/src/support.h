@@ -25,8 +25,9 @@ typedef struct hxShares {
 
 void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest, hxSupportModel *model);
 
-/* 1 while the leg stands, 0 in the air, in between over the hand-over */
-double hx_support_activation(const hxSupportModel *model, double phase, int swinging, int walking);
+/* 1 while the leg stands, 0 in the air, in between over the hand-over.
+ * stayed, stays: it had nowhere to step when it was to lift off last, or will have nowhere to when it is next. */
+double hx_support_activation(const hxSupportModel *model, double phase, int stayed, int stays, int walking);
 
 /* m  how much lower than planned the feet must be for the torso to keep its height over the ground that gives way */
 void hx_support_lowering(const hxSupportModel *model, const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],

@@ -96,7 +96,9 @@ void hx_paths_compile(const hxControllerDefinition *definition, const hxLegModel
   model->swing_time = gait->period * (1.0 - gait->duty);
   model->landing_lead = 0.5 * gait->period * gait->duty + model->swing_time;
   for (int k = 0; k < HX_LEGS; ++k) {
-    model->offset[k] = offset[k] + hx_gait_start_clock(gait, offset) - clock_epsilon;
+    const double begin = offset[k] + hx_gait_start_clock(gait, offset), first = begin + clock_epsilon;
+    model->offset[k] = begin - clock_epsilon;
+    model->late[k] = first - floor(first) >= gait->duty;
     hx_leg_forward(&leg[k], leg[k].stance, foot);
     model->home[k] = hx_plane(foot[0], foot[1]);
     model->home_height[k] = foot[2];
@@ -118,6 +120,7 @@ static void rest(const hxPathModel *model, const hxPlane plane[HX_LEGS], hxPaths
     steps->plane[leg] = steps->goal[leg] = place[leg];
     steps->height[leg] = model->home_height[leg];
     steps->phase[leg] = phase_after(model, leg, 0);
+    paths->stayed[leg] = model->late[leg];
   }
 }
 
@@ -130,7 +133,9 @@ static int lift_off(const hxPathModel *model, const hxPaths *old, hxPaths *paths
     const int stood = phase_after(model, leg, paths->before) < model->duty;
     paths->standing[leg] = phase_after(model, leg, paths->before + 1) < model->duty;
     paths->lifted[leg] = stood && !paths->standing[leg];
+    paths->stayed[leg] |= paths->lifted[leg];
     paths->swinging[leg] = old->swinging[leg] && !paths->standing[leg];
+    paths->stays[leg] = 0;
     any |= paths->swinging[leg];
   }
   return any;
@@ -145,6 +150,7 @@ static int come_home(const hxPathModel *model, const hxPaths *old, const hxSteps
     if (old->swinging[leg] && paths->standing[leg]) feet[leg] = hx_times(hx_cis(-now->turn), hx_sub(now->goal[leg], now->way));
     const int home = sqrt(hx_square(hx_sub(feet[leg], model->home[leg]))) < home_tolerance;
     paths->lifted[leg] &= !home;
+    paths->stays[leg] = home && !paths->swinging[leg];
     all_home &= home;
     any_lifted |= paths->lifted[leg];
   }
@@ -206,7 +212,10 @@ void hx_paths_plan(const hxPathModel *model, const hxSteps *now, int64_t number,
     rest(model, feet, paths, first);
     return;
   }
-  for (int leg = 0; leg < HX_LEGS; ++leg) paths->swinging[leg] |= paths->lifted[leg];
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    paths->swinging[leg] |= paths->lifted[leg];
+    paths->stayed[leg] &= !paths->lifted[leg];
+  }
   paths->walking = 1;
   set_out(model, paths, now, twist, first);
 }

@@ -37,6 +37,7 @@ int hx_ramp_moves(const hxRamp *ramp);
 typedef struct hxPathModel {
   double period, gait_period, duty, step_height, touchdown_speed;
   double offset[HX_LEGS];       /* cycles  phases at the walk's begin */
+  int late[HX_LEGS];            /* the walk begins in the time of its swing */
   double swing_time;            /* s */
   double landing_lead;          /* s   from lift-off to the middle of the next stance */
   hxPlane home[HX_LEGS];        /* m   feet of the stance */
@@ -71,6 +72,8 @@ typedef struct hxPaths {
   int swinging[HX_LEGS];
   int standing[HX_LEGS];  /* by the clock; a foot with nowhere to step neither stands by it nor swings */
   int lifted[HX_LEGS];    /* just now */
+  int stayed[HX_LEGS];    /* had nowhere to step when it was to lift off last, so it stood through the time of its swing */
+  int stays[HX_LEGS];     /* will have nowhere to when it is next: at home under a body at rest */
 } hxPaths;
 
 void hx_paths_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS], hxPathModel *model);

@@ -1,4 +1,5 @@
-"""The `hexapod` command: parse, call one function, exit code. 0 only on success; an error is one paragraph on stderr.
+"""The `hexapod` command: parse, call one function, exit code. 0 only on success; an error is one paragraph on stderr, and with --json an
+object on stdout as well.
 
 Nothing slow is imported before `main` guards it, so Ctrl-C at any time ends in one line.
 """
@@ -10,7 +11,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-FAILURE, USAGE, INTERRUPT = 1, 2, 130
+from hexapod_cosim.cosim.cli.failures import FAILURE, INTERRUPT, SUCCESS, USAGE, tell_failure
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,11 +24,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         if "--debug" in given:
             raise
-        print(f"hexapod: unexpected {type(error).__name__}: {error}; run `hexapod --debug ...` to see where", file=sys.stderr)
-        return FAILURE
-    if code == INTERRUPT:
-        print("hexapod: interrupted", file=sys.stderr)
-    return code
+        text = f"unexpected {type(error).__name__}: {error}; run `hexapod --debug ...` to see where"
+        return tell_failure(text, FAILURE, as_json=_wants_json(given))
+    return tell_failure("interrupted", INTERRUPT, as_json=_wants_json(given)) if code == INTERRUPT else code
+
+
+def _wants_json(given: Sequence[str]) -> bool:
+    """Whether --json was typed, also on a command line that cannot be parsed."""
+    return "--json" in given
 
 
 def _run(given: list[str]) -> int:
@@ -44,13 +48,13 @@ def _run(given: list[str]) -> int:
     except usage_error as error:
         return _usage(error, given)
     except SystemExit as stop:  # typer ends so when it answers a shell
-        return 0 if stop.code is None else stop.code if isinstance(stop.code, int) else FAILURE
+        return SUCCESS if stop.code is None else stop.code if isinstance(stop.code, int) else FAILURE
     except HexapodError as error:
-        print(f"hexapod: {error}", file=sys.stderr)
+        tell_failure(str(error), FAILURE, error=error, as_json=_wants_json(given))
         if "--debug" in given:
             traceback.print_exception(error)
         return FAILURE
-    return code if isinstance(code, int) else 0  # after Ctrl-C too: typer keeps KeyboardInterrupt to itself
+    return code if isinstance(code, int) else SUCCESS  # after Ctrl-C too: typer keeps KeyboardInterrupt to itself
 
 
 def _usage(error: Any, given: Sequence[str]) -> int:
@@ -64,5 +68,4 @@ def _usage(error: Any, given: Sequence[str]) -> int:
     path, usage = (context.command_path, context.command.get_usage(context)) if context else ("hexapod", "")
     said, expected = (" ".join(text.split()) for text in (error.format_message().rstrip("."), usage.removeprefix("Usage: ")))
     told = HexapodError("not understood", got=said, expected=expected or "a value after it", fix=f"`{path} --help` explains it")
-    print(f"hexapod: {told}", file=sys.stderr)
-    return USAGE
+    return tell_failure(str(told), USAGE, error=told, as_json=_wants_json(given))

@@ -7,13 +7,14 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.cosim.cli import compare_command, fmu_commands, listing, run_commands, study_command
+from hexapod_cosim.cosim.cli.failures import EPILOG
 from hexapod_cosim.cosim.plant_files import package_version
 
-app = typer.Typer(name="hexapod", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(name="hexapod", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False, epilog=EPILOG)
 app.command("export")(fmu_commands.export)
-app.command("simulate")(run_commands.simulate)
-app.command("compare")(compare_command.compare)
-app.command("study")(study_command.study)
+app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
+app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
+app.command("study", epilog=study_command.EPILOG)(study_command.study)
 app.command("design")(fmu_commands.design)
 app.command("report")(run_commands.report)
 app.command("validate")(fmu_commands.validate)

@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.accuracy import Accuracy, halved
 from hexapod_cosim.cosim.batch import Summary, run_batch, summarise
+from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
+from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     FmuFile,
     FolderName,
@@ -26,13 +29,15 @@ from hexapod_cosim.cosim.cli.running import (
     show_rows,
     titled,
 )
-from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, warn
+from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, show_text, warn
 from hexapod_cosim.cosim.comparison import SEEDS, SEEDS_PARTIAL, Comparison, compare_runs, write_seeds
 from hexapod_cosim.cosim.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.interrupts import held_interrupts
 from hexapod_cosim.cosim.master import COMPLETED
+from hexapod_cosim.cosim.metrics import has_net_slip
 from hexapod_cosim.cosim.report import REPORT, about, comparison_rows, write_report
-from hexapod_cosim.cosim.results import METRICS_FILE, SCENARIO, Folder, Stored, results_folder, stored
+from hexapod_cosim.cosim.report.accuracy import with_errors
+from hexapod_cosim.cosim.results import ACCURACY, METRICS_FILE, SCENARIO, Folder, read_scenario, results_folder, stored
 from hexapod_cosim.cosim.run import Result, chosen_gains
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS, Scenario
@@ -40,6 +45,10 @@ from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.cosim.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
 
+EPILOG = (
+    f"Exit code {FELL} when the robot did not walk to the end of every run, under either control: the report is written all the same, "
+    "says how many did, and compares the seeds on which both walked."
+)
 MAX_SEEDS = 10_000
 Seeds = Annotated[
     int, typer.Option("--seeds", metavar="N", help="Runs of each control, which small variations tell apart; 1: the plain walk alone.")
@@ -48,24 +57,39 @@ Seeds = Annotated[
 
 def compare(
     scenario: Name = "walk_flat", seeds: Seeds = 10, settings: Settings = None, output: FolderName = None,
-    fmu: FmuFile = None, gains: GainsFile = None, json: Json = False,
-) -> None:  # fmt: skip
+    fmu: FmuFile = None, gains: GainsFile = None, accuracy: CheckAccuracy = False, json: Json = False,
+) -> int:  # fmt: skip
     """Run a walk under kinematic and under compliant control; report."""
     plan = _plan(scenario, settings or [], seeds)
-    ready = chosen_gains(replace(plan, control="compliant"), given_gains(gains))
-    command = command_line("compare", scenario, seeds=seeds, settings=settings, fmu=fmu, gains=gains)
+    if accuracy:
+        halved(plan)  # refused before anything is run
+    given = given_gains(gains)
+    ready = chosen_gains(replace(plan, control="compliant"), given)
+    command = command_line("compare", scenario, seeds=seeds, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy)
     with results_folder(output or default_folder(scenario)) as folder:
         results, files = _first_seed(plan, folder, command, fmu=fmu, gains=ready)
         comparison = _all_seeds(plan, results, seeds, folder.path, fmu=fmu, gains=ready)
+        files += _store(plan, comparison, folder.path, command)
+        checked: dict[str, Accuracy] = {}
+        if accuracy:
+            checked = _accuracies(plan, comparison, folder.path, fmu=fmu, used=ready, given=given)
+            write_json(folder.path / METRICS_FILE, _table(comparison, checked))
         with drawing(folder.path):
             runs = {control: stored(result) for control, result in results.items()}
-            files += _finish(plan, runs, comparison, folder.path, command)
+            scenario_text = read_scenario(folder.path)
+            files += write_report(
+                runs, folder.path, tell=warn, comparison=comparison, scenario=scenario_text, command=command, accuracies=checked
+            )
     if json:
-        show_json({**comparison.as_table(), "report": str(folder.path / REPORT)})
-        return
-    show_rows(comparison_rows(comparison), CONTROLS)
-    show_files(files)
-    print("\n".join(filter(None, (about(comparison), f"report: {folder.path / REPORT}"))))
+        show_json({**_table(comparison, checked), "report": str(folder.path / REPORT)})
+    else:
+        net_slip = has_net_slip(next(iter(results.values())).parameters)
+        rows = comparison_rows(comparison, net_slip=net_slip)
+        show_rows(with_errors(rows, checked), CONTROLS)
+        show_accuracy(rows, checked, comparison.means)
+        show_files(files)
+        show_text("\n".join(filter(None, (about(comparison), f"report: {folder.path / REPORT}"))))
+    return FELL if comparison.losses else SUCCESS
 
 
 def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
@@ -113,10 +137,27 @@ def _all_seeds(
     return comparison
 
 
-def _finish(plan: Scenario, runs: Mapping[str, Stored], comparison: Comparison, folder: Path, command: str) -> list[Path]:
+def _accuracies(
+    plan: Scenario, comparison: Comparison, folder: Path, *, fmu: Path | None, used: Gains | None, given: Gains | None
+) -> dict[str, Accuracy]:
+    """By control, of the means over the seeds that are compared."""
+    found = {}
+    for control, runs in zip(CONTROLS, comparison.judged, strict=True):
+        plans = [replace(plan, control=control, seed=run.seed) for run in runs]
+        found[control] = check_accuracy(plans, runs, folder, fmu=fmu, used=used, given=given)
+    return found
+
+
+def _table(comparison: Comparison, checked: Mapping[str, Accuracy]) -> dict[str, Any]:
+    """The content of metrics.json."""
+    accuracy = {ACCURACY: {control: item.as_table() for control, item in checked.items()}} if checked else {}
+    return comparison.as_table() | accuracy
+
+
+def _store(plan: Scenario, comparison: Comparison, folder: Path, command: str) -> list[Path]:
+    """Writes all but the figures and the report."""
     text = to_toml({key: value for key, value in plan.to_table().items() if key != "control"})  # both were run
     write_text(folder / SCENARIO, text)
-    write_json(folder / METRICS_FILE, comparison.as_table())
+    write_json(folder / METRICS_FILE, _table(comparison, {}))
     write_json(folder / RUN_FILE, {"kind": "compare", "status": COMPLETED, "title": plan.title, "command": command})
-    files = write_report(runs, folder, tell=warn, comparison=comparison, scenario=text, command=command)
-    return [folder / SEEDS, folder / SCENARIO, folder / METRICS_FILE, folder / RUN_FILE, *files]
+    return [folder / SEEDS, folder / SCENARIO, folder / METRICS_FILE, folder / RUN_FILE]

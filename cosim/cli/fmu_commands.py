@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from hexapod_cosim.controller import Gains, save_gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
-from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, show_table, waiting, warn
+from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, show_table, show_text, waiting, warn
 from hexapod_cosim.cosim.controller_export import export_controller, make_setup
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.export import export_fmu
@@ -141,6 +142,14 @@ def _show_written(path: Path, robot: Robot, kind: str, *, json: bool) -> None:
     print("".join(f"{text}\n" for key, text in robot.source.items() if key.startswith("URDF, ")), end="")
 
 
+class UnsoundError(FmuError):
+    """An FMU with problems; `found` is what --json says of it beside the error."""
+
+    def __init__(self, fmu: Path, problems: Sequence[str], what: str, **parts: Any) -> None:
+        super().__init__(what, **parts)
+        self.found = {"fmu": str(fmu), "valid": False, "problems": list(problems)}
+
+
 def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The FMU to check.")], json: Json = False) -> None:
     """Check an FMU of ours and say what is wrong."""
     if fmu.suffix == PACKAGE_SUFFIX:
@@ -149,16 +158,18 @@ def validate(fmu: Annotated[Path, typer.Argument(metavar="FILE.fmu", help="The F
     try:
         problems = find_problems(fmu)
     except HexapodError as error:  # not even to be read
-        if json:
-            show_json({"fmu": str(fmu), "valid": False, "problems": [str(error)]})
-        raise
-    if json:
-        show_json({"fmu": str(fmu), "valid": not problems, "problems": problems})
-    else:
-        print("\n".join(problems) if problems else f"{fmu}: no problems found")
+        parts = {"got": error.got, "expected": error.expected, "fix": error.fix, "where": error.where}
+        raise UnsoundError(fmu, [str(error)], error.what, **parts) from error
     if problems:
+        if not json:
+            print("\n".join(problems))
         fix = "export it again with `hexapod export`"
-        raise FmuError("the FMU is not sound: problems", got=f"{len(problems)} of them", expected="none", fix=fix, where=str(fmu))
+        what, got = "the FMU is not sound: problems", f"{len(problems)} of them"
+        raise UnsoundError(fmu, problems, what, got=got, expected="none", fix=fix, where=str(fmu))
+    if json:
+        show_json({"fmu": str(fmu), "valid": True, "problems": []})
+    else:
+        print(f"{fmu}: no problems found")
 
 
 def design(
@@ -178,12 +189,13 @@ def design(
 ) -> None:
     """Design the gains of the compliant control, with plots."""
     from hexapod_cosim.controller.design import design_gains, plot_design  # noqa: PLC0415  slow to import: python-control, matplotlib
-    from hexapod_cosim.cosim.design import read_requirements, standing_plants  # noqa: PLC0415
+    from hexapod_cosim.cosim.design import examine_stances, read_requirements  # noqa: PLC0415
     from hexapod_cosim.cosim.design_check import check_design  # noqa: PLC0415
 
-    made, needs, folder = load_robot(robot), read_requirements(settings or []), output or Path("out") / "design"
-    plants = standing_plants(made, macro_step)
-    gains = design_gains(made, macro_step, plants=plants, requirements=needs)
+    made, folder = load_robot(robot), output or Path("out") / "design"
+    needs = read_requirements(settings or [], made)
+    plants, left_out = examine_stances(made, macro_step)
+    gains = design_gains(made, macro_step, plants=plants, requirements=needs, left_out=left_out)
     deviation = check_design(made, gains).error
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -194,8 +206,10 @@ def design(
         show_json({"gains": asdict(gains), "check_error": deviation, "files": [str(file) for file in files]})
         return
     show_table(["requirement", "asked", "reached"], design_rows(gains), right=(1, 2))
-    print(f"binding: {gains.margins.binding}")
-    print(f"a small squeeze in the non-linear FMU goes as the linear loop predicts, to {100.0 * deviation:.2g} % of its peak")
+    show_text(f"binding: {gains.margins.binding}")
+    for text in gains.caveats:
+        show_text(text)
+    show_text(f"a small squeeze in the non-linear FMU goes as the linear loop predicts, to {100.0 * deviation:.2g} % of its peak")
     show_files(files)
 
 

@@ -7,7 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
+from hexapod_cosim.cosim.accuracy import Accuracy, halved
+from hexapod_cosim.cosim.batch import summarise
 from hexapod_cosim.cosim.cli import completion
+from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
+from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
     FmuFile,
     FolderName,
@@ -25,12 +29,24 @@ from hexapod_cosim.cosim.cli.running import (
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
 from hexapod_cosim.cosim.comparison import SEEDS, compare_runs, read_seeds
 from hexapod_cosim.cosim.files import STUDY
+from hexapod_cosim.cosim.metrics import has_net_slip
 from hexapod_cosim.cosim.report import REPORT, metric_rows, write_report
-from hexapod_cosim.cosim.results import read_facts, read_result, read_scenario, results_folder, stored
-from hexapod_cosim.cosim.run import Result
+from hexapod_cosim.cosim.report.accuracy import with_errors
+from hexapod_cosim.cosim.results import (
+    ACCURACY,
+    read_accuracies,
+    read_facts,
+    read_result,
+    read_scenario,
+    results_folder,
+    stored,
+    write_accuracy,
+)
+from hexapod_cosim.cosim.run import Result, chosen_gains
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
 
+EPILOG = f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 Control = Annotated[
     str | None,
     typer.Option("--control", metavar="|".join(CONTROLS), help="Overrides the scenario's control.", autocompletion=completion.control),
@@ -39,23 +55,35 @@ Control = Annotated[
 
 def simulate(
     scenario: Name = "walk_flat", control: Control = None, settings: Settings = None, output: FolderName = None,
-    fmu: FmuFile = None, gains: GainsFile = None, json: Json = False,
-) -> None:  # fmt: skip
+    fmu: FmuFile = None, gains: GainsFile = None, accuracy: CheckAccuracy = False, json: Json = False,
+) -> int:  # fmt: skip
     """Run one co-simulation: results, metrics, plots."""
     plan = load_scenario(scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])])
     plan = titled(plan, settings or [])
-    ready = given_gains(gains)
+    given = given_gains(gains)
+    if accuracy:
+        halved(plan)  # refused before anything is run
+    ready = chosen_gains(plan, given) if accuracy else given
     with results_folder(output or default_folder(scenario)) as folder:
-        command = command_line("simulate", scenario, control=control, settings=settings, fmu=fmu, gains=gains)
+        command = command_line("simulate", scenario, control=control, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy)
         result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready)
+        checked: dict[str, Accuracy] = {}
+        if accuracy:
+            checked[plan.control] = check_accuracy([plan], [summarise(result)], folder.path, fmu=fmu, used=ready, given=given)
+            write_accuracy(folder.path, result.metrics, checked[plan.control].as_table())
         if plan.outputs.plots:
             with drawing(folder.path):
-                files += write_report({plan.control: stored(result)}, folder.path, tell=warn)
+                files += write_report({plan.control: stored(result)}, folder.path, tell=warn, accuracies=checked)
     if json:
-        show_json(_summary(result, folder.path, files))
-        return
-    show_rows(metric_rows({plan.control: result.metrics}), [plan.control])
-    show_files(files)
+        told = {ACCURACY: checked[plan.control].as_table()} if accuracy else {}
+        show_json(_summary(result, folder.path, files) | told)
+    else:
+        metrics = {plan.control: result.metrics}
+        rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
+        show_rows(with_errors(rows, checked), [plan.control])
+        show_accuracy(rows, checked, metrics)
+        show_files(files)
+    return SUCCESS if result.facts["walk"]["upright"] else FELL
 
 
 def report(
@@ -73,11 +101,13 @@ def report(
         runs = {control: read_result(folder / control) for control in CONTROLS}
         comparison = compare_runs(*(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS))
         files = write_report(
-            runs, folder, tell=warn, comparison=comparison, scenario=read_scenario(folder), command=facts.get("command", "")
-        )
+            runs, folder, tell=warn, comparison=comparison, scenario=read_scenario(folder), command=facts.get("command", ""),
+            accuracies=read_accuracies(folder),
+        )  # fmt: skip
     else:
         run = read_result(folder)
-        files = write_report({run.facts["control"]: run}, folder, tell=warn)
+        control = run.facts["control"]
+        files = write_report({control: run}, folder, tell=warn, accuracies={control: run.accuracy} if run.accuracy else {})
     if json:
         show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
         return

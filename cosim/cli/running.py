@@ -50,13 +50,21 @@ class RunError(HexapodError):
 
 
 def command_line(
-    name: str, scenario: str, *, settings: list[str] | None, fmu: Path | None, gains: Path | None, **more: str | int | None
+    name: str,
+    scenario: str,
+    *,
+    settings: list[str] | None,
+    fmu: Path | None,
+    gains: Path | None,
+    accuracy: bool = False,
+    **more: str | int | None,
 ) -> str:
     """The command that does the same again."""
     options = [("--set", text) for text in settings or []]
     given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
     options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
-    return shlex.join(["hexapod", name, scenario, *(word for option in options for word in option)])
+    flags = ["--check-accuracy"] if accuracy else []
+    return shlex.join(["hexapod", name, scenario, *(word for option in options for word in option), *flags])
 
 
 def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:

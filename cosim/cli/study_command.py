@@ -9,11 +9,13 @@ from typing import Annotated
 
 import typer
 
+from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.running import FmuFile, GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, warn
 from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE, ENGINES
 from hexapod_cosim.cosim.study.records import StudyError
 
+EPILOG = f"A fall is a result of a study. Exit code {FELL} only when the robot walked to the end of no run at all and fell in some."
 MAX_WORKERS = 4096
 Workers = Annotated[
     int | None, typer.Option("--workers", metavar="N", help="Processes on this machine; default: one for each processor; 0: this one.")
@@ -29,7 +31,7 @@ def study(
     file: Annotated[str, typer.Argument(metavar="STUDY", help="A study file, or a name of `hexapod list studies`.")],
     output: StudyFolder = None, workers: Workers = None, scheduler: Scheduler = None, engine: EngineName = DEFAULT_ENGINE,
     fmu: FmuFile = None, gains: GainsFile = None, json: Json = False,
-) -> None:  # fmt: skip
+) -> int:  # fmt: skip
     """Run a study: sweeps, Monte Carlo, tuning. Stopped at any point and started again, it goes on where it was."""
     from hexapod_cosim.cosim.cli.studying import carry_out  # noqa: PLC0415  slow to import, and no other command needs it
     from hexapod_cosim.cosim.study.study import Options  # noqa: PLC0415
@@ -38,7 +40,7 @@ def study(
         engine=engine, fmu=fmu, gains=given_gains(gains), workers=_checked_workers(workers), scheduler=scheduler, say=warn,
         command=_command_line(file, {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains}),
     )  # fmt: skip
-    carry_out(file, output or Path("out") / Path(file).stem, options, json=json)
+    return carry_out(file, output or Path("out") / Path(file).stem, options, json=json)
 
 
 def _checked_workers(count: int | None) -> int | None:

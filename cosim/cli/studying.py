@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from hexapod_cosim.cosim.cli.terminal import counting_bar, show_files, show_json, show_table, warn
+from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
+from hexapod_cosim.cosim.cli.terminal import counting_bar, show_files, show_json, show_table, show_text, warn
+from hexapod_cosim.cosim.comparison import METHOD
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.conduct import Tell
 from hexapod_cosim.cosim.study.manifest import TIMES
@@ -20,8 +22,8 @@ from hexapod_cosim.cosim.study.study import Begun, Options, run_study
 MOST_REASONS = 10
 
 
-def carry_out(file: str, folder: Path, options: Options, *, json: bool) -> None:
-    """Runs a study, or what is missing of it, writes its report and shows what came out."""
+def carry_out(file: str, folder: Path, options: Options, *, json: bool) -> int:
+    """Runs a study, or what is missing of it, writes its report and shows what came out. Returns the exit code."""
     plan = load_study(file)
     try:
         with progress(plain=not json) as begun:
@@ -33,10 +35,17 @@ def carry_out(file: str, folder: Path, options: Options, *, json: bool) -> None:
     warn_of(found)
     if json:
         show_json({**summary_of(found), "results": str(results), "report": str(files[-1])})
-        return
-    show_study(found)
-    show_files([results, folder / TIMES, *files])
-    print(f"report: {files[-1]}")
+    else:
+        show_study(found)
+        show_files([results, folder / TIMES, *files])
+        print(f"report: {files[-1]}")
+    return FELL if _only_falls(found) else SUCCESS
+
+
+def _only_falls(found: Results) -> bool:
+    """Whether no run at all walked to its end, and the robot fell in some of them."""
+    overall = found.overall
+    return not any(overall.walked.values()) and any(status == COMPLETED for _, status, _ in overall.failures)
 
 
 def warn_of(found: Results) -> None:
@@ -101,12 +110,14 @@ def show_study(found: Results) -> None:
     ]
     show_table(columns, texts, right=[k for k, name in enumerate(columns) if name not in ("metric", "unit", "")])
     walked = ", ".join(f"{control} {overall.walked.get(control, 0)} of {overall.total.get(control, 0)}" for control in controls)
-    print(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
+    show_text(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
+    if len(controls) == 2:
+        show_text(f"{METHOD}.")
     for (control, status, reason), count in list(overall.failures.items())[:MOST_REASONS]:
-        print(f"{count:6d} x {control} {_ending(status)}: {reason}")
+        show_text(f"{count:6d} x {control} {_ending(status)}: {reason}")
     for row in optimum_rows(found):
         settings = ", ".join(f"{name} {text}" for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True))
-        print(f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}")
+        show_text(f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}")
     show_gained(found)
 
 
@@ -115,4 +126,4 @@ def show_gained(found: Results) -> None:
     for row in optimum_changes(found):
         interval = f" (95 % interval {row['interval']})" if row["interval"] else ""
         verdict = f", {row['verdict']}" if row["verdict"] else ""
-        print(f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, {row['pairs']} pairs{verdict}")
+        show_text(f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, {row['pairs']} pairs{verdict}")

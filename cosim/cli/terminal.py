@@ -13,12 +13,16 @@ from typing import Annotated, Any, Protocol
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from hexapod_cosim.cosim import master
+from hexapod_cosim.cosim.cli.width import columns_of, fitted
 from hexapod_cosim.cosim.files import to_json
 
+PIPE = 160  # columns of tables where there is no terminal
+GAP = 2  # between columns
+NARROWEST = 20  # of a column of text that is broken into lines
 EVERY = 30.0  # s    between lines of progress in a log
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
@@ -41,23 +45,57 @@ def show_files(files: Iterable[Path]) -> None:
     for file in files:
         folders.setdefault(file.parent, []).append(file.name)
     for folder, names in folders.items():
-        print(f"wrote {folder}/" + (names[0] if len(names) == 1 else "{" + ", ".join(sorted(names)) + "}"))
+        show_text(f"wrote {folder}/" + (names[0] if len(names) == 1 else "{" + ", ".join(sorted(names)) + "}"))
+
+
+def show_text(text: str) -> None:
+    """Prints sentences, broken between words on a terminal."""
+    print(fitted(text, sys.stdout))
 
 
 def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
-    """Prints an aligned table; `right` are the columns of numbers."""
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for k, name in enumerate(columns):
-        table.add_column(name, justify="right" if k in right else "left", no_wrap=k < len(columns) - 1)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    shown = sys.stdout.isatty()
-    Console(width=None if shown else 160, force_terminal=shown, highlight=False).print(table)
+    """Prints an aligned table; `right` are the columns of numbers.
+
+    On a terminal too narrow for it the last column is broken into lines where it is text, else columns stand closer together, else those
+    for which there is no room follow in a table of their own, below the same first column.
+    """
+    texts, width = [list(row) for row in rows], columns_of(sys.stdout)
+    widths = [max(map(len, column)) for column in zip(columns, *texts, strict=True)]
+    gap, blocks = _layout(widths, width or PIPE, broken=len(columns) - 1 not in right)
+    console = Console(width=width or PIPE, force_terminal=width is not None, highlight=False)
+    for number, block in enumerate(blocks):
+        if number:
+            print()
+        table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0))
+        for k in block:
+            last = k == len(columns) - 1
+            table.add_column(columns[k], justify="right" if k in right else "left", no_wrap=not last, overflow="fold")
+        for row in texts:
+            table.add_row(*(Text(row[k]) for k in block))
+        console.print(table)
+
+
+def _layout(widths: Sequence[int], width: int, *, broken: bool) -> tuple[int, list[list[int]]]:
+    """The gap between columns, and which of them stand side by side, for a table in a terminal of that width.
+
+    broken: whether the last column may be broken into lines.
+    """
+    whole = list(range(len(widths)))
+    least = [*widths[:-1], min(widths[-1], NARROWEST)] if broken else widths
+    for gap in (GAP, 1):
+        if sum(least) + gap * (len(least) - 1) <= width:
+            return gap, [whole]
+    blocks = [[0]]
+    for k in whole[1:]:
+        if len(blocks[-1]) > 1 and sum(least[place] + GAP for place in blocks[-1]) + least[k] > width:
+            blocks.append([0])
+        blocks[-1].append(k)
+    return GAP, blocks
 
 
 def warn(text: str) -> None:
     """A doubt, on stderr."""
-    print(f"warning: {text}", file=sys.stderr)
+    print(fitted(f"warning: {text}", sys.stderr), file=sys.stderr)
 
 
 @contextmanager
@@ -110,10 +148,15 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
+def _whole() -> Column:
+    """A column of a progress bar that is not broken into lines: the bar gives way instead."""
+    return Column(no_wrap=True)
+
+
 @contextmanager
 def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[..., None]]:
     """A progress bar that moves to and fro until it is told for the first time how much is done, and counts from there."""
-    columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left())
+    columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left(_whole()))
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total, start=False, already=0.0)
 
@@ -132,7 +175,7 @@ def progress_bar(label: str, duration: float) -> Iterator[master.Progress | None
     if not sys.stderr.isatty():
         yield None
         return
-    with _bar(label, duration, _Simulated()) as tell:
+    with _bar(label, duration, _Simulated(_whole())) as tell:
         yield tell
 
 
@@ -148,7 +191,7 @@ def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Cou
     if not sys.stderr.isatty():
         yield _PlainCount(label, total) if plain else lambda done, failed=0: None
         return
-    with _bar(label, total, _Counted()) as tell:
+    with _bar(label, total, _Counted(_whole())) as tell:
         yield tell
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
-from hexapod_cosim.cosim.comparison import BETTER, SAME, WORSE, Change, Comparison
+from hexapod_cosim.cosim.accuracy import Accuracy
+from hexapod_cosim.cosim.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
 from hexapod_cosim.cosim.files import write_text
-from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS
-from hexapod_cosim.cosim.report.headline import cards, headline, plain_headline
+from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
+from hexapod_cosim.cosim.report.accuracy import about_accuracy, effect_rows, with_errors
+from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.results import Stored
@@ -35,6 +38,11 @@ class Section(NamedTuple):
 SECTIONS = (
     Section("foot_forces", "Foot forces", "Normal force of each foot, in body weights."),
     Section("slip", "Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot."),
+    Section(
+        "feet",
+        "Planned and real feet",
+        "How far each foot's centre is from where the command plans it, in the torso's frame; the figures show both paths.",
+    ),
     Section("posture", "Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", "pairs"),
     Section("torques", "Torques", "The largest absolute torque over the six legs, joint by joint."),
     Section("energy", "Energy audit", "Work, loss and stored energy since the start; beside them what the books do not explain.", "pairs"),
@@ -56,11 +64,13 @@ def write_report(
     comparison: Comparison | None = None,
     scenario: str | None = None,
     command: str | None = None,
+    accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
 ) -> list[Path]:
     """Draws the figures and writes report.html for runs by control. Returns the files, the report last.
 
     `tell` hears what could not be drawn. A comparison, whose figures are over all seeds while the runs are those of the first one, says
-    by what `scenario` (TOML) and `command` it was made; a single run has its own.
+    by what `scenario` (TOML) and `command` it was made; a single run has its own. `accuracies`, by control, are of the figures where they
+    were checked.
     """
     from hexapod_cosim.cosim.plots import FIGURES, save_figures  # noqa: PLC0415  matplotlib is slow to import
 
@@ -70,6 +80,7 @@ def write_report(
         tell(text)
     first = next(iter(runs.values()))
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
+    metrics = {label: run.metrics for label, run in runs.items()} if comparison is None else comparison.means
     page = render(
         "report.html.jinja",
         title=first.facts["title"],
@@ -82,8 +93,12 @@ def write_report(
         missing=missing,
         scenario=first.scenario if scenario is None else scenario,
         command=first.facts.get("command", "") if command is None else command,
+        creep=creep_note(first.facts["parameters"]),
         gains={label: to_toml(run.facts["gains"]) for label, run in runs.items() if run.facts.get("gains")},
-        **content,
+        accuracy=about_accuracy(accuracies),
+        effects=effect_rows(content["rows"], accuracies, metrics),
+        notes=[f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
+        **content | {"rows": with_errors(content["rows"], accuracies)},
         **_replay(runs),
     )
     write_text(folder / REPORT, page)
@@ -91,7 +106,7 @@ def write_report(
 
 
 def _one_run(run: Stored) -> dict[str, Any]:
-    rows = metric_rows({run.facts["control"]: run.metrics})
+    rows = metric_rows({run.facts["control"]: run.metrics}, net_slip=has_net_slip(run.facts["parameters"]))
     return {
         "headline": plain_headline(run.metrics, run.facts),
         "cards": [],
@@ -103,8 +118,9 @@ def _one_run(run: Stored) -> dict[str, Any]:
 
 
 def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, Any]:
-    rows, notes = comparison_rows(comparison), about(comparison)
-    means = notes.replace(" of the mean change.", " in brackets.") or "One run of each control."
+    rows, notes = comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"])), about(comparison)
+    means = notes.partition(f"; {METHOD}")[0]
+    means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
     lead = f"Robot {facts['robot']['name']}. {means}"
     return {"headline": headline(comparison), "cards": cards(comparison), "rows": rows, "about": notes, "losses": comparison.losses,
             "lead": lead}  # fmt: skip
@@ -133,18 +149,19 @@ def _robot(facts: Mapping[str, Any]) -> str:
     return f"Robot {facts['robot']['name']}, {_told(facts)}."
 
 
-def metric_rows(metrics: Mapping[str, Mapping[str, float | None]]) -> Rows:
-    """A row per metric: name, unit, meaning, and values by control as text."""
+def metric_rows(metrics: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> Rows:
+    """A row per metric that tells something of these runs: name, unit, meaning, and values by control as text."""
     empty = {"change": "", "interval": "", "verdict": ""}
+    shown = [(name, *METRICS[name]) for name in shown_metrics(metrics, net_slip=net_slip)]
     return [
         {"name": name, "unit": unit, "meaning": meaning, "values": [_shown(name, run.get(name)) for run in metrics.values()]} | empty
-        for name, (unit, _, meaning) in METRICS.items()
+        for name, unit, _, meaning in shown
     ]
 
 
-def comparison_rows(comparison: Comparison) -> Rows:
+def comparison_rows(comparison: Comparison, *, net_slip: bool = False) -> Rows:
     """The same of means, with changes from the first control to the second; before them, if of several seeds, how many runs walked."""
-    rows = metric_rows(comparison.means)
+    rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
         change = comparison.changes[row["name"]]
         row |= {"change": _change(change), "interval": _interval(change), "verdict": change.verdict}
@@ -161,11 +178,7 @@ def about(comparison: Comparison) -> str:
     seeds, n = comparison.seeds, len(comparison.seeds)
     judged = max(change.pairs for change in comparison.changes.values())
     told = f" of the {judged} in which both walked to the end" if judged < n else ""
-    return (
-        f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){told}, both controls on each; 95 % intervals of the mean change."
-        if n > 1
-        else ""
-    )
+    return f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){told}, both controls on each; {METHOD}." if n > 1 else ""
 
 
 def _shown(name: str, value: float | None) -> str:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.metrics import View, bearing_load, body_height, commanded_path, robot_weight, running_integral, slip_under_load
+from hexapod_cosim.cosim.metrics import foot_errors
 from hexapod_cosim.cosim.recorder import ColumnError
+from hexapod_cosim.cosim.walk import View, bearing_load, body_height, commanded_path, robot_weight, running_integral, slip_under_load
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 Array = NDArray[np.float64]
@@ -123,6 +124,13 @@ def _slip(view: View) -> Iterator[tuple[str, Array]]:
     yield "slip.way", running_integral(view.recording.time, speed.sum(axis=1))
 
 
+def _feet(view: View) -> Iterator[tuple[str, Array]]:
+    """Distance of each foot's centre from where the command plans it, torso frame [mm]; nothing when the controller does not tell."""
+    errors = foot_errors(view.recording, view.parameters)
+    if len(errors):
+        yield from _split([f"{leg}.off" for leg in LEG_NAMES], 1e3 * np.linalg.norm(errors, axis=-1))
+
+
 def _height(view: View) -> Iterator[tuple[str, Array]]:
     yield "height", 1e3 * body_height(view.recording, view.parameters)  # mm
 
@@ -148,7 +156,8 @@ REPLAYED: dict[str, Maker] = {
     "pose": _pose, "forces": _forces, "contacts": _contacts, "swings": _swings, "slipped": _slipped, "commanded": _commanded,
 }  # fmt: skip
 DRAWN: dict[str, Maker] = {
-    "normal_forces": _normal_forces, "slip": _slip, "height": _height, "attitude": _attitude, "torques": _torques, "energies": _energies,
+    "normal_forces": _normal_forces, "slip": _slip, "feet": _feet,
+    "height": _height, "attitude": _attitude, "torques": _torques, "energies": _energies,
 }  # fmt: skip
 
 

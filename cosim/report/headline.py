@@ -8,18 +8,33 @@ from dataclasses import dataclass
 from typing import Any
 
 from hexapod_cosim.cosim.comparison import BETTER, WORSE, Change, Comparison
-from hexapod_cosim.cosim.metrics import METRICS
+from hexapod_cosim.cosim.metrics import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.walk import TANH
 
-# metric -> its name on a card, and what there is less or more of in the sentence
+# metric -> its name on a card, and what there is less or more of in the sentence: first what depends on no assumed slope of
+# friction, slip last
 TOLD = {
-    "slip_per_metre": ("slip per metre", "slip"),
     "height_rms": ("height, RMS", "bobbing"),
     "roll_rms": ("roll, RMS", "rolling"),
+    "foot_error_stance": ("feet from their plan, stance", "error of the standing feet"),
     "loading_rate": ("loading rate", "jolt on landing"),
     "cost_of_transport": ("cost of transport", "motor work per metre"),
-    "torque_rms": ("motor torque, RMS", "motor torque"),
+    "electrical_cost": ("electrical cost", "electrical energy per metre"),
+    "servo_load_max": ("hottest servo, of its rating", "torque on the hottest servo"),
+    "slip_per_metre": ("slip per metre", "slip"),
 }
-MILLI = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "m/m": (1e3, "mm/m"), "1": (1.0, "")}  # units that people read on a card
+TURNED = {
+    "cost_of_transport": ("work per radian", "motor work per radian"),
+    "electrical_cost": ("electrical cost per radian", "electrical energy per radian"),
+    "slip_per_metre": ("slip per radian", "slip"),
+}  # the same of a robot that turns on the spot
+CREEP = (
+    "Under the tanh friction law a foot under load always creeps, at a rate that friction.slope assumes: most of the slip is that. "
+    "Walk with friction.law=bristle to see what slips on ground that holds a foot."
+)
+MILLI = {
+    "m": (1e3, "mm"), "rad": (1e3, "mrad"), "m/m": (1e3, "mm/m"), "m/rad": (1e3, "mm/rad"), "1": (1.0, ""),
+}  # units that people read on a card  # fmt: skip
 MOST_GAINS = 4  # in the sentence
 
 
@@ -59,6 +74,21 @@ def headline(comparison: Comparison) -> list[Part]:
     return [*parts, Part(".")]
 
 
+def _told(comparison: Comparison) -> dict[str, tuple[str, str]]:
+    """TOLD, with what is per radian where that is what the runs have."""
+    told: dict[str, tuple[str, str]] = {}
+    for name, text in TOLD.items():
+        twin = PER_RADIAN.get(name, name)
+        turned = name in TURNED and comparison.changes[twin].pairs and not comparison.changes[name].pairs
+        told[twin if turned else name] = TURNED[name] if turned else text
+    return told
+
+
+def creep_note(parameters: Mapping[str, Any]) -> str:
+    """What to know of slip under a run's friction law, "" when nothing."""
+    return CREEP if parameters.get("friction.law", TANH) == TANH else ""
+
+
 def _falls(comparison: Comparison) -> list[Part]:
     """How many of whose runs did not come to their end with the robot on its feet; nothing when all did."""
     count, walked = len(comparison.seeds), comparison.walked
@@ -73,7 +103,8 @@ def _falls(comparison: Comparison) -> list[Part]:
 
 def _nothing(comparison: Comparison, begin: str) -> str:
     """Where no main figure differs: that there is none, that others do, or that none does."""
-    if not any(comparison.changes[name].pairs for name in TOLD):
+    told = _told(comparison)
+    if not any(comparison.changes[name].pairs for name in told):
         return "The walk was too short to measure: figures are of whole gait cycles after the first two."
     others = [name for name, change in comparison.changes.items() if change.verdict in {BETTER, WORSE}]
     if others:
@@ -82,11 +113,9 @@ def _nothing(comparison: Comparison, begin: str) -> str:
 
 
 def _of(comparison: Comparison, verdict: str) -> list[Part]:
-    found = [(name, comparison.changes[name]) for name in TOLD]
+    found = [(what, comparison.changes[name]) for name, (_, what) in _told(comparison).items()]
     return [
-        Part(_less_or_more(TOLD[name][1], change), verdict)
-        for name, change in found
-        if change.verdict == verdict and math.isfinite(change.relative)
+        Part(_less_or_more(what, change), verdict) for what, change in found if change.verdict == verdict and math.isfinite(change.relative)
     ]
 
 
@@ -106,8 +135,8 @@ def _listed(parts: list[Part]) -> list[Part]:
 
 def cards(comparison: Comparison) -> list[Card]:
     """The figures of TOLD, as far as the runs have them."""
-    changes = {name: comparison.changes[name] for name in TOLD if comparison.changes[name].pairs}
-    return [_card(TOLD[name][0], METRICS[name][0], change) for name, change in changes.items()]
+    told = {name: text for name, (text, _) in _told(comparison).items() if comparison.changes[name].pairs}
+    return [_card(text, METRICS[name][0], comparison.changes[name]) for name, text in told.items()]
 
 
 def _card(name: str, unit: str, change: Change) -> Card:
@@ -131,9 +160,11 @@ def _share(value: float) -> str:
 
 
 def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]) -> list[Part]:
-    """Of one run: how long and how fast it walked, and what it slipped on the way."""
-    speed, slip = (facts.get("walk") or {}).get("mean_speed"), metrics.get("slip_per_metre")
+    """Of one run: how long and how fast it walked, how far its feet were from their plan, and what it took."""
+    speed = (facts.get("walk") or {}).get("mean_speed")
     begin = f"{facts['control'].capitalize()} control, {facts['simulated']:.4g} s"
-    if speed is None or slip is None or not math.isfinite(speed + slip):
-        return [Part(f"{begin}.")]
-    return [Part(f"{begin}: {1e3 * speed:.3g} mm/s, {1e3 * slip:.3g} mm of slip per metre walked.")]
+    error, cost = metrics.get("foot_error_stance"), metrics.get("cost_of_transport")
+    told = [f"{1e3 * speed:.3g} mm/s"] if speed is not None and math.isfinite(speed) else []
+    told += [f"standing feet {1e3 * error:.3g} mm from their plan"] if error is not None and math.isfinite(error) else []
+    told += [f"cost of transport {cost:.3g}"] if cost is not None and math.isfinite(cost) else []
+    return [Part(f"{begin}: {', '.join(told)}." if told else f"{begin}.")]

@@ -16,6 +16,7 @@ from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
 
+from hexapod_cosim.cosim.installation import install_extra
 from hexapod_cosim.cosim.study.cluster_worker import job_plugin, work_here
 from hexapod_cosim.cosim.study.crew import IN_FLIGHT, Chunk, Returned, Say
 from hexapod_cosim.cosim.study.job import Job
@@ -254,7 +255,7 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client  # noqa: PLC0415  an extra
     except ImportError as error:
-        raise StudyError("Dask is not installed", fix="pip install 'hexapod-cosim[cluster]'", where="--scheduler") from error
+        raise StudyError("Dask is not installed", fix=install_extra("cluster"), where="--scheduler") from error
     try:
         return Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:

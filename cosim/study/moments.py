@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.comparison import half_widths
+from hexapod_cosim.cosim.comparison import half_widths, log_half_widths
 
 Array = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -48,6 +48,11 @@ class Moments:
         share = other.count / np.maximum(count, 1.0)
         apart = other.mean - self.mean
         return Moments(count, self.mean + apart * share, self.square + other.square + apart**2 * self.count * share)
+
+
+def ratio_half_widths(before: Moments, after: Moments, difference: Moments) -> Array:
+    """Of pairs, half of the 95 % intervals of ln(mean after / mean before); NaN where there is none."""
+    return log_half_widths(difference.count, before.mean, after.mean, (before.square, after.square, difference.square))
 
 
 def no_moments(*shape: int) -> Moments:

@@ -19,6 +19,7 @@ import numpy as np
 
 from hexapod_cosim.cosim.comparison import change_of
 from hexapod_cosim.cosim.files import to_json
+from hexapod_cosim.cosim.installation import install_extra
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.study.conduct import Desk, conduct
 from hexapod_cosim.cosim.study.crew import Crew
@@ -30,7 +31,6 @@ from hexapod_cosim.cosim.study.table import Point
 
 OPTIMUM = "optimum.json"
 WORST = 1e9  # what a trial without a figure gets; the samplers take no infinities as constraints
-EXTRA = "pip install 'hexapod-cosim[optimise]'"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +114,7 @@ def make_sampler(study: Study) -> Any:
     try:
         import optuna  # noqa: PLC0415  an extra, and slow to import
     except ImportError as error:
-        raise StudyError("Optuna is not installed", fix=EXTRA, where=f"{study.where}: optimise") from error
+        raise StudyError("Optuna is not installed", fix=install_extra("optimise"), where=f"{study.where}: optimise") from error
     asked = study.optimise
     assert asked is not None
     optuna.logging.set_verbosity(optuna.logging.WARNING)

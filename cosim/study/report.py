@@ -10,9 +10,9 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from hexapod_cosim.cosim.comparison import Change
+from hexapod_cosim.cosim.comparison import METHOD, Change
 from hexapod_cosim.cosim.files import write_text
-from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS
+from hexapod_cosim.cosim.metrics import DUST, FLOORS, METRICS, shown_metrics
 from hexapod_cosim.cosim.study.columns import FIGURES
 from hexapod_cosim.cosim.study.figures import drawings, save
 from hexapod_cosim.cosim.study.notes import notes
@@ -40,7 +40,7 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         results=results, overall=overall_rows(results), points=point_rows(results), figures=pictures, optimum=optimum_rows(results),
         gained=optimum_changes(results),
         failures=[(*key, count) for key, count in results.overall.failures.items()], toml=_toml(results), notes=notes(results),
-        of_what=of_what(results), wall=shown_time(results.wall), metrics=OF_POINTS,
+        of_what=of_what(results), method=METHOD, wall=shown_time(results.wall), metrics=OF_POINTS,
     )  # fmt: skip
     write_text(folder / REPORT, page)
     return [folder / POINTS, folder / SUMMARY, *files, folder / REPORT]
@@ -81,7 +81,8 @@ def of_what(results: Results) -> str:
 def overall_rows(results: Results) -> list[dict[str, Any]]:
     """A row per metric: mean of all runs that walked by control, change over all pairs."""
     overall, rows = results.overall, []
-    for name in FIGURES:
+    means = {control: {name: overall.means[control][name].value for name in FIGURES} for control in results.study.run_controls}
+    for name in (each for each in shown_metrics(means, net_slip=False) if each in FIGURES):
         unit, _, meaning = METRICS[name]
         values = [shown_mean(name, overall.means[control][name]) for control in results.study.run_controls]
         change = overall.changes.get(name)

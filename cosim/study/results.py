@@ -18,7 +18,7 @@ from hexapod_cosim.cosim.files import RUN_FILE, read_json, to_json
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.columns import FIGURES, WALL, result_schema, schema_of
 from hexapod_cosim.cosim.study.manifest import MANIFEST, RESULTS, RUNS, TIMES, provenance
-from hexapod_cosim.cosim.study.moments import Array
+from hexapod_cosim.cosim.study.moments import Array, ratio_half_widths
 from hexapod_cosim.cosim.study.optimise import OPTIMUM, Optimisation, Trial, trials_of
 from hexapod_cosim.cosim.study.reading import study_from_table
 from hexapod_cosim.cosim.study.records import SCENARIO_FACTOR, Study
@@ -175,9 +175,10 @@ def points_table(block: Block, study: Study) -> pa.Table:
         columns |= _by_metric(control, part.value, part.half_width)
     if len(study.run_controls) == 2:
         before, after, half_width = (sums.moments[:, part] for part in (BEFORE, AFTER, DIFFERENCE))
+        ratio = ratio_half_widths(before, after, half_width)
         columns |= {"pairs": sums.pairs, **_by_metric("change", after.value - before.value, half_width.half_width)}
         for k, name in enumerate(FIGURES):
-            verdict = verdicts(name, before.value[:, k], after.value[:, k], half_width.half_width[:, k])
+            verdict = verdicts(name, before.value[:, k], after.value[:, k], half_width.half_width[:, k], ratio[:, k])
             columns[f"change.{name}.verdict"] = verdict.tolist()
     arrays = [
         pa.array(item, schema.field(name).type, from_pandas=True) if isinstance(item, np.ndarray) else item

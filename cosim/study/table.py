@@ -15,8 +15,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from hexapod_cosim.cosim.comparison import Change, made_change
+from hexapod_cosim.cosim.metrics import OF_THE_RUN
 from hexapod_cosim.cosim.study.columns import FIGURES
-from hexapod_cosim.cosim.study.moments import no_moments
+from hexapod_cosim.cosim.study.moments import no_moments, ratio_half_widths
 from hexapod_cosim.cosim.study.records import SCENARIO_FACTOR, Study
 from hexapod_cosim.cosim.study.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, Sums
 
@@ -93,10 +94,11 @@ def _changes(sums: Sums, study: Study) -> dict[str, Change]:
     if len(study.run_controls) != 2:
         return {}
     before, after, difference = (sums.moments[0, part] for part in (BEFORE, AFTER, DIFFERENCE))
-    parts = (before.value, after.value, difference.half_width, difference.count.astype(int))
+    ratio = ratio_half_widths(before, after, difference)
+    parts = (before.value, after.value, difference.half_width, ratio, difference.count.astype(int))
     return {
-        name: made_change(name, before=first, after=second, half_width=half, pairs=pairs)
-        for name, first, second, half, pairs in zip(FIGURES, *(part.tolist() for part in parts), strict=True)
+        name: made_change(name, before=first, after=second, half_width=half, log_half_width=log_half, pairs=pairs)
+        for name, first, second, half, log_half, pairs in zip(FIGURES, *(part.tolist() for part in parts), strict=True)
     }
 
 
@@ -137,7 +139,7 @@ class Tally:
 def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
     """By scenario and control: how many walked, and how many of these have any figure."""
     kept = table.filter(table["walked"])
-    figured = pc.is_valid(pc.coalesce(*(kept[name] for name in FIGURES)))
+    figured = pc.is_valid(pc.coalesce(*(kept[name] for name in FIGURES if name not in OF_THE_RUN)))
     groups = pa.table({"case": kept["case"], "control": kept["control"], "figured": figured}).group_by(["case", "control"])
     return [
         (row["case"], row["control"], row["figured_count"], row["figured_sum"])

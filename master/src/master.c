@@ -5,8 +5,8 @@
 /* notes a refusal; returns whether there was none */
 static int accept(hxMaster *master, hxMasterCall call, fmi2Status status) {
   if (status <= fmi2Warning) return 1;
-  master->call = call;
-  master->status = status;
+  master->call = (int)call;
+  master->status = (int)status;
   return 0;
 }
 
@@ -92,17 +92,53 @@ static int step_plant(hxMaster *master) {
   return accept(master, HX_CALL_PLANT_STEP, master->plant.do_step(master->plant.instance, master->time[master->step], master->h, fmi2True));
 }
 
-void hx_master_record(hxMaster *master) {
-  double *row = master->row + master->rows * master->stride;
-  for (size_t j = 0; j < master->columns; ++j) row[j] = master->value[master->column[j]];
-  ++master->rows;
+static void write_row(hxMasterTable *table, const double *value) {
+  double *row;
+  if (!table->row) return;
+  row = table->row + table->rows * table->stride;
+  for (size_t j = 0; j < table->columns; ++j) row[j] = value[table->column[j]];
+  ++table->rows;
 }
+
+/* the largest of each peak since the last row */
+static void fold_peaks(hxMasterPeaks *peaks, const double *value) {
+  const size_t first = peaks->places - peaks->counts;
+  for (size_t i = 0; i < peaks->places; ++i) {
+    const double now = value[peaks->place[i]];
+    int fresh = 0;
+    if (i >= first) {
+      const size_t k = i - first;
+      const double count = value[peaks->count[k]];
+      fresh = count != peaks->seen[k] && peaks->seen[k] == peaks->kept[k];
+      peaks->seen[k] = count;
+    }
+    if (fresh || now > peaks->largest[i]) peaks->largest[i] = now;
+  }
+}
+
+/* puts the largest into the row of values, and begins anew */
+static void show_peaks(hxMasterPeaks *peaks, double *value) {
+  for (size_t i = 0; i < peaks->places; ++i) value[peaks->place[i]] = peaks->largest[i];
+  memset(peaks->largest, 0, peaks->places * sizeof *peaks->largest);
+  memcpy(peaks->kept, peaks->seen, peaks->counts * sizeof *peaks->kept);
+}
+
+/* the present moment, kept when it is `due` */
+static void record(hxMaster *master, int due) {
+  write_row(&master->judged, master->value);
+  if (master->every > 1) fold_peaks(&master->peaks, master->value);
+  if (!due) return;
+  if (master->every > 1) show_peaks(&master->peaks, master->value);
+  write_row(&master->kept, master->value);
+}
+
+void hx_master_record(hxMaster *master) { record(master, 1); }
 
 static int macro_step(hxMaster *master) {
   if (master->push)
     memcpy(master->value + master->push_place, master->push + master->step * master->push_count, master->push_count * sizeof(double));
   if (!control(master) || !write_plant(master)) return 0;
-  hx_master_record(master);
+  record(master, master->step % master->every == 0);
   if (!step_plant(master)) return 0;
   ++master->step;
   return read_plant(master, master->step);
@@ -113,7 +149,10 @@ static int macro_step(hxMaster *master) {
 size_t hx_master_size(void) { return sizeof(hxMaster); }
 
 int hx_master_begin(hxMaster *master) {
-  master->step = master->rows = 0;
+  master->step = master->kept.rows = master->judged.rows = 0;
+  memset(master->peaks.largest, 0, master->peaks.places * sizeof *master->peaks.largest);
+  memset(master->peaks.seen, 0, master->peaks.counts * sizeof *master->peaks.seen);
+  memset(master->peaks.kept, 0, master->peaks.counts * sizeof *master->peaks.kept);
   master->call = HX_CALL_NONE;
   master->status = fmi2OK;
   return read_plant(master, 0);

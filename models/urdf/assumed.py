@@ -18,6 +18,8 @@ ROTOR_TIME = math.sqrt(0.01 / 40.0)  # s    sqrt(rotor inertia / kp)
 CONTINUOUS = 0.2  # 1    of the stall torque
 FEMUR_RISE, TIBIA_RISE = 0.386, -1.399  # rad    directions of both above the horizontal when standing
 STRIDE, STEP_HEIGHT = 2.0 / 3.0, 1.0 / 3.0  # 1    of the height of the hips above the feet
+# s, m    of the ATHENA-like robot; robots of other heights walk at the same Froude number
+GAIT_PERIOD, HIP_HEIGHT = 1.0, 0.12
 
 
 def assume_servo(servo: Table) -> list[str]:
@@ -32,8 +34,10 @@ def assume_servo(servo: Table) -> list[str]:
 
 
 def assume_gait(gait: Table, height: float) -> list[str]:
-    """Fills in strides for hips at a height [m] above the feet."""
-    return _fill(gait, {"stride": STRIDE * height, "step_height": STEP_HEIGHT * height})
+    """Fills in strides and their period for hips at a height [m] above the feet."""
+    taller = height / HIP_HEIGHT if height > 0.0 else 1.0  # what has no height is refused later
+    scaled = {"stride": STRIDE * height, "step_height": STEP_HEIGHT * height}
+    return _fill(gait, {"period": GAIT_PERIOD * math.sqrt(taller), **scaled})
 
 
 def _fill(table: Table, values: Mapping[str, float]) -> list[str]:

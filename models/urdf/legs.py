@@ -41,8 +41,7 @@ class FoundLeg:
 def find_legs(torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str) -> list[FoundLeg]:
     """The six legs in our order; `origin` (3,) and `axes` (3, 3) are the torso's frame in the root link's. Raises RobotError."""
     if len(torso.branches) != len(LEG_NAMES):
-        got = f"{len(torso.branches)} moving joints on {torso.name!r}: {', '.join(branch.joint.name for branch in torso.branches)}"
-        raise RobotError("not six legs", got=got, expected="six", fix="make joints that are no legs' fixed", where=where)
+        raise _not_six(torso, where)
     chains = [_chain(branch, where) for branch in torso.branches]
     hips = np.array([axes.T @ (chain[0].position - origin) for chain in chains])
     order = _order(hips, [chain[0].joint.name for chain in chains], where)
@@ -51,6 +50,32 @@ def find_legs(torso: Body, origin: Array, axes: Array, *, keep_frames: bool, whe
         _leg(name, chains[k], hips[k], hips[k] - middle, axes, keep_frames=keep_frames, where=where)
         for name, k in zip(LEG_NAMES, order, strict=True)
     ]
+
+
+def _not_six(torso: Body, where: str) -> RobotError:
+    """The error for a torso without exactly six moving joints: other joints besides six legs can be fixed, missing legs cannot."""
+    legs = [branch.joint.name for branch in torso.branches if _is_leg(branch)]
+    others = [branch.joint.name for branch in torso.branches if not _is_leg(branch)]
+    got = f"{len(torso.branches)} moving joints on {torso.name!r}: {', '.join(branch.joint.name for branch in torso.branches)}"
+    if len(legs) == len(LEG_NAMES):
+        fix = f"make joints that are no legs' fixed: {', '.join(others)}"
+        return RobotError("not six legs alone", got=got, expected="six legs and no other moving joints", fix=fix, where=where)
+    if len(torso.branches) == 1:
+        fix = f"make {torso.branches[0].joint.name!r} fixed if what it moves is the torso; robots with six legs alone can be simulated"
+        return RobotError("not six legs on the root link", got=got, expected="six legs of three joints each", fix=fix, where=where)
+    got = f"{len(legs)} legs of three joints each, of {got}"
+    fix = "take a robot with six legs: plant, gaits and controller are a hexapod's, and fixing or adding joints makes no other robot one"
+    return RobotError(
+        "six legs only: robots with another number of legs cannot be simulated", got=got, expected="six", fix=fix, where=where
+    )
+
+
+def _is_leg(branch: Branch) -> bool:
+    """Whether three moving joints follow each other from here on, and no more."""
+    count, branches = 1, branch.body.branches
+    while len(branches) == 1:
+        count, branches = count + 1, branches[0].body.branches
+    return not branches and count == len(JOINT_NAMES)
 
 
 def _chain(branch: Branch, where: str) -> tuple[Branch, Branch, Branch]:

@@ -48,6 +48,8 @@ typedef struct hxContinuous {
 
   void (*rates)(hxComponent *component, struct hxVariables *variables); /* at the present time under the input */
 
+  void (*completed)(hxComponent *component, const struct hxVariables *variables); /* the importer's step to the present state is */
+
   /* hx_component_step, but *event tells whether discrete variables changed on the way, and with stop the step ends where the first did.
    * Going on from there to the same end under the same input gives, bit for bit, what the step would have given without the stop. */
   hxStatus (*step)(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event);
@@ -58,6 +60,9 @@ typedef struct hxContinuous {
   /* Derivatives of output and rate along a change of input and state: rows of the same structure. */
   hxStatus (*tangent)(hxComponent *component, const struct hxVariables *variables, const struct hxVariables *change,
                       struct hxVariables *result);
+
+  /* Sets the rates over time of those outputs that are integrals of the past and hence no functions of state and input. */
+  void (*integrals)(hxComponent *component, const struct hxVariables *variables, struct hxVariables *result);
 } hxContinuous;
 
 extern const hxContinuous *const hx_continuous; /* NULL for a component without */

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-static double *state_of(struct hxVariables *variables) { return (double *)((char *)variables + hx_continuous->state); }
-static double *rate_of(struct hxVariables *variables) { return (double *)((char *)variables + hx_continuous->rate); }
+static double *state_of(struct hxVariables *variables) { return (double *)(void *)((char *)variables + hx_continuous->state); }
+static double *rate_of(struct hxVariables *variables) { return (double *)(void *)((char *)variables + hx_continuous->rate); }
 
 /* whether an array has as many places as there are; complains if not */
 static hxStatus check_count(hxInstance *instance, const char *what, size_t got, size_t expected) {
@@ -76,6 +76,14 @@ hxStatus hx_instance_get_nominals(hxInstance *instance, double nominal[], size_t
   return status;
 }
 
+hxStatus hx_instance_completed_step(hxInstance *instance) {
+  if (!hx_continuous) return HX_OK;
+  if (instance->state.model_stale && hx_instance_initialize(instance) != HX_OK) return HX_INVALID_ARGUMENT;
+  hx_continuous->completed(instance->component, &instance->state.variables);
+  hx_stale(instance);
+  return HX_OK;
+}
+
 /* ---------------------------------------------------------------------------------------------- events */
 
 hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], size_t n) {
@@ -102,7 +110,7 @@ static size_t state_place(unsigned reference) {
 }
 
 static double *place_in(struct hxVariables *variables, const hxVariable *variable) {
-  return (double *)((char *)variables + variable->offset);
+  return (double *)(void *)((char *)variables + variable->offset);
 }
 
 /* the place of a known's change: an input or a continuous state; NULL, with a message, for others */
@@ -129,13 +137,16 @@ static const double *unknown_place(hxInstance *instance, unsigned reference, str
   return NULL;
 }
 
-/* result: derivatives along a change of input and state, output and rate filled in; then those of some unknowns are read */
-static hxStatus differentiate(hxInstance *instance, const struct hxVariables *change, const unsigned unknown[], size_t n, double value[]) {
+/* Derivatives of some unknowns along a change of input and state; in_time: the change is that of a second, which integrals of the past
+ * see too. */
+static hxStatus differentiate(hxInstance *instance, const struct hxVariables *change, int in_time, const unsigned unknown[], size_t n,
+                              double value[]) {
   struct hxVariables result;
   for (size_t i = 0; i < n; i++)
     if (!unknown_place(instance, unknown[i], &result)) return HX_INVALID_ARGUMENT;
   const hxStatus status = hx_continuous->tangent(instance->component, &instance->state.variables, change, &result);
   if (status != HX_OK) hx_log(instance, HX_LOG_ERROR, "%s; nothing was done", hx_component_message(instance->component));
+  if (status == HX_OK && in_time) hx_continuous->integrals(instance->component, &instance->state.variables, &result);
   for (size_t i = 0; i < n && status == HX_OK; i++) value[i] = *unknown_place(instance, unknown[i], &result);
   return status;
 }
@@ -159,7 +170,7 @@ hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[],
     if (!place) return HX_INVALID_ARGUMENT;
     *place += change[i];
   }
-  return differentiate(instance, &direction, unknown, n_unknown, result);
+  return differentiate(instance, &direction, 0, unknown, n_unknown, result);
 }
 
 hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n, const double rate[]) {
@@ -214,5 +225,5 @@ hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned refer
   memset(&flow, 0, sizeof flow);
   memcpy(state_of(&flow), rate_of(&instance->state.variables), hx_state_count * sizeof(double));
   flow.input = instance->state.input_rate;
-  return differentiate(instance, &flow, reference, n, rate);
+  return differentiate(instance, &flow, 1, reference, n, rate);
 }

@@ -437,7 +437,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance || !given(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation)) return fmi2Error;
   *enterEventMode = *terminateSimulation = fmi2False;
-  return fmi2OK;
+  return status_of(hx_instance_completed_step(&instance->base));
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {

@@ -169,7 +169,7 @@ static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fm
   instance->log = log;
   instance->base.sink = log_sink;
   instance->base.logged = loggingOn ? ~0u : HX_LOG_ALWAYS;
-  instance->base.state.interface = interface;
+  instance->base.state.interface = (int)interface;
   if (name) snprintf(instance->base.name, sizeof instance->base.name, "%s", name);
   return instance;
 }
@@ -216,7 +216,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                                                fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
                                                fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
   (void)instantiationToken, (void)resourcePath, (void)visible, (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-  return refuse_kind(new_instance(0, instanceName, loggingOn, instanceEnvironment, logMessage), "scheduled execution");
+  return refuse_kind(new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage), "scheduled execution");
 }
 
 void fmi3FreeInstance(fmi3Instance c) {
@@ -500,10 +500,11 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
   (void)noSetFMUStatePriorToCurrentPoint;
-  if (!enter(c, COMPLETED_INTEGRATOR_STEP)) return fmi3Error;
+  fmi3InstanceData *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
+  if (!instance) return fmi3Error;
   put(enterEventMode, 0);
   put(terminateSimulation, 0);
-  return fmi3OK;
+  return status_of(hx_instance_completed_step(&instance->base));
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {

@@ -145,7 +145,7 @@ static hxStatus get_reals(hxInstance *instance, const unsigned reference[], size
   hxCausality causality = HX_OUTPUT;
   for (size_t i = 0; i < n; i++) {
     const hxVariable *variable = row_of(reference[i], &causality);
-    const double *number = (const double *)(variables + variable->offset);
+    const double *number = (const double *)(const void *)(variables + variable->offset);
     if (!isfinite(*number)) return hx_instance_check_finite(instance, number, 1, variable->name);
   }
   for (size_t i = 0; i < n; i++) memcpy(value + i, variables + row_of(reference[i], &causality)->offset, sizeof *value);

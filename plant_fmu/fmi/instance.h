@@ -89,6 +89,7 @@ hxStatus hx_instance_set_time(hxInstance *instance, double t);
 hxStatus hx_instance_get_states(hxInstance *instance, double x[], size_t n);
 hxStatus hx_instance_set_states(hxInstance *instance, const double x[], size_t n);
 hxStatus hx_instance_get_rates(hxInstance *instance, double rate[], size_t n);
+hxStatus hx_instance_completed_step(hxInstance *instance); /* of the importer's solver */
 hxStatus hx_instance_get_nominals(hxInstance *instance, double nominal[], size_t n);
 hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], size_t n);
 hxStatus hx_instance_update(hxInstance *instance, int *states_changed);
@@ -108,6 +109,9 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *block);
 hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *block, void *bytes, size_t n);
 hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t n, void **block);
 
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
 void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);
 
 /* A function of the standard: when it may be called, as masks. */

@@ -58,6 +58,10 @@ static void rates(hxComponent *component, struct hxVariables *variables) {
   hx_plant_indicators(const_plant(component), variables->indicator);
 }
 
+static void completed(hxComponent *component, const struct hxVariables *variables) {
+  hx_plant_completed_step(plant_of(component), &variables->input);
+}
+
 static hxStatus step(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event) {
   return hx_plant_step_to_event(plant_of(component), &variables->input, t_end, stop, event);
 }
@@ -81,6 +85,10 @@ static hxStatus tangent(hxComponent *component, const struct hxVariables *variab
   return status;
 }
 
+static void integrals(hxComponent *component, const struct hxVariables *variables, struct hxVariables *result) {
+  hx_plant_integral_rates(plant_of(component), &variables->input, &result->output);
+}
+
 static const hxContinuous continuous = {
     .state = offsetof(struct hxVariables, state),
     .rate = offsetof(struct hxVariables, rate),
@@ -88,10 +96,12 @@ static const hxContinuous continuous = {
     .get = get_state,
     .set = set_state,
     .rates = rates,
+    .completed = completed,
     .step = step,
     .indicate = indicate,
     .update = update,
     .tangent = tangent,
+    .integrals = integrals,
 };
 
 const hxContinuous *const hx_continuous = &continuous;

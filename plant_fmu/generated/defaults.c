@@ -408,6 +408,8 @@ static const hxDefinition default_definition = {
     .initial.speed[5][0] = 0.0,
     .initial.speed[5][1] = 0.0,
     .initial.speed[5][2] = 0.0,
+    .friction.mu_static = 0.0,
+    .friction.stribeck_speed = 0.005,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -475,6 +477,24 @@ static const hxInput default_input = {
     .push_torque[0] = 0.0,
     .push_torque[1] = 0.0,
     .push_torque[2] = 0.0,
+    .acceleration_ref[0][0] = 0.0,
+    .acceleration_ref[0][1] = 0.0,
+    .acceleration_ref[0][2] = 0.0,
+    .acceleration_ref[1][0] = 0.0,
+    .acceleration_ref[1][1] = 0.0,
+    .acceleration_ref[1][2] = 0.0,
+    .acceleration_ref[2][0] = 0.0,
+    .acceleration_ref[2][1] = 0.0,
+    .acceleration_ref[2][2] = 0.0,
+    .acceleration_ref[3][0] = 0.0,
+    .acceleration_ref[3][1] = 0.0,
+    .acceleration_ref[3][2] = 0.0,
+    .acceleration_ref[4][0] = 0.0,
+    .acceleration_ref[4][1] = 0.0,
+    .acceleration_ref[4][2] = 0.0,
+    .acceleration_ref[5][0] = 0.0,
+    .acceleration_ref[5][1] = 0.0,
+    .acceleration_ref[5][2] = 0.0,
 };
 
 void hx_input_default(hxInput *input) {
@@ -889,6 +909,8 @@ static const hxRange definition_ranges[] = {
     {"initial.RR.coxa.speed", "rad/s", -10000.0, 10000.0, offsetof(hxDefinition, initial.speed[5][0]), 0},
     {"initial.RR.femur.speed", "rad/s", -10000.0, 10000.0, offsetof(hxDefinition, initial.speed[5][1]), 0},
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(hxDefinition, initial.speed[5][2]), 0},
+    {"friction.mu_static", "", 0.0, 100.0, offsetof(hxDefinition, friction.mu_static), 0},
+    {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(hxDefinition, friction.stribeck_speed), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {
@@ -957,6 +979,24 @@ static const hxRange input_ranges[] = {
     {"torso.push_torque[1]", "N.m", -100000000.0, 100000000.0, offsetof(hxInput, push_torque[0]), 0},
     {"torso.push_torque[2]", "N.m", -100000000.0, 100000000.0, offsetof(hxInput, push_torque[1]), 0},
     {"torso.push_torque[3]", "N.m", -100000000.0, 100000000.0, offsetof(hxInput, push_torque[2]), 0},
+    {"LF.coxa.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[0][0]), 0},
+    {"LF.femur.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[0][1]), 0},
+    {"LF.tibia.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[0][2]), 0},
+    {"LM.coxa.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[1][0]), 0},
+    {"LM.femur.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[1][1]), 0},
+    {"LM.tibia.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[1][2]), 0},
+    {"LR.coxa.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[2][0]), 0},
+    {"LR.femur.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[2][1]), 0},
+    {"LR.tibia.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[2][2]), 0},
+    {"RF.coxa.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[3][0]), 0},
+    {"RF.femur.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[3][1]), 0},
+    {"RF.tibia.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[3][2]), 0},
+    {"RM.coxa.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[4][0]), 0},
+    {"RM.femur.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[4][1]), 0},
+    {"RM.tibia.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[4][2]), 0},
+    {"RR.coxa.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[5][0]), 0},
+    {"RR.femur.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[5][1]), 0},
+    {"RR.tibia.acceleration_ref", "rad/s2", -1000000000.0, 1000000000.0, offsetof(hxInput, acceleration_ref[5][2]), 0},
 };
 
 size_t hx_input_ranges(const hxRange **range) {

@@ -49,6 +49,11 @@ static void relations(hxChecker *c, const hxDefinition *d) {
   legs(c, d);
   if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) && d->contact.restitution < 1e-3)
     hx_check_fail(c, "contact.restitution", d->contact.restitution, "0.001 to 1 with this contact.law, which divides by it");
+  if (d->friction.mu_static != 0.0 && d->friction.mu_static < d->friction.mu)
+    hx_check_fail(c, "friction.mu_static", d->friction.mu_static, "at least friction.mu, or 0, which means the same");
+  else if (d->friction.mu_static > d->friction.mu && d->friction.law != HX_FRICTION_BRISTLE)
+    hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
+                  "0 or friction.mu with this friction.law; the bristle law alone tells static from kinetic friction");
   if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
     hx_check_fail(c, "solver.step", d->solver.step, "a fixed step > 0 with this solver.method, which has no error estimate");
   length_not_zero(c, "initial.quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");

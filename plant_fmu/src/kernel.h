@@ -37,7 +37,16 @@ typedef struct hxKernel {
   /* All feet: penetration, approach speed; m, m/s. */
   void (*feet)(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]);
 
+  /* Touch-downs and lift-offs that are due at the state's time by these penetrations. */
+  void (*switch_contacts)(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxState *state);
+
+  /* Measures the path since the last moment, for solvers of others whose step to here is completed. */
+  void (*measure)(const hxModel *model, const hxCommand *command, hxState *state);
+
   void (*output)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output);
+
+  /* Rates of the outputs that are integrals since the start. */
+  void (*integral_rates)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *rate);
 
   void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],
                         double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]);

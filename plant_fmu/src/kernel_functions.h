@@ -19,6 +19,12 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   hx_contact_start(model, feet.delta, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, &work);
+  hx_moment_here(model, state);
+  memset(&state->completed, 0, sizeof state->completed);
+  memset(&state->measured, 0, sizeof state->measured);
+  for (int pack = 0; pack < HX_PACKS; ++pack) hx_store(&state->measured.peak_force[pack * HX_LANES], work.pack[pack].foot.normal.force);
+  for (int slot = 0; slot < HX_SLOTS; ++slot) state->measured.landed_at[slot] = -HUGE_VAL;
+  hx_fill_measured_slots(state);
   state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) + hx_potential_energy(model, &state->motion, &work);
 }
 
@@ -45,11 +51,72 @@ static void kernel_feet(const hxModel *model, const hxMotion *motion, double del
   memcpy(ddelta, feet.ddelta, sizeof feet.ddelta);
 }
 
+static void kernel_switch_contacts(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxState *state) {
+  hx_switch_contacts(model, delta, ddelta, state->time, state);
+}
+
+/* Adds h/2 of the forces at the present and of those kept from the last completed step; keeps the present ones. */
+static void halve_impulses(const hxWork *work, double h, hxCompleted *completed, hxImpulses *impulses) {
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const hxLegWork *leg = &work->pack[pack];
+    const int slot = pack * HX_LANES;
+    const hxReal half = hx_splat(0.5 * h);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxServo *servo = &leg->joint[joint].servo;
+      double *motor = &completed->motor[joint][slot], *gear = &completed->gear[joint][slot];
+      impulses->motor[joint][pack] = half * (hx_load(motor) + servo->torque);
+      impulses->gear[joint][pack] = half * (hx_load(gear) + servo->friction);
+      hx_store(motor, servo->torque);
+      hx_store(gear, servo->friction);
+    }
+    impulses->foot[pack] = hx_scale(half, hx_add(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot), leg->foot.force));
+    hx_store_vec3(completed->foot, slot, leg->foot.force);
+  }
+  completed->known = 1.0;
+}
+
+static void kernel_measure(const hxModel *model, const hxCommand *command, hxState *state) {
+  hxMoment end;
+  hxWork work;
+  hxRate rate;
+  hxImpulses impulses;
+  hxStepWorks works;
+  const int known = state->completed.known != 0.0;
+  const double h = state->time - state->moment.time;
+  hxPath path = {.model = model, .contact = &state->contact, .t = state->moment.time, .h = h, .from = &state->moment, .to = &end};
+  for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
+  memset(&end, 0, sizeof end);
+  hx_moment_of(model, &state->motion, &end);
+  end.time = state->time;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
+  halve_impulses(&work, h, &state->completed, &impulses);
+  if (!known) halve_impulses(&work, h, &state->completed, &impulses); /* the first step: as at its end */
+  hx_reset_peaks(&state->measured);
+  if (h > 0.0) {
+    hx_step_works(&path, &impulses, &works);
+    hx_measure_path(&path, &works, &state->measured);
+  }
+  state->moment = end;
+  hx_fill_measured_slots(state);
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    hx_fill_slots(state->completed.motor[joint]);
+    hx_fill_slots(state->completed.gear[joint]);
+  }
+  for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.foot[i]);
+}
+
 static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output) {
   hxRate rate;
   hxWork work;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
   hx_output_fill(model, state, &work, output);
+}
+
+static void kernel_integral_rates(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *rate) {
+  hxRate all;
+  hxWork work;
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &all);
+  hx_integral_rates_fill(model, &work, rate);
 }
 
 static void kernel_accelerations(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],
@@ -69,5 +136,8 @@ static void kernel_accelerations(const hxModel *model, const hxState *state, con
    .place = hx_motion_from_coordinates,                                                                                                    \
    .coordinates = kernel_coordinates,                                                                                                      \
    .feet = kernel_feet,                                                                                                                    \
+   .switch_contacts = kernel_switch_contacts,                                                                                              \
+   .measure = kernel_measure,                                                                                                              \
    .output = kernel_output,                                                                                                                \
+   .integral_rates = kernel_integral_rates,                                                                                                \
    .accelerations = kernel_accelerations}

@@ -19,7 +19,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 5;
+static const uint64_t saved_version = 6;
 
 static uint64_t checksum(const hxSaved *saved) { return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model)); }
 
@@ -52,7 +52,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   memset(&plant->state, 0, sizeof plant->state);
   hx_model_compile(&plant->model, definition);
   hx_initial_bodies(definition, body);
-  hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
+  hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
   hx_kernel()->start(&plant->model, t, &plant->state);
   plant->message[0] = '\0';
   return HX_OK;
@@ -169,7 +169,14 @@ hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates 
   hx_kernel()->place(&plant->model, x, &plant->state.motion);
   plant->state.time = t;
   plant->state.call_input = 0.0;
+  plant->state.moment.stale = 1.0;
   return HX_OK;
+}
+
+void hx_plant_completed_step(hxPlant *plant, const hxInput *input) {
+  hxCommand command;
+  hx_command_from_input(&command, input, plant->state.time);
+  hx_kernel()->measure(&plant->model, &command, &plant->state);
 }
 
 void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate) {
@@ -205,8 +212,7 @@ int hx_plant_update_contacts(hxPlant *plant) {
   all_feet(plant, delta, ddelta);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
     delta[slot] = switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
-  plant->state.touchdowns += hx_contact_switch(&plant->model, delta, ddelta, &plant->state.contact);
-  if (plant->model.friction_law == HX_FRICTION_BRISTLE) hx_contact_slacken(&plant->state.contact, &plant->state.motion);
+  hx_kernel()->switch_contacts(&plant->model, delta, ddelta, &plant->state);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
 }
 
@@ -230,6 +236,12 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
 #else
   return refuse(plant, HX_INVALID_ARGUMENT, "derivatives: this binary's compiler has no complex numbers; use another");
 #endif
+}
+
+void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutput *rate) {
+  hxCommand command;
+  hx_command_from_input(&command, input, plant->state.time);
+  hx_kernel()->integral_rates(&plant->model, &plant->state, &command, rate);
 }
 
 void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]) {

@@ -152,6 +152,16 @@ static void compile_ground(hxModel *model, const hxDefinition *d) {
   model->ground_normal[2] = level;
 }
 
+static const double load_share = 0.01; /* of the robot's weight: a foot that bears more can slip under load */
+
+/* N  all bodies' */
+static double weight_of(const hxDefinition *d) {
+  double mass = d->torso.mass;
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) mass += d->leg[leg].link[joint].mass;
+  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] + d->gravity[2] * d->gravity[2]);
+}
+
 static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->foot_radius = d->foot_radius;
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
@@ -161,6 +171,7 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
   model->friction_law = d->friction.law, model->mu = d->friction.mu, model->slope = d->friction.slope;
   model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
+  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0), model->per_stribeck = 1.0 / d->friction.stribeck_speed;
   model->servo_mode = d->servo.mode;
   model->kp = d->servo.mode == HX_SERVO_POSITION ? d->servo.kp : 0.0;
   model->kd = d->servo.mode == HX_SERVO_POSITION ? d->servo.kd : 0.0;
@@ -169,6 +180,7 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max, model->projection = d->solver.projection;
+  model->load_threshold = load_share * weight_of(d);
 }
 
 void hx_model_compile(hxModel *model, const hxDefinition *d) {
@@ -273,10 +285,12 @@ void hx_command_from_input(hxCommand *command, const hxInput *input, double time
       command->angle[joint][leg] = input->angle_ref[leg][joint];
       command->speed[joint][leg] = input->speed_ref[leg][joint];
       command->torque[joint][leg] = input->torque_ref[leg][joint];
+      command->acceleration[joint][leg] = input->acceleration_ref[leg][joint];
     }
     hx_fill_slots(command->angle[joint]);
     hx_fill_slots(command->speed[joint]);
     hx_fill_slots(command->torque[joint]);
+    hx_fill_slots(command->acceleration[joint]);
   }
   for (int i = 0; i < 3; ++i) {
     command->push_force[i] = input->push_force[i];

@@ -5,6 +5,8 @@
 #ifndef HX_STATE_H
 #define HX_STATE_H
 
+#include <stddef.h>
+
 #include "hexapod/hexapod.h"
 #include "hexapod/inside.h"
 
@@ -54,9 +56,11 @@ typedef struct hxModel {
   double stiffness, damping_scale, impact_speed_floor; /* eq. 4; what damping_scale means is the law's business */
   double mu, slope;                 /* eq. 5 */
   double presliding, bristle_damping; /* eq. 18, 19 */
+  double static_rise, per_stribeck;   /* eq. 19: mu_s - mu, 1/v_s */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;
+  double load_threshold;            /* N  a foot that bears more slips under load */
 } hxModel;
 
 /* The inputs of one step, legs innermost. */
@@ -65,7 +69,8 @@ typedef struct hxCommand {
   double speed[HX_JOINTS][HX_SLOTS];
   double torque[HX_JOINTS][HX_SLOTS];
   double push_force[3], push_torque[3];
-  double time;  /* s  when it was given: the kinematic drive follows angle + speed (t - time) */
+  double acceleration[HX_JOINTS][HX_SLOTS];
+  double time;  /* s  when it was given: the kinematic drive goes on from there (eq. 14) */
 } hxCommand;
 
 /* Changes at touch-down and lift-off only, never within a step. */
@@ -74,6 +79,46 @@ typedef struct hxContactState {
   double damping[HX_SLOTS];       /* s/m  d of f_n = K delta^1.5 (1 + d ddelta), fixed at touch-down */
   double impact_speed[HX_SLOTS];  /* m/s  at the last touch-down */
 } hxContactState;
+
+/* Where joints and feet are at one time: an end of a step, between which its works and peaks are found. World axes. */
+typedef struct hxMoment {
+  double angle[HX_JOINTS][HX_SLOTS];   /* rad */
+  double speed[HX_JOINTS][HX_SLOTS];   /* rad/s */
+  double centre[3][HX_SLOTS];          /* m    of the foot's sphere */
+  double normal[3][HX_SLOTS];          /* 1    of the ground there */
+  double slip[3][HX_SLOTS];            /* m/s  velocity of the contact point's material along the ground */
+  double roll[3][HX_SLOTS];            /* m/s  the part of it by the foot's rotation */
+  double delta[HX_SLOTS], ddelta[HX_SLOTS]; /* m, m/s  penetration, approach speed */
+  double time;                         /* s */
+  double stale;                        /* 1    0: it is the state's; 1: coordinates were set since */
+} hxMoment;
+
+/* Forces and powers at the last completed step of a solver of others. */
+typedef struct hxCompleted {
+  double motor[HX_JOINTS][HX_SLOTS];   /* N m  motor torques */
+  double gear[HX_JOINTS][HX_SLOTS];    /* N m  gear friction */
+  double foot[3][HX_SLOTS];            /* N    ground on feet, world axes */
+  double known;                        /* 1    0: there was none yet */
+} hxCompleted;
+
+enum { HX_MOMENT_ROWS = offsetof(hxMoment, time) / (HX_SLOTS * sizeof(double)) };
+
+/* What was measured since the start, along the path that the steps went. */
+typedef struct hxMeasured {
+  double positive_work[HX_JOINTS][HX_SLOTS];  /* J       of the motors, where they drive */
+  double negative_work[HX_JOINTS][HX_SLOTS];  /* J       where they brake, >= 0 */
+  double torque_squared[HX_JOINTS][HX_SLOTS]; /* N2 m2 s integral of the motor torque's square */
+  double slip_distance[HX_SLOTS];             /* m       along the ground under load */
+  double impulse[HX_SLOTS];                   /* N s     integral of the normal force */
+  double peak_force[HX_SLOTS];                /* N       largest normal force of the last call */
+  double peak_rate[HX_SLOTS];                 /* N/s     steepest rise of the normal force in the last call */
+  double landing_rate[HX_SLOTS];              /* N/s     steepest rise within landing_time of the last touch-down */
+  double landed_at[HX_SLOTS];                 /* s       time of the last touch-down */
+  double landings[HX_SLOTS];                  /* 1       touch-downs */
+  double contact_loss, friction_loss, gear_loss; /* J    their sum is what the motion has dissipated */
+} hxMeasured;
+
+enum { HX_MEASURED_ROWS = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
 
 typedef struct hxState {
   double time;
@@ -85,6 +130,9 @@ typedef struct hxState {
   hxMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
+  hxMoment moment;         /* the last step's end */
+  hxCompleted completed;   /* model exchange: the last step's end */
+  hxMeasured measured;
 } hxState;
 
 struct hxPlant {

@@ -1,8 +1,36 @@
 /* controller_probe.c - the controller's internal functions for the tests, under names that the library shows. */
+#include <string.h>
+
+#include "slip_pid.h"
+#include "support.h"
 #include "suspension.h"
 
 HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period, hxSuspension *suspension);
+HX_API void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
+HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS], const double asked[6], double force[HX_LEGS][3]);
 
 void hx_probe_suspension(double mass, double damping, double stiffness, double period, hxSuspension *suspension) {
   hx_suspension_discretise(mass, damping, stiffness, period, suspension);
+}
+
+void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]) {
+  hx_slip_squeeze(normal, feet, push);
+}
+
+/* asked: push x y, weight, moment x y, twist */
+void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS], const double asked[6], double force[HX_LEGS][3]) {
+  hxDemand demand;
+  hxShares shares;
+  memset(&demand, 0, sizeof demand);
+  demand.push = hx_plane(asked[0], asked[1]);
+  demand.weight = asked[2];
+  demand.moment = hx_plane(asked[3], asked[4]);
+  demand.twist = asked[5];
+  memcpy(shares.activation, activation, sizeof shares.activation);
+  hx_support_shares(feet, &demand, &shares);
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    force[leg][0] = shares.push[leg].x;
+    force[leg][1] = shares.push[leg].y;
+    force[leg][2] = shares.normal[leg];
+  }
 }

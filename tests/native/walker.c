@@ -12,13 +12,15 @@
 
 #include "fmi2Functions.h"
 
+typedef void Function(void);
+
 #ifdef _WIN32
 #include <windows.h>
 static void *load(const char *path) {
   static wchar_t wide[4096];
   return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, 4096) ? (void *)LoadLibraryW(wide) : NULL;
 }
-static void *find(void *library, const char *name) { return (void *)GetProcAddress((HMODULE)library, name); }
+static Function *find(void *library, const char *name) { return (Function *)GetProcAddress((HMODULE)library, name); }
 #else
 #include <dlfcn.h>
 static void *load(const char *path) {
@@ -26,7 +28,12 @@ static void *load(const char *path) {
   if (!library) fprintf(stderr, "%s\n", dlerror());
   return library;
 }
-static void *find(void *library, const char *name) { return dlsym(library, name); }
+static Function *find(void *library, const char *name) {
+  void *address = dlsym(library, name);
+  Function *function;
+  memcpy(&function, &address, sizeof function); /* POSIX promises it, ISO C has no cast for it */
+  return function;
+}
 #endif
 
 static void log_line(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...) {

@@ -30,7 +30,7 @@ class Late:
         """The joint commands for [t, t + period)."""
         state = self.controller.save()
         shown = self.controller.step(t, command, self._before or measurement)
-        answer = JointCommand(shown.angle_ref.copy(), shown.speed_ref.copy(), shown.torque_ref.copy())
+        answer = JointCommand(**{name: np.array(value) for name, value in vars(shown).items()})
         self.controller.restore(state)
         self.controller.step(t, command, measurement)
         self._before = copy(measurement)

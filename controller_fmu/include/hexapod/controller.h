@@ -138,6 +138,8 @@ typedef struct hxControllerOutput {
   int fallback[HX_LEGS];                  /* walks without feedback */
   double shift[HX_LEGS][2];               /* m  horizontal correction of the foot, walking frame */
   double lift[HX_LEGS];                   /* m  and the vertical one */
+  double planned[HX_LEGS][3];             /* m  the foot's centre as the command plans it, torso frame, without any correction */
+  double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  planned, for kinematic drives */
 } hxControllerOutput;
 
 typedef struct hxController hxController;

@@ -40,7 +40,7 @@ const BOOKS = [
 export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (() => Panel)[] {
   const { robot } = runs[0].run;
   const legs = robot.legs.map(({ name }) => name);
-  const [loads, slips] = ["load", "slip"].map((kind) =>
+  const [loads, slips, errors] = ["load", "slip", "off"].map((kind) =>
     limitsOf(
       runs,
       legs.map((leg) => `${leg}.${kind}`),
@@ -52,6 +52,7 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
       { title: "slipped way, all feet", unit: "mm", column: "slip.way", whole: true, height: 150 },
       ...legs.map((leg) => ({ title: nameOf(leg), unit: "mm/s", column: `${leg}.slip`, limits: slips })),
     ],
+    feet: legs.map((leg) => ({ title: nameOf(leg), unit: "mm", column: `${leg}.off`, limits: errors })),
     posture: [
       { title: "height", unit: "mm", column: "height" },
       ...["roll", "pitch", "yaw"].map((name) => ({ title: name, unit: "deg", column: name })),

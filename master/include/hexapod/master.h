@@ -69,6 +69,26 @@ typedef enum hxMasterCall {
   HX_CALL_CONTROLLER_STEP
 } hxMasterCall;
 
+/* Rows of a recording: places in the row of values, and where they are written. */
+typedef struct hxMasterTable {
+  const size_t *column;   /* 1     [columns] places of what is recorded in the row of values */
+  size_t columns;
+  double *row;            /*       rows, `stride` numbers apart, of which the first `columns` are written; NULL: none are */
+  size_t stride;
+  size_t rows;            /* 1     written */
+} hxMasterTable;
+
+/* Values of peaks, folded where rows are left out: the largest since the last row. Of the last `counts` places each has a counter: the peak
+ * begins anew when that moves on, and so does the largest, when it does for the first time since the last row. */
+typedef struct hxMasterPeaks {
+  const size_t *place;    /* 1     [places] in the row of values */
+  size_t places;
+  const size_t *count;    /* 1     [counts] places of the counters there */
+  size_t counts;
+  double *largest;        /*       [places] room */
+  double *seen, *kept;    /* 1     [counts] room: the counters a macro-step ago and at the last row */
+} hxMasterPeaks;
+
 typedef struct hxMaster {
   hxMasterFmu plant, controller;
   hxMasterBlock plant_output, plant_flag, plant_input;
@@ -86,12 +106,11 @@ typedef struct hxMaster {
   size_t push_count;
   size_t push_place;
   double h;               /* s     the macro-step */
-  const size_t *column;   /* 1     [columns] places of what is recorded in the row of values */
-  size_t columns;
-  double *row;            /*       [steps + 1] rows, `stride` numbers apart, of which the first `columns` are written */
-  size_t stride;
+  hxMasterTable kept;     /*       the recording: a row for every `every` macro-steps, and one at the end */
+  size_t every;
+  hxMasterPeaks peaks;    /*       of the rows kept; without effect while every = 1 */
+  hxMasterTable judged;   /*       a row for each macro-step */
   size_t step;            /* 1     macro-steps done */
-  size_t rows;            /* 1     recorded */
   int call;               /* hxMasterCall  the one that was refused */
   int status;             /* fmi2Status    and with what */
 } hxMaster;
@@ -103,7 +122,7 @@ HX_API size_t hx_master_size(void);
 HX_API int hx_master_begin(hxMaster *master);
 
 /* Goes on until `end` macro-steps are done; called again, goes on from there. Returns as hx_master_begin; a row is recorded before the plant
- * steps, so what led to a refused step is kept. */
+ * steps, so what led to a refused step is there, in the table of all macro-steps at least. */
 HX_API int hx_master_run(hxMaster *master, size_t end);
 
 /* Records the present moment: the last row, when all steps are done. */

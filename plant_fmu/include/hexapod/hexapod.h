@@ -89,6 +89,8 @@ typedef struct hxDefinition {
     double slope;            /* s/m  k_t of eq. 5, of the tanh law */
     double presliding;       /* m    b_max of eq. 18, of the bristle law: a foot pushed this far slides */
     double bristle_damping;  /* s    tau of eq. 19, of the bristle law: damping over stiffness */
+    double mu_static;        /* 1    of a foot that sticks, of the bristle law; 0: mu */
+    double stribeck_speed;   /* m/s  v_s of eq. 19, of the bristle law: half-way from mu_static to mu */
   } friction;
   struct {
     int mode;                 /* hxServoMode, all joints */
@@ -133,6 +135,7 @@ typedef struct hxInput {
   double torque_ref[HX_LEGS][HX_JOINTS];  /* N m   feed-forward */
   double push_force[3];                   /* N     at the torso's centre of mass */
   double push_torque[3];                  /* N m */
+  double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  of kinematic drives alone */
 } hxInput;
 
 /* What the robot shows. Booleans are ints. */
@@ -141,6 +144,9 @@ typedef struct hxOutput {
   double angle[HX_LEGS][HX_JOINTS];               /* rad */
   double speed[HX_LEGS][HX_JOINTS];               /* rad/s */
   double torque[HX_LEGS][HX_JOINTS];              /* N m    motor on child (kinematic mode: the drive's multiplier) */
+  double positive_work[HX_LEGS][HX_JOINTS];       /* J      of the motor on the joint where it drives, since the start */
+  double negative_work[HX_LEGS][HX_JOINTS];       /* J      where it brakes, >= 0 */
+  double torque_squared[HX_LEGS][HX_JOINTS];      /* N2 m2 s  integral of the motor torque's square since the start */
   double reaction_force[HX_LEGS][HX_JOINTS][3];   /* N      joint on child */
   double reaction_torque[HX_LEGS][HX_JOINTS][3];  /* N m    joint on child, about the joint's point */
   struct {
@@ -153,6 +159,12 @@ typedef struct hxOutput {
     double bristle[HX_LEGS][3];           /* m    b of eq. 18, the bristle law's; 0 with others */
     double penetration[HX_LEGS];          /* m    < 0: clearance */
     double impact_speed[HX_LEGS];         /* m/s  at the last touch-down */
+    double slip_distance[HX_LEGS];        /* m    along the ground while the foot bears more than 1 % of the weight, since the start */
+    double impulse[HX_LEGS];              /* N s  integral of the normal force since the start */
+    double peak_force[HX_LEGS];           /* N    largest normal force of the last step, a call of hx_plant_step */
+    double peak_force_rate[HX_LEGS];      /* N/s  steepest rise of the normal force in the last step */
+    double landing_rate[HX_LEGS];         /* N/s  steepest rise within 20 ms after the last touch-down */
+    double landings[HX_LEGS];             /* 1    touch-downs since the start */
     int contact[HX_LEGS];
   } foot;
   struct {
@@ -171,6 +183,9 @@ typedef struct hxOutput {
     double actuator_work;  /* J  by the motors on the joints, since start */
     double push_work;      /* J  by push_force and push_torque */
     double dissipated;     /* J  in contact, friction (with what bristles hold) and gears */
+    double contact_loss;   /* J  its part in the normal contact */
+    double friction_loss;  /* J  its part in friction */
+    double gear_loss;      /* J  its part in the gears */
     double residual;       /* J  stored - stored at start - work + dissipated: what the books do not explain */
   } energy;
   struct {
@@ -221,7 +236,7 @@ HX_API hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, d
 HX_API hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end);
 
 /* The same under an input that changes at a rate, per second; NULL: it is held. In kinematic mode a rate of angle_ref takes the place of
- * what speed_ref moves the drives by. */
+ * what speed_ref moves the drives by, and a rate of speed_ref that of acceleration_ref. */
 HX_API hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end);
 
 /* hx_plant_step, but *event tells whether a foot touched down or lifted off, and with stop the call ends there, hx_plant_time says when.
@@ -243,6 +258,11 @@ HX_API hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t siz
  * indicators, > 0 for feet that touch the ground and < 0 for others, and then has the contacts updated. */
 HX_API void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x);
 HX_API hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x); /* contacts stay; HX_NOT_FINITE: no state */
+
+/* Tells the plant that the solver's step to the present coordinates is completed. Peaks, integrals and losses of hxOutput are those of the
+ * path between two such calls; without them they stand still. The works in the coordinates are the solver's own. */
+HX_API void hx_plant_completed_step(hxPlant *plant, const hxInput *input);
+
 HX_API void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *rate);
 HX_API void hx_plant_indicators(const hxPlant *plant,
                                 double indicator[HX_LEGS]); /* m  penetration, but for a tenth of a nanometre (docs/equations.md) */
@@ -253,6 +273,10 @@ HX_API int hx_plant_update_contacts(hxPlant *plant); /* touch-downs and lift-off
  * may either result. HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx,
                                  hxCoordinates *d_rate, hxOutput *d_output);
+
+/* Sets the rates per second, at the present time under this input, of those outputs that are integrals since the start: works, squared
+ * torques, slip, impulses, losses. Peaks stay as they are within a call, so their rates are set to 0. */
+HX_API void hx_plant_integral_rates(hxPlant *plant, const hxInput *input, hxOutput *rate);
 
 /* For multibody researchers: the bodies' states, drifted joints allowed, and eq. 1 solved for them. */
 HX_API void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_STATE]);

@@ -16,12 +16,16 @@ typedef struct {
   hxMotion6 bias;    /* sums of dw and P x dw */
 } hxChain;
 
-/* The drive's acceleration: the rheonomic constraint q = q_ref + qd_ref (t - t_command) with Baumgarte. */
+/* The drive's acceleration: the rheonomic constraint q = q_ref + qd_ref s + qdd_ref s^2/2,
+ * s = t - t_command, with Baumgarte (eq. 14). */
 static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *command, double t, int joint, int slot,
                                         const hxJointWork *k) {
   const hxReal angle_ref = hx_load(&command->angle[joint][slot]), speed_ref = hx_load(&command->speed[joint][slot]);
-  const hxReal error = k->angle - (angle_ref + speed_ref * (t - command->time));
-  return -2.0 * model->alpha * (k->speed - speed_ref) - model->beta * model->beta * error;
+  const hxReal acceleration_ref = hx_load(&command->acceleration[joint][slot]);
+  const hxNumber since = t - command->time;
+  const hxReal error = k->angle - (angle_ref + since * (speed_ref + (0.5 * since) * acceleration_ref));
+  const hxReal slower = k->speed - (speed_ref + since * acceleration_ref);
+  return acceleration_ref - 2.0 * model->alpha * slower - model->beta * model->beta * error;
 }
 
 /* dw of eq. 10: rows 4 and 5 of D on it are c = gamma - 2 alpha dPhi - beta^2 Phi, s.dw is 0 or the drive's qdd.
@@ -121,7 +125,7 @@ static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
 
 static inline void leg_foot(const hxModel *model, const hxContactState *contact, const hxMotion *motion, int slot, hxLegWork *leg) {
   leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
-  hx_foot_force(model, contact, motion, slot, &leg->foot);
+  hx_foot_force(model, contact, slot, hx_load_vec3(motion->bristle, slot), &leg->foot);
   push_tibia(leg, contact_point(leg), leg->foot.force);
 }
 
@@ -145,9 +149,15 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
     implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
   }
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
-    implicit->slope[pack].servo_stiffness[joint] = leg->joint[joint].servo.stiffness;
-    implicit->slope[pack].servo_damping[joint] = leg->joint[joint].servo.damping + leg->joint[joint].servo.drag;
+    implicit->slope[pack].motor_stiffness[joint] = leg->joint[joint].servo.stiffness;
+    implicit->slope[pack].motor_damping[joint] = leg->joint[joint].servo.damping;
+    implicit->slope[pack].gear_drag[joint] = leg->joint[joint].servo.drag;
   }
+}
+
+/* N m s/rad  of motor and gear together */
+static inline hxReal servo_damping(const hxImplicit *implicit, int pack, int joint) {
+  return implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
 }
 
 /* displacement and velocity change of a body before this stage's own share: dx = s_x + z (v + s_v), dv = s_v */
@@ -185,7 +195,7 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       hxJointWork *work = &leg->joint[joint];
       work->turned = implicit->z * work->speed, work->sped = hx_splat(0.0);
-      work->torque -= implicit->slope[pack].servo_stiffness[joint] * work->turned;
+      work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->turned;
     }
     leg->foot_moved = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity), leg->foot_sped = hx_zero3();
     leg->response = hx_scale(implicit->z * k * leg->foot.kin.ddelta, n);
@@ -197,7 +207,7 @@ static inline void leg_response(const hxImplicit *implicit, const hxMotion *moti
     hxJointWork *work = &leg->joint[joint];
     j = link_shift(implicit, motion, joint, pack * HX_LANES);
     work->turned = hx_dot(work->sweep.S.ang, hx_sub(j.x.ang, i.x.ang)), work->sped = hx_dot(work->sweep.S.ang, hx_sub(j.v.ang, i.v.ang));
-    work->torque -= implicit->slope[pack].servo_stiffness[joint] * work->turned + implicit->slope[pack].servo_damping[joint] * work->sped;
+    work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->turned + servo_damping(implicit, pack, joint) * work->sped;
   }
   const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
   leg->foot_moved = x, leg->foot_sped = v;
@@ -286,7 +296,7 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   hxReal resists = hx_splat(model->rotor_inertia);
   if (implicit) {
     const double z = implicit->z;
-    resists += z * implicit->slope[pack].servo_damping[joint] + (z * z) * implicit->slope[pack].servo_stiffness[joint];
+    resists += z * servo_damping(implicit, pack, joint) + (z * z) * implicit->slope[pack].motor_stiffness[joint];
     if (joint == HX_JOINTS - 1) *I = contact_inertia(model, implicit, pack, leg);
   } else if (joint == HX_JOINTS - 1) {
     sweep->U = hx_rigid_mul(&own, sweep->S);
@@ -438,58 +448,61 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
-/* power of the motor, and what the gear takes; along a stage's own shift of angle and speed, to first order */
-static inline void joint_powers(const hxJointWork *k, double z, hxReal *in, hxReal *out) {
-  *in += k->servo.torque * k->speed;
-  *out -= k->servo.friction * k->speed;
-  if (z == 0.0) return;
-  const hxReal dspeed = k->sped + z * k->qdd, dangle = k->turned + (z * z) * k->qdd;
-  const hxReal torque = k->servo.torque, shifted = torque - k->servo.stiffness * dangle - k->servo.damping * dspeed;
-  const hxReal within = hx_clip(shifted, hx_min(k->servo.low, torque), hx_max(k->servo.high, torque)); /* a drive's may be anything */
-  *in += torque * dspeed + k->speed * (within - torque);
-  *out -= k->servo.friction * dspeed - k->speed * k->servo.drag * dspeed;
-}
-
-/* the same of friction by bristles: what they hold counts as taken until they give it back */
-static inline hxReal bristle_power(const hxLegWork *leg, hxReal drag, hxVec3 dv, hxReal dforce) {
-  const hxFootWork *foot = &leg->foot;
-  const hxReal shifted = foot->normal.force * hx_dot(foot->bristle.grip, dv) + dforce * hx_dot(foot->bristle.grip, foot->slip);
-  return shifted + drag * hx_dot(foot->slip, dv) + hx_dot(leg->bristle_force, foot->slip);
-}
-
-/* what contact damping and friction take */
-static inline hxReal foot_power(const hxModel *model, const hxImplicit *implicit, int pack, const hxLegWork *leg) {
-  const hxFootWork *foot = &leg->foot;
-  const hxNormalForce *f = &foot->normal;
-  const hxReal slip2 = foot->slip_speed * foot->slip_speed;
-  const hxReal friction = has_bristles(model) ? f->force * hx_dot(foot->bristle.grip, foot->slip) : foot->drag * slip2;
-  const hxReal power = (f->force - f->elastic) * foot->kin.ddelta + friction;
-  if (!implicit) return power;
-  const double z = implicit->z;
-  const hxVec3 a = foot_acceleration(model, leg), n = foot->kin.normal;
-  const hxVec3 dv = hx_add_scaled(leg->foot_sped, hx_splat(z), a), dx = hx_add_scaled(leg->foot_moved, hx_splat(z * z), a);
-  const hxReal dspeed = -hx_dot(n, dv), ddepth = -hx_dot(n, dx);
-  const hxReal dforce = f->viscosity * dspeed + f->stiffness * ddepth;
-  const hxReal normal = power + (f->force - f->elastic) * dspeed + foot->kin.ddelta * (dforce - f->stored * ddepth);
-  if (has_bristles(model)) return normal + bristle_power(leg, implicit->slope[pack].drag, dv, dforce);
-  return normal + 2.0 * foot->drag * hx_dot(foot->slip, dv) + foot->drag_per_load * slip2 * dforce;
-}
-
-static inline void store_powers(const hxModel *model, const hxCommand *command, const hxMotion *motion, const hxImplicit *implicit,
-                                const hxWork *work, hxMotion *rate) {
+/* Powers of motors and pushes, and what contact damping, friction and gears take. They are rates for the
+ * solvers of others: a step of ours takes its works from its impulses (eq. 22). */
+static inline void store_powers(const hxModel *model, const hxCommand *command, const hxMotion *motion, const hxWork *work,
+                                hxMotion *rate) {
   hxReal actuator[HX_PACKS], dissipated[HX_PACKS];
-  const double z = implicit ? implicit->z : 0.0;
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
+    const hxNormalForce *f = &leg->foot.normal;
     actuator[pack] = hx_splat(0.0);
-    dissipated[pack] = foot_power(model, implicit, pack, leg);
-    for (int joint = 0; joint < HX_JOINTS; ++joint) joint_powers(&leg->joint[joint], z, &actuator[pack], &dissipated[pack]);
+    dissipated[pack] = (f->force - f->elastic) * leg->foot.kin.ddelta + hx_friction_power(model, &leg->foot);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointWork *k = &leg->joint[joint];
+      actuator[pack] += k->servo.torque * k->speed;
+      dissipated[pack] -= k->servo.friction * k->speed;
+    }
   }
   rate->actuator_work = hx_lane(hx_sum_legs(actuator), 0);
   rate->dissipated = hx_lane(hx_sum_legs(dissipated), 0);
   rate->push_work = 0.0;
   for (int i = 0; i < 3; ++i)
     rate->push_work += command->push_force[i] * motion->torso[HX_V + i] + command->push_torque[i] * motion->torso[HX_W + i];
+}
+
+/* Impulses of a step's forces, summed over its stages. Shape [joint][pack] and [pack], legs in lanes. */
+typedef struct {
+  hxReal motor[HX_JOINTS][HX_PACKS]; /* N m s  motors on their joints */
+  hxReal gear[HX_JOINTS][HX_PACKS];  /* N m s  gear friction on the joints */
+  hxVec3 foot[HX_PACKS];             /* N s    ground on feet */
+  hxNumber push[6];                  /* N s, N m s  force, then torque on the torso */
+} hxImpulses;
+
+/* A stage's share: the forces as the stage's accelerations contain them, with their linearly implicit parts. */
+static inline void hx_add_impulses(const hxModel *model, const hxCommand *command, const hxImplicit *implicit, const hxWork *work,
+                                   double weight, hxImpulses *sum) {
+  const hxReal w = hx_splat(weight);
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const hxLegWork *leg = &work->pack[pack];
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointWork *k = &leg->joint[joint];
+      hxReal motor = k->servo.torque, gear = k->servo.friction;
+      if (implicit && model->servo_mode != HX_SERVO_KINEMATIC) { /* a drive's torque is a multiplier, which has it all */
+        const double z = implicit->z;
+        const hxReal turned = k->turned + (z * z) * k->qdd, sped = k->sped + z * k->qdd;
+        motor -= implicit->slope[pack].motor_stiffness[joint] * turned + implicit->slope[pack].motor_damping[joint] * sped;
+        gear -= implicit->slope[pack].gear_drag[joint] * sped;
+      }
+      sum->motor[joint][pack] += w * motor;
+      sum->gear[joint][pack] += w * gear;
+    }
+    sum->foot[pack] = hx_add_scaled(sum->foot[pack], w, stage_force(model, implicit, pack, leg));
+  }
+  for (int i = 0; i < 3; ++i) {
+    sum->push[i] += weight * command->push_force[i];
+    sum->push[3 + i] += weight * command->push_torque[i];
+  }
 }
 
 /* Positions, velocities and forces at (t, y); work is filled up to the sweeps, with what the multipliers take if they are wanted. */
@@ -538,7 +551,10 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
       store_link_rate(model, motion, implicit, joint, pack * HX_LANES, &work->pack[pack].joint[joint], rate);
   if (has_bristles(model)) store_bristle_rates(model, contact, implicit, work, &rate->motion);
   fill_rate_slots(rate);
-  store_powers(model, command, motion, implicit, work, &rate->motion);
+  if (!implicit)
+    store_powers(model, command, motion, work, &rate->motion);
+  else
+    rate->motion.actuator_work = rate->motion.push_work = rate->motion.dissipated = 0.0;
 }
 
 #endif

@@ -24,7 +24,6 @@ typedef struct {
   hxReal elastic;   /* N    its part that is stored: K delta^(3/2) */
   hxReal stiffness; /* N/m  df_n/ddelta */
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
-  hxReal stored;    /* N/m  d elastic/ddelta */
 } hxNormalForce;
 
 /* What a foot with bristles feels across the normal. */
@@ -67,7 +66,8 @@ static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
 
 /* Elasto-plastic bristles (eq. 18, 19), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+ u/|u|, of which friction is the share
  * w = u (3 - u.u)/2 + d room/|(room, d)|, d = 3/2 tau db/dt / b_max. The room that the spring leaves, 1 - |u| (3 - u.u)/2, is all that the
- * damping can have: w never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages scatter. */
+ * damping can have: w never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages scatter. Friction is
+ * static where nothing slides and falls with the speed p of what does: mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2). */
 static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
@@ -81,11 +81,13 @@ static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b
   const hxReal room = 1.0 - spring * size;
   const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) + 1e-30); /* tiny: no room and no motion is 0, not 0/0 */
   const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
+  const hxReal sliding = hx_splat(model->per_stribeck) * let_go * size;
+  const hxReal mu = model->mu + model->static_rise / (1.0 + sliding * sliding);
   return (hxBristle){
-      .grip = hx_scale(hx_splat(model->mu), w),
+      .grip = hx_scale(mu, w),
       .rate = rate,
-      .stiffness = (model->mu * per_length) * spring,
-      .damping = (1.5 * model->mu * model->bristle_damping * per_length) * share,
+      .stiffness = (mu * per_length) * spring,
+      .damping = (1.5 * mu * model->bristle_damping * per_length) * share,
       .yield = per_length * let_go,
   };
 }
@@ -102,7 +104,6 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
       .force = elastic * hx_max(factor, zero),
       .elastic = elastic,
       .stiffness = hx_select(pushes, closed * (1.5 * model->stiffness) * root * factor, zero),
-      .stored = closed * (1.5 * model->stiffness) * root,
       .viscosity = hx_select(pushes, elastic * damping, zero),
   };
 }
@@ -117,19 +118,25 @@ static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hx
 }
 
 /* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t or the bristles' across it. The only place a friction law is chosen. */
-static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, const hxMotion *motion, int slot, hxFootWork *foot) {
+static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, int slot, hxVec3 bristle, hxFootWork *foot) {
   const hxFootKinematics *kin = &foot->kin;
   foot->normal = hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), kin->delta, kin->ddelta);
   foot->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
   if (model->friction_law == HX_FRICTION_BRISTLE) {
-    foot->bristle = hx_bristle(model, hx_load(&contact->closed[slot]), hx_load_vec3(motion->bristle, slot), foot->slip);
+    foot->bristle = hx_bristle(model, hx_load(&contact->closed[slot]), bristle, foot->slip);
     foot->force = hx_scale(foot->normal.force, hx_sub(kin->normal, foot->bristle.grip));
     return;
   }
   foot->drag_per_load = model->mu * hx_friction(model, foot->slip_speed);
   foot->drag = foot->normal.force * foot->drag_per_load;
   foot->force = hx_add_scaled(hx_scale(foot->normal.force, kin->normal), -foot->drag, foot->slip);
+}
+
+/* W  that friction takes */
+static inline hxReal hx_friction_power(const hxModel *model, const hxFootWork *foot) {
+  if (model->friction_law == HX_FRICTION_BRISTLE) return foot->normal.force * hx_dot(foot->bristle.grip, foot->slip);
+  return foot->drag * foot->slip_speed * foot->slip_speed;
 }
 
 #endif

@@ -6,15 +6,14 @@
 
 #include "../contact_law.h"
 #include "../method.h"
-#include "dynamics.h"
+#include "measure.h"
 
 static const double step_floor = 1e-11;              /* s  below this the error control gives up */
 static const double most_steps[3] = {1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
 static const double touch_depth[2] = {1e-10, 1e-6};  /* m, m over the tolerance  a touch-down is found when the foot is in by less */
 
-/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s, and 1 J for the energy audit. */
+/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
-static const double work_scale = 1.0;
 static const double bristle_scale = 10.0; /* preslidings: at the default tolerance a thousandth of the friction force */
 
 /* Where a step starts. */
@@ -36,6 +35,7 @@ typedef struct {
 
 typedef struct {
   hxMotion y;
+  hxImpulses impulses;
   double error; /* of the step over the tolerance; 0 without an estimate */
 } hxTrial;
 
@@ -98,7 +98,7 @@ static inline double larger(double a, double b) { return b > a ? b : a; }
 static double error_norm(const hxModel *model, const hxMotion *error) {
   hxReal links = hx_splat(0.0);
   double largest[HX_LANES];
-  double worst = larger(larger(fabs(error->actuator_work), fabs(error->push_work)), fabs(error->dissipated)) / work_scale;
+  double worst = 0.0;
   for (int i = 0; i < HX_BODY_STATE; ++i) {
     const double scale = 1.0 / error_scale[i];
     worst = larger(worst, scale * fabs(error->torso[i]));
@@ -126,16 +126,29 @@ static void normalise_quaternions(hxMotion *m) {
     }
 }
 
-/* The command at a time; in kinematic mode speed_ref moves the drives whose angle_ref does not move by itself. */
+/* A kinematic drive's command a while after it was given. A rate given for an input takes the place
+ * of the input one derivative above it. */
+static void move_drive(const hxCommand *from, const hxCommand *rate, double elapsed, int joint, int slot, hxCommand *now) {
+  const int given = rate->speed[joint][slot] != 0.0;
+  const double a = given ? rate->speed[joint][slot] : from->acceleration[joint][slot];
+  const double jerk = given ? 0.0 : rate->acceleration[joint][slot];
+  now->acceleration[joint][slot] = a + elapsed * jerk;
+  now->speed[joint][slot] = from->speed[joint][slot] + elapsed * (a + 0.5 * elapsed * jerk);
+  if (rate->angle[joint][slot] != 0.0) return;
+  now->angle[joint][slot] =
+      from->angle[joint][slot] + elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
+}
+
+/* The command at a time; in kinematic mode drives go on between rates as without (eq. 14). */
 static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
-  enum { SIZE = sizeof(hxCommand) / sizeof(double), ANGLES = HX_JOINTS * HX_SLOTS };
+  enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   const double *from = (const double *)start->command, *rate = (const double *)start->ramp;
   double *to = (double *)now;
   if (!start->ramp) return start->command;
   const double elapsed = t - start->command->time;
   for (int i = 0; i < SIZE; ++i) to[i] = from[i] + elapsed * rate[i];
-  for (int i = 0; i < ANGLES && start->model->servo_mode == HX_SERVO_KINEMATIC; ++i)
-    if (rate[i] == 0.0) to[i] = from[i] + elapsed * now->speed[i / HX_SLOTS][i % HX_SLOTS];
+  for (int i = 0; i < HX_JOINTS * HX_SLOTS && start->model->servo_mode == HX_SERVO_KINEMATIC; ++i)
+    move_drive(start->command, start->ramp, elapsed, i / HX_SLOTS, i % HX_SLOTS, now);
   now->time = t;
   return now;
 }
@@ -149,6 +162,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxMotion y;
   hxWork work;
   hxCommand now;
+  memset(&trial->impulses, 0, sizeof trial->impulses);
   for (int i = 0; i < m->stages; ++i) {
     const double t = start->t + m->c[i] * h;
     if (i > 0) {
@@ -156,8 +170,10 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
       if (m->gamma > 0.0) combine(model, change.y, NULL, h, m->g[i], k, i, 0);
       implicit.change = &change;
     }
-    hx_dynamics_evaluate(model, start->contact, command_at(start, t, &now), t, i > 0 ? &y : start->y, m->gamma > 0.0 ? &implicit : NULL, 0,
-                         &work, &k[i]);
+    const hxCommand *command = command_at(start, t, &now);
+    hxImplicit *stage = m->gamma > 0.0 ? &implicit : NULL;
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? &y : start->y, stage, 0, &work, &k[i]);
+    hx_add_impulses(model, command, stage, &work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
   memcpy(trial->y.bristle, start->y->bristle, sizeof trial->y.bristle);
@@ -167,6 +183,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     combine(model, y.y, NULL, h, m->e, k, m->stages, HX_TURN_SIZE);
     trial->error = error_norm(model, &y);
   }
+  trial->y.actuator_work = start->y->actuator_work; /* the accepted step's are added by measure_step */
+  trial->y.push_work = start->y->push_work, trial->y.dissipated = start->y->dissipated;
   normalise_quaternions(&trial->y);
   if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial->y);
 }
@@ -274,6 +292,33 @@ static int all_finite(const hxMotion *y) {
   return total == 0.0;
 }
 
+/* ---- what a step did -------------------------------------------------------------------------------------------------------- */
+
+/* Work of the push: its impulses times the mean of the torso's velocities at both ends. */
+static double push_work(const hxImpulses *impulses, const hxMotion *from, const hxMotion *to) {
+  double work = 0.0;
+  for (int i = 0; i < 6; ++i) work += impulses->push[i] * (0.5 * (from->torso[HX_V + i] + to->torso[HX_V + i]));
+  return work;
+}
+
+/* Adds the works of an accepted step of h to the motion at its end, and what it did to what the state has measured. */
+static void measure_step(const hxStart *start, double h, const hxMoment *end, hxState *state, hxTrial *trial) {
+  hxStepWorks works;
+  hxCommand command[INTERVALS + 1];
+  hxReal work[HX_PACKS];
+  hxPath path = {.model = start->model, .contact = start->contact, .t = start->t, .h = h, .from = &state->moment, .to = end};
+  for (int node = 0; node <= INTERVALS; ++node)
+    path.command[node] = command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
+  hx_step_works(&path, &trial->impulses, &works);
+  hxMeasured *measured = &state->measured;
+  hx_measure_path(&path, &works, measured);
+  for (int pack = 0; pack < HX_PACKS; ++pack) work[pack] = (works.motor[0][pack] + works.motor[1][pack]) + works.motor[2][pack];
+  trial->y.actuator_work += hx_lane(hx_sum_legs(work), 0);
+  trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);
+  trial->y.dissipated = (measured->contact_loss + measured->friction_loss) + measured->gear_loss;
+  state->moment = *end;
+}
+
 /* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is its length. */
 static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state, double *taken, char *message) {
   const hxModel *model = start->model;
@@ -294,12 +339,22 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
     /* a step cut short by the end of the interval says little against a longer one */
     *next_step = state->next_step = h < h_max ? next : fmax(next, state->next_step);
   }
-  hxFeet feet = feet_of(model, &trial.y);
-  *taken = open_depth(start->contact, &feet) > 0.0 ? find_touchdown(start, h, state, &trial, &feet) : h;
+  hxMoment end;
+  hxFeet feet;
+  memset(&end, 0, sizeof end);
+  hx_moment_of(model, &trial.y, &end);
+  memcpy(feet.delta, end.delta, sizeof feet.delta);
+  memcpy(feet.ddelta, end.ddelta, sizeof feet.ddelta);
+  *taken = h;
+  if (open_depth(start->contact, &feet) > 0.0) {
+    *taken = find_touchdown(start, h, state, &trial, &feet);
+    hx_moment_of(model, &trial.y, &end);
+  }
+  end.time = start->t + *taken;
+  measure_step(start, *taken, &end, state, &trial);
   state->motion = trial.y;
   state->steps += 1.0;
-  state->touchdowns += hx_contact_switch(model, feet.delta, feet.ddelta, &state->contact);
-  if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
+  hx_switch_contacts(model, feet.delta, feet.ddelta, start->t + *taken, state);
   return HX_OK;
 }
 
@@ -353,8 +408,11 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
 /* Advances the state to t_end exactly, or to an event. On failure the state is somewhere on the way and the message says why. */
 static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
                              hxState *state, char *message) {
+  if (state->moment.stale != 0.0) hx_moment_here(model, state);
+  if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end, events, state, message);
   fill_motion_slots(&state->motion);
+  hx_fill_measured_slots(state);
   return status;
 }
 

@@ -50,12 +50,15 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion
 }
 
 /* joint on child: force -lambda, torque about the joint's point -(u1 lambda_4 + u2 lambda_5); the motor's torque is not in it */
-static void fill_joint(const hxJointWork *k, int lane, int leg, int joint, hxOutput *o) {
+static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int leg, int joint, hxOutput *o) {
   const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.axes.x, s), u2 = hx_cross(k->body.axes.y, s);
   const hxVec3 couple = hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
   o->angle[leg][joint] = hx_lane(k->angle, lane);
   o->speed[leg][joint] = hx_lane(k->speed, lane);
   o->torque[leg][joint] = hx_lane(k->servo.torque, lane);
+  o->positive_work[leg][joint] = state->measured.positive_work[joint][leg];
+  o->negative_work[leg][joint] = state->measured.negative_work[joint][leg];
+  o->torque_squared[leg][joint] = state->measured.torque_squared[joint][leg];
   get3(hx_neg(k->reaction.lambda_lin), lane, o->reaction_force[leg][joint]);
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
@@ -72,6 +75,12 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
   o->foot.penetration[leg] = hx_lane(foot->kin.delta, lane);
   o->foot.impact_speed[leg] = state->contact.impact_speed[leg];
   for (int i = 0; i < 3; ++i) o->foot.bristle[leg][i] = state->motion.bristle[i][leg];
+  o->foot.slip_distance[leg] = state->measured.slip_distance[leg];
+  o->foot.impulse[leg] = state->measured.impulse[leg];
+  o->foot.peak_force[leg] = state->measured.peak_force[leg];
+  o->foot.peak_force_rate[leg] = state->measured.peak_rate[leg];
+  o->foot.landing_rate[leg] = state->measured.landing_rate[leg];
+  o->foot.landings[leg] = state->measured.landings[leg];
   o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
 }
 
@@ -115,6 +124,9 @@ static void fill_energy(const hxModel *model, const hxState *state, const hxWork
   o->energy.actuator_work = m->actuator_work;
   o->energy.push_work = m->push_work;
   o->energy.dissipated = m->dissipated;
+  o->energy.contact_loss = state->measured.contact_loss;
+  o->energy.friction_loss = state->measured.friction_loss;
+  o->energy.gear_loss = state->measured.gear_loss;
   o->energy.residual = o->energy.kinetic + o->energy.potential - state->stored_at_start - m->actuator_work - m->push_work + m->dissipated;
 }
 
@@ -123,7 +135,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
-    for (int joint = 0; joint < HX_JOINTS; ++joint) fill_joint(&w->joint[joint], lane, leg, joint, o);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) fill_joint(state, &w->joint[joint], lane, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
     fill_foot(model, state, &w->foot, tibia, lane, leg, o);
   }
@@ -135,6 +147,38 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
   o->solver.rejected = state->rejected;
   o->solver.touchdowns = state->touchdowns;
 }
+
+#ifndef HX_TANGENT /* derivatives of state and input do not see them */
+/* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0 */
+static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
+  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const hxLegWork *w = &work->pack[pack];
+    const hxNormalForce *f = &w->foot.normal;
+    contact[pack] = (f->force - f->elastic) * w->foot.kin.ddelta;
+    friction[pack] = hx_friction_power(model, &w->foot);
+    gear[pack] = hx_splat(0.0);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) gear[pack] -= w->joint[joint].servo.friction * w->joint[joint].speed;
+  }
+  rate->energy.contact_loss = hx_lane(hx_sum_legs(contact), 0);
+  rate->energy.friction_loss = hx_lane(hx_sum_legs(friction), 0);
+  rate->energy.gear_loss = hx_lane(hx_sum_legs(gear), 0);
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    int lane;
+    const hxLegWork *w = leg_work(work, leg, &lane);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const double torque = hx_lane(w->joint[joint].servo.torque, lane), power = torque * hx_lane(w->joint[joint].speed, lane);
+      rate->positive_work[leg][joint] = fmax(power, 0.0);
+      rate->negative_work[leg][joint] = fmax(-power, 0.0);
+      rate->torque_squared[leg][joint] = torque * torque;
+    }
+    const double force = hx_lane(w->foot.normal.force, lane);
+    rate->foot.impulse[leg] = force;
+    rate->foot.slip_distance[leg] = force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
+    rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] = rate->foot.landings[leg] = 0.0;
+  }
+}
+#endif
 
 /* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's bodies */
 static inline void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, hxNumber acceleration[HX_BODIES][6],

@@ -72,7 +72,7 @@ typedef struct {
   double ahead;         /* s  how far ahead the first stage looks for the contact's slopes */
   const hxRate *change; /* sum of h g_ij k_j over the stages before this one; NULL: the first stage */
   struct {
-    hxReal servo_stiffness[HX_JOINTS], servo_damping[HX_JOINTS];
+    hxReal motor_stiffness[HX_JOINTS], motor_damping[HX_JOINTS], gear_drag[HX_JOINTS];
     hxReal stiffness, viscosity, drag;
     hxReal bristle, yield; /* N/m, 1/s  bristles: stiffness over 1 + z yield (in drag too, z times), how fast they let go */
   } slope[HX_PACKS];

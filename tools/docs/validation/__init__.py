@@ -15,18 +15,21 @@ sys.path.insert(0, str(ROOT / "tests"))  # the tests' robots, motions and proble
 
 from building import built, shared_library
 
-from tools.docs.validation import agreement, benchmarks, books, impacts, motion, orders
+from tools.docs.validation import agreement, benchmarks, books, impacts, motion, orders, quoted
 
-PLACE = re.compile(r"<!-- result: (\w+) -->")
+PLACE = re.compile(r"<!-- result: ([\w-]+) -->")
 COMPUTED: Mapping[str, Callable[[ctypes.CDLL], Shown]] = {
     "motion": motion.closed_forms,
     "restitution": impacts.restitution,
+    "gravity": impacts.under_gravity,
     "penetration": impacts.penetration,
     "orders": orders.orders,
     "agreement": agreement.agreement,
 }
 READ: Mapping[str, Callable[[], Shown]] = {
     "books": books.books,
+    "books-of-scenarios": books.scenarios,
+    **quoted.RESULTS,
     "peers": benchmarks.peers,
     "speed": benchmarks.speed,
     "control": benchmarks.control,

@@ -1,4 +1,4 @@
-"""The energy books of a walk: what they leave unexplained, by the tolerance of the integrator."""
+"""The energy books: what they leave unexplained, by the tolerance of the integrator, and of every shipped scenario."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.run import simulate
-from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.scenario import list_scenarios, load_scenario
+from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import PALETTE, Shown, short
 
@@ -46,3 +47,21 @@ def books() -> Shown:
         columns=("solver.tolerance", "evaluations", f"residual over work after {DURATION:g} s"), rows=rows, draw=draw,
         alt="The energy residual of a walk over time: it falls with the tolerance",
     )  # fmt: skip
+
+
+SOLVERS = {"default": [], "ros2 at 0.1": ["solver.method=ros2", "solver.tolerance=0.1"]}
+
+
+def scenarios() -> Shown:
+    """Every shipped scenario under both controls: the metric energy_residual."""
+    rows = []
+    with Walker() as walker:
+        for name in list_scenarios():
+            cells = [name]
+            for settings in SOLVERS.values():
+                for control in ("kinematic", "compliant"):
+                    plan = load_scenario(name, overrides=[f"control={control}", *settings])
+                    cells.append(short(walker.simulate(plan).metrics["energy_residual"]))
+            rows.append(cells)
+    columns = ["scenario", *(f"{control}, {solver}" for solver in SOLVERS for control in ("kinematic", "compliant"))]
+    return Shown(columns=columns, rows=rows)

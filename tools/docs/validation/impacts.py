@@ -14,6 +14,9 @@ from tools.docs.validation.shown import MARKERS, PALETTE, Shown, short
 
 ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
 SPEED = 0.4  # m/s
+GRAVITY = 9.81  # m/s2
+TINY = 1e-9  # m    that the feet are above the ground
+CONTACT_TIME = 0.5  # s    an impact that lasts longer is none
 NAMES = {
     "exact_restitution": "exact restitution",
     "flores": "Flores",
@@ -45,9 +48,40 @@ def restitution(core: ct.CDLL) -> Shown:
     )  # fmt: skip
 
 
-def _bounced(core: ct.CDLL, law: str, e: float) -> float:
-    bounced = flown_off(falling(core, rigid(law, restitution=e), speed=SPEED), step=2e-3)
-    return float(bounced.torso.velocity[2]) / SPEED
+def _bounced(core: ct.CDLL, law: str, e: float, *, speed: float = SPEED) -> float:
+    bounced = flown_off(falling(core, rigid(law, restitution=e), speed=speed), step=2e-3)
+    return float(bounced.torso.velocity[2]) / speed
+
+
+def under_gravity(core: ct.CDLL) -> Shown:
+    """The exact law at 0.5 with the robot's weight on its feet while they touch: what is left of the restitution, by speed."""
+    speeds, e = (0.05, 0.1, 0.2, 0.3, 0.4, 1.0), 0.5
+    alone = [_bounced(core, "exact_restitution", e, speed=speed) for speed in speeds]
+    heavy = [_bounced_heavily(core, e, speed) for speed in speeds]
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        axes.semilogx(speeds, alone, MARKERS[0], color=PALETTE[0], label="without gravity", markersize=5)
+        axes.semilogx(speeds, heavy, MARKERS[1], color=PALETTE[1], label="with gravity", markersize=5)
+        axes.set(xlabel="speed of the impact [m/s]", ylabel="restitution delivered", ylim=(0, 0.6))
+        axes.legend()
+
+    return Shown(
+        columns=("e = 0.5, speed [m/s]", *(f"{speed:g}" for speed in speeds)),
+        rows=[("without gravity", *(f"{value:.4f}" for value in alone)), ("with gravity", *(f"{value:.4f}" for value in heavy))],
+        draw=draw, size=(7.6, 2.8), alt="Restitution against impact speed: with gravity it falls to nothing as the impact becomes slow",
+    )  # fmt: skip
+
+
+def _bounced_heavily(core: ct.CDLL, e: float, speed: float) -> float:
+    """Of a robot that arrives at its feet with a speed under gravity; 0 when it stays."""
+    robot = rigid("exact_restitution", gravity=GRAVITY, restitution=e)
+    plant = falling(core, robot, clearance=TINY, speed=speed)
+    try:
+        bounced = flown_off(plant, step=1e-4, limit=CONTACT_TIME)
+    except AssertionError:
+        return 0.0
+    return float(bounced.torso.velocity[2]) / speed
 
 
 def penetration(core: ct.CDLL) -> Shown:

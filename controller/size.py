@@ -1,0 +1,76 @@
+"""How large a robot is beside those that the design's figures are for, and what it is asked for.
+
+Robots of one shape and density whose lengths are l times as large walk alike, with times that are
+sqrt(l) times as long (Froude's number, v^2/(g l)). The figures of the requirements, round as they
+are, suit legs of SHORTEST to LONGEST, an octave that holds both robots of the package. Beyond it
+lengths, times, speeds and rates grow or shrink with the legs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hexapod_cosim.controller.gains import TRIPOD_LEGS, Requirements
+from hexapod_cosim.controller.kinematics import LegSolver
+from hexapod_cosim.models import Robot
+
+SHORTEST, LONGEST = 0.22, 0.44  # m    coxa, femur and tibia of legs that the figures suit
+YIELD = 1.5  # 1    deflection of the suspension over the sag of its leg's servos, at most
+LENGTHS = ("deflection", "deflection_limit", "height_limit")
+TIMES = ("load_time", "handover_time", "weight_time", "ground_time")
+RATES = ("bandwidth", "frequency", "attitude_rate", "height_rate", "path_rate", "turn_limit")
+SPEEDS = ("speed_limit",)
+
+
+@dataclass(frozen=True)
+class Size:
+    """Factors on figures that suit robots of the usual size. 1: as they are."""
+
+    length: float
+
+    @property
+    def time(self) -> float:
+        """Of times; rates go with its inverse."""
+        return math.sqrt(self.length)
+
+    @property
+    def speed(self) -> float:
+        """Of speeds."""
+        return self.length / self.time
+
+
+def size_of(robot: Robot) -> Size:
+    """By the mean length of the legs."""
+    legs = LegSolver(robot)
+    length = float((np.abs(legs.coxa_length) + legs.femur + legs.tibia).mean())
+    return Size(length / min(max(length, SHORTEST), LONGEST))
+
+
+def requirements_for(robot: Robot, **given: Any) -> Requirements:
+    """What the design asks for by a robot's size and servos; what is given is taken as it is.
+
+    Stiff servos bound the suspension's deflection: beside theirs it is the gain of the
+    suspension's loop, which would have no margins.
+    """
+    size, usual = size_of(robot), Requirements()
+    factors = (
+        (LENGTHS, size.length),
+        (TIMES, size.time),
+        (RATES, 1.0 / size.time),
+        (SPEEDS, size.speed),
+    )
+    asked = {name: getattr(usual, name) * factor for names, factor in factors for name in names}
+    if robot.servo.kp > 0.0:
+        asked["deflection"] = min(asked["deflection"], YIELD * sag(robot))
+    return Requirements(**{**asked, **given})
+
+
+def sag(robot: Robot) -> float:
+    """m    of a leg's servos in the stance under a third of the weight, the legs' mean"""
+    vertical = LegSolver(robot).jacobian(robot.stance)[:, 2]
+    softness = float((vertical**2).sum(axis=1).mean() / robot.servo.kp)
+    return softness * robot.weight / TRIPOD_LEGS

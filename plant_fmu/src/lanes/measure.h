@@ -1,0 +1,272 @@
+/* measure.h - what a step did: works, losses, slip, impulses and peaks of joints and feet
+ *
+ * Works and losses are the impulses of the step's own forces times the mean of the speeds at its ends (eq. 22), so that they explain
+ * the change of kinetic energy. What is no work is integrated along the step's path between its ends (hxMoment, eq. 23): angles and
+ * depths follow cubics through values and rates, sliding velocities parabolas through values and mean. Nothing depends on how often
+ * anyone looks at the plant.
+ */
+#ifndef HX_MEASURE_H
+#define HX_MEASURE_H
+
+#include "../contact_law.h"
+#include "dynamics.h"
+
+static const double landing_time = 0.02; /* s  after touch-down, in which a rise of the normal force counts as the landing's */
+static const double shortest_bend = 1e-7; /* s  in shorter steps second differences of depths are rounding */
+static const double half_turn = 3.14159265358979323846;
+
+/* Nodes of a step, at which laws are evaluated: all of them for feet, every second one for motors; and Simpson's weights there. */
+enum { INTERVALS = 4, MOTOR_STRIDE = 2 };
+static const double foot_weight[INTERVALS + 1] = {1.0 / 12, 4.0 / 12, 2.0 / 12, 4.0 / 12, 1.0 / 12};
+static const double motor_weight[INTERVALS + 1] = {1.0 / 6, 0.0, 4.0 / 6, 0.0, 1.0 / 6};
+
+/* The works and losses of a step, J, one pack's legs in lanes. */
+typedef struct {
+  hxReal motor[HX_JOINTS][HX_PACKS];
+  hxReal mean_torque[HX_JOINTS][HX_PACKS]; /* N m  of the motors */
+  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
+} hxStepWorks;
+
+/* A step between two moments. */
+typedef struct {
+  const hxModel *model;
+  const hxContactState *contact;        /* in force during the step */
+  const hxCommand *command[INTERVALS + 1]; /* at its nodes */
+  double t, h;                          /* s  its start and length */
+  const hxMoment *from, *to;
+} hxPath;
+
+/* ---- moments ---------------------------------------------------------------------------------------------------------------- */
+
+/* Angles, speeds and feet of a motion. */
+static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hxMoment *moment) {
+  const hxBody torso = hx_torso_body(motion);
+  for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
+    hxBody i = torso, j = torso;
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxJointModel *m = &model->joint[joint];
+      hxReal sine, cosine;
+      i = j;
+      j = hx_link_body(motion, joint, slot);
+      hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot), hx_link_quat(motion, joint, slot), &sine, &cosine);
+      hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
+      const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
+      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub(j.w, i.w)));
+    }
+    const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);
+    const hxVec3 to_point = hx_scale(hx_splat(-model->foot_radius), foot.normal);
+    const hxVec3 centre = hx_add(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub(foot.arm, to_point));
+    hx_store_vec3(moment->centre, slot, centre);
+    hx_store_vec3(moment->normal, slot, foot.normal);
+    hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
+    hx_store_vec3(moment->roll, slot, hx_cross(j.w, to_point));
+    hx_store(&moment->delta[slot], foot.delta);
+    hx_store(&moment->ddelta[slot], foot.ddelta);
+  }
+}
+
+/* The moment of the state as it is. */
+static inline void hx_moment_here(const hxModel *model, hxState *state) {
+  hx_moment_of(model, &state->motion, &state->moment);
+  state->moment.time = state->time;
+  state->moment.stale = 0.0;
+}
+
+/* Peaks are those of one call: they begin anew with it. */
+static inline void hx_reset_peaks(hxMeasured *measured) {
+  memset(measured->peak_force, 0, sizeof measured->peak_force);
+  memset(measured->peak_rate, 0, sizeof measured->peak_rate);
+}
+
+/* Slots that no pack of this width covers go with leg 0, as in every motion; a structure begins with so many rows of slots. */
+static inline void fill_rows(void *structure, size_t rows) {
+  double *first = structure;
+  for (size_t row = 0; row < rows; ++row) hx_fill_slots(&first[row * HX_SLOTS]);
+}
+
+static inline void hx_fill_measured_slots(hxState *state) {
+  fill_rows(&state->moment, HX_MOMENT_ROWS);
+  fill_rows(&state->measured, HX_MEASURED_ROWS);
+}
+
+/* Touch-downs and lift-offs that are due at a time, and what begins with them. */
+static inline void hx_switch_contacts(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], double t,
+                                      hxState *state) {
+  const hxContactState before = state->contact;
+  state->touchdowns += hx_contact_switch(model, delta, ddelta, &state->contact);
+  for (int slot = 0; slot < HX_SLOTS; ++slot)
+    if (before.closed[slot] == 0.0 && state->contact.closed[slot] != 0.0) {
+      state->measured.landings[slot] += 1.0;
+      state->measured.landed_at[slot] = t;
+      state->measured.landing_rate[slot] = 0.0;
+    }
+  if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
+}
+
+/* ---- works and losses (eq. 22) ----------------------------------------------------------------------------------------------- */
+
+static inline hxReal mean_of(const double *from, const double *to) { return 0.5 * (hx_load(from) + hx_load(to)); }
+
+static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS], int slot) {
+  return hx_scale(hx_splat(0.5), hx_add(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
+}
+
+/* 2/5 K delta^(5/2) of a closed foot */
+static inline hxReal stored_in_contact(const hxModel *model, hxReal closed, const double *delta) {
+  const hxReal depth = hx_max(hx_load(delta), hx_splat(0.0));
+  return closed * (0.4 * model->stiffness) * (depth * depth) * hx_sqrt(depth);
+}
+
+static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse, hxStepWorks *works) {
+  const hxMoment *from = path->from, *to = path->to;
+  const hxReal per_step = hx_splat(1.0 / path->h);
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const int slot = pack * HX_LANES;
+    works->gear[pack] = hx_splat(0.0);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      const hxReal speed = mean_of(&from->speed[joint][slot], &to->speed[joint][slot]);
+      works->motor[joint][pack] = impulse->motor[joint][pack] * speed;
+      works->mean_torque[joint][pack] = impulse->motor[joint][pack] * per_step;
+      works->gear[pack] -= impulse->gear[joint][pack] * speed;
+    }
+    const hxReal closed = hx_load(&path->contact->closed[slot]);
+    const hxVec3 normal = mean_vec3(from->normal, to->normal, slot), slip = mean_vec3(from->slip, to->slip, slot);
+    const hxReal taken = hx_dot(impulse->foot[pack], normal) * mean_of(&from->ddelta[slot], &to->ddelta[slot]);
+    const hxReal stored =
+        stored_in_contact(path->model, closed, &to->delta[slot]) - stored_in_contact(path->model, closed, &from->delta[slot]);
+    works->contact[pack] = taken - stored;
+    works->friction[pack] = -hx_dot(impulse->foot[pack], slip);
+  }
+}
+
+/* ---- joints ----------------------------------------------------------------------------------------------------------------- */
+
+/* The cubic through values and rates (per step) at both ends, x in [0, 1]: value, rate and rate of the rate. */
+typedef struct {
+  hxReal value, rate, second;
+} hxCubic;
+
+static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal slope_to, double x) {
+  const hxReal bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;
+  return (hxCubic){from + x * (slope_from + x * (curve + x * bend)), slope_from + x * (2.0 * curve + (3.0 * x) * bend),
+                   2.0 * curve + (6.0 * x) * bend};
+}
+
+/* an angle that passed the half turn is measured from the other side */
+static inline hxReal within_turn(hxReal angle) {
+  const hxReal low = hx_select(hx_less(hx_splat(half_turn), angle), angle - 2.0 * half_turn, angle);
+  return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
+}
+
+/* One joint of a pack: positive and negative work, whose difference is the step's work, and the squared torque's integral. */
+static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal work, hxReal mean_torque, hxMeasured *measured) {
+  const hxModel *model = path->model;
+  const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
+  const hxReal angle = hx_load(&path->from->angle[joint][slot]), rise = within_turn(hx_load(&path->to->angle[joint][slot]) - angle);
+  const hxReal slope_from = h * hx_load(&path->from->speed[joint][slot]), slope_to = h * hx_load(&path->to->speed[joint][slot]);
+  hxReal positive = zero, negative = zero, squared = zero;
+  for (int node = 0; node <= INTERVALS; node += MOTOR_STRIDE) {
+    const hxCommand *command = path->command[node];
+    const hxCubic q = cubic(angle, slope_from, rise, slope_to, (double)node / INTERVALS);
+    const hxReal speed = per_step * q.rate, weight = hx_splat(path->h * motor_weight[node]);
+    hxReal torque = mean_torque; /* of a kinematic drive, which has no law */
+    if (model->servo_mode != HX_SERVO_KINEMATIC)
+      torque = hx_motor_torque(model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
+                               hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]))
+                   .torque;
+    positive += weight * hx_max(torque * speed, zero);
+    negative += weight * hx_max(-(torque * speed), zero);
+    squared += weight * (torque * torque);
+  }
+  /* what the path misses of the step's work goes to the larger of both */
+  const hxReal rest = work - (positive - negative);
+  const hxMask drives = hx_less(negative, positive);
+  positive += hx_select(drives, rest, zero);
+  negative -= hx_select(drives, zero, rest);
+  const hxReal below = hx_min(positive, negative); /* neither sinks below 0 */
+  const hxReal excess = hx_min(below, zero);
+  hx_store(&measured->positive_work[joint][slot], hx_load(&measured->positive_work[joint][slot]) + (positive - excess));
+  hx_store(&measured->negative_work[joint][slot], hx_load(&measured->negative_work[joint][slot]) + (negative - excess));
+  hx_store(&measured->torque_squared[joint][slot], hx_load(&measured->torque_squared[joint][slot]) + squared);
+}
+
+/* ---- feet ------------------------------------------------------------------------------------------------------------------- */
+
+/* a velocity with its values at both ends and its mean, at x in [0, 1] */
+static inline hxVec3 sliding(hxVec3 from, hxVec3 to, hxVec3 mean, double x) {
+  const hxVec3 ends = hx_add_scaled(hx_scale(hx_splat(1.0 - x * (4.0 - 3.0 * x)), from), hx_splat(x * (3.0 * x - 2.0)), to);
+  return hx_add_scaled(ends, hx_splat(6.0 * x * (1.0 - x)), mean);
+}
+
+static inline hxVec3 along_ground(hxVec3 a, hxVec3 normal) { return hx_add_scaled(a, -hx_dot(normal, a), normal); }
+
+/* Share of an interval in which a force that changes linearly exceeds a limit, and where in the interval that part's middle is. */
+static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *middle) {
+  const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
+  const hxReal a = from - limit, b = to - limit;
+  const hxReal crossing = hx_abs(a) / hx_max(hx_abs(a) + hx_abs(b), hx_splat(1e-300));
+  const hxMask first = hx_less(zero, a), last = hx_less(zero, b);
+  const hxReal low = hx_select(first, zero, hx_select(last, crossing, one));
+  const hxReal high = hx_select(last, one, hx_select(first, crossing, low));
+  *middle = 0.5 * (low + high);
+  return high - low;
+}
+
+/* One pack's feet: slip under load, impulse, peaks. */
+static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measured) {
+  const hxModel *model = path->model;
+  const hxMoment *from = path->from, *to = path->to;
+  const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
+  const hxReal closed = hx_load(&path->contact->closed[slot]), damping = hx_load(&path->contact->damping[slot]);
+  const hxVec3 slip_from = hx_load_vec3(from->slip, slot), slip_to = hx_load_vec3(to->slip, slot);
+  const hxVec3 way = hx_sub(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
+  const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
+  const hxVec3 mean = hx_add(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
+  const hxReal delta = hx_load(&from->delta[slot]), slope_from = h * hx_load(&from->ddelta[slot]);
+  const hxReal rise = hx_load(&to->delta[slot]) - delta, slope_to = h * hx_load(&to->ddelta[slot]);
+  const hxReal landing_end = hx_load(&measured->landed_at[slot]) + landing_time;
+  hxReal peak = hx_load(&measured->peak_force[slot]), steepest = hx_load(&measured->peak_rate[slot]);
+  hxReal landing = hx_load(&measured->landing_rate[slot]), impulse = zero, slipped = zero;
+  const hxReal bends = path->h < shortest_bend ? zero : per_step * per_step;
+  hxReal last_force = zero, last_speed = zero;
+  for (int node = 0; node <= INTERVALS; ++node) {
+    const double x = (double)node / INTERVALS;
+    const hxCubic depth = cubic(delta, slope_from, rise, slope_to, x);
+    const hxReal approach = per_step * depth.rate;
+    const hxNormalForce f = hx_normal_force(model, closed, damping, depth.value, approach);
+    const hxVec3 slip = sliding(slip_from, slip_to, mean, x);
+    const hxReal speed = hx_sqrt(hx_dot(slip, slip));
+    const hxReal rate = f.stiffness * approach + f.viscosity * (bends * depth.second);
+    peak = hx_max(peak, f.force);
+    steepest = hx_max(steepest, rate);
+    landing = hx_max(landing, hx_select(hx_less(landing_end, hx_splat(path->t + x * path->h)), zero, rate));
+    impulse += hx_splat(path->h * foot_weight[node]) * f.force;
+    if (node > 0) {
+      hxReal middle;
+      const hxReal share = share_above(last_force, f.force, model->load_threshold, &middle);
+      slipped += (h * (1.0 / INTERVALS)) * share * (last_speed + middle * (speed - last_speed));
+    }
+    last_force = f.force, last_speed = speed;
+  }
+  hx_store(&measured->peak_force[slot], peak);
+  hx_store(&measured->peak_rate[slot], steepest);
+  hx_store(&measured->landing_rate[slot], landing);
+  hx_store(&measured->impulse[slot], hx_load(&measured->impulse[slot]) + impulse);
+  hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
+}
+
+/* ---- the whole step --------------------------------------------------------------------------------------------------------- */
+
+/* Adds what a step did to what was measured. */
+static inline void hx_measure_path(const hxPath *path, const hxStepWorks *works, hxMeasured *measured) {
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack], works->mean_torque[joint][pack], measured);
+    measure_feet(path, pack * HX_LANES, measured);
+  }
+  measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0);
+  measured->friction_loss += hx_lane(hx_sum_legs(works->friction), 0);
+  measured->gear_loss += hx_lane(hx_sum_legs(works->gear), 0);
+}
+
+#endif

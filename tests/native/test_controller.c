@@ -1,0 +1,89 @@
+/* test_controller.c - the controller through controller.h alone: at rest, saved, misused. */
+#include <stdlib.h>
+#include <string.h>
+
+#include <hexapod/controller.h>
+
+#include "check.h"
+
+/* ticks, the last of them under an input with a speed */
+static void tick(hxController *controller, double vx, int ticks) {
+  hxControllerInput input;
+  hx_controller_input_default(&input);
+  input.command.vx = vx;
+  for (int k = 0; k < ticks; ++k) CHECK(hx_controller_step(controller, &input, NULL, hx_controller_time(controller) + 0.005) == HX_OK);
+}
+
+static void without_a_command_it_holds_the_stance(void) {
+  hxController *controller = hx_controller_create();
+  hxControllerDefinition definition;
+  hxControllerInput input;
+  hxControllerOutput told;
+  hx_controller_definition_default(&definition);
+  hx_controller_input_default(&input);
+  hx_controller_output(controller, &input, &told);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      NEAR(told.angle_ref[leg][joint], definition.leg[leg].link[joint].stance, 1e-9);
+      NEAR(told.speed_ref[leg][joint], 0.0, 1e-9);
+    }
+  hx_controller_destroy(controller);
+}
+
+static void a_saved_state_goes_on_as_it_would_have(void) {
+  hxController *one = hx_controller_create(), *two = hx_controller_create();
+  const size_t size = hx_controller_state_size();
+  unsigned char *saved = malloc(size), *first = malloc(size), *second = malloc(size);
+  hxControllerDefinition definition;
+  CHECK(saved && first && second);
+  hx_controller_definition_default(&definition);
+  for (int control = HX_CONTROL_KINEMATIC; control <= HX_CONTROL_COMPLIANT; ++control)
+    for (int pattern = HX_PATTERN_TRIPOD; pattern <= HX_PATTERN_CUSTOM; ++pattern) {
+      definition.control = control, definition.gait.pattern = pattern;
+      if (pattern != HX_PATTERN_TRIPOD) definition.gait.duty = 5.0 / 6.0;
+      CHECK(hx_controller_reset(one, &definition, 0.0) == HX_OK);
+      tick(one, 0.05, 100);
+      hx_controller_get_state(one, saved);
+      tick(one, 0.02, 150);
+      hx_controller_get_state(one, first);
+      CHECK(hx_controller_set_state(two, saved, size) == HX_OK);
+      tick(two, 0.02, 150);
+      hx_controller_get_state(two, second);
+      CHECK(memcmp(first, second, size) == 0);
+    }
+  saved[size - 1] ^= 1;
+  CHECK(hx_controller_set_state(two, saved, size) == HX_BAD_STATE);
+  free(saved), free(first), free(second);
+  hx_controller_destroy(one), hx_controller_destroy(two);
+}
+
+static void bad_input_changes_nothing(void) {
+  hxController *controller = hx_controller_create();
+  const size_t size = hx_controller_state_size();
+  unsigned char *before = malloc(size), *after = malloc(size);
+  hxControllerDefinition definition;
+  hxControllerInput input;
+  CHECK(before && after);
+  tick(controller, 0.05, 10);
+  hx_controller_get_state(controller, before);
+  hx_controller_input_default(&input);
+  input.foot_force[HX_LEGS - 1][2] = nan("");
+  CHECK(hx_controller_step(controller, &input, NULL, 1.0) == HX_INVALID_ARGUMENT);
+  CHECK(strlen(hx_controller_message(controller)) > 0);
+  hx_controller_input_default(&input);
+  CHECK(hx_controller_step(controller, &input, NULL, 0.0) == HX_INVALID_ARGUMENT);
+  hx_controller_definition_default(&definition);
+  definition.gait.duty = 2.0;
+  CHECK(hx_controller_reset(controller, &definition, 0.0) != HX_OK);
+  hx_controller_get_state(controller, after);
+  CHECK(memcmp(before, after, size) == 0);
+  free(before), free(after);
+  hx_controller_destroy(controller);
+}
+
+int main(void) {
+  without_a_command_it_holds_the_stance();
+  a_saved_state_goes_on_as_it_would_have();
+  bad_input_changes_nothing();
+  return failures;
+}

@@ -1,0 +1,144 @@
+"""A robot heavier than its servos carry: the support asks for less, the arch stays, and far too heavy a robot walks kinematically."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gains import PERIOD
+from standing import GAINS, ROBOT, make_laws, plan, rest, shared, squeezing
+
+from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller.burden import Burden
+
+MOST, CYCLE = 5.0, 1.0  # N m, s
+WEIGHT_TIME = 0.5  # s    a fifth of which smooths the measured weight
+
+
+def make() -> Burden:
+    return Burden(most=MOST, cycle=CYCLE, period=PERIOD, weight_time=WEIGHT_TIME)
+
+
+def of_weight(ratio: float) -> Burden:
+    """After so long that the measured weight is known."""
+    burden = make()
+    for _ in range(4000):
+        burden.weigh(ratio)
+    return burden
+
+
+@pytest.mark.parametrize(
+    ("needed", "scale", "strength"),
+    [
+        (2.0, 1.0, 1.0),
+        (2.5, 2.0, 1.0),
+        (5.0 / 0.9, 1.0, 0.9),
+        (5.0 / 1.68, 2.0, 0.84),
+        (5.0 / 0.69, 1.0, 0.42),
+        (5.0 / 0.54, 1.0, 0.0),
+        (20.0, 1.0, 0.0),
+    ],
+)  # fmt: skip
+def test_no_servo_is_asked_for_more_than_it_may_and_for_less_where_the_arch_has_to_help(
+    needed: float, scale: float, strength: float
+) -> None:
+    """All of the torque allowed down to 84 % of what is needed, nothing from 54 % on."""
+    burden = make()
+    burden.step(needed, scale)
+    assert burden.strength == pytest.approx(strength, abs=1e-9)
+    assert burden.strength * scale * needed <= MOST * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize(("heft", "freedom"), [(0.6, 1.0), (1.0, 1.0), (1.0 / 0.95, 1.0), (1.0 / 0.875, 0.5), (1.25, 0.0), (2.0, 0.0)])
+def test_the_arch_may_go_as_far_as_servos_carry_the_measured_weight_without_it(heft: float, freedom: float) -> None:
+    """Wholly down to 95 % of it, not at all from 80 % on; whatever the support believes as yet."""
+    burden = of_weight(heft)
+    burden.step(MOST, 0.3)
+    assert burden.freedom == pytest.approx(freedom, abs=1e-9)
+
+
+def test_far_too_heavy_is_half_more_than_servos_carry_and_stays_so_down_to_a_third() -> None:
+    burden, found = of_weight(1.0), []
+    for needed in (7.4, 7.6, 6.8, 6.7, 7.4, 7.6):
+        burden.restore((*burden.save()[:1], 0.0, *burden.save()[2:]))  # without the peak of before
+        burden.step(needed, 1.0)
+        found.append(burden.overburdened)
+    assert found == [False, True, True, False, False, True]
+
+
+def test_the_measured_weight_is_smoothed_and_believed_between_half_and_four_times() -> None:
+    burden = make()
+    for k in range(1, 200):
+        burden.weigh(2.0)
+        assert burden.heft == pytest.approx(2.0 - math.exp(-k * PERIOD / 0.1))
+    assert of_weight(0.0).heft == pytest.approx(0.5)
+    assert of_weight(1e9).heft == pytest.approx(4.0)
+
+
+def test_the_largest_torque_of_late_fades_by_e_in_a_gait_cycle() -> None:
+    burden = make()
+    burden.step(10.0, 1.0)
+    for _ in range(round(CYCLE / PERIOD)):
+        burden.step(0.0, 1.0)
+    assert burden.strength == 1.0
+    assert burden.save()[1] == pytest.approx(10.0 * math.exp(-1.0))
+
+
+def test_a_saved_burden_goes_on_the_same() -> None:
+    burden, other = of_weight(1.7), make()
+    burden.step(8.0, 1.5)
+    other.restore(burden.save())
+    for one in (burden, other):
+        one.weigh(1.0)
+        one.step(1.0, 1.0)
+    assert burden.save() == other.save()
+
+
+def test_servos_that_saturate_would_be_asked_for_the_same_part_of_every_share() -> None:
+    """1.9 times the weight on servos that may only give 90 % of what that asks: all torques for the load shrink by the same factor."""
+    largest = 0.9 * 1.9 * float(np.abs(carried()).max())
+    weak = replace(GAINS, limits=replace(GAINS.limits, torque=largest))
+    laws = make_laws(gains=weak, parts=Parts(fallback=False))
+    plan(laws, 3000)
+    force = 1.9 * shared(laws)
+    for _ in range(3000):
+        laws.step(force)
+    asked = np.abs(laws._plan.carry[0]) > 0.1 * np.abs(carried()).max()
+    ratio = (laws.torque - rest(ROBOT).torque[0])[asked] / carried()[asked]
+    assert np.median(ratio) == pytest.approx(1.71, rel=1e-3)
+    assert np.abs(laws.torque).max() <= largest
+
+
+def carried() -> np.ndarray:
+    """(6, 3) torques for the planned load [N m]."""
+    laws = make_laws()
+    plan(laws, 1)
+    return np.array(laws._plan.carry[0])
+
+
+def test_the_squeeze_of_a_robot_too_heavy_for_its_servos_is_left_to_it() -> None:
+    """Under the same squeeze: where servos carry the weight the feet give way, where they carry 3/4 of it they do not."""
+    bends = []
+    for share in (1.1, 0.75):
+        weak = replace(GAINS, limits=replace(GAINS.limits, torque=share * float(np.abs(carried()).max())))
+        laws = make_laws(gains=weak, parts=Parts(fallback=False, suspension=False, touchdown=False))
+        plan(laws, 2000)
+        for _ in range(2000):
+            laws.step(squeezing())
+        bends.append(float(np.abs(laws.bend).max()))
+    assert bends[0] > 1e-3
+    assert bends[1] == 0.0
+
+
+def test_a_robot_far_too_heavy_goes_over_to_kinematic_control_and_back() -> None:
+    weak = replace(GAINS, limits=replace(GAINS.limits, torque=float(np.abs(carried()).max())))
+    laws = make_laws(gains=weak)
+    plan(laws, 4000)
+    normal = shared(laws)
+    for ratio, falls_back in ((1.45, False), (1.55, True), (1.4, True), (1.3, False)):
+        for _ in range(1000):
+            laws.step(ratio * normal)
+        assert bool(laws.fallback.all()) is falls_back
+        assert bool(laws.torque.any()) is not falls_back

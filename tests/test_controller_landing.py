@@ -1,0 +1,102 @@
+"""At what height feet are expected to meet the ground: what all have in common, or a foot twice, is no bump."""
+
+from __future__ import annotations
+
+import numpy as np
+from gains import PERIOD
+from standing import WEIGHT, make_laws, plan, squeezing
+
+from hexapod_cosim.controller import Parts
+from hexapod_cosim.controller.compliance import Compliance
+from hexapod_cosim.controller.landing import Landings
+
+LOW = np.zeros(6)
+ALL, NONE = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
+FIRST = np.array([True, False, True, False, True, False])  # a tripod
+ONLY_TOUCHDOWN = Parts(slip_pid=False, suspension=False, support=False, fallback=False)
+
+
+def step(landings: Landings, swinging: np.ndarray, heights: list[float]) -> None:
+    """These legs swing and come down at heights [m]; the others stand."""
+    landings.look(~swinging, np.full(6, 0.03), swinging)
+    landings.look(ALL, np.array(heights), swinging)
+    landings.look(ALL, LOW, NONE)
+
+
+def test_before_any_step_feet_are_expected_at_the_end_of_their_paths() -> None:
+    landings = Landings()
+    landings.look(ALL, LOW, NONE)
+    np.testing.assert_array_equal(landings.expected(ALL, LOW, NONE), 0.0)
+
+
+def test_feet_are_expected_as_low_as_the_lowest_of_the_others() -> None:
+    landings = Landings()
+    step(landings, FIRST, [0.012, 0.0, 0.010, 0.0, 0.014, 0.0])
+    step(landings, ~FIRST, [0.0, 0.015, 0.0, 0.011, 0.0, 0.013])
+    np.testing.assert_allclose(landings.expected(ALL, LOW, NONE), [0.010, 0.010, 0.011, 0.010, 0.010, 0.010])
+
+
+def test_feet_still_in_the_air_tell_that_there_is_no_ground_so_high() -> None:
+    landings, height = Landings(), np.array([0.015, 0.0, 0.009, 0.0, 0.015, 0.0])
+    touching = np.array([True, True, False, True, True, True])
+    np.testing.assert_allclose(landings.expected(touching, height, FIRST)[[0, 4]], 0.009)
+
+
+def test_a_foot_is_expected_where_it_came_down_a_step_before() -> None:
+    landings = Landings()
+    for swinging in (FIRST, ~FIRST):
+        step(landings, swinging, [0.0] * 6)
+    np.testing.assert_array_equal(landings.expected(ALL, LOW, NONE), 0.0)
+    step(landings, FIRST, [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert landings.expected(ALL, LOW, NONE)[0] == 0.0  # the first time it is a bump
+    step(landings, FIRST, [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(landings.expected(ALL, LOW, NONE), [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_a_foot_that_comes_down_late_meets_the_ground_at_the_end_of_its_path_and_one_that_never_left_tells_nothing() -> None:
+    landings = Landings()
+    landings.look(~FIRST, np.full(6, 0.03), FIRST)
+    landings.look(~FIRST, LOW, NONE)
+    landings.look(ALL, np.full(6, 0.02), NONE)
+    np.testing.assert_array_equal(landings.met, np.where(FIRST, 0.0, np.inf))
+
+
+def test_what_is_saved_does_not_change() -> None:
+    landings, other = Landings(), Landings()
+    step(landings, FIRST, [0.01] * 6)
+    state = landings.save()
+    step(landings, FIRST, [0.02] * 6)
+    step(landings, ~FIRST, [0.02] * 6)
+    other.restore(state)
+    np.testing.assert_array_equal(other.met, np.where(FIRST, 0.01, np.inf))
+
+
+def walk(laws: Compliance, ground: np.ndarray, steps: int) -> list[np.ndarray]:
+    """Two tripods in turn, feet that come down from 25 mm at 0.25 m/s onto ground so high [m] (6,). Offsets at the end of each step."""
+    found = []
+    for k in range(steps):
+        swinging = FIRST if k % 2 == 0 else ~FIRST
+        standing = "".join("0" if swings else "1" for swings in swinging)
+        for height in np.arange(0.025, -1e-9, -0.25 * PERIOD):
+            force = squeezing(0.0)
+            force[swinging & (height > ground), 2] = 0.0
+            force[swinging & (height <= ground), 2] = 0.05 * WEIGHT
+            plan(laws, 1, standing=standing, height=height, rise=-0.25)
+            laws.step(force)
+        found.append(laws.offset.copy())
+    return found
+
+
+def test_ground_that_all_feet_meet_early_raises_none_and_a_bump_raises_the_foot_on_it() -> None:
+    sunk, bump = np.full(6, 0.012), np.array([0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert np.abs(walk(make_laws(parts=ONLY_TOUCHDOWN), sunk, 8)).max() < 1e-12
+    offsets = walk(make_laws(parts=ONLY_TOUCHDOWN), bump, 1)[0]
+    assert 0.005 < offsets[0] < 0.012
+    assert not offsets[1:].any()
+
+
+def test_feet_that_drag_through_soft_ground_have_no_broken_sensors() -> None:
+    """They touch 20 mm above the ends of their paths, a quarter of the step height is 10 mm."""
+    laws = make_laws()
+    walk(laws, np.full(6, 0.02), 8)
+    assert not laws.doubted.any()

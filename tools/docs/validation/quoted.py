@@ -1,0 +1,133 @@
+"""The figures that people quote of the judged walk: whether they depend on how often the plant is read, and on the friction assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from measured import driven, integral, landing_rates, sampled, slipped
+
+from hexapod_cosim.cosim.export import export_fmu
+from hexapod_cosim.cosim.metrics import METRICS, compute_metrics, shown_metrics
+from hexapod_cosim.cosim.run import Result, simulate
+from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.scenario_records import CONTROLS
+from hexapod_cosim.cosim.signals import joint_names
+from hexapod_cosim.cosim.walk import View
+from hexapod_cosim.models import load_robot
+from tools.docs.validation.shown import Shown
+
+PERIOD = 1.0  # s    of the judged walk's gait
+FINE_STEP, COARSE = 0.001, 0.02  # s
+OF_THE_LOOP = "realtime_factor"
+LAWS = {  # friction -> settings
+    "tanh, 100 s/m": (),
+    "tanh, 1000 s/m": ("friction.slope=1000",),
+    "bristle": ("friction.law=bristle",),
+}
+OF_FRICTION = (
+    "slip_per_metre", "cone_use_p50", "cone_use_p95", "foot_error_stance", "roll_rms", "peak_force", "cost_of_transport",
+    "electrical_cost", "servo_load_max",
+)  # fmt: skip
+
+
+@cache
+def walk(*settings: str) -> Result:
+    """The judged walk with some settings."""
+    with TemporaryDirectory() as folder:
+        fmu = export_fmu(load_robot("athena"), Path(folder) / "athena.fmu")
+        return simulate(load_scenario("walk_flat", overrides=[*settings, "outputs.plots=false"]), fmu=fmu)
+
+
+def intervals() -> Shown:
+    """Every metric of the judged walk with rows 1 ms and 20 ms apart: as a run tells it, and from the rows that are kept alone."""
+    columns = ["metric"]
+    cells: dict[str, list[str]] = {}
+    for control in CONTROLS:
+        at = (f"control={control}", f"macro_step={FINE_STEP}")
+        every, coarse = walk(*at), walk(*at, f"outputs.interval={COARSE}")
+        view = View(coarse.outcome.recording, coarse.parameters, PERIOD)
+        alone = compute_metrics(view, servo=load_robot("athena").servo, realtime_factor=np.nan)
+        columns += [f"{control}, rows 1 ms apart", "20 ms", "20 ms, of these rows alone"]
+        names = [name for name in shown_metrics({"": every.metrics}, net_slip=False) if name != OF_THE_LOOP]
+        for name in names:
+            value = every.metrics[name]
+            cells.setdefault(name, []).extend([f"{value:.4g}", _gap(coarse.metrics[name], value), _gap(alone[name], value)])
+    return Shown(columns=columns, rows=[(f"`{name}`", *row) for name, row in cells.items()])
+
+
+def _gap(value: float, reference: float) -> str:
+    """Relative, for people."""
+    if not np.isfinite(value / reference if reference else np.nan):
+        return "" if value == reference else "-"
+    share = 100.0 * (value / reference - 1.0)
+    return f"{share:+.2g} %" if share else "0 %"
+
+
+def sampled_again() -> Shown:
+    """What the plant measured in the default walk against sums over samples of 0.1 ms."""
+    rows: dict[str, list[str]] = {}
+    for control in CONTROLS:
+        settings = (f"control={control}", "duration=6")
+        result = walk(*settings)
+        plan = load_scenario("walk_flat", overrides=[*settings, "outputs.plots=false"])
+        part = View(result.outcome.judged, result.parameters, PERIOD).walk
+        assert part is not None
+        seen = sampled(plan, result.outcome.recording, begin=1.4)
+        judged = seen.after(2.0)
+        squares, load = integral(judged.torque**2), part.weight * part.distance
+        own = {
+            "slip_per_metre": slipped(judged, part.weight) / part.distance,
+            "cost_of_transport": driven(judged) / load,
+            "torque_rms": float(np.sqrt(squares.mean() / part.duration)),
+            "servo_load_max": float(np.sqrt(squares.max() / part.duration)) / load_robot("athena").servo.torque_continuous,
+            "peak_force": float(judged.normal.max()) / part.weight,
+            "loading_rate": float(np.percentile(landing_rates(seen, apart=0.5 * PERIOD, after=2.0), 95)) / part.weight,
+        }
+        for name, value in own.items():
+            told = result.metrics[name]
+            rows.setdefault(name, []).extend([f"{told:.5g}", f"{value:.5g}", f"{100.0 * (told / value - 1.0):+.2f} %"])
+    headings = [f"{control}, {what}" for control in CONTROLS for what in ("the plant's", "of samples", "difference")]
+    return Shown(columns=("metric", *headings), rows=[(f"`{name}`", *row) for name, row in rows.items()])
+
+
+def work_by_step() -> Shown:
+    """Cost of transport by macro-step: the plant's, and summed over one sample of power per macro-step."""
+    rows = []
+    for control in CONTROLS:
+        cells = []
+        for step in (0.02, 0.005, 0.001):
+            result = walk(f"control={control}", f"macro_step={step}", "duration=4")
+            cells.append(f"{result.metrics['cost_of_transport']:.3f} ({_sampled_cost(result):.3f})")
+        rows.append((control, *cells))
+    return Shown(columns=("cost of transport (of samples)", "20 ms", "5 ms", "1 ms"), rows=rows)
+
+
+def _sampled_cost(result: Result) -> float:
+    """What rows at macro-steps would make of it."""
+    recording = result.outcome.recording
+    part = View(recording, result.parameters, PERIOD).walk
+    assert part is not None
+    power = np.maximum(part.recording.columns(joint_names("torque")) * part.recording.columns(joint_names("speed")), 0.0).sum(axis=1)
+    return float(part.weights @ power) * part.duration / (part.weight * part.distance)
+
+
+def friction() -> Shown:
+    """The judged walk on three frictions that hold a foot differently well."""
+    runs = {(law, control): walk(f"control={control}", *settings) for law, settings in LAWS.items() for control in CONTROLS}
+    columns = ("metric", *(f"{law}: {control}" for law, control in runs))
+    return Shown(columns=columns, rows=[_row(name, runs) for name in OF_FRICTION])
+
+
+def _row(name: str, runs: Mapping[tuple[str, str], Result]) -> Sequence[str]:
+    unit = METRICS[name][0]
+    heading = f"`{name}`" + (f" [{unit}]" if unit != "1" else "")
+    return (heading, *(f"{run.metrics[name]:.3g}" for run in runs.values()))
+
+
+RESULTS: Mapping[str, Callable[[], Shown]] = {
+    "intervals": intervals, "samples": sampled_again, "works": work_by_step, "friction": friction,
+}  # fmt: skip
