@@ -21,12 +21,10 @@ from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
 from hexapod_cosim.cosim.master import INTERRUPTED
 from hexapod_cosim.cosim.run import chosen_gains, known_robot, simulate
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.summary import REFUSED, Summary, refused, summarise
+from hexapod_cosim.cosim.summary import Summary, refused, summarise
 from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.cosim.workers import METHOD, begin_worker, stop_if_told
 from hexapod_cosim.models import HexapodError, load_robot
-
-__all__ = ["REFUSED", "Summary", "processors", "run_batch", "summarise"]
 
 QUEUED = 8  # runs that wait for each worker
 

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.batch import Summary
 from hexapod_cosim.cosim.files import atomic_text
 from hexapod_cosim.cosim.metrics import FLOORS, METRICS
+from hexapod_cosim.cosim.summary import Summary
 from hexapod_cosim.models import HexapodError
 
 Array = NDArray[np.float64]

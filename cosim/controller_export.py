@@ -3,36 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
-from hexapod_cosim.controller import Gains, GainsError, make_gait
 from hexapod_cosim.cosim.controller_interface import ControllerSetup, load_controller_interface
 from hexapod_cosim.cosim.export import export_interface
-from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.models import Robot, unknown_name
 
 
 def export_controller(setup: ControllerSetup, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
     """Writes a controller's FMU and returns its path; arguments and errors as of `export_fmu`, and what `Controller` refuses."""
     return export_interface(load_controller_interface(setup), path, fmi=fmi, platforms=platforms)
-
-
-def make_setup(robot: Robot, *, control: str, period: float, gait: str | None = None, gains: Gains | None = None) -> ControllerSetup:
-    """What `simulate` would walk a robot with: its gait or one by name; under compliant control gains designed for it, if none are given.
-
-    Raises HexapodError for an unknown control or gait, GainsError for gains without compliant control or without a design.
-    """
-    if control not in CONTROLS:
-        raise unknown_name("control", control, CONTROLS)
-    setup = ControllerSetup(robot=robot, gait=make_gait(robot, gait), period=period)
-    setup.build()  # refused before anything is designed
-    if control == "kinematic":
-        if gains is not None:
-            raise GainsError("gains without compliant control", got=control, expected="compliant", fix="leave out the gains")
-        return setup
-    if gains is None:
-        from hexapod_cosim.cosim.design import design_for  # noqa: PLC0415  python-control takes a second to import
-
-        gains = design_for(robot, period)
-    return replace(setup, gains=gains)

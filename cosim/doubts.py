@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.metrics import energy_residual
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.signals import joint_names, vector_names
+from hexapod_cosim.cosim.variable_names import joint_names, vector_names
 from hexapod_cosim.cosim.walk import SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
 from hexapod_cosim.models.records import STATIC_LAWS

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.signals import ACCELERATION, COMMANDED, MEASURED, vector_names
+from hexapod_cosim.cosim.signals import ACCELERATION, COMMANDED, MEASURED
+from hexapod_cosim.cosim.variable_names import vector_names
 from hexapod_cosim.models import LEG_NAMES
 
 LEGS = len(LEG_NAMES)

@@ -26,7 +26,8 @@ import numpy as np
 from hexapod_cosim.controller.design.standing import StandingPlant
 from hexapod_cosim.controller.size import Size, size_of
 from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.signals import COMMANDED, JOINTS, LEGS, MEASURED, PUSH, vector_names
+from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, PUSH
+from hexapod_cosim.cosim.variable_names import JOINTS, LEGS, vector_names
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import quaternion_product
 from hexapod_cosim.models.records import Array

@@ -15,7 +15,8 @@ from hexapod_cosim.cosim.interrupts import interruptible
 from hexapod_cosim.cosim.protocols import Plant
 from hexapod_cosim.cosim.recorder import Recorder, Recording
 from hexapod_cosim.cosim.schedule import Schedule
-from hexapod_cosim.cosim.signals import Signals, vector_names
+from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.variable_names import vector_names
 from hexapod_cosim.models import LEG_NAMES, HexapodError
 
 COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.signals import foot_names, foot_vector_names, joint_names, vector_names
 from hexapod_cosim.cosim.support import stability_margins
+from hexapod_cosim.cosim.variable_names import foot_names, foot_vector_names, joint_names, vector_names
 from hexapod_cosim.cosim.walk import (
     BRISTLE,
     CONTACT_SHARE,

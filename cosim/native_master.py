@@ -23,7 +23,8 @@ from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, Outcome, 
 from hexapod_cosim.cosim.plant_files import BUILD, LOOP, shared_library
 from hexapod_cosim.cosim.recorder import COMMAND_COLUMNS, Peaks, Recording, kept_moments
 from hexapod_cosim.cosim.schedule import Schedule
-from hexapod_cosim.cosim.signals import ACCELERATION, COMMANDED, MEASURED, PUSH, refuse_foreign, vector_names
+from hexapod_cosim.cosim.signals import ACCELERATION, COMMANDED, MEASURED, PUSH, refuse_foreign
+from hexapod_cosim.cosim.variable_names import vector_names
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
 STEPS_AT_ONCE = 500  # macro-steps between two looks at interrupts: some 10 ms

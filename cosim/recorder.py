@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.signals import JOINTS, LEGS, Signals, foot_names, foot_vector_names, joint_names, vector_names
+from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.variable_names import JOINTS, LEGS, foot_names, foot_vector_names, joint_names, vector_names
 from hexapod_cosim.models import HexapodError, ScenarioError, nearest_name
 
 Array = NDArray[np.float64]

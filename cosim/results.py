@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.accuracy import Accuracy, accuracy_of_table
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, claim_folder, clear_folder, read_json, write_json, write_text
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.recordings import COMMANDS, read_recording, write_commands, write_recording
-from hexapod_cosim.cosim.run import Result
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.models import HexapodError

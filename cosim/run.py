@@ -27,6 +27,7 @@ from hexapod_cosim.cosim.metrics import MEASURED_BY_PLANT, compute_metrics, judg
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.reach import check_commands
 from hexapod_cosim.cosim.recorder import Recorder, chosen_columns
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.scenario import scenario_robot
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import Schedule, make_schedule
@@ -40,21 +41,6 @@ from hexapod_cosim.models.records import Vector3
 BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
 WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
 SAME = 1e-9  # relative, of a parameter printed and read again
-
-
-@dataclass(frozen=True, kw_only=True)
-class Result:
-    """A run and what came of it."""
-
-    scenario: Scenario
-    outcome: Outcome
-    metrics: Mapping[str, float]
-    parameters: Mapping[str, float]  # of the FMU, as run
-    facts: Mapping[str, Any]  # robot, FMU, versions, warnings
-
-    @property
-    def completed(self) -> bool:
-        return self.outcome.status == COMPLETED
 
 
 def simulate(

@@ -14,31 +14,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.controller import JointCommand, Measurement
 from hexapod_cosim.cosim.force_sensor import ForceSensor
 from hexapod_cosim.cosim.protocols import Plant
-from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, FmuError
-
-LEGS, JOINTS = len(LEG_NAMES), len(JOINT_NAMES)
-AXES = (1, 2, 3)
-
-
-def joint_names(quantity: str) -> list[str]:
-    """Names of a quantity of all joints, legs slowest."""
-    return [f"{leg}.{joint}.{quantity}" for leg in LEG_NAMES for joint in JOINT_NAMES]
-
-
-def foot_names(quantity: str) -> list[str]:
-    """Names of a scalar quantity of all feet."""
-    return [f"{leg}.foot.{quantity}" for leg in LEG_NAMES]
-
-
-def vector_names(stem: str, size: int = 3) -> list[str]:
-    """Names of a vector's entries."""
-    return [f"{stem}[{k}]" for k in range(1, size + 1)]
-
-
-def foot_vector_names(quantity: str) -> list[str]:
-    """Names of a vector quantity of all feet, axes fastest."""
-    return [name for stem in foot_names(quantity) for name in vector_names(stem)]
-
+from hexapod_cosim.cosim.variable_names import AXES, JOINTS, LEGS, foot_names, foot_vector_names, joint_names, vector_names
+from hexapod_cosim.models import FmuError
 
 MEASURED = {
     "angle": joint_names("angle"),

@@ -16,7 +16,8 @@ from hexapod_cosim.controller.kinematics import Mask
 from hexapod_cosim.controller.size import size_of
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.linearise import ANGLES, LATEST, POSES, STATES, Bench, Motion
-from hexapod_cosim.cosim.signals import JOINTS, LEGS, PUSH
+from hexapod_cosim.cosim.signals import PUSH
+from hexapod_cosim.cosim.variable_names import JOINTS, LEGS
 from hexapod_cosim.models import LEG_NAMES, FmuError, ReachError, Robot
 from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.kinematics import body_states

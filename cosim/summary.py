@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.run import Result
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.models import HexapodError
 

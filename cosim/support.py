@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.signals import vector_names
+from hexapod_cosim.cosim.variable_names import vector_names
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.scenario_records import Command, Variation
-from hexapod_cosim.cosim.signals import JOINTS, LEGS, joint_names, vector_names
+from hexapod_cosim.cosim.variable_names import JOINTS, LEGS, joint_names, vector_names
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
 from hexapod_cosim.models.terrain import ground

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.recorder import COMMAND_COLUMNS, Recording
-from hexapod_cosim.cosim.signals import vector_names
+from hexapod_cosim.cosim.variable_names import vector_names
 from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
 
 Array = NDArray[np.float64]

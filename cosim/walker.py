@@ -17,9 +17,9 @@ from hexapod_cosim.cosim.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master import Progress
 from hexapod_cosim.cosim.metrics import judged_columns
 from hexapod_cosim.cosim.native_master import NativeMaster
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.run import (
     Plan,
-    Result,
     chosen_gains,
     describe,
     foreign_settings,

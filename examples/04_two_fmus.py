@@ -9,7 +9,8 @@ from tempfile import TemporaryDirectory
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from hexapod_cosim.cosim.controller_export import export_controller, make_setup
+from hexapod_cosim.cosim.controller_export import export_controller
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.models import load_robot
 

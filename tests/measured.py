@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.run import initialise_plant, make_plan, open_plant
 from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.signals import COMMANDED, foot_names, foot_vector_names, joint_names
+from hexapod_cosim.cosim.signals import COMMANDED
+from hexapod_cosim.cosim.variable_names import foot_names, foot_vector_names, joint_names
 
 Array = NDArray[np.float64]
 

@@ -17,12 +17,13 @@ from pathlib import Path
 import pytest
 from command import COMMAND, settings
 
-from hexapod_cosim.cosim.batch import REFUSED, Summary, run_batch, summarise
+from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.comparison import read_seeds
 from hexapod_cosim.cosim.master import COMPLETED, FAILED
 from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.variation import STANDARD
 
 PATIENCE = 60.0  # s    for what takes a second or two on an idle machine

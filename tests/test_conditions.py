@@ -11,8 +11,9 @@ import pytest
 from hexapod_cosim.controller import GainsError
 from hexapod_cosim.cosim.controller_interface import controller_parameters
 from hexapod_cosim.cosim.design import design_for
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.robot_package import read_values
-from hexapod_cosim.cosim.run import Result, make_plan, simulate
+from hexapod_cosim.cosim.run import make_plan, simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.models import HexapodError, load_robot
 

@@ -15,8 +15,9 @@ from fmpy.validation import validate_fmu
 from gains import PERIOD, make_gains
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement, make_gait, save_gains
-from hexapod_cosim.cosim.controller_export import export_controller, make_setup
+from hexapod_cosim.cosim.controller_export import export_controller
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.fmu import Fmu, StepError
 from hexapod_cosim.cosim.fmu_controller import COMMANDS, FmuController
 from hexapod_cosim.cosim.master import COMPLETED, JointController, run
@@ -25,8 +26,9 @@ from hexapod_cosim.cosim.run import known_robot, make_sensor, open_plant
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Scenario
 from hexapod_cosim.cosim.schedule import make_schedule
-from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, Signals, joint_names, vector_names
+from hexapod_cosim.cosim.signals import COMMANDED, MEASURED, Signals
 from hexapod_cosim.cosim.validation import find_problems
+from hexapod_cosim.cosim.variable_names import joint_names, vector_names
 from hexapod_cosim.models import LEG_NAMES, FmuError, HexapodError, load_robot
 
 ANGLE, SPEED = 1e-12, 1e-12  # rad; of a servo's largest

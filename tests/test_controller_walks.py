@@ -9,7 +9,8 @@ import pytest
 from gains import make_gains
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.cosim.run import Result, simulate
+from hexapod_cosim.cosim.result import Result
+from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.doubts import fall, slipping_ground
-from hexapod_cosim.cosim.signals import foot_names
+from hexapod_cosim.cosim.variable_names import foot_names
 from hexapod_cosim.cosim.walk import View
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ from types import ModuleType
 import pytest
 from command import Call
 
-from hexapod_cosim.cosim.controller_export import export_controller, make_setup
+from hexapod_cosim.cosim.controller_export import export_controller
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.models import load_robot
 

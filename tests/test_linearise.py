@@ -12,8 +12,8 @@ from hexapod_cosim.controller.design.loci import eigenloci
 from hexapod_cosim.controller.design.standing import ANGLES, axes_of, relieved, weight_share
 from hexapod_cosim.cosim.design import STANCES, level_fmu
 from hexapod_cosim.cosim.linearise import STATES, Bench, linearise
-from hexapod_cosim.cosim.signals import foot_vector_names
 from hexapod_cosim.cosim.standing import StanceError, rest
+from hexapod_cosim.cosim.variable_names import foot_vector_names
 from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s

@@ -16,11 +16,13 @@ from hexapod_cosim.cosim.fmu import Fmu, StepError
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, insides, run
 from hexapod_cosim.cosim.recorder import Recorder, Recording
 from hexapod_cosim.cosim.recordings import read_csv, write_csv
-from hexapod_cosim.cosim.run import Result, adopt_settings, make_sensor, simulate
+from hexapod_cosim.cosim.result import Result
+from hexapod_cosim.cosim.run import adopt_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario_records import Push, Scenario
 from hexapod_cosim.cosim.schedule import make_schedule, push_rows
-from hexapod_cosim.cosim.signals import MEASURED, Signals, joint_names
+from hexapod_cosim.cosim.signals import MEASURED, Signals
+from hexapod_cosim.cosim.variable_names import joint_names
 from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.models import FmuError, HexapodError, RobotError, load_robot
 

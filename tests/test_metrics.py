@@ -15,7 +15,7 @@ from hexapod_cosim.cosim.files import to_json
 from hexapod_cosim.cosim.metrics import FLOORS, METRICS, compute_metrics, shown_metrics
 from hexapod_cosim.cosim.recorder import Recording
 from hexapod_cosim.cosim.report import metric_rows, number
-from hexapod_cosim.cosim.signals import foot_names, joint_names
+from hexapod_cosim.cosim.variable_names import foot_names, joint_names
 from hexapod_cosim.cosim.walk import View, body_height, commanded_path, held_integral
 
 Array = NDArray[np.float64]

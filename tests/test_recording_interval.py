@@ -15,10 +15,12 @@ from hexapod_cosim.cosim.fmu_controller import FmuController
 from hexapod_cosim.cosim.master import Outcome, insides, run
 from hexapod_cosim.cosim.metrics import compute_metrics, judged_columns
 from hexapod_cosim.cosim.recorder import Peaks, Recorder, Recording, kept_moments
-from hexapod_cosim.cosim.run import Result, initialise_plant, make_plan, open_plant, simulate
+from hexapod_cosim.cosim.result import Result
+from hexapod_cosim.cosim.run import initialise_plant, make_plan, open_plant, simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS, Outputs, Scenario
-from hexapod_cosim.cosim.signals import Signals, foot_names
+from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.variable_names import foot_names
 from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.models import load_robot

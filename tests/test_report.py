@@ -11,11 +11,11 @@ import pytest
 from command import Call
 
 from hexapod_cosim.cosim import report
-from hexapod_cosim.cosim.batch import Summary
 from hexapod_cosim.cosim.comparison import Comparison, compare_runs
 from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
+from hexapod_cosim.cosim.summary import Summary
 
 
 def comparison(after: Mapping[str, float], *, seeds: int = 4, before: Mapping[str, float] | None = None) -> Comparison:

@@ -20,10 +20,10 @@ from hexapod_cosim.cosim.study import heat
 from hexapod_cosim.cosim.study.columns import FIGURES
 from hexapod_cosim.cosim.study.curves import history
 from hexapod_cosim.cosim.study.figures import drawings
-from hexapod_cosim.cosim.study.optimise import Trial
 from hexapod_cosim.cosim.study.records import Study
 from hexapod_cosim.cosim.study.results import read_results
 from hexapod_cosim.cosim.study.table import Mean, Point
+from hexapod_cosim.cosim.study.trials import Trial
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}

@@ -18,9 +18,9 @@ from studies import FAKE, KINEMATIC, rows, run_quietly, store_instead, study_of
 from hexapod_cosim.controller import save_gains
 from hexapod_cosim.cosim.cli.studying import report_on
 from hexapod_cosim.cosim.study.curves import front
-from hexapod_cosim.cosim.study.optimise import OPTIMUM
 from hexapod_cosim.cosim.study.report import optimum_changes
 from hexapod_cosim.cosim.study.results import POINTS, SUMMARY, read_results
+from hexapod_cosim.cosim.study.trials import OPTIMUM
 from hexapod_cosim.models import load_robot
 
 METRIC = "cost_of_transport"

@@ -11,8 +11,8 @@ from walks import PARAMETERS, Walk
 
 from hexapod_cosim.cosim.interface import load_interface
 from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.signals import joint_names, vector_names
 from hexapod_cosim.cosim.support import centre_of_mass, polygon_margins, stability_margins
+from hexapod_cosim.cosim.variable_names import joint_names, vector_names
 from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
 from hexapod_cosim.models import energy as twin
 from hexapod_cosim.models.kinematics import body_states

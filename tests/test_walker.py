@@ -14,7 +14,7 @@ from memory import resident
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim import native_master
-from hexapod_cosim.cosim.batch import REFUSED, Summary, run_batch, summarise
+from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.controller_export import export_controller
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.fmu import Fmu
@@ -22,10 +22,12 @@ from hexapod_cosim.cosim.fmu_controller import FmuController
 from hexapod_cosim.cosim.master import COMPLETED, FAILED, INTERRUPTED, Outcome, insides, run
 from hexapod_cosim.cosim.native_master import NativeMaster
 from hexapod_cosim.cosim.recorder import Recorder
-from hexapod_cosim.cosim.run import Result, initialise_plant, judge, make_plan, make_sensor, open_plant, simulate
+from hexapod_cosim.cosim.result import Result
+from hexapod_cosim.cosim.run import initialise_plant, judge, make_plan, make_sensor, open_plant, simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import Command, Scenario
 from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.variation import STANDARD
 from hexapod_cosim.cosim.walker import Walker
 from hexapod_cosim.models import FRICTION_LAWS, FmuError, load_robot

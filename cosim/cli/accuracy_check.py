@@ -11,10 +11,11 @@ import typer
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.accuracy import Accuracy, finer, halved, judge_accuracy
-from hexapod_cosim.cosim.batch import Summary, run_batch
+from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.cli.terminal import Count, counting_bar, show_table, show_text, warn
 from hexapod_cosim.cosim.report.accuracy import Metrics, Rows, about_accuracy, effect_rows
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.summary import Summary
 
 CheckAccuracy = Annotated[
     bool,

@@ -12,7 +12,7 @@ import typer
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.accuracy import Accuracy, halved
-from hexapod_cosim.cosim.batch import Summary, run_batch, summarise
+from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
@@ -37,10 +37,12 @@ from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.metrics import has_net_slip
 from hexapod_cosim.cosim.report import REPORT, about, comparison_rows, write_report
 from hexapod_cosim.cosim.report.accuracy import with_errors
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.results import ACCURACY, METRICS_FILE, SCENARIO, Folder, read_scenario, results_folder, stored
-from hexapod_cosim.cosim.run import Result, chosen_gains
+from hexapod_cosim.cosim.run import chosen_gains
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS, Scenario
+from hexapod_cosim.cosim.summary import Summary, summarise
 from hexapod_cosim.cosim.toml_text import to_toml
 from hexapod_cosim.cosim.variation import STANDARD
 from hexapod_cosim.models import ScenarioError

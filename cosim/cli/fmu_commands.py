@@ -14,8 +14,9 @@ from hexapod_cosim.controller import Gains, save_gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, show_table, show_text, waiting, warn
-from hexapod_cosim.cosim.controller_export import export_controller, make_setup
+from hexapod_cosim.cosim.controller_export import export_controller
 from hexapod_cosim.cosim.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.files import not_writable
 from hexapod_cosim.cosim.robot_files import chosen_format, export_description

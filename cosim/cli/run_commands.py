@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.cosim.accuracy import Accuracy, halved
-from hexapod_cosim.cosim.batch import summarise
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
@@ -32,6 +31,7 @@ from hexapod_cosim.cosim.files import STUDY
 from hexapod_cosim.cosim.metrics import has_net_slip
 from hexapod_cosim.cosim.report import REPORT, metric_rows, write_report
 from hexapod_cosim.cosim.report.accuracy import with_errors
+from hexapod_cosim.cosim.result import Result
 from hexapod_cosim.cosim.results import (
     ACCURACY,
     read_accuracies,
@@ -42,9 +42,10 @@ from hexapod_cosim.cosim.results import (
     stored,
     write_accuracy,
 )
-from hexapod_cosim.cosim.run import Result, chosen_gains
+from hexapod_cosim.cosim.run import chosen_gains
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
+from hexapod_cosim.cosim.summary import summarise
 
 EPILOG = f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 Control = Annotated[

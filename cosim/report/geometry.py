@@ -11,7 +11,7 @@ import numpy as np
 
 from hexapod_cosim.cosim.portrait import COLOURS, THICKNESS
 from hexapod_cosim.cosim.results import Stored
-from hexapod_cosim.cosim.signals import vector_names
+from hexapod_cosim.cosim.variable_names import vector_names
 from hexapod_cosim.cosim.walk import FLAT
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 

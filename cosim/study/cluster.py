@@ -16,9 +16,10 @@ from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
 
+from hexapod_cosim.cosim.events import EventSink
 from hexapod_cosim.cosim.installation import install_extra
 from hexapod_cosim.cosim.study.cluster_worker import job_plugin, work_here
-from hexapod_cosim.cosim.study.crew import IN_FLIGHT, Chunk, Returned, Say
+from hexapod_cosim.cosim.study.crew import IN_FLIGHT, Chunk, Returned
 from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.records import StudyError
 from hexapod_cosim.models import HexapodError
@@ -44,7 +45,7 @@ class _Gone:
 class Cluster:
     """The workers of a connected client."""
 
-    def __init__(self, client: Any, job: Job, say: Say) -> None:
+    def __init__(self, client: Any, job: Job, say: EventSink) -> None:
         self._client, self._job, self._say = client, job.name, say
         self._lanes: dict[str, deque[Any]] = {}  # by worker, the futures of chunks it was given, in their order
         self._chunks: dict[Any, tuple[str, Chunk]] = {}  # by future, its worker and what it was asked for
@@ -198,7 +199,7 @@ def no_workers(address: str) -> StudyError:
 
 
 @contextmanager
-def cluster_crew(job: Job, address: str, say: Say) -> Iterator[Cluster]:
+def cluster_crew(job: Job, address: str, say: EventSink) -> Iterator[Cluster]:
     """The workers behind a scheduler's address. Raises StudyError when there are none."""
     client = _connect(address)
     name = f"{OURS}{client.id}"

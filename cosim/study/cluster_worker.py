@@ -6,9 +6,10 @@ import asyncio
 from typing import Any
 
 from hexapod_cosim.cosim.study.crew import Chunk
+from hexapod_cosim.cosim.study.done import Done
 from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.records import StudyError
-from hexapod_cosim.cosim.study.worker import Done, close_workshop, work
+from hexapod_cosim.cosim.study.worker import close_workshop, work
 
 _jobs: dict[str, Job] = {}  # of this process, by their names
 

@@ -7,9 +7,9 @@ import math
 import pyarrow as pa
 
 from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.study.job import identity
+from hexapod_cosim.cosim.study.done import Done
+from hexapod_cosim.cosim.study.identity import identity
 from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, VALUES, Factor, Study, Value
-from hexapod_cosim.cosim.study.worker import Done
 
 OF_TIME = "realtime_factor"  # the metric that is the machine's
 FIGURES = tuple(name for name in METRICS if name != OF_TIME)

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.study.columns import row_of
 from hexapod_cosim.cosim.study.crew import DEATHS, IN_FLIGHT, Chunk, Crew, Returned
+from hexapod_cosim.cosim.study.done import Done
 from hexapod_cosim.cosim.study.records import Order, Study, StudyError
 from hexapod_cosim.cosim.study.store import Store
-from hexapod_cosim.cosim.study.worker import Done, failed
+from hexapod_cosim.cosim.study.worker import failed
 
 CHUNK_TIME = 0.5  # s    of work in a chunk: what a hand-over costs is small beside it, and little is lost with a worker
 MOST_CHUNKS = 40.0  # 1/s    that come back from all workers together: a cluster's scheduler takes some milliseconds for each

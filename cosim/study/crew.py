@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from hexapod_cosim.cosim.study.done import Done
 from hexapod_cosim.cosim.study.records import Order
-from hexapod_cosim.cosim.study.worker import Done
-
-Say = Callable[[str], None]  # who hears, in words, of what the program waits for or puts right by itself
 
 IN_FLIGHT = 2  # chunks per worker: the next is there when one is done
 DEATHS = 3  # of workers on a run alone, before it is given up
-
-
-def silent(_text: str) -> None:
-    """Nobody hears."""
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from matplotlib.ticker import MaxNLocator
 
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.study.marks import COLOURS, COST, MARKS, NAMES, SLIP, Array, label_of, mean_of, named, place_of, some_of, ticks_of
-from hexapod_cosim.cosim.study.optimise import Trial
 from hexapod_cosim.cosim.study.records import Factor, Study
 from hexapod_cosim.cosim.study.table import Point
+from hexapod_cosim.cosim.study.trials import Trial
 
 MOST_EFFECTS, ACROSS = 9, 3  # factors that get a panel, panels side by side
 WIDE = 10.0  # largest over least value beyond which an axis is logarithmic

@@ -20,9 +20,9 @@ from hexapod_cosim.cosim.study.coordinates import parallel
 from hexapod_cosim.cosim.study.curves import effects, history, pareto, response, shown_effects, slip_and_cost
 from hexapod_cosim.cosim.study.heat import heat_map
 from hexapod_cosim.cosim.study.marks import MOST_CELLS, SLIP, mean_of
-from hexapod_cosim.cosim.study.optimise import Trial
 from hexapod_cosim.cosim.study.records import GRID, VALUES, Study
 from hexapod_cosim.cosim.study.table import Point
+from hexapod_cosim.cosim.study.trials import Trial
 from hexapod_cosim.models import HexapodError
 
 WHY_NOT = "A dot: no run (no pair) there yet; a cross: none walked; a dash: walked, too short for a figure."

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import platform
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,13 +14,15 @@ from typing import Any
 from uuid import uuid4
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.controller_export import export_controller, make_setup
+from hexapod_cosim.cosim.controller_export import export_controller
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table
 from hexapod_cosim.cosim.study.engines import engine_named
-from hexapod_cosim.cosim.study.records import Case, Factor, Order, Study, StudyError, Value
+from hexapod_cosim.cosim.study.manifest import FORMAT
+from hexapod_cosim.cosim.study.records import Case, Factor, Study, StudyError
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
 CONTROLLER_PERIOD = 0.005  # s    of the FMU as packed, like all its parameters; a run has its own
@@ -111,17 +112,24 @@ def environment(study: Study | None = None) -> dict[str, str]:
     }  # fmt: skip
 
 
-def canonical(content: Any) -> bytes:
-    """JSON whose bytes are the content's alone."""
-    return json.dumps(content, sort_keys=True, default=str).encode()
+def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
+    """The study as its tables, the scenarios in full, seeds, versions, hashes of the FMUs, gains."""
+    return {
+        "format": FORMAT,
+        "title": study.title,
+        "study": study.source,
+        "runs": runs,
+        "seeds": [study.seeds[0], study.seeds[-1], len(study.seeds)] if study.optimise is None else _judged(study),
+        "scenarios": {name: case.table for name, case in study.cases.items()},
+        "engine": job.engine,
+        "environment": job.environment,
+        "fmus": {name: hashlib.sha256(content).hexdigest() for name, content in job.fmus.items()},
+        "controller": hashlib.sha256(job.controller).hexdigest(),
+        "robots": {name: hashlib.sha256(content).hexdigest() for name, content in job.robots.items()},
+        "gains": None if job.gains is None else asdict(job.gains),
+    }
 
 
-def identity(order: Order, factors: Sequence[Factor]) -> str:
-    """A hash of a run's settings, whatever its number."""
-    settings = {factor.name: value for factor, value in zip(factors, order.values, strict=True)}
-    return hashlib.sha256(canonical([order.case, settings, order.seed, order.control])).hexdigest()[:16]
-
-
-def settings_of(order: Order, factors: Sequence[Factor]) -> list[tuple[Factor, Value]]:
-    """Each factor that is set, with its value."""
-    return [(factor, value) for factor, value in zip(factors, order.values, strict=True) if value is not None]
+def _judged(study: Study) -> dict[str, list[int]]:
+    assert study.optimise is not None
+    return {"training": list(study.optimise.training.seeds), "held_out": list(study.optimise.held_out.seeds)}

@@ -6,16 +6,14 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from pathlib import Path
 from time import time
 from typing import Any
 
 from hexapod_cosim.cosim.files import RUN_FILE, RUNNING, STUDY, not_writable, read_json, to_json
 from hexapod_cosim.cosim.master import COMPLETED
-from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.locks import HELD, lock_file
-from hexapod_cosim.cosim.study.records import Study, StudyError
+from hexapod_cosim.cosim.study.records import StudyError
 from hexapod_cosim.cosim.study.store import LEFTOVERS, write_durably
 
 MANIFEST, LOCK, RUNS, RESULTS, TIMES = "manifest.json", ".lock", "runs", "results.parquet", "times.parquet"
@@ -23,29 +21,6 @@ FORMAT = 1
 OF_FILE = "hexapod."  # keys of a file's metadata
 MOST_NAMED = 6  # differences in a message
 WHILE = 600.0  # s    after which nobody is writing a file any more
-
-
-def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
-    """The study as its tables, the scenarios in full, seeds, versions, hashes of the FMUs, gains."""
-    return {
-        "format": FORMAT,
-        "title": study.title,
-        "study": study.source,
-        "runs": runs,
-        "seeds": [study.seeds[0], study.seeds[-1], len(study.seeds)] if study.optimise is None else _judged(study),
-        "scenarios": {name: case.table for name, case in study.cases.items()},
-        "engine": job.engine,
-        "environment": job.environment,
-        "fmus": {name: hashlib.sha256(content).hexdigest() for name, content in job.fmus.items()},
-        "controller": hashlib.sha256(job.controller).hexdigest(),
-        "robots": {name: hashlib.sha256(content).hexdigest() for name, content in job.robots.items()},
-        "gains": None if job.gains is None else asdict(job.gains),
-    }
-
-
-def _judged(study: Study) -> dict[str, list[int]]:
-    assert study.optimise is not None
-    return {"training": list(study.optimise.training.seeds), "held_out": list(study.optimise.held_out.seeds)}
 
 
 def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:

@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -23,52 +21,14 @@ from hexapod_cosim.cosim.installation import install_extra
 from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.study.conduct import Desk, conduct
 from hexapod_cosim.cosim.study.crew import Crew
-from hexapod_cosim.cosim.study.job import identity
+from hexapod_cosim.cosim.study.identity import identity
 from hexapod_cosim.cosim.study.objective import WALKED
-from hexapod_cosim.cosim.study.records import INTEGERS, LOGUNIFORM, VALUES, Factor, Judging, Optimise, Order, Study, StudyError, Value
+from hexapod_cosim.cosim.study.optimisation import Optimisation
+from hexapod_cosim.cosim.study.records import INTEGERS, LOGUNIFORM, VALUES, Factor, Optimise, Order, Study, StudyError
 from hexapod_cosim.cosim.study.store import write_durably
-from hexapod_cosim.cosim.study.table import Point
+from hexapod_cosim.cosim.study.trials import OPTIMUM, Trial, feasible
 
-OPTIMUM = "optimum.json"
 WORST = 1e9  # what a trial without a figure gets; the samplers take no infinities as constraints
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trial:
-    """Settings and what they came to on the training runs."""
-
-    number: int
-    values: tuple[Value, ...]
-    means: Mapping[str, float]  # of the metrics and bounds
-    feasible: bool
-
-
-class Optimisation:
-    """The numbers of all its runs: trials, the beginning (no setting at all), then the held-out runs."""
-
-    def __init__(self, study: Study) -> None:
-        assert study.optimise is not None
-        self.study, self.asked = study, study.optimise
-        self.trained, self.most = self.asked.trained, self.asked.most
-
-    def training(self, point: int, values: tuple[Value | None, ...]) -> list[Order]:
-        """The training runs of a trial."""
-        return self._orders(self.asked.training, point * self.asked.training.runs, point, values)
-
-    def held_out(self, place: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
-        """The held-out runs of the `place`-th of what is tried in the end."""
-        return self._orders(self.asked.held_out, self.trained + place * self.asked.held_out.runs, point, values)
-
-    def _orders(self, judging: Judging, first: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
-        pairs = enumerate(product(judging.cases, judging.seeds))
-        return [
-            Order(run=first + k, point=point, case=case, values=values, seed=seed, control=self.asked.control) for k, (case, seed) in pairs
-        ]
-
-    @property
-    def unset(self) -> tuple[None, ...]:
-        """The values that leave all as it is without the study."""
-        return (None,) * len(self.study.factors)
 
 
 def optimise(desk: Desk, crew: Crew, folder: Path) -> None:
@@ -105,7 +65,7 @@ def _search(plan: Optimisation, desk: Desk, crew: Crew) -> Iterator[Trial]:
         sets = [plan.training(number + k, item) for k, item in enumerate(values)]
         for trial, item, rows in zip(asked, values, _judge(desk, crew, sets), strict=True):
             means = _means(rows, plan.asked)
-            yield _told(study, trial, Trial(number=number, values=item, means=means, feasible=_feasible(means, plan.asked)), plan.asked)
+            yield _told(study, trial, Trial(number=number, values=item, means=means, feasible=feasible(means, plan.asked)), plan.asked)
             number += 1
 
 
@@ -197,10 +157,6 @@ def _figure(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
-def _feasible(means: Mapping[str, float], asked: Optimise) -> bool:
-    return all(bound.excess(means[bound.metric]) <= 0.0 for bound in asked.constraints)
-
-
 def best_of(trials: Sequence[Trial], asked: Optimise) -> list[Trial]:
     """The best trial, or up to FRONT evenly chosen of those that no other is better than in all metrics; none that breaks a constraint
     where there is one that does not.
@@ -211,20 +167,6 @@ def best_of(trials: Sequence[Trial], asked: Optimise) -> list[Trial]:
     )
     places = np.unique(np.linspace(0, len(front) - 1, min(asked.chosen, len(front))).round().astype(int))
     return [front[place] for place in places.tolist()]
-
-
-def trials_of(plan: Optimisation, points: Sequence[Point]) -> list[Trial]:
-    """Trials from the points of their runs, for people to look at; those that are whole."""
-    found = []
-    for point in points:
-        if point.held_out or point.number >= plan.asked.trials or point.runs[plan.asked.control] < plan.asked.training.runs:
-            continue
-        share = point.walked[plan.asked.control] / point.runs[plan.asked.control]
-        means = {name: item.value if share == 1.0 else math.nan for name, item in point.means[plan.asked.control].items()}
-        means[WALKED] = share
-        values = tuple(point.values[factor.name] for factor in plan.study.factors)
-        found.append(Trial(number=point.number, values=values, means=means, feasible=_feasible(means, plan.asked)))
-    return found
 
 
 def _costs(trial: Trial, asked: Optimise) -> tuple[float, ...]:

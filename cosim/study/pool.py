@@ -14,9 +14,10 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.interrupts import deaf_to_interrupts
 from hexapod_cosim.cosim.study.crew import Chunk, Returned
+from hexapod_cosim.cosim.study.done import Done
 from hexapod_cosim.cosim.study.job import Job
 from hexapod_cosim.cosim.study.scratch import job_in, scratch
-from hexapod_cosim.cosim.study.worker import Done, close_workshop, work
+from hexapod_cosim.cosim.study.worker import close_workshop, work
 from hexapod_cosim.cosim.workers import METHOD, begin_worker, stop_if_told
 
 DIED = "its worker process ended by itself (killed, or out of memory)"

@@ -19,12 +19,13 @@ from hexapod_cosim.cosim.master import COMPLETED
 from hexapod_cosim.cosim.study.columns import FIGURES, WALL, result_schema, schema_of
 from hexapod_cosim.cosim.study.manifest import MANIFEST, RESULTS, RUNS, TIMES, provenance
 from hexapod_cosim.cosim.study.moments import Array, ratio_half_widths
-from hexapod_cosim.cosim.study.optimise import OPTIMUM, Optimisation, Trial, trials_of
+from hexapod_cosim.cosim.study.optimisation import Optimisation
 from hexapod_cosim.cosim.study.reading import study_from_table
 from hexapod_cosim.cosim.study.records import SCENARIO_FACTOR, Study
 from hexapod_cosim.cosim.study.store import ROWS_AT_ONCE, Store, write_durably, write_whole
 from hexapod_cosim.cosim.study.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, blocks_of, whole_pairs
 from hexapod_cosim.cosim.study.table import Mean, Overall, Point, Tally, point_at
+from hexapod_cosim.cosim.study.trials import OPTIMUM, Trial, trials_of
 from hexapod_cosim.models import HexapodError
 
 POINTS, SUMMARY = "points.parquet", "summary.json"

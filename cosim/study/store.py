@@ -21,8 +21,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from hexapod_cosim.cosim.events import EventSink, ignore_event
 from hexapod_cosim.cosim.files import not_writable
-from hexapod_cosim.cosim.study.crew import Say, silent
 from hexapod_cosim.cosim.study.parts import (
     COMPRESSION,
     DAMAGED,
@@ -97,7 +97,7 @@ class Store:
         self._rows: list[dict[str, object]] = []
         self._flushed = monotonic()
 
-    def prepare(self, count: int, *, say: Say = silent) -> None:
+    def prepare(self, count: int, *, say: EventSink = ignore_event) -> None:
         """Makes the folder for `count` runs, takes away what a killed study left half written, and sets damaged parts aside."""
         try:
             self._folder.mkdir(exist_ok=True)
@@ -108,7 +108,7 @@ class Store:
         except OSError as error:
             raise _not_written(self._folder, error) from error
 
-    def _judge(self, path: Path, count: int, say: Say) -> None:
+    def _judge(self, path: Path, count: int, say: EventSink) -> None:
         try:
             runs = runs_of(path, self._schema)
             if len(runs) and not 0 <= runs[0] <= runs[-1] < count:

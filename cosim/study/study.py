@@ -12,13 +12,14 @@ import pyarrow as pa
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.batch import processors
+from hexapod_cosim.cosim.events import EventSink, ignore_event
 from hexapod_cosim.cosim.files import read_json
 from hexapod_cosim.cosim.study.columns import WALL, result_schema, schema_of
 from hexapod_cosim.cosim.study.conduct import Desk, conduct, missing
-from hexapod_cosim.cosim.study.crew import Crew, Say, silent
+from hexapod_cosim.cosim.study.crew import Crew
 from hexapod_cosim.cosim.study.design import Sweep
 from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE
-from hexapod_cosim.cosim.study.job import Job, make_job
+from hexapod_cosim.cosim.study.job import Job, make_job, manifest_of
 from hexapod_cosim.cosim.study.manifest import (
     MANIFEST,
     RESULTS,
@@ -28,10 +29,10 @@ from hexapod_cosim.cosim.study.manifest import (
     clear_leftovers,
     finish_folder,
     locked,
-    manifest_of,
     provenance,
 )
-from hexapod_cosim.cosim.study.optimise import Optimisation, optimise
+from hexapod_cosim.cosim.study.optimisation import Optimisation
+from hexapod_cosim.cosim.study.optimise import optimise
 from hexapod_cosim.cosim.study.pool import local_crew, own_crew
 from hexapod_cosim.cosim.study.records import Study
 from hexapod_cosim.cosim.study.results import POINTS, SUMMARY
@@ -51,7 +52,7 @@ class Options:
     scheduler: str | None = None  # a Dask scheduler's address instead
     command: str = ""
     write: Writer = write_durably
-    say: Say = silent  # e.g. that workers are waited for
+    say: EventSink = ignore_event  # e.g. that workers are waited for
 
 
 def run_study(study: Study, folder: Path, *, options: Options, begun: Begun) -> Path:

@@ -7,7 +7,7 @@ import traceback
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from threading import Lock
@@ -20,8 +20,10 @@ from hexapod_cosim.cosim.metrics import METRICS
 from hexapod_cosim.cosim.run import chosen_gains, known_robot
 from hexapod_cosim.cosim.scenario import scenario_from_table, with_values
 from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.study.done import Done
 from hexapod_cosim.cosim.study.engines import Engine, engine_named
-from hexapod_cosim.cosim.study.job import Job, canonical, environment, settings_of
+from hexapod_cosim.cosim.study.identity import canonical, settings_of
+from hexapod_cosim.cosim.study.job import Job, environment
 from hexapod_cosim.cosim.study.records import GAINS, SCENARIO_FACTOR, Factor, Order, StudyError, Value
 from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.models import HexapodError
@@ -30,15 +32,6 @@ MOST_DESIGNS = 64  # sets of gains a worker keeps
 MOST_KNOWN = 4096  # summaries a worker keeps: some 10 MB
 MOST_TEXT = 400  # characters of what an exception says
 ADDRESS = re.compile(r"0x[0-9a-fA-F]+")  # of an object in memory: another one each time
-
-
-@dataclass(frozen=True)
-class Done:
-    """A run and what it came to."""
-
-    order: Order
-    summary: Summary
-    wall: float  # s
 
 
 class Workshop:

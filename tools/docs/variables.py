@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hexapod_cosim.cosim.controller_export import make_setup
 from hexapod_cosim.cosim.controller_interface import load_controller_interface
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.documentation import Row, variable_rows
 from hexapod_cosim.cosim.interface import Interface, load_interface
 from hexapod_cosim.models import load_robot

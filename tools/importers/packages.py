@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hexapod_cosim.cosim.controller_export import make_setup
+from hexapod_cosim.cosim.controller_setup import make_setup
 from hexapod_cosim.cosim.fmu import Fmu
 from hexapod_cosim.cosim.plant_files import package_version
 from hexapod_cosim.cosim.recorder import Recording

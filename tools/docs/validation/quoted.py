@@ -12,10 +12,11 @@ from measured import driven, integral, landing_rates, sampled, slipped
 
 from hexapod_cosim.cosim.export import export_fmu
 from hexapod_cosim.cosim.metrics import METRICS, compute_metrics, shown_metrics
-from hexapod_cosim.cosim.run import Result, simulate
+from hexapod_cosim.cosim.result import Result
+from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario import load_scenario
 from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.cosim.signals import joint_names
+from hexapod_cosim.cosim.variable_names import joint_names
 from hexapod_cosim.cosim.walk import View
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import Shown
