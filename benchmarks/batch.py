@@ -22,12 +22,12 @@ from typing import Any
 
 from benchmarks.run import RESULTS, machine
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.batch import processors, run_batch
-from hexapod_cosim.cosim.run import chosen_gains
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.variation import STANDARD
-from hexapod_cosim.cosim.walker import Walker
+from hexapod_cosim.cosim.run.batch import processors, run_batch
+from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 FAST = ("solver.method=ros2", "solver.tolerance=0.01")  # docs/architecture.md says what it costs in accuracy
 SETTINGS: dict[str, tuple[str, ...]] = {"default solver": (), "fast solver": FAST}

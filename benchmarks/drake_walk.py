@@ -44,7 +44,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from mirror import JOINTS, LEGS, HxDefinition, HxInput
 
 Array = NDArray[np.float64]

@@ -10,14 +10,14 @@ from time import perf_counter
 
 from benchmarks.toolchain import Tools
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.design import design_for
-from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.master import run
-from hexapod_cosim.cosim.recorder import Recorder
-from hexapod_cosim.cosim.run import simulate
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.schedule import make_schedule
-from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.loop import run
+from hexapod_cosim.cosim.master.recorder import Recorder
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import load_robot
 
 SCENARIO = "walk_flat"

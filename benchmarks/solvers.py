@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from benchmarks.run import RESULTS
 from benchmarks.study import BOTH, PAGE, put_in_page
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.files import atomic_text
-from hexapod_cosim.cosim.metrics import FLOORS, METRICS
-from hexapod_cosim.cosim.run import chosen_gains
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.variation import STANDARD
-from hexapod_cosim.cosim.walker import Walker
+from hexapod_cosim.cosim.common.files import atomic_text
+from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
+from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 SEEDS = 6
 SHOWN = ("slip_per_metre", "cost_of_transport", "torque_rms", "peak_force", "loading_rate", "path_error", "stability_margin")

@@ -27,22 +27,22 @@ import numpy as np
 
 from benchmarks.run import RESULTS, machine
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.files import atomic_text, write_text
-from hexapod_cosim.cosim.master import COMPLETED, Progress
-from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.run import chosen_gains
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.study import conduct
-from hexapod_cosim.cosim.study.manifest import RESULTS as RESULTS_FILE
-from hexapod_cosim.cosim.study.reading import study_from_table
-from hexapod_cosim.cosim.study.report import write_study_report
-from hexapod_cosim.cosim.study.results import read_results
-from hexapod_cosim.cosim.study.study import Options, run_study
-from hexapod_cosim.cosim.summary import Summary
-from hexapod_cosim.cosim.variation import STANDARD
-from hexapod_cosim.cosim.walker import Walker
+from hexapod_cosim.cosim.common.files import atomic_text, write_text
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.master.loop import COMPLETED, Progress
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
+from hexapod_cosim.cosim.study.execute import conduct
+from hexapod_cosim.cosim.study.execute.study import Options, run_study
+from hexapod_cosim.cosim.study.plan.reading import study_from_table
+from hexapod_cosim.cosim.study.report.report import write_study_report
+from hexapod_cosim.cosim.study.store.manifest import RESULTS as RESULTS_FILE
+from hexapod_cosim.cosim.study.store.results import read_results
 from hexapod_cosim.models import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -21,8 +21,8 @@ from plant import definition, inputs
 
 from benchmarks import BUILD
 from hexapod_cosim.controller import PATTERNS, BodyCommand, Controller, Gait, Measurement, make_gait
-from hexapod_cosim.cosim.reach import check_commands
-from hexapod_cosim.cosim.scenario_records import Command as TimedCommand
+from hexapod_cosim.cosim.scenario.reach import check_commands
+from hexapod_cosim.cosim.scenario.records import Command as TimedCommand
 from hexapod_cosim.models import HexapodError, Robot, load_robot
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.statics import settled

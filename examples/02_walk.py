@@ -3,9 +3,9 @@
 usage: python examples/02_walk.py
 """
 
-from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.run import simulate
-from hexapod_cosim.cosim.scenario import load_scenario
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 
 def main() -> None:

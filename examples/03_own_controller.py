@@ -6,12 +6,12 @@ usage: python examples/03_own_controller.py
 import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, JointCommand, Measurement
-from hexapod_cosim.cosim.master import Outcome, run
-from hexapod_cosim.cosim.recorder import Recorder
-from hexapod_cosim.cosim.run import open_plant
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.schedule import make_schedule
-from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.master.loop import Outcome, run
+from hexapod_cosim.cosim.master.recorder import Recorder
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.run.run import open_plant
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import load_robot
 
 AMPLITUDE, FREQUENCY = 0.1, 1.0  # rad, Hz

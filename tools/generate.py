@@ -13,15 +13,15 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.arrays import arrays
-from hexapod_cosim.cosim.components import PLANT, Component
-from hexapod_cosim.cosim.controller_interface import ControllerSetup, load_controller_interface
-from hexapod_cosim.cosim.documentation import render_html
-from hexapod_cosim.cosim.export import start_values
-from hexapod_cosim.cosim.extras import PICTURES
-from hexapod_cosim.cosim.interface import CAUSALITIES, Interface, Variable, load_interface
-from hexapod_cosim.cosim.model_description import render_fmi2
-from hexapod_cosim.cosim.terminals import render_terminals
+from hexapod_cosim.cosim.common.components import PLANT, Component
+from hexapod_cosim.cosim.export.documentation import render_html
+from hexapod_cosim.cosim.export.export import start_values
+from hexapod_cosim.cosim.export.extras import PICTURES
+from hexapod_cosim.cosim.interface.arrays import arrays
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup, load_controller_interface
+from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Variable, load_interface
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.terminals import render_terminals
 from hexapod_cosim.models.robot import load_robot
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -17,10 +17,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
-from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.extras import pictures
-from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.reference import TOLERANCE, read_csv, reference_members
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.extras import pictures
+from hexapod_cosim.cosim.export.reference import TOLERANCE, read_csv, reference_members
+from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.models.robot import load_robot
 
 GENERATED = Path(__file__).resolve().parents[1] / "plant_fmu" / "generated"

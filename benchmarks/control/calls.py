@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Controller, Gains, JointCommand, Measurement, make_gait
-from hexapod_cosim.cosim.design import design_for
-from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.master import run
-from hexapod_cosim.cosim.recorder import Recorder
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.schedule import make_schedule
-from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.loop import run
+from hexapod_cosim.cosim.master.recorder import Recorder
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.schedule import make_schedule
 from hexapod_cosim.models import load_robot
 
 SCENARIO, REPEATS = "walk_flat", 5

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.variation import STANDARD
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import load_robot
 
 DATA: dict[str, Any] = tomllib.loads((Path(__file__).parent / "scenarios.toml").read_text(encoding="utf-8"))

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 from benchmarks.control.cases import Case
 from hexapod_cosim.controller import make_gait
-from hexapod_cosim.cosim.batch import run_batch
-from hexapod_cosim.cosim.comparison import Comparison, compare_runs
-from hexapod_cosim.cosim.scenario_records import CONTROLS, Scenario
-from hexapod_cosim.cosim.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.toml_text import to_toml
+from hexapod_cosim.cosim.common.toml_text import to_toml
+from hexapod_cosim.cosim.results.comparison import Comparison, compare_runs
+from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
+from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.models import ScenarioError, load_robot
 
 Tell = Callable[[int, int], None]  # runs done, of how many

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.comparison import SAME, Change, Comparison
-from hexapod_cosim.cosim.files import atomic_text, write_text
-from hexapod_cosim.cosim.metrics import METRICS
-from hexapod_cosim.cosim.summary import REFUSED
+from hexapod_cosim.cosim.common.files import atomic_text, write_text
+from hexapod_cosim.cosim.results.comparison import SAME, Change, Comparison
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.summary import REFUSED
 from hexapod_cosim.models import HexapodError
 
 # metric -> heading of its column

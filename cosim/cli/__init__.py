@@ -38,7 +38,7 @@ def _run(given: list[str]) -> int:
     import typer  # noqa: PLC0415  a second of imports, in which Ctrl-C may come
 
     from hexapod_cosim.cosim.cli.app import app  # noqa: PLC0415
-    from hexapod_cosim.cosim.interrupts import termination_as_interrupt  # noqa: PLC0415
+    from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt  # noqa: PLC0415
     from hexapod_cosim.models import HexapodError  # noqa: PLC0415
 
     usage_error: Any = typer.BadParameter.__mro__[1]  # which typer does not export

@@ -10,12 +10,12 @@ from typing import Annotated
 import typer
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.accuracy import Accuracy, finer, halved, judge_accuracy
-from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.cli.terminal import Count, counting_bar, show_table, show_text, warn
 from hexapod_cosim.cosim.report.accuracy import Metrics, Rows, about_accuracy, effect_rows
-from hexapod_cosim.cosim.scenario_records import Scenario
-from hexapod_cosim.cosim.summary import Summary
+from hexapod_cosim.cosim.results.accuracy import Accuracy, finer, halved, judge_accuracy
+from hexapod_cosim.cosim.results.summary import Summary
+from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.scenario.records import Scenario
 
 CheckAccuracy = Annotated[
     bool,

@@ -8,7 +8,7 @@ import typer
 
 from hexapod_cosim.cosim.cli import compare_command, fmu_commands, listing, run_commands, study_command
 from hexapod_cosim.cosim.cli.failures import EPILOG
-from hexapod_cosim.cosim.plant_files import package_version
+from hexapod_cosim.cosim.common.plant_files import package_version
 
 app = typer.Typer(name="hexapod", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False, epilog=EPILOG)
 app.command("export")(fmu_commands.export)

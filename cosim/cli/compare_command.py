@@ -11,8 +11,6 @@ from typing import Annotated, Any
 import typer
 
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.accuracy import Accuracy, halved
-from hexapod_cosim.cosim.batch import run_batch
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
@@ -30,21 +28,23 @@ from hexapod_cosim.cosim.cli.running import (
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, show_text, warn
-from hexapod_cosim.cosim.comparison import SEEDS, SEEDS_PARTIAL, Comparison, compare_runs, write_seeds
-from hexapod_cosim.cosim.files import RUN_FILE, write_json, write_text
-from hexapod_cosim.cosim.interrupts import held_interrupts
-from hexapod_cosim.cosim.master import COMPLETED
-from hexapod_cosim.cosim.metrics import has_net_slip
-from hexapod_cosim.cosim.report import REPORT, about, comparison_rows, write_report
+from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
+from hexapod_cosim.cosim.common.toml_text import to_toml
+from hexapod_cosim.cosim.master.interrupts import held_interrupts
+from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.result import Result
-from hexapod_cosim.cosim.results import ACCURACY, METRICS_FILE, SCENARIO, Folder, read_scenario, results_folder, stored
-from hexapod_cosim.cosim.run import chosen_gains
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.scenario_records import CONTROLS, Scenario
-from hexapod_cosim.cosim.summary import Summary, summarise
-from hexapod_cosim.cosim.toml_text import to_toml
-from hexapod_cosim.cosim.variation import STANDARD
+from hexapod_cosim.cosim.report.report import REPORT, about, comparison_rows, write_report
+from hexapod_cosim.cosim.results.accuracy import Accuracy, halved
+from hexapod_cosim.cosim.results.comparison import SEEDS, SEEDS_PARTIAL, Comparison, compare_runs, write_seeds
+from hexapod_cosim.cosim.results.metrics import has_net_slip
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.results import ACCURACY, METRICS_FILE, SCENARIO, Folder, read_scenario, results_folder, stored
+from hexapod_cosim.cosim.results.summary import Summary, summarise
+from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
 
 EPILOG = (

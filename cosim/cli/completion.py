@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from hexapod_cosim.controller import PATTERNS, Requirements
-from hexapod_cosim.cosim.columns import Column, plant_variables
-from hexapod_cosim.cosim.scenario import list_scenarios
-from hexapod_cosim.cosim.scenario_checks import setting_names
-from hexapod_cosim.cosim.scenario_records import CONTROLS, KEYS, SECTIONS
+from hexapod_cosim.cosim.results.columns import Column, plant_variables
+from hexapod_cosim.cosim.scenario.checks import setting_names
+from hexapod_cosim.cosim.scenario.records import CONTROLS, KEYS, SECTIONS
+from hexapod_cosim.cosim.scenario.scenario import list_scenarios
 from hexapod_cosim.models import list_robots
 
 Offers = list[tuple[str, str]]  # word, meaning

@@ -14,16 +14,16 @@ from hexapod_cosim.controller import Gains, save_gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.running import GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, is_given, show_files, show_json, show_table, show_text, waiting, warn
-from hexapod_cosim.cosim.controller_export import export_controller
-from hexapod_cosim.cosim.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.controller_setup import make_setup
-from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.files import not_writable
-from hexapod_cosim.cosim.robot_files import chosen_format, export_description
-from hexapod_cosim.cosim.robot_package import SUFFIX as PACKAGE_SUFFIX
-from hexapod_cosim.cosim.robot_package import chosen_package, export_package, package_path, read_values
-from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.cosim.validation import find_problems
+from hexapod_cosim.cosim.common.files import not_writable
+from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.export.robot_files import chosen_format, export_description
+from hexapod_cosim.cosim.export.robot_package import SUFFIX as PACKAGE_SUFFIX
+from hexapod_cosim.cosim.export.robot_package import chosen_package, export_package, package_path, read_values
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, Robot, load_robot
 
 RobotName = Annotated[
@@ -190,8 +190,8 @@ def design(
 ) -> None:
     """Design the gains of the compliant control, with plots."""
     from hexapod_cosim.controller.design import design_gains, plot_design  # noqa: PLC0415  slow to import: python-control, matplotlib
-    from hexapod_cosim.cosim.design import examine_stances, read_requirements  # noqa: PLC0415
-    from hexapod_cosim.cosim.design_check import check_design  # noqa: PLC0415
+    from hexapod_cosim.cosim.design.design import examine_stances, read_requirements  # noqa: PLC0415
+    from hexapod_cosim.cosim.design.design_check import check_design  # noqa: PLC0415
 
     made, folder = load_robot(robot), output or Path("out") / "design"
     needs = read_requirements(settings or [], made)

@@ -10,9 +10,9 @@ import typer
 
 from hexapod_cosim.controller import PATTERNS
 from hexapod_cosim.cosim.cli.terminal import Json, show_json, show_table
-from hexapod_cosim.cosim.interface import load_interface
-from hexapod_cosim.cosim.scenario import list_scenarios
-from hexapod_cosim.cosim.study.bundled import list_studies
+from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.scenario.scenario import list_scenarios
+from hexapod_cosim.cosim.study.plan.bundled import list_studies
 from hexapod_cosim.models import LEG_NAMES, list_robots, load_robot, unknown_name
 
 Rows = list[dict[str, Any]]

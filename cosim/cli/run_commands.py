@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-from hexapod_cosim.cosim.accuracy import Accuracy, halved
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
@@ -26,13 +25,14 @@ from hexapod_cosim.cosim.cli.running import (
     titled,
 )
 from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
-from hexapod_cosim.cosim.comparison import SEEDS, compare_runs, read_seeds
-from hexapod_cosim.cosim.files import STUDY
-from hexapod_cosim.cosim.metrics import has_net_slip
-from hexapod_cosim.cosim.report import REPORT, metric_rows, write_report
+from hexapod_cosim.cosim.common.files import STUDY
 from hexapod_cosim.cosim.report.accuracy import with_errors
-from hexapod_cosim.cosim.result import Result
-from hexapod_cosim.cosim.results import (
+from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
+from hexapod_cosim.cosim.results.accuracy import Accuracy, halved
+from hexapod_cosim.cosim.results.comparison import SEEDS, compare_runs, read_seeds
+from hexapod_cosim.cosim.results.metrics import has_net_slip
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.results import (
     ACCURACY,
     read_accuracies,
     read_facts,
@@ -42,10 +42,10 @@ from hexapod_cosim.cosim.results import (
     stored,
     write_accuracy,
 )
-from hexapod_cosim.cosim.run import chosen_gains
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.cosim.summary import summarise
+from hexapod_cosim.cosim.results.summary import summarise
+from hexapod_cosim.cosim.run.run import chosen_gains
+from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 EPILOG = f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
 Control = Annotated[

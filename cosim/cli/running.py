@@ -14,12 +14,12 @@ import typer
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, waiting, warn
-from hexapod_cosim.cosim.interrupts import held_interrupts
-from hexapod_cosim.cosim.master import INTERRUPTED
-from hexapod_cosim.cosim.result import Result
-from hexapod_cosim.cosim.results import Folder, write_result
-from hexapod_cosim.cosim.run import simulate as run_scenario
-from hexapod_cosim.cosim.scenario_records import Scenario
+from hexapod_cosim.cosim.master.interrupts import held_interrupts
+from hexapod_cosim.cosim.master.loop import INTERRUPTED
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.results import Folder, write_result
+from hexapod_cosim.cosim.run.run import simulate as run_scenario
+from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
 Name = Annotated[

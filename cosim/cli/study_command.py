@@ -12,8 +12,8 @@ import typer
 from hexapod_cosim.cosim.cli.failures import FELL
 from hexapod_cosim.cosim.cli.running import FmuFile, GainsFile, given_gains
 from hexapod_cosim.cosim.cli.terminal import Json, warn
-from hexapod_cosim.cosim.study.engines import DEFAULT_ENGINE, ENGINES
-from hexapod_cosim.cosim.study.records import StudyError
+from hexapod_cosim.cosim.study.execute.engines import DEFAULT_ENGINE, ENGINES
+from hexapod_cosim.cosim.study.plan.records import StudyError
 
 EPILOG = f"A fall is a result of a study. Exit code {FELL} only when the robot walked to the end of no run at all and fell in some."
 MAX_WORKERS = 4096
@@ -34,7 +34,7 @@ def study(
 ) -> int:  # fmt: skip
     """Run a study: sweeps, Monte Carlo, tuning. Stopped at any point and started again, it goes on where it was."""
     from hexapod_cosim.cosim.cli.studying import carry_out  # noqa: PLC0415  slow to import, and no other command needs it
-    from hexapod_cosim.cosim.study.study import Options  # noqa: PLC0415
+    from hexapod_cosim.cosim.study.execute.study import Options  # noqa: PLC0415
 
     options = Options(
         engine=engine, fmu=fmu, gains=given_gains(gains), workers=_checked_workers(workers), scheduler=scheduler, say=warn,

@@ -9,15 +9,15 @@ from pathlib import Path
 
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.terminal import counting_bar, show_files, show_json, show_table, show_text, warn
-from hexapod_cosim.cosim.comparison import METHOD
-from hexapod_cosim.cosim.master import COMPLETED
-from hexapod_cosim.cosim.study.conduct import Tell
-from hexapod_cosim.cosim.study.manifest import TIMES
-from hexapod_cosim.cosim.study.notes import NO_WALK, notes
-from hexapod_cosim.cosim.study.reading import load_study
-from hexapod_cosim.cosim.study.report import optimum_changes, optimum_rows, overall_rows, write_study_report
-from hexapod_cosim.cosim.study.results import Results, read_results, summary_of
-from hexapod_cosim.cosim.study.study import Begun, Options, run_study
+from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.comparison import METHOD
+from hexapod_cosim.cosim.study.execute.conduct import Tell
+from hexapod_cosim.cosim.study.execute.study import Begun, Options, run_study
+from hexapod_cosim.cosim.study.plan.reading import load_study
+from hexapod_cosim.cosim.study.report.notes import NO_WALK, notes
+from hexapod_cosim.cosim.study.report.report import optimum_changes, optimum_rows, overall_rows, write_study_report
+from hexapod_cosim.cosim.study.store.manifest import TIMES
+from hexapod_cosim.cosim.study.store.results import Results, read_results, summary_of
 
 MOST_REASONS = 10
 

@@ -16,9 +16,9 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column, Table
 from rich.text import Text
 
-from hexapod_cosim.cosim import master
 from hexapod_cosim.cosim.cli.width import columns_of, fitted
-from hexapod_cosim.cosim.files import to_json
+from hexapod_cosim.cosim.common.files import to_json
+from hexapod_cosim.cosim.master import loop as master
 
 PIPE = 160  # columns of tables where there is no terminal
 GAP = 2  # between columns

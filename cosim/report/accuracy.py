@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from hexapod_cosim.cosim.accuracy import Accuracy
-from hexapod_cosim.cosim.metrics import DUST, FLOORS
+from hexapod_cosim.cosim.results.accuracy import Accuracy
+from hexapod_cosim.cosim.results.metrics import DUST, FLOORS
 
 SHOWN = 0.0005  # relative: less is 0.0 %
 

@@ -11,9 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.metrics import foot_errors
-from hexapod_cosim.cosim.recorder import ColumnError
-from hexapod_cosim.cosim.walk import View, bearing_load, body_height, commanded_path, robot_weight, running_integral, slip_under_load
+from hexapod_cosim.cosim.master.recorder import ColumnError
+from hexapod_cosim.cosim.results.metrics import foot_errors
+from hexapod_cosim.cosim.results.walk import (
+    View,
+    bearing_load,
+    body_height,
+    commanded_path,
+    robot_weight,
+    running_integral,
+    slip_under_load,
+)
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 
 Array = NDArray[np.float64]

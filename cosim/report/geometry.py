@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.cosim.portrait import COLOURS, THICKNESS
-from hexapod_cosim.cosim.results import Stored
-from hexapod_cosim.cosim.variable_names import vector_names
-from hexapod_cosim.cosim.walk import FLAT
+from hexapod_cosim.cosim.export.portrait import COLOURS, THICKNESS
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.results.results import Stored
+from hexapod_cosim.cosim.results.walk import FLAT
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 
 Parameters = Mapping[str, float]

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hexapod_cosim.cosim.comparison import BETTER, WORSE, Change, Comparison
-from hexapod_cosim.cosim.metrics import METRICS, PER_RADIAN
-from hexapod_cosim.cosim.walk import TANH
+from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Comparison
+from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
+from hexapod_cosim.cosim.results.walk import TANH
 
 # metric -> its name on a card, and what there is less or more of in the sentence: first what depends on no assumed slope of
 # friction, slip last

@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from hexapod_cosim.cosim.plant_files import plant_folders
+from hexapod_cosim.cosim.common.plant_files import plant_folders
 
 VIEWER = Path("viewer") / "viewer.js"  # in the plant's folder, where CMake installs it
 NO_VIEWER = (
@@ -32,7 +32,7 @@ def environment() -> Environment:
 
 def render(template: str, **content: Any) -> str:
     """A page in the colours of the figures."""
-    from hexapod_cosim.cosim.plots import STYLES  # noqa: PLC0415  matplotlib is slow to import
+    from hexapod_cosim.cosim.report.plots import STYLES  # noqa: PLC0415  matplotlib is slow to import
 
     colours = {label: style["color"] for label, style in STYLES.items()}
     return environment().get_template(template).render(colours=colours, **content)

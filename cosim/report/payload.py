@@ -9,8 +9,8 @@ from typing import Any
 from hexapod_cosim.cosim.report.columns import MOST_ROWS, Chosen, choose
 from hexapod_cosim.cosim.report.geometry import describe_ground, describe_robot
 from hexapod_cosim.cosim.report.packing import pack
-from hexapod_cosim.cosim.results import Stored
-from hexapod_cosim.cosim.walk import CONTACT_SHARE
+from hexapod_cosim.cosim.results.results import Stored
+from hexapod_cosim.cosim.results.walk import CONTACT_SHARE
 
 
 def make_payload(runs: Mapping[str, Stored], *, most_rows: int = MOST_ROWS) -> tuple[dict[str, Any], list[str]]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from hexapod_cosim.cosim.controller_interface import load_controller_interface
-from hexapod_cosim.cosim.controller_setup import make_setup
-from hexapod_cosim.cosim.documentation import Row, variable_rows
-from hexapod_cosim.cosim.interface import Interface, load_interface
+from hexapod_cosim.cosim.export.documentation import Row, variable_rows
+from hexapod_cosim.cosim.interface.controller_interface import load_controller_interface
+from hexapod_cosim.cosim.interface.interface import Interface, load_interface
+from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}

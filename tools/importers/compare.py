@@ -19,8 +19,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from hexapod_cosim.cosim.plant_files import package_version
-from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.common.plant_files import package_version
+from hexapod_cosim.cosim.master.recorder import Recording
 from tools.importers.outcome import Outcome, answers, last_lines, not_installed, shortcomings, version
 from tools.importers.packages import TOOLS, PackageRow, compare_packages
 from tools.importers.walk import STEP, Walk, record

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
-from hexapod_cosim.cosim.controller_interface import ControllerSetup
-from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.master import JointController, run
-from hexapod_cosim.cosim.recorder import Recorder, Recording
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.schedule import make_schedule
-from hexapod_cosim.cosim.signals import Signals
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.loop import JointController, run
+from hexapod_cosim.cosim.master.recorder import Recorder, Recording
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.schedule import make_schedule
 
 
 class Late:

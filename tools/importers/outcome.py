@@ -7,8 +7,8 @@ from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol
 
-from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.recordings import read_csv
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.recordings import read_csv
 from hexapod_cosim.models import HexapodError
 
 LAST_LINES = 3

@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from hexapod_cosim.cosim.fmu import Fmu, FmuBlock
-from hexapod_cosim.cosim.recorder import Recording
+from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
+from hexapod_cosim.cosim.master.recorder import Recording
 
 
 @dataclass(frozen=True)

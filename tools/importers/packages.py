@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hexapod_cosim.cosim.controller_setup import make_setup
-from hexapod_cosim.cosim.fmu import Fmu
-from hexapod_cosim.cosim.plant_files import package_version
-from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.robot_package import CONTROLLER, PLANT, export_package
+from hexapod_cosim.cosim.common.plant_files import package_version
+from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_package
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
 from tools.importers.late import walk
 from tools.importers.outcome import answers, not_installed, version

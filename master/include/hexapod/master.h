@@ -1,6 +1,6 @@
 /* master.h - the co-simulation loop: a plant FMU and a controller FMU, macro-step by macro-step, through functions of FMI 2.0 alone.
  *
- * It does what cosim/master.py does with a controller FMU, in the same order and with the same numbers: at t_k = start + k h read the
+ * It does what cosim/master/loop.py does with a controller FMU, in the same order and with the same numbers: at t_k = start + k h read the
  * plant's outputs -> controller -> set the plant's inputs -> record -> both step to t_k + h. Whoever calls it has loaded, initialised and
  * will free both FMUs, and owns all memory: nothing here allocates, prints or has a state of its own. Different hxMaster may run in
  * different threads if their instances differ.
@@ -43,7 +43,7 @@ typedef struct hxMasterBlock {
   size_t place;
 } hxMasterBlock;
 
-/* What is wrong with the feet's force sensors, as cosim/force_sensor.py has it. They are between the plant and the controller; a fault is
+/* What is wrong with the feet's force sensors, as cosim/master/force_sensor.py has it. They are between the plant and the controller; a fault is
  * what comes out last, after noise and delay. */
 typedef struct hxMasterSensor {
   const double *factor;  /* 1     [steps + 1][forces] of the noise; NULL: none */

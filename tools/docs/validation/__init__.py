@@ -11,7 +11,8 @@ from pathlib import Path
 from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown
 
-sys.path.insert(0, str(ROOT / "tests"))  # the tests' robots, motions and problems
+# the robots, motions and problems of the tests
+sys.path.extend(str(ROOT / "tests" / room) for room in ("support", "models", "plant"))
 
 from building import built, shared_library
 

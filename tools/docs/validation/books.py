@@ -8,11 +8,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from matplotlib.figure import Figure
 
-from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.recorder import Recording
-from hexapod_cosim.cosim.run import simulate
-from hexapod_cosim.cosim.scenario import list_scenarios, load_scenario
-from hexapod_cosim.cosim.walker import Walker
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import PALETTE, Shown, short
 

@@ -1,4 +1,4 @@
-"""Orders of convergence of the integrators, on the problems of tests/test_plant_integrator.py."""
+"""Orders of convergence of the integrators, on the problems of tests/plant/test_plant_integrator.py."""
 
 from __future__ import annotations
 

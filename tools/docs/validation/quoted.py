@@ -10,14 +10,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from measured import driven, integral, landing_rates, sampled, slipped
 
-from hexapod_cosim.cosim.export import export_fmu
-from hexapod_cosim.cosim.metrics import METRICS, compute_metrics, shown_metrics
-from hexapod_cosim.cosim.result import Result
-from hexapod_cosim.cosim.run import simulate
-from hexapod_cosim.cosim.scenario import load_scenario
-from hexapod_cosim.cosim.scenario_records import CONTROLS
-from hexapod_cosim.cosim.variable_names import joint_names
-from hexapod_cosim.cosim.walk import View
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.interface.names import joint_names
+from hexapod_cosim.cosim.results.metrics import METRICS, compute_metrics, shown_metrics
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.records import CONTROLS
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import Shown
 

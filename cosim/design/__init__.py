@@ -1,0 +1,1 @@
+"""Linearises the plant FMU and designs controller gains for it. Imports `common` to `export`."""

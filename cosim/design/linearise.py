@@ -1,0 +1,174 @@
+"""The plant FMU itself, linearised about the standing robot by central differences.
+
+    x(k+1) = A x(k) + B u(k)        y(k) = C x(k)
+
+x: torso's position and small rotation, joint angles, and the velocities of all these. One period of the FMU from x with the inputs u
+held is the exact sampled system, so nothing is approximated but the differences. Each column takes two fresh starts from the `initial`
+parameters, one on either side; those of angle_ref and speed_ref are kp and kd times torque_ref's, by eq. 13.
+
+Sizes of the differences. They must be small against what bends: the foot's depth in the ground (0.1 mm and more), the slip speed at which
+friction saturates (10 mm/s), the joint speed at which the gear's friction does (50 mrad/s); and large against the round-off of a start,
+1e-15 m in a contact of 5e4 N/m.
+
+Left out are the servos' torque limits, which no small motion sees but a heavy load does, and the error control, whose choice of steps
+would be noise: steps are fixed, and short against the times in which a foot swings on the ground.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import control
+import numpy as np
+
+from hexapod_cosim.controller.design.standing import StandingPlant
+from hexapod_cosim.controller.size import Size, size_of
+from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, vector_names
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.signals import COMMANDED, MEASURED, PUSH
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import quaternion_product
+from hexapod_cosim.models.records import Array
+
+ANGLES = LEGS * JOINTS
+POSES = 6 + ANGLES  # of torso and joints; the states are these and their velocities
+STATES = 2 * POSES
+CHANGE, RATE = 1e-6, 1e-5  # m and rad, m/s and rad/s    of the differences, by the robot's size
+TORQUE = 1e-4  # N m    the same, of servos of STIFFNESS, otherwise by theirs
+STIFFNESS = 40.0  # N m/rad
+LONGEST_STEP = 5e-4  # s    of the integration, by the robot's size
+UNLIMITED = 1e6  # N m
+LATEST = 600.0  # s    no start is stepped beyond it
+TORSO = [f"torso.{name}[{k}]" for name in ("position", "rotation") for k in (1, 2, 3)]
+TORSO_RATES = [*vector_names("torso.velocity"), *MEASURED["angular_velocity"]]
+STATE_NAMES = [*TORSO, *MEASURED["angle"], *TORSO_RATES, *MEASURED["speed"]]
+INPUT_NAMES = [name for names in COMMANDED.values() for name in names]
+OUTPUT_NAMES = [*MEASURED["foot_force"], *MEASURED["angle"], *TORSO, *TORSO_RATES]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Where the torso and the joints are and how they move: what an FMU starts from."""
+
+    values: Array  # (49,) position, quaternion, angles, velocity, angular velocity, joint speeds
+
+    @property
+    def angle(self) -> Array:
+        """rad    (6, 3)"""
+        return self.values[7 : 7 + ANGLES].reshape(LEGS, JOINTS)
+
+    def moved(self, state: Array) -> Motion:
+        """The same after small changes (48,)."""
+        new = self.values.copy()
+        new[:3] += state[:3]
+        new[3:7] = quaternion_product(np.array([1.0, *(0.5 * state[3:6])]), self.values[3:7])
+        new[7:] += state[6:]
+        return Motion(values=new)
+
+    def less(self, other: Motion) -> Array:
+        """(48,) small changes that lead here from another."""
+        w, x, y, z = other.values[3:7]
+        turn = quaternion_product(self.values[3:7], np.array([w, -x, -y, -z]))
+        return np.concatenate([self.values[:3] - other.values[:3], 2.0 * turn[1:] / turn[0], self.values[7:] - other.values[7:]])
+
+
+class Bench:
+    """An FMU that is started over and over again. Inputs (60,): angle_ref, speed_ref, torque_ref of all joints, push force and torque."""
+
+    def __init__(self, plant: Fmu, robot: Robot, *, coulomb_friction: float, slope: float, period: float) -> None:
+        """robot: the FMU's; coulomb_friction: of the gears [N m]; slope: of the feet's friction [s/m];
+        period [s].
+        """
+        size = size_of(robot)
+        self.plant, self.period = plant, period
+        self._sizes, self._torque = difference_sizes(size), TORQUE * (robot.servo.kp / STIFFNESS)
+        step = period / math.ceil(period / (LONGEST_STEP * size.time) - 1e-9)
+        self._settings = plant.block(["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"])
+        self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step
+        pose, rates = [*vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"]], [*TORSO_RATES, *MEASURED["speed"]]
+        seen = [*pose, *rates]
+        self._seen = plant.block(seen)
+        self._initial = plant.block([f"initial.{name.removeprefix('torso.')}" for name in seen])
+        self._inputs = plant.block([*INPUT_NAMES, *PUSH])
+        self._forces = plant.block(MEASURED["foot_force"])
+
+    def start(self, motion: Motion, inputs: Array) -> None:
+        """Ready to step at time 0."""
+        self.plant.reset()
+        self._settings.set()
+        self._initial.values[:] = motion.values
+        self._initial.set()
+        self.plant.initialise(0.0, LATEST)
+        self.tell(inputs)
+
+    def tell(self, inputs: Array) -> None:
+        """Sets the inputs (60,)."""
+        self._inputs.values[:] = inputs
+        self._inputs.set()
+
+    def step(self, k: int = 0) -> None:
+        """The period after k of them."""
+        self.plant.step(k * self.period, self.period)
+
+    def motion(self) -> Motion:
+        """How the FMU moves now."""
+        self._seen.get()
+        return Motion(values=self._seen.values.copy())
+
+    def force(self) -> Array:
+        """N    (18,) ground on feet now"""
+        self._forces.get()
+        return np.array(self._forces.values)
+
+    def differences(self, motion: Motion, inputs: Array, *, scale: float = 1.0) -> tuple[Array, Array, Array]:
+        """A (48, 48), B (48, 18) of the joints' torques and C (18, 48) of the feet's forces about a motion; scale: of the differences."""
+        a, b, c = np.zeros((STATES, STATES)), np.zeros((STATES, ANGLES)), np.zeros((ANGLES, STATES))
+        for k, change in enumerate(scale * np.diag(self._sizes)):
+            ahead, behind = (self._step_from(motion.moved(way), inputs) for way in (change, -change))
+            c[:, k], a[:, k] = (ahead[0] - behind[0]) / (2.0 * change[k]), ahead[1].less(behind[1]) / (2.0 * change[k])
+        for k, change in enumerate(scale * self._torque * np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]):
+            ahead, behind = (self._step_from(motion, inputs + way) for way in (change, -change))
+            b[:, k] = ahead[1].less(behind[1]) / (2.0 * scale * self._torque)
+        return a, b, c
+
+    def _step_from(self, motion: Motion, inputs: Array) -> tuple[Array, Motion]:
+        self.start(motion, inputs)
+        force = self.force()
+        self.step()
+        return force, self.motion()
+
+
+def difference_sizes(size: Size) -> Array:
+    """(48,) of the differences of states: torso's way, all angles, and the rates of both."""
+    sizes = np.repeat([CHANGE, RATE], POSES)
+    sizes[:3] *= size.length
+    sizes[POSES : POSES + 3] *= size.speed
+    sizes[POSES + 3 :] /= size.time
+    return sizes
+
+
+def linearise(
+    plant: Fmu, robot: Robot, motion: Motion, inputs: Array, *, period: float, coulomb_friction: float, scale: float = 1.0
+) -> StandingPlant:
+    """The FMU of a robot about a motion at rest, sampled with a period [s] over which the inputs are held.
+
+    coulomb_friction: of the gears [N m]; scale: of the differences.
+    """
+    bench = Bench(plant, robot, coulomb_friction=coulomb_friction, slope=robot.friction.slope, period=period)
+    a, b, c = bench.differences(motion, inputs, scale=scale)
+    bench.start(motion, inputs)
+    force = bench.force().reshape(LEGS, 3)
+    shown = np.eye(STATES)[[*range(6, POSES), *range(6), *range(POSES, POSES + 6)]]
+    system = control.ss(
+        a, np.hstack([robot.servo.kp * b, robot.servo.kd * b, b]), np.vstack([c, shown]), 0, period,
+        states=_plain(STATE_NAMES), inputs=_plain(INPUT_NAMES), outputs=_plain(OUTPUT_NAMES),
+    )  # fmt: skip
+    torque = inputs[2 * ANGLES : 3 * ANGLES].reshape(LEGS, JOINTS)
+    return StandingPlant(system=system, angle=motion.angle.copy(), force=force, torque=torque, standing=force[:, 2] > 0.0)
+
+
+def _plain(names: Sequence[str]) -> list[str]:
+    # python-control takes no dots
+    return [name.replace(".", "_") for name in names]

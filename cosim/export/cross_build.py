@@ -1,0 +1,197 @@
+"""Shared libraries for other systems and processors, compiled on this machine by the C compiler of the ziglang package.
+
+Zig brings each system's headers and link stubs, so nothing else has to be installed. Sources are compiled in a folder of their own under
+their relative names, so no path of this machine gets into a binary, and what is built is a function of sources, compiler and flags alone:
+that is what the cache goes by.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import metadata, util
+from pathlib import Path
+
+import platformdirs
+
+from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.common.installation import install_extra
+from hexapod_cosim.models.errors import FmuError, HexapodError
+
+PACKAGE = "ziglang"
+APPLICATION = "hexapod-cosim"
+SHOWN_LINES = 12  # of a compiler's complaints
+PATIENCE = 1200  # s    the compiler was seen to wait for itself for ever, now and then, for Windows
+
+# as plant_fmu/CMakeLists.txt, with reasons
+COMPILE = ("-std=c11", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fvisibility=hidden", "-fno-ident")
+ELF = ("-fPIC", "-Wl,-z,relro,-z,now,--no-undefined", "-lm")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A system and processor: how Zig calls it, how its shared libraries end, how they are linked."""
+
+    triple: str
+    suffix: str
+    link: tuple[str, ...] = ()
+
+
+# the oldest systems in use: CentOS 7's C library, the first macOS for both processors, the C library that comes with Windows 10
+TARGETS = {
+    "x86_64-linux": Target("x86_64-linux-gnu.2.17", ".so", ELF),
+    "aarch64-linux": Target("aarch64-linux-gnu.2.17", ".so", ELF),
+    "x86_64-windows": Target("x86_64-windows-gnu", ".dll"),
+    "x86_64-darwin": Target("x86_64-macos.11.0", ".dylib"),
+    "aarch64-darwin": Target("aarch64-macos.11.0", ".dylib"),
+}
+
+
+@dataclass(frozen=True)
+class Library:
+    """What a shared library is built from.
+
+    sources: C files and headers by their path below the folder that includes are relative to. headers: further folders of headers.
+    """
+
+    name: str
+    sources: Mapping[str, Path]
+    headers: tuple[Path, ...] = ()
+    flags: tuple[str, ...] = field(default=())
+
+    def digest(self) -> str:
+        """A fingerprint of all that goes in."""
+        parts = [self.name, *self.flags]
+        files = [*self.sources.items(), *((f"{n}/{path.name}", path) for n, folder in enumerate(self.headers) for path in _headers(folder))]
+        parts += [f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in files]
+        return _digest(parts)
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A compiler driver and its version."""
+
+    command: tuple[str, ...]
+    version: str
+
+
+@cache
+def find_compiler() -> Compiler:
+    """The installed cross compiler. Raises FmuError when there is none."""
+    spec = util.find_spec(PACKAGE)
+    if spec is None or spec.origin is None:
+        fix = f"{install_extra('platforms')}; without --platforms an FMU gets this machine's installed binary"
+        raise FmuError("no cross compiler", got=f"no package {PACKAGE}", expected=PACKAGE, fix=fix)
+    program = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
+    return Compiler((str(program), "cc"), metadata.version(PACKAGE))
+
+
+def build_library(library: Library, target: str, *, compiler: Compiler | None = None, cache_folder: Path | None = None) -> bytes:
+    """The shared library for a target, from the cache if it was built before.
+
+    Args:
+        library: what to build.
+        target: a key of TARGETS.
+        compiler: by default the installed one.
+        cache_folder: by default the user's; processes may share it.
+
+    Raises FmuError: no compiler, or sources that it does not compile.
+    """
+    compiler, folder = compiler or find_compiler(), cache_folder or user_cache()
+    flags = (*_flags(library, target), *library.flags)
+    key = _digest([library.digest(), compiler.version, *flags])
+    kept = folder / "binaries" / f"{library.name}-{target}-{key[:32]}{TARGETS[target].suffix}"
+    if kept.is_file() and (data := _unsealed(kept.read_bytes())):
+        return data
+    data = _compile(library, [*compiler.command, *flags], target, folder)
+    _keep(kept, data)
+    return data
+
+
+def user_cache() -> Path:
+    """Where built binaries are kept: the user's cache folder."""
+    return Path(platformdirs.user_cache_path(APPLICATION, appauthor=False))
+
+
+def _flags(library: Library, target: str) -> tuple[str, ...]:
+    chosen = TARGETS[target]
+    link = (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",) if chosen.suffix == ".dylib" else chosen.link
+    return ("-target", chosen.triple, "-mcpu=baseline", *COMPILE, "-shared", "-s", *link)
+
+
+def _compile(library: Library, command: Sequence[str], target: str, cache_folder: Path) -> bytes:
+    """Copies the sources into a folder, compiles them there and returns the library's bytes."""
+    with tempfile.TemporaryDirectory(prefix="hexapod-build-") as name:
+        root, out = Path(name), library.name + TARGETS[target].suffix
+        for path, source in library.sources.items():
+            (root / "in" / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / "in" / path).write_bytes(source.read_bytes())
+        for number, folder in enumerate(library.headers):
+            (root / "in" / f"headers{number}").mkdir(parents=True)
+            for header in _headers(folder):
+                (root / "in" / f"headers{number}" / header.name).write_bytes(header.read_bytes())
+        (root / "out").mkdir()
+        includes = ["-I.", *(item for number in range(len(library.headers)) for item in ("-isystem", f"headers{number}"))]
+        sources = [path for path in library.sources if path.endswith(".c")]
+        _run([*command, *includes, *sources, "-o", f"../out/{out}"], root, target, cache_folder)
+        return (root / "out" / out).read_bytes()
+
+
+def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) -> None:
+    environment = compiler_environment(root, cache_folder)
+    try:
+        process = subprocess.run(
+            command, cwd=root / "in", env=environment, capture_output=True, text=True, errors="replace", check=False, timeout=PATIENCE
+        )
+    except subprocess.TimeoutExpired as error:
+        fix = "run it again: what is done so far is kept"
+        raise FmuError(
+            f"cannot build for {target}", got="a compiler that hangs", expected=f"an end within {PATIENCE} s", fix=fix
+        ) from error
+    if process.returncode != 0:
+        complaint = "\n".join(process.stderr.splitlines()[:SHOWN_LINES]) or f"exit code {process.returncode}"
+        fix = "correct the sources, or install the compiler anew if it is damaged"
+        raise FmuError(f"cannot build for {target}", got=complaint, expected="sources that compile", fix=fix)
+
+
+def compiler_environment(scratch: Path, cache_folder: Path) -> dict[str, str]:
+    """Environment of the compiler: what it makes of the systems' libraries is kept in the cache, the rest goes to a scratch folder."""
+    folders = {"ZIG_LOCAL_CACHE_DIR": scratch / "zig", "ZIG_GLOBAL_CACHE_DIR": _writable(cache_folder / "zig", scratch)}
+    return os.environ | {name: str(folder) for name, folder in folders.items()}
+
+
+def _writable(folder: Path, otherwise: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return otherwise / "zig-global"
+    return folder if os.access(folder, os.W_OK) else otherwise / "zig-global"
+
+
+def _keep(path: Path, data: bytes) -> None:
+    """Writes to the cache, whole or not at all; a cache that cannot be written to is none."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_path(path) as part:
+            part.write_bytes(hashlib.sha256(data).digest() + data)
+    except (OSError, HexapodError):
+        return
+
+
+def _unsealed(data: bytes) -> bytes:
+    """What `_keep` wrote, or nothing if it is damaged."""
+    size = hashlib.sha256().digest_size
+    return data[size:] if hashlib.sha256(data[size:]).digest() == data[:size] else b""
+
+
+def _headers(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.h"))
+
+
+def _digest(parts: Sequence[str]) -> str:
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()

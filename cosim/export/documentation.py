@@ -1,0 +1,144 @@
+"""documentation/index.html inside an FMU: what an importer's user needs to know, on one page."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Iterable, Sequence
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from hexapod_cosim.cosim.interface.arrays import arrays
+from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Pattern, Variable
+from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
+
+INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
+# what a user asks of a tool's compatibility list, by the flag of modelDescription.xml
+CAPABILITIES = {
+    "canHandleVariableCommunicationStepSize": "steps of any size, from rounding error to 100 s",
+    "canGetAndSetFMUstate": "state saved and restored, bit for bit",
+    "canSerializeFMUstate": "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused",
+    "providesDirectionalDerivative": "directional derivatives",
+    "canInterpolateInputs": "derivatives of inputs over a step; without them inputs are held",
+    "maxOutputDerivativeOrder": "derivatives of outputs, highest order",
+    "canBeInstantiatedOnlyOncePerProcess": "one instance a process only",
+    "canRunAsynchronuously": "steps that return before they are done",
+    "completedIntegratorStepNotNeeded": "model exchange without a call after every step of the solver",
+    "canNotUseMemoryManagementFunctions": "needs no memory functions of the importer",
+    "canGetAndSetFMUState": "state saved and restored, bit for bit",
+    "canSerializeFMUState": "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused",
+    "providesDirectionalDerivatives": "directional derivatives",
+    "providesAdjointDerivatives": "adjoint derivatives",
+    "providesPerElementDependencies": "dependencies of single elements of arrays",
+    "hasEventMode": "event mode, where discrete variables change and inputs may",
+    "mightReturnEarlyFromDoStep": "steps that end where discrete variables change, if the importer allows",
+    "providesIntermediateUpdate": "intermediate updates",
+    "providesEvaluateDiscreteStates": "discrete states evaluated without an update",
+    "needsCompletedIntegratorStep": "model exchange needs a call after every step of the solver",
+}
+# how the names in the tables are to be read, and whether they are of arrays
+NAMES = {
+    False: "Below, {leg}, {joint} and {inertia} stand for each of the names above or of xx, yy, zz, xy, xz, yz; [i] for 1, 2, 3 "
+    "(quaternions: to 4).",
+    True: "Below, the numbers behind a name are an array's sizes: 6 legs, 3 joints in the order above, 3 axes; the last index runs "
+    "fastest. What FMI 2.0 calls LF.coxa.angle_ref is the first element of angle_ref.",
+}
+AXES = {"leg": LEG_NAMES, "joint": JOINT_NAMES}
+
+Row = dict[str, str]
+
+
+def render_html(interface: Interface, description: str, *, picture: str, reference: bool) -> str:
+    """The page for one robot's FMU. What is a component's own is in pages/.
+
+    Args:
+        interface: what to tell of.
+        description: its modelDescription.xml.
+        picture: the robot's picture, by its path in the archive.
+        reference: whether the archive has reference results.
+    """
+    root = ElementTree.fromstring(description.encode())
+    environment = Environment(loader=PackageLoader("hexapod_cosim.cosim.export", "pages"), autoescape=True, undefined=StrictUndefined)
+    robot, arrayed = interface.robot, str(root.get("fmiVersion")).startswith("3")
+    return environment.get_template(f"{interface.component.name}.html.jinja").render(
+        robot=robot,
+        picture=posixpath.relpath(picture, "documentation"),
+        reference=reference,
+        interface=interface,
+        joints=sum(len(leg.links) for leg in robot.legs),
+        fmi=root.get("fmiVersion"),
+        token=root.get("guid", root.get("instantiationToken")),
+        kinds=[name for tag, name in INTERFACES.items() if root.find(tag) is not None],
+        capabilities=_capabilities(root),
+        names=NAMES[arrayed],
+        arrayed=arrayed,
+        groups={causality: variable_rows(interface, causality, arrayed=arrayed) for causality in CAUSALITIES},
+        weight=robot.total_mass * max(map(abs, robot.gravity)),
+    )
+
+
+def _capabilities(root: Element) -> list[Row]:
+    """Every flag that the model description declares, of every interface that it offers."""
+    found = {tag: root.find(tag) for tag in INTERFACES}
+    offered = {tag: element for tag, element in found.items() if element is not None}
+    return [
+        {"flag": flag, "meaning": meaning, "values": ", ".join(dict.fromkeys(_words(element.get(flag)) for element in offered.values()))}
+        for flag, meaning in CAPABILITIES.items()
+        if any(element.get(flag) is not None for element in offered.values())
+    ]
+
+
+def _words(value: str | None) -> str:
+    return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
+
+
+def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> list[Row]:
+    """What to tell of the variables of a causality: a row per pattern, or per FMI 3.0 array."""
+    if arrayed:
+        chosen = [array for array in arrays(interface) if array.first.causality == causality]
+        sizes = ["".join(f"[{size}]" for size in array.shape) for array in chosen]
+        return [_row(array.name + size, array.description, array.elements, interface) for array, size in zip(chosen, sizes, strict=True)]
+    variables = [variable for variable in interface.variables if variable.causality == causality]
+    patterns = [pattern for pattern in interface.patterns if pattern.causality == causality]
+    return [_row(pattern.name, pattern.description, _matching(pattern, variables), interface) for pattern in patterns]
+
+
+def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Interface) -> Row:
+    first = variables[0]
+    display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(first.unit or "", "")
+    choices = interface.enumerations[first.enumeration].items if first.enumeration else ()
+    return {
+        "name": name,
+        "unit": first.unit or first.enumeration or first.type,
+        "display": display,
+        "count": str(len(variables)),
+        "range": "" if choices else _range(first),
+        "start": _starts(variables, [name for name, _ in choices]),
+        "meaning": meaning,
+        "choices": "; ".join(f"{number} {name}: {text}" for number, (name, text) in enumerate(choices, start=1)),
+    }
+
+
+def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]:
+    """The variables that a pattern stands for."""
+    expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d\]")
+    expression = re.sub(r"\\\{(\w+)\\\}", lambda match: f"(?:{'|'.join(AXES.get(match[1], (r'[xyz]{2}',)))})", expression)
+    return [variable for variable in variables if re.fullmatch(expression, variable.name)]
+
+
+def _range(variable: Variable) -> str:
+    if variable.minimum is None and variable.maximum is None:
+        return ""
+    low, high = ("" if bound is None else f"{bound:.4g}" for bound in (variable.minimum, variable.maximum))
+    return f"{low} to {high}" if low and high else f"from {low}" if low else f"to {high}"
+
+
+def _starts(variables: Sequence[Variable], choices: Sequence[str]) -> str:
+    """The start values, in short: one if all are the same."""
+    values = list(dict.fromkeys(variable.start for variable in variables if variable.start is not None))
+    if choices and values:
+        return f"{values[0]} ({choices[int(values[0]) - 1]})"
+    shown = list(dict.fromkeys(f"{value:.4g}" for value in values))
+    return ", ".join(shown) if len(shown) <= 4 else f"{min(values):.4g} to {max(values):.4g}"

@@ -1,0 +1,130 @@
+"""Packs an FMU: the same binary for every robot, with the robot's model description and start values."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from functools import reduce
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hexapod_cosim.cosim.common.components import PLANT, Component
+from hexapod_cosim.cosim.common.files import atomic_path, not_writable
+from hexapod_cosim.cosim.common.plant_files import FMI2_SOURCE, FMI3_SOURCE, binary, fmi2_platform, fmi3_platform, source_files
+from hexapod_cosim.cosim.export.extras import extra_members
+from hexapod_cosim.cosim.export.platforms import build_binaries, choose_platforms, component_library
+from hexapod_cosim.cosim.export.reference import reference_members
+from hexapod_cosim.cosim.interface.interface import Interface, Variable, load_interface
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.cosim.interface.model_description3 import render_build_description, render_fmi3
+from hexapod_cosim.models.errors import FmuError
+from hexapod_cosim.models.records import Robot
+
+FMI_VERSIONS = (2, 3)
+FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
+
+
+def export_fmu(robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
+    """Writes a robot's FMU and returns its path.
+
+    Args:
+        robot: what the FMU's start values are.
+        path: the file to write; it appears complete or not at all. Its folder is made if need be.
+        fmi: version of the standard.
+        platforms: folders such as linux64, or "all", each cross-compiled; "sources": no binary at all. By default this machine's binary
+            as it was installed.
+
+    Raises FmuError: no binary, no cross compiler, a version or platform that is not offered; HexapodError: a path that cannot be written.
+    """
+    return export_interface(load_interface(robot), path, fmi=fmi, platforms=platforms)
+
+
+def export_interface(interface: Interface, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
+    """Writes the FMU of a component with this interface, as `export_fmu` does."""
+    if fmi not in FMI_VERSIONS:
+        offered = ", ".join(map(str, FMI_VERSIONS))
+        raise FmuError("no such FMI version", got=fmi, expected=offered, fix="export with one of these")
+    component = interface.component
+    if platforms is None:
+        binaries = installed_binary(component, fmi=fmi)
+    else:
+        binaries = build_binaries(component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi)
+    return write_archive(Path(path), _members(interface, binaries, fmi))
+
+
+def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
+    """This machine's binary as it was built when this package was installed, by its path in the FMU."""
+    library, folder = binary(fmi2_platform(), component), fmi2_platform() if fmi == 2 else fmi3_platform()
+    return {f"binaries/{folder}/{component.identifier}{library.suffix}": library.read_bytes()}
+
+
+def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
+    """Contents of the archive by path."""
+    description = (render_fmi2 if fmi == 2 else render_fmi3)(interface)
+    members = {
+        "modelDescription.xml": description.xml.encode(),
+        "resources/start_values.txt": start_values(interface, description.guid).encode(),
+    }
+    members |= dict(binaries) | _sources(interface.component, fmi)
+    reference = _reference(interface, members) if fmi == 2 else {}
+    return members | extra_members(interface, description.xml, fmi=fmi, reference=bool(reference)) | reference
+
+
+def _sources(component: Component, fmi: int) -> dict[str, bytes]:
+    """All that the binary was made of, but for the other version's layer, whose headers an importer need not have."""
+    other = FMI3_SOURCE if fmi == 2 else FMI2_SOURCE
+    files = {name: path for name, path in source_files(component).items() if name != other}
+    members = {f"sources/{name}": path.read_bytes() for name, path in files.items()}
+    if fmi == 3:
+        description = render_build_description(component, (name for name in files if name.endswith(".c")))
+        members["sources/buildDescription.xml"] = description.encode()
+    return members
+
+
+def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:
+    """Reference results of the plant where this machine can run it: none for an FMU that is packed for other platforms alone."""
+    if interface.component is not PLANT or not any(name.startswith(f"binaries/{fmi2_platform()}/") for name in members):
+        return {}
+    with TemporaryDirectory(prefix="hexapod-export-") as folder:
+        return reference_members(interface, write_archive(Path(folder) / "trial.fmu", members))
+
+
+def start_values(interface: Interface, guid: str) -> str:
+    """What the binary reads at instantiation: the GUID, then "reference value name" of every input and parameter, exactly; a checksum."""
+    lines = [guid, *map(_start_line, interface.of_causality("input", "parameter"))]
+    return "\n".join([*lines, f"checksum {reduce(checksum, (line.encode() for line in lines), 0):016x}"]) + "\n"
+
+
+def _start_line(variable: Variable) -> str:
+    value = float(variable.start or 0.0).hex() if variable.type == "Real" else str(int(variable.start or 0))
+    return f"{variable.reference} {value} {variable.name}"
+
+
+def checksum(seed: int, data: bytes) -> int:
+    """hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, its high bits mixed into the low ones."""
+    value = seed ^ FNV_BASIS
+    for place in range(0, len(data), WORD):
+        value = (value ^ int.from_bytes(data[place : place + WORD], "little")) * FNV_PRIME & MASK
+        value ^= value >> 32
+    return (value ^ len(data)) * FNV_PRIME & MASK
+
+
+def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
+    """A ZIP archive, whole or not at all, the same bytes for the same members. Raises HexapodError when it cannot be written."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise not_writable(path, error) from error
+    with atomic_path(path) as part, zipfile.ZipFile(part, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(_member(name), content)
+    return path
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, TIMESTAMP)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system = 3  # Unix, wherever it is packed
+    info.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+    return info

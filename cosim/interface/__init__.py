@@ -1,0 +1,1 @@
+"""The FMU variables: names, arrays, start values and model descriptions. Imports `common`."""

@@ -1,0 +1,91 @@
+"""The controller's FMU variables, expanded from controller_fmu/interface.toml for one set-up of the controller."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from types import SimpleNamespace
+
+from hexapod_cosim.controller import Controller, Gains, Gait, Parts
+from hexapod_cosim.controller.controller import gains_warnings
+from hexapod_cosim.controller.gains import TRIPOD_LEGS, HoldGains, LimitGains, SlipGains, SupportGains, SuspensionGains
+from hexapod_cosim.controller.size import requirements_for
+from hexapod_cosim.cosim.common.components import CONTROLLER
+from hexapod_cosim.cosim.interface.interface import Interface, expand_interface
+from hexapod_cosim.cosim.interface.start_values import parameter_values
+from hexapod_cosim.models import Robot
+
+ALL_PARTS = Parts()
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerSetup:
+    """What `Controller` is made of. Gains None: kinematic control."""
+
+    robot: Robot
+    gait: Gait
+    period: float  # s
+    gains: Gains | None = None
+    parts: Parts = ALL_PARTS
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about it: those of the Python controller."""
+        return gains_warnings(self.robot, self.gains, self.period)
+
+    def build(self) -> Controller:
+        """The Python controller of this set-up. Raises RobotError, ControllerError for one that cannot be."""
+        return Controller(self.robot, period=self.period, gait=self.gait, gains=self.gains, parts=self.parts)
+
+
+@lru_cache(maxsize=16)
+def load_controller_interface(setup: ControllerSetup) -> Interface:
+    """The interface of a controller's FMU. Raises what `Controller` raises, HexapodError when a value does not fit its variable."""
+    setup.build()  # refuses what the C, which takes joint axes and gaits for granted, could not
+    return expand_interface(CONTROLLER, setup.robot, controller_roots(setup))
+
+
+def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
+    """What the path of a start value of the controller may begin with."""
+    settings = SimpleNamespace(control="kinematic" if setup.gains is None else "compliant", period=setup.period, upright=UPRIGHT)
+    gains = passive_gains(setup.robot) if setup.gains is None else setup.gains
+    return SimpleNamespace(robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings)
+
+
+def controller_parameters(setup: ControllerSetup) -> dict[str, float]:
+    """All parameters of the FMU of a set-up. Raises what `Controller` raises."""
+    _build_kinematic(setup.robot, setup.gait, setup.period)
+    return parameter_values(CONTROLLER, controller_roots(setup))
+
+
+@lru_cache(maxsize=64)
+def _build_kinematic(robot: Robot, gait: Gait, period: float) -> None:
+    """Refuses what no gains change."""
+    ControllerSetup(robot=robot, gait=gait, period=period).build()
+
+
+def passive_gains(robot: Robot) -> SimpleNamespace:
+    """What the gains' parameters start with under kinematic control, which has none: a law against slip that answers nothing, and
+    what requirements alone say of the rest.
+    """
+    wanted, servo = requirements_for(robot), robot.servo
+    stiffness, omega = robot.weight / TRIPOD_LEGS / wanted.deflection, 2.0 * math.pi * wanted.frequency
+    slip = SlipGains(
+        kp=0.0, ki=0.0, kd=0.0, derivative_time=wanted.filter_time, filter_time=wanted.filter_time, load_time=wanted.load_time,
+        tracking_time=wanted.filter_time, limit=wanted.slip_limit,
+    )  # fmt: skip
+    suspension = SuspensionGains(
+        mass=stiffness / omega**2,
+        damping=2.0 * wanted.damping_ratio * stiffness / omega,
+        stiffness=stiffness,
+        limit=wanted.deflection_limit,
+    )
+    hold = HoldGains(
+        attitude_rate=wanted.attitude_rate, height_rate=wanted.height_rate, ground_time=wanted.ground_time, angle_limit=wanted.angle_limit,
+        height_limit=wanted.height_limit, path_rate=wanted.path_rate, speed_limit=wanted.speed_limit, turn_limit=wanted.turn_limit,
+    )  # fmt: skip
+    support = SupportGains(handover_time=wanted.handover_time, weight_time=wanted.weight_time)
+    limits = LimitGains(speed=wanted.speed_share * servo.speed_max, torque=wanted.torque_share * servo.torque_max)
+    return SimpleNamespace(slip=slip, suspension=suspension, support=support, hold=hold, limits=limits)

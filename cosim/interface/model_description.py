@@ -1,0 +1,192 @@
+"""modelDescription.xml of FMI 2.0 and the GUID that ties it to the binary's start values."""
+
+from __future__ import annotations
+
+import hashlib
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from hexapod_cosim.cosim.common.components import Component
+from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCE, source_files
+from hexapod_cosim.cosim.interface.interface import Enumeration, Interface, Unit, Variable
+
+# what the binary can do; tests/fmi/test_fmi.py and tests/fmi/test_fmi_exchange.py hold each of these to its word
+BOTH = {
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}
+MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"} | BOTH
+# canInterpolateInputs: derivatives of inputs are taken whenever they are given, but some masters that connect sources without any
+# refuse an FMU that declares it, and none refuses one that does not
+CO_SIMULATION = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "canInterpolateInputs": "false",
+    "canRunAsynchronuously": "false",
+} | BOTH
+
+
+@dataclass(frozen=True)
+class ModelDescription:
+    """The document and its GUID, a fingerprint of the document: any other variable, unit, value or version is another GUID."""
+
+    guid: str
+    xml: str
+
+
+def render_fmi2(interface: Interface) -> ModelDescription:
+    """The model description of a robot's FMU."""
+    root = _document(interface)
+    digest = hashlib.sha256(ElementTree.tostring(root)).digest()
+    guid = "{" + str(uuid.UUID(bytes=digest[:16], version=4)) + "}"
+    root.set("guid", guid)
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return ModelDescription(guid=guid, xml=f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def _document(interface: Interface) -> Element:
+    own = {"fmiVersion": "2.0", "guid": "", "numberOfEventIndicators": str(interface.event_indicators)}
+    root = Element("fmiModelDescription", own | general_facts(interface))
+    _add_interfaces(root, interface)
+    add_units(root, interface.units)
+    _add_types(root, interface.enumerations.values(), interface.units)
+    add_log_categories(root, interface)
+    SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(interface.stop_time), stepSize=repr(interface.step))
+    _add_provenance(root, interface)
+    variables = SubElement(root, "ModelVariables")
+    for variable in interface.variables:
+        _add_variable(variables, variable, interface)
+    _add_structure(root, interface)
+    return root
+
+
+def _add_interfaces(root: Element, interface: Interface) -> None:
+    """Model exchange for components with continuous states, whose derivatives are exact; co-simulation."""
+    differentiable = {"providesDirectionalDerivative": _flag(bool(interface.states))}
+    order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
+    identifier = {"modelIdentifier": interface.component.identifier}
+    if interface.states:
+        _add_sources(SubElement(root, "ModelExchange", identifier | MODEL_EXCHANGE | differentiable), interface.component)
+    _add_sources(SubElement(root, "CoSimulation", identifier | CO_SIMULATION | order | differentiable), interface.component)
+
+
+def _flag(value: bool) -> str:
+    return "true" if value else "false"
+
+
+def _add_sources(element: Element, component: Component) -> None:
+    files = SubElement(element, "SourceFiles")
+    for name in source_files(component):
+        if name.endswith(".c") and name != FMI3_SOURCE:
+            SubElement(files, "File", name=name)
+
+
+def general_facts(interface: Interface) -> dict[str, str]:
+    """The attributes of the document that are the same in both versions of the standard."""
+    robot = interface.robot
+    joints = sum(len(leg.links) for leg in robot.legs)
+    return {
+        "modelName": robot.name + interface.component.suffix, "version": interface.version, "license": "MIT",
+        "description": interface.component.description.format(bodies=1 + joints, joints=joints),
+        "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
+    }  # fmt: skip
+
+
+def add_log_categories(root: Element, interface: Interface) -> None:
+    """The log's categories."""
+    categories = SubElement(root, "LogCategories")
+    for name, text in interface.log_categories.items():
+        SubElement(categories, "Category", name=name, description=text)
+
+
+def add_units(root: Element, units: Iterable[Unit]) -> None:
+    """The units, with how users like to see them."""
+    parent = SubElement(root, "UnitDefinitions")
+    for unit in units:
+        element = SubElement(parent, "Unit", name=unit.name)
+        if unit.exponents is not None:
+            SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in unit.exponents.items()})
+        if unit.display is not None:
+            SubElement(element, "DisplayUnit", name=unit.display[0], factor=repr(unit.display[1]))
+
+
+def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
+    parent = SubElement(root, "TypeDefinitions")
+    for unit in units:
+        _add_real_type(parent, unit)
+    for enumeration in enumerations:
+        element = SubElement(SubElement(parent, "SimpleType", name=enumeration.name), "Enumeration")
+        for number, (name, text) in enumerate(enumeration.items, start=1):
+            SubElement(element, "Item", name=name, value=str(number), description=text)
+
+
+def _add_real_type(parent: Element, unit: Unit) -> None:
+    if unit.type is not None:
+        display = {"displayUnit": unit.display[0]} if unit.display else {}
+        SubElement(SubElement(parent, "SimpleType", name=unit.type), "Real", {"quantity": unit.type, "unit": unit.name} | display)
+
+
+def _add_provenance(root: Element, interface: Interface) -> None:
+    tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=DISTRIBUTION)
+    SubElement(tool, "Robot", name=interface.robot.name, hash=interface.robot.hash)
+
+
+def _add_variable(parent: Element, variable: Variable, interface: Interface) -> None:
+    element = SubElement(parent, "ScalarVariable", {
+        "name": variable.name, "valueReference": str(variable.reference), "causality": variable.causality,
+        "variability": variable.variability, "initial": "exact" if variable.causality == "parameter" else "calculated",
+        "description": variable.description,
+    })  # fmt: skip
+    if variable.causality == "input":
+        del element.attrib["initial"]  # the standard forbids to state it
+    displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
+    types = {unit.name: unit.type for unit in interface.units}
+    attributes = {
+        "declaredType": variable.enumeration or types.get(variable.unit or ""),
+        "unit": variable.unit,
+        "displayUnit": displays.get(variable.unit or ""),
+        "min": variable.minimum,
+        "max": variable.maximum,
+        "nominal": variable.nominal,
+        "start": variable.start,
+        "derivative": interface.derivative_of.get(variable.name),
+        "reinit": "true" if variable.name in interface.reinitialised else None,
+    }
+    SubElement(element, variable.type, {name: attribute_text(value) for name, value in attributes.items() if value is not None})
+
+
+def attribute_text(value: float | int | str) -> str:
+    """A number, truth or text as XML has it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else repr(value)
+
+
+def _add_structure(root: Element, interface: Interface) -> None:
+    """Outputs and derivatives with what they depend on now; the same and the states with what they depend on at the start."""
+    structure = SubElement(root, "ModelStructure")
+    outputs = [variable.name for variable in interface.of_causality("output")]
+    derivatives = [state.derivative for state in interface.states]
+    initial = sorted({*outputs, *derivatives, *(state.name for state in interface.states)}, key=interface.index.__getitem__)
+    for title, names, depends in (
+        ("Outputs", outputs, interface.depends),
+        ("Derivatives", derivatives, interface.depends),
+        ("InitialUnknowns", initial, interface.depends_initially),
+    ):
+        if names:
+            parent = SubElement(structure, title)
+            for name in names:
+                _add_unknown(parent, interface, name, depends(name))
+
+
+def _add_unknown(parent: Element, interface: Interface, name: str, depends: Iterable[str] | None) -> None:
+    """Without dependencies an unknown depends on all knowns."""
+    attributes = {"index": str(interface.index[name])}
+    if depends is not None:
+        attributes["dependencies"] = " ".join(map(str, sorted(interface.index[known] for known in depends)))
+    SubElement(parent, "Unknown", attributes)

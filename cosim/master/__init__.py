@@ -1,0 +1,1 @@
+"""The co-simulation master: FMUs, signals, sensors and the loop, in Python and in C. Imports `common` to `scenario`."""

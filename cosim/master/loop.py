@@ -1,0 +1,115 @@
+"""The co-simulation loop: at t_k = start + k h read outputs -> controller -> set inputs -> record -> step to t_k + h."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from time import perf_counter
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.master.interrupts import interruptible
+from hexapod_cosim.cosim.master.protocols import Plant
+from hexapod_cosim.cosim.master.recorder import Recorder, Recording
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.scenario.schedule import Schedule
+from hexapod_cosim.models import LEG_NAMES, HexapodError
+
+COMPLETED, FAILED, INTERRUPTED = "completed", "failed", "interrupted"
+PROGRESS_STEPS = 20  # macro-steps between two calls of the progress function
+
+Progress = Callable[[float], None]  # simulated time since the start [s]
+
+
+class JointController(Protocol):
+    """What the master asks of a controller."""
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand: ...
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended. A run that did not complete keeps what it recorded up to then."""
+
+    status: str  # COMPLETED, FAILED or INTERRUPTED
+    reason: str  # in words, "" when completed
+    simulated: float  # s
+    wall: float  # s, the whole loop
+    recording: Recording
+    cause: Exception | None = None  # of a failure
+    every_step: Recording | None = None  # what is judged, of every macro-step; None: the recording has them all
+    finished: datetime = field(default_factory=lambda: datetime.now(UTC), compare=False)
+
+    @property
+    def judged(self) -> Recording:
+        """What figures are made of: a row per macro-step."""
+        return self.recording if self.every_step is None else self.every_step
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated over wall time."""
+        return self.simulated / self.wall if self.wall > 0.0 else 0.0
+
+
+def run(
+    plant: Plant, signals: Signals, controller: JointController, schedule: Schedule, recorder: Recorder, *, h: float,
+    progress: Progress | None = None,
+) -> Outcome:  # fmt: skip
+    """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
+
+    A step that the plant refuses, whatever a controller raises and an interrupt end the run; the outcome says which.
+    """
+    status, reason, begin, cause = COMPLETED, "", perf_counter(), None
+    try:
+        with interruptible():
+            _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
+    except KeyboardInterrupt:
+        status, reason = INTERRUPTED, "interrupted"
+    except Exception as error:  # a controller may raise anything: the rows before it are kept
+        status, reason, cause = FAILED, str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}", error
+    wall, judged = perf_counter() - begin, recorder.judged
+    simulated = float(judged.time[-1] - schedule.times[0]) if len(judged.time) else 0.0
+    return Outcome(status, reason, simulated, wall, recorder.recording, cause, judged)
+
+
+def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
+    """What the controller shows of itself, if it is ours: planned swing, legs that could not follow, corrections of the feet [m]."""
+    shown = getattr(controller, "diagnostics", None)
+    if not isinstance(shown, Diagnostics):
+        return {}
+    six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift", "fallback")}
+    shift = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2))  # x + i y in memory is x, y
+    planned = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
+    told = {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()}
+    return told | {shift: shown.shift.view(float), planned: shown.planned}
+
+
+def _loop(
+    plant: Plant,
+    signals: Signals,
+    controller: JointController,
+    schedule: Schedule,
+    recorder: Recorder,
+    *,
+    h: float,
+    progress: Progress | None,
+) -> None:
+    read, control, write, record, advance = signals.read, controller.step, signals.write, recorder.record, plant.step
+    pushes, measurement = schedule.pushes, signals.measurement
+    read()
+    for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):
+        if pushes is not None:
+            signals.push[:] = pushes[k]
+        write(control(t, command, measurement))
+        record()
+        advance(t, h)
+        read()
+        if progress is not None and k % PROGRESS_STEPS == 0:
+            progress((k + 1) * h)
+    record()
+    if progress is not None:
+        progress(len(schedule.commands) * h)

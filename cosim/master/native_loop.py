@@ -1,0 +1,263 @@
+"""The master's loop in C (master/src/master.c): the same walk as `master.run` with an `FmuController`, without Python between macro-steps.
+
+The FMUs are loaded, initialised and freed by `Fmu`, in Python; the loop gets their functions and references and drives them through FMI
+alone. It runs for some macro-steps at a time without the interpreter's lock: interrupts are heard in between, other threads go on.
+"""
+
+from __future__ import annotations
+
+import ctypes as ct
+from collections.abc import Sequence
+from functools import cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.common.plant_files import BUILD, LOOP, shared_library
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.fmu_controller import COMMANDS, FLAGS, SENSED
+from hexapod_cosim.cosim.master.force_sensor import SensorSettings, noise_factors
+from hexapod_cosim.cosim.master.interrupts import interruptible
+from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, Outcome, Progress
+from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Peaks, Recording, kept_moments
+from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED, PUSH, refuse_foreign
+from hexapod_cosim.cosim.scenario.schedule import Schedule
+from hexapod_cosim.models import LEG_NAMES, FmuError
+
+STEPS_AT_ONCE = 500  # macro-steps between two looks at interrupts: some 10 ms
+FORCE = MEASURED["foot_force"]
+JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
+SHIFT = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
+PLANNED = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.planned")]
+INSIDES = [*SHIFT, *(f"{leg}.lift" for leg in LEG_NAMES), *PLANNED]
+CONTROLLER_FLAGS = [f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES]
+
+_Size = ct.c_size_t
+_Pointer = ct.c_void_p
+
+
+class _Fmu(ct.Structure):
+    """hxMasterFmu"""
+
+    _fields_ = [(name, _Pointer) for name in ("instance", "get_real", "get_boolean", "set_real", "do_step")]
+
+
+class _Block(ct.Structure):
+    """hxMasterBlock"""
+
+    _fields_ = [("reference", _Pointer), ("count", _Size), ("place", _Size)]
+
+
+class _Sensor(ct.Structure):
+    """hxMasterSensor"""
+
+    _fields_ = [(name, _Pointer) for name in ("factor", "fault", "memory")] + [
+        (name, _Size) for name in ("delay", "feet", "forces", "place", "reading")
+    ]
+
+
+class _Table(ct.Structure):
+    """hxMasterTable"""
+
+    _fields_ = [("column", _Pointer), ("columns", _Size), ("row", _Pointer), ("stride", _Size), ("rows", _Size)]
+
+
+class _Peaks(ct.Structure):
+    """hxMasterPeaks"""
+
+    _fields_ = [
+        ("place", _Pointer), ("places", _Size), ("count", _Pointer), ("counts", _Size),
+        *((name, _Pointer) for name in ("largest", "seen", "kept")),
+    ]  # fmt: skip
+
+
+class _Master(ct.Structure):
+    """hxMaster"""
+
+    _fields_ = [
+        *((name, _Fmu) for name in ("plant", "controller")),
+        *((name, _Block) for name in ("plant_output", "plant_flag", "plant_input", "controller_output", "controller_flag")),
+        *((name, _Pointer) for name in ("flag", "value", "controller_input", "controller_value", "sensed")),
+        *((name, _Size) for name in ("command_count", "sensed_count")),
+        ("sensor", _Sensor),
+        *((name, _Pointer) for name in ("time", "command", "push")),
+        *((name, _Size) for name in ("push_count", "push_place")),
+        ("h", ct.c_double),
+        ("kept", _Table),
+        ("every", _Size),
+        ("peaks", _Peaks),
+        ("judged", _Table),
+        ("step", _Size),
+        *((name, ct.c_int) for name in ("call", "status")),
+    ]
+
+
+# hxMasterCall, from 1: which FMU, and what the message says; a step's says more
+CALLS = (
+    ("plant", "the FMU does not give its outputs"), ("plant", "the FMU does not take its inputs"), ("plant", ""),
+    ("controller", "the FMU does not give its outputs"), ("controller", "the FMU does not take its inputs"), ("controller", ""),
+)  # fmt: skip
+
+
+@cache
+def _library() -> ct.CDLL:
+    """The loop, its functions' types declared. Raises FmuError when it is missing or another version's."""
+    path = shared_library(LOOP)
+    library = ct.CDLL(str(path))
+    library.hx_master_size.restype = _Size
+    if library.hx_master_size() != ct.sizeof(_Master):
+        raise FmuError("the co-simulation library is another version's", got=str(path), fix=BUILD)
+    library.hx_master_begin.argtypes = library.hx_master_record.argtypes = [ct.POINTER(_Master)]
+    library.hx_master_run.argtypes = [ct.POINTER(_Master), _Size]
+    library.hx_master_record.restype = None
+    return library
+
+
+class NativeMaster:
+    """A plant FMU wired to a controller FMU, for any number of runs one after the other. Of all signals `columns` are recorded; None: all.
+
+    Where not every macro-step is recorded, all of them are of `judged`. Raises FmuError when either is not what `hexapod export` makes.
+    """
+
+    def __init__(self, plant: Fmu, controller: Fmu, *, columns: Sequence[str] | None = None, judged: Sequence[str] = ()) -> None:
+        self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
+        seen, flagged = plant.names("output"), plant.names("output", "Boolean")
+        refuse_foreign(seen, plant.names("input"), flagged)
+        shown = {"insides": INSIDES, "flags": CONTROLLER_FLAGS}  # of the controller
+        if columns is not None:  # what nobody looks at is not read
+            wanted = {*columns, *(name for key in SENSED for name in MEASURED[key])}
+            seen, flagged = ([name for name in names if name in wanted] for names in (seen, flagged))
+            shown = {key: [name for name in names if f"controller.{name}" in wanted] for key, names in shown.items()}
+        told = (f"controller.{name}" for names in shown.values() for name in names)
+        both = set(plant.names("input")) & set(controller.names("output"))
+        self._commands = [*JOINT_COMMANDS, *(ACCELERATION if set(ACCELERATION) <= both else [])]
+        self._places = {name: place for place, name in enumerate((*seen, *flagged, *PUSH, *self._commands, *told))}
+        self._reading = len(self._places)  # the sensors' readings come last, and are not recorded
+        self._value = np.zeros(self._reading + len(FORCE))
+        self.columns = tuple(self._places if columns is None else columns)
+        self._judged = tuple(name for name in self.columns if name in set(judged))
+        self._keep: list[NDArray[Any]] = []  # what the structure points to
+        self._master = self._wire(seen, flagged, **shown)
+
+    def _wire(self, seen: list[str], flagged: list[str], *, insides: list[str], flags: list[str]) -> _Master:
+        """What is the same in all runs."""
+        plant, controller = self._fmus["plant"], self._fmus["controller"]
+        sensed = [name for key in SENSED for name in MEASURED[key]]
+        peaks = Peaks(tuple(self._places))
+        room = {name: self._hold(np.zeros(len(peaks.places))) for name in ("largest", "seen", "kept")}
+        return _Master(
+            plant=_functions(plant), controller=_functions(controller),
+            plant_output=self._block(plant, seen), plant_flag=self._block(plant, flagged),
+            plant_input=self._block(plant, [*PUSH, *self._commands]),
+            controller_output=self._block(controller, [*self._commands, *insides]),
+            controller_flag=self._block(controller, flags, self._reading - len(flags)),
+            flag=self._hold(np.zeros(max(len(flagged), len(CONTROLLER_FLAGS)), dtype=np.int32)), value=self._value.ctypes.data,
+            controller_input=self._references(controller, [*COMMANDS, *sensed]),
+            controller_value=self._hold(np.zeros(len(COMMANDS) + len(sensed))),
+            command_count=len(COMMANDS), sensed_count=len(sensed), push_count=len(PUSH), push_place=self._places[PUSH[0]],
+            kept=_Table(self._indices([self._places[name] for name in self.columns]), len(self.columns)),
+            judged=_Table(self._indices([self._places[name] for name in self._judged]), len(self._judged)),
+            peaks=_Peaks(self._indices(peaks.places), len(peaks.places), self._indices(peaks.counts), len(peaks.counts), **room),
+        )  # fmt: skip
+
+    def _hold(self, array: NDArray[Any]) -> int:
+        """The address of an array that lives as long as this."""
+        self._keep.append(array)
+        return int(array.ctypes.data)
+
+    def _indices(self, places: Sequence[int]) -> int:
+        return self._hold(np.array(places, dtype=np.uintp))
+
+    def _references(self, fmu: Fmu, names: Sequence[str]) -> int:
+        return self._hold(np.array(fmu.references(names), dtype=np.uint32))
+
+    def _block(self, fmu: Fmu, names: Sequence[str], place: int | None = None) -> _Block:
+        return _Block(self._references(fmu, names), len(names), self._places[names[0]] if place is None else place)
+
+    def run(
+        self, schedule: Schedule, *, h: float, every: int = 1, sensor: SensorSettings | None = None, progress: Progress | None = None
+    ) -> Outcome:
+        """Runs both FMUs, just initialised, over the whole schedule in macro-steps of h [s], of which one of `every` is recorded; as
+        `master.run`, but that it never raises.
+        """
+        master = self._master
+        kept = _laid_out(master.kept, self.columns, schedule, every)
+        judged = _laid_out(master.judged, self._judged, schedule, 1) if every > 1 else None
+        if judged is None:
+            master.judged.row = None
+        self._value[:] = 0.0
+        arrays = self._lay_in(schedule, sensor)
+        master.h, master.every = h, every
+        for fmu in self._fmus.values():
+            fmu.forget()
+        begin = perf_counter()
+        status, reason, cause = self._drive(schedule.times, h, progress)
+        wall, recording = perf_counter() - begin, _recorded(self.columns, kept, master.kept)
+        every_step = recording if judged is None else _recorded(self._judged, judged, master.judged)
+        del arrays  # until here the loop needed them
+        simulated = float(every_step.time[-1] - schedule.times[0]) if len(every_step.time) else 0.0
+        return Outcome(status, reason, simulated, wall, recording, cause, every_step)
+
+    def _lay_in(self, schedule: Schedule, sensor: SensorSettings | None) -> list[NDArray[Any]]:
+        """Points the structure to what is this run's own, and returns that."""
+        master, count = self._master, len(schedule.rows)
+        arrays: dict[str, NDArray[Any] | None] = {"time": schedule.times, "command": schedule.rows, "push": schedule.pushes}
+        reals = {name: None if array is None else np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()}
+        for name, array in reals.items():
+            setattr(master, name, None if array is None else array.ctypes.data)
+        parts, sensed = {}, self._places[FORCE[0]]
+        if sensor is not None:
+            parts = {"memory": np.zeros((sensor.delay + 1, len(FORCE))), "factor": noise_factors(sensor, count), "fault": sensor.faults}
+        master.sensor = _Sensor(
+            **{name: array.ctypes.data for name, array in parts.items() if array is not None}, delay=0 if sensor is None else sensor.delay,
+            feet=len(LEG_NAMES), forces=len(FORCE), place=sensed, reading=self._reading,
+        )  # fmt: skip
+        force = self._reading if parts else sensed
+        places = [force + k if name in FORCE else self._places[name] for key in SENSED for k, name in enumerate(MEASURED[key])]
+        where = np.array(places, dtype=np.uintp)
+        master.sensed = where.ctypes.data
+        return [array for array in (*reals.values(), *parts.values(), where) if array is not None]
+
+    def _drive(self, times: NDArray[np.float64], h: float, progress: Progress | None) -> tuple[str, str, Exception | None]:
+        """All macro-steps: status, reason and cause of the outcome."""
+        master, library, steps = self._master, self._library, len(times) - 1
+        try:
+            with interruptible():
+                going = library.hx_master_begin(master)
+                while going and master.step < steps:
+                    going = library.hx_master_run(master, min(master.step + STEPS_AT_ONCE, steps))
+                    if progress is not None and going:
+                        progress(master.step * h)
+                if going:
+                    library.hx_master_record(master)
+                    return COMPLETED, "", None
+        except KeyboardInterrupt:
+            return INTERRUPTED, "interrupted", None
+        error = self._refusal(float(times[master.step]))
+        return FAILED, str(error), error
+
+    def _refusal(self, t: float) -> FmuError:
+        """What the loop ended with in the macro-step at t [s], as the Python master says it."""
+        which, what = CALLS[self._master.call - 1]
+        fmu, status = self._fmus[which], self._master.status
+        return fmu.failure(what, status) if what else fmu.step_failure(t, status)
+
+
+def _laid_out(table: _Table, columns: Sequence[str], schedule: Schedule, every: int) -> NDArray[np.float64]:
+    """Room for a table's rows, with times and commands, to which the table then points."""
+    moments = kept_moments(len(schedule.rows), every)
+    data = np.empty((len(moments), 1 + len(columns) + len(COMMAND_COLUMNS)))
+    data[:, 0], data[:, 1 + len(columns) :] = schedule.times[moments], schedule.rows[moments]
+    table.row, table.stride = data.ctypes.data + data.itemsize, data.shape[1]
+    return data
+
+
+def _recorded(columns: Sequence[str], data: NDArray[np.float64], table: _Table) -> Recording:
+    return Recording(("time", *columns, *COMMAND_COLUMNS), data[: table.rows])
+
+
+def _functions(fmu: Fmu) -> _Fmu:
+    return _Fmu(fmu.component, *(fmu.address(name) for name in ("fmi2GetReal", "fmi2GetBoolean", "fmi2SetReal", "fmi2DoStep")))

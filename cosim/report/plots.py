@@ -1,0 +1,280 @@
+"""Static figures of one run or of several laid over each other, whose lines are told apart by colours and by dashes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
+from hexapod_cosim.cosim.common.files import atomic_path
+from hexapod_cosim.cosim.master.recorder import ColumnError
+from hexapod_cosim.cosim.results.metrics import planned_feet
+from hexapod_cosim.cosim.results.walk import (
+    Array,
+    View,
+    body_height,
+    commanded_path,
+    real_feet,
+    robot_weight,
+    running_integral,
+    slip_under_load,
+)
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+
+STYLES: dict[str, dict[str, Any]] = {
+    "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.0},
+    "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
+}
+PLAN = "0.7"  # grey of the path that is planned
+PLANNED = "0.85"  # grey of the swing that the gait plans
+LEAST_WIDTH = 2.0  # mm of the sideways axis: less would show round-off as a drift
+STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
+SIDES, PLACES = {"L": "left", "R": "right"}, {"F": "front", "M": "middle", "R": "rear"}
+BOOKS = {"actuator_work": "-", "dissipated": (0, (5, 1.2)), "potential": (0, (1, 1)), "kinetic": "-", "push_work": (0, (3, 1, 1, 1))}
+
+Views = Mapping[str, View]  # by control
+
+
+def foot_forces(views: Views) -> Figure:
+    """Normal force of each foot over the last cycles, in body weights."""
+    figure = Figure(figsize=(WIDTH, 3.8))
+    axes = figure.subplots(2, 3, sharex=True, sharey=True)
+    for label, view in views.items():
+        end = view.last_cycles()
+        force = end.recording.feet("normal_force") / robot_weight(view.parameters)
+        for leg, axis in enumerate(axes.flat):
+            axis.plot(end.recording.time, force[:, leg], label=label, **STYLES[label])
+            axis.set_title(leg_title(leg))
+    _label(axes[-1], "time [s]", axes[:, 0], "normal force [BW]")
+    _legend(figure, axes.flat[0])
+    return figure
+
+
+def slip(views: Views) -> Figure:
+    """Way slipped by all feet since the start, and the slip speed of each foot over the last cycles."""
+    figure = Figure(figsize=(WIDTH, 5.0))
+    grid = figure.add_gridspec(3, 3)
+    top = figure.add_subplot(grid[0, :])
+    axes = np.ravel(grid[1:, :].subgridspec(2, 3).subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
+    for label, view in views.items():
+        time, speed = view.recording.time, slip_under_load(view.recording, view.parameters)
+        top.plot(time, 1e3 * running_integral(time, speed.sum(axis=1)), label=label, **STYLES[label])
+        last = slice(-len(view.last_cycles().recording.time), None)
+        for leg, axis in enumerate(axes):
+            axis.plot(time[last], 1e3 * speed[last, leg], **STYLES[label])
+            axis.set_title(leg_title(leg))
+    top.set_xlabel("time [s]")
+    top.set_ylabel("slipped way [mm]")
+    _label(axes[3:], "time [s]", axes[::3], "slip speed [mm/s]")
+    _legend(figure, top)
+    return figure
+
+
+def feet(views: Views) -> Figure:
+    """Each foot's planned and real path in the torso's frame over the last cycles, seen from the side."""
+    figure = Figure(figsize=(WIDTH, 3.8))
+    axes = figure.subplots(2, 3, sharey=True)
+    for number, (label, view) in enumerate(views.items()):
+        end = view.last_cycles()
+        planned, real = planned_feet(end.recording), real_feet(end.recording, view.parameters)
+        for leg, axis in enumerate(axes.flat):
+            x, z = 1e3 * planned[:, leg, [0, 2]].T
+            axis.plot(x, z, color=PLAN, linewidth=2.2, label=None if number else "planned")
+            x, z = 1e3 * real[:, leg, [0, 2]].T
+            axis.plot(x, z, label=label, **STYLES[label])
+            axis.set_title(leg_title(leg))
+    _label(axes[-1], "x, torso frame [mm]", axes[:, 0], "z [mm]")
+    _legend(figure, axes.flat[0])
+    return figure
+
+
+def posture(views: Views) -> Figure:
+    """Height, roll, pitch and yaw of the torso."""
+    figure = Figure(figsize=(WIDTH, 5.2))
+    axes = figure.subplots(4, 1, sharex=True)
+    for label, view in views.items():
+        recording = view.recording
+        axes[0].plot(recording.time, 1e3 * body_height(recording, view.parameters), label=label, **STYLES[label])
+        for axis, name in zip(axes[1:], ("roll", "pitch", "yaw"), strict=True):
+            axis.plot(recording.time, np.degrees(np.unwrap(recording.column(f"torso.{name}"))), **STYLES[label])
+    for axis, text in zip(axes, ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"), strict=True):
+        axis.set_ylabel(text)
+    axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(axes)
+    _legend(figure, axes[0])
+    return figure
+
+
+def path(views: Views) -> Figure:
+    """The torso's way seen from above, with the commanded one."""
+    figure = Figure(figsize=(WIDTH, 3.0))
+    axis = figure.subplots()
+    for label, view in views.items():
+        position = view.recording.vector("torso.position")
+        axis.plot(position[:, 0], 1e3 * position[:, 1], label=label, **STYLES[label])
+        axis.plot(position[-1, 0], 1e3 * position[-1, 1], marker="o", markersize=4, clip_on=False, color=STYLES[label]["color"])
+    commanded = commanded_path(next(iter(views.values())).recording)
+    axis.plot(commanded[:, 0], 1e3 * commanded[:, 1], color="0.45", linestyle=":", label="commanded, without its ramps")
+    axis.margins(x=0.02)
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [mm]")
+    _legend(figure, axis)
+    if np.ptp(commanded[:, 1]) > STRAIGHT * np.ptp(commanded[:, 0]):
+        axis.set_aspect(1e-3, adjustable="datalim")
+        axis.set_title("to scale", loc="right", fontsize="small")
+        return figure
+    low, high = axis.get_ylim()
+    missing = max(LEAST_WIDTH - (high - low), 0.0)
+    axis.set_ylim(low - missing / 2, high + missing / 2)
+    figure.draw_without_rendering()  # lays out: the size of the axes is known after it
+    enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height))
+    axis.set_title(f"not to scale: y is drawn about {enlarged:.0f} times larger than x", loc="right", fontsize="small")
+    return figure
+
+
+def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
+    return (limits[1] - limits[0]) / pixels
+
+
+def torques(views: Views) -> Figure:
+    """Largest absolute torque among the six legs, joint by joint, over the last cycles."""
+    figure = Figure(figsize=(WIDTH, 4.2))
+    axes = figure.subplots(3, 1, sharex=True)
+    for label, view in views.items():
+        end = view.last_cycles().recording
+        largest = np.abs(end.joints("torque")).max(axis=1)
+        for joint, axis in enumerate(axes):
+            axis.plot(end.time, largest[:, joint], label=label, **STYLES[label])
+            axis.set_ylabel(f"{JOINT_NAMES[joint]} [N m]")
+    for axis in axes:
+        axis.set_ylim(bottom=0.0)  # last: it ends the scaling to what is drawn
+    axes[0].set_title("largest |torque| of the six legs", loc="left")
+    axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(axes)
+    _legend(figure, axes[0])
+    return figure
+
+
+def energy(views: Views) -> Figure:
+    """The energy audit: what went in, where it is, where it went, and what the books do not explain."""
+    figure = Figure(figsize=(WIDTH, 0.3 + 2.4 * len(views)))
+    axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
+    pushed = any(np.ptp(view.recording.column("energy.push_work")) for view in views.values())
+    for (axis, rest), (label, view) in zip(axes, views.items(), strict=True):
+        recording = view.recording
+        residual = recording.column("energy.residual")
+        rest.plot(recording.time, 1e3 * (residual - residual[0]), color=PALETTE[-1], linewidth=0.9)
+        rest.set_title(f"{label}: what the books leave over")
+        rest.set_ylabel("residual since the start [mJ]")
+        for color, (name, style) in zip(PALETTE, BOOKS.items(), strict=False):
+            if name != "push_work" or pushed:
+                values = recording.column(f"energy.{name}")
+                axis.plot(recording.time, values - values[0], color=color, linestyle=style, label=name.replace("_", " "), linewidth=1.0)
+        axis.set_title(label)
+        axis.set_ylabel("since the start [J]")
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
+    for column in axes.T:
+        figure.align_ylabels(column)
+    _legend(figure, axes[0, 0])
+    return figure
+
+
+def footfall(views: Views) -> Figure:
+    """Which foot is on the ground when, over the last cycles; a grey band is where the gait wants it in the air."""
+    figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * len(views)))
+    axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
+    for axis, (label, view) in zip(axes, views.items(), strict=True):
+        end = view.last_cycles().recording
+        for leg, name in enumerate(LEG_NAMES):
+            swinging = f"controller.{name}.swinging"
+            if swinging in end.names:
+                _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color=PLANNED)
+            _bars(axis, end.time, end.feet("contact")[:, leg] > 0.5, leg, height=0.5, color=STYLES[label]["color"])
+        axis.set_yticks(range(len(LEG_NAMES)), LEG_NAMES)
+        axis.invert_yaxis()
+        axis.set_title(label)
+        axis.grid(visible=False)
+    axes[-1].set_xlabel("time [s]")
+    keys = {f"on the ground, {label}": STYLES[label]["color"] for label in views} | {"swing the gait plans": PLANNED}
+    patches = [Patch(color=color, linewidth=0) for color in keys.values()]
+    figure.legend(patches, list(keys), loc="outside upper center", ncols=len(keys))
+    return figure
+
+
+def _bars(axis: Axes, time: Array, on: Any, row: int, *, height: float, color: str) -> None:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
+    last = len(time) - 1
+    spans = [(time[begin], time[min(end, last)] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+    axis.broken_barh(spans, (row - height / 2, height), color=color, linewidth=0)
+
+
+def leg_title(leg: int) -> str:
+    """Where a leg is, and its name."""
+    name = LEG_NAMES[leg]
+    return f"{SIDES[name[0]]} {PLACES[name[1]]} ({name})"
+
+
+def _label(bottom: Any, x: str, left: Any, y: str) -> None:
+    for axis in bottom:
+        axis.set_xlabel(x)
+    for axis in left:
+        axis.set_ylabel(y)
+
+
+def _legend(figure: Figure, axis: Axes) -> None:
+    handles, labels = axis.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of the report."""
+
+    title: str
+    caption: str
+    draw: Callable[[Views], Figure]
+
+
+FIGURES: dict[str, Drawing] = {
+    "foot_forces": Drawing("Foot forces", "Normal force of each foot over the last gait cycles, in body weights.", foot_forces),
+    "slip": Drawing("Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.", slip),
+    "feet": Drawing("Planned and real feet", "Each foot's path in the torso's frame over the last gait cycles, from the side.", feet),
+    "posture": Drawing("Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", posture),
+    "path": Drawing("Path of the torso", "The torso from above, its end marked by a dot, and where the command leads.", path),
+    "torques": Drawing("Torques", "The largest absolute torque over the six legs, joint by joint, over the last gait cycles.", torques),
+    "energy": Drawing("Energy audit", "Work, loss and stored energy; on its own axis, the residual that the books leave.", energy),
+    "footfall": Drawing("Footfall", "Coloured: the foot is on the ground. Grey: the gait plans it to swing.", footfall),
+}
+
+
+def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]]:
+    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that lacks its columns is not drawn; one
+    of that name from an earlier report is taken away.
+    """
+    folder.mkdir(exist_ok=True)
+    saved: list[Path] = []
+    skipped: dict[str, str] = {}
+    with matplotlib.rc_context(SETTINGS):
+        for name, item in FIGURES.items():
+            try:
+                figure = item.draw(views)
+            except ColumnError as error:
+                skipped[name] = f"{error.got} was not recorded"
+                for kind in UNDATED:
+                    (folder / f"{name}.{kind}").unlink(missing_ok=True)
+                continue
+            for kind, metadata in UNDATED.items():
+                saved.append(folder / f"{name}.{kind}")
+                with atomic_path(saved[-1]) as temporary:
+                    figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
+                figure.set_layout_engine("none")  # laid out once is enough: it takes as long as the drawing
+    return saved, skipped

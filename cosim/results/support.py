@@ -1,0 +1,129 @@
+"""How far the robot is from tipping: its centre of mass over the polygon of its standing feet, for all rows of a recording at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+ROWS_AT_ONCE = 4096  # bounds the memory of the pairs of feet
+COINCIDENT = 1e-9  # m    feet closer than this make no edge
+
+
+def stability_margins(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows,) distance [m] of the centre of mass' projection along gravity from the support polygon's nearest edge.
+
+    Negative outside, and for a line of two feet; NaN with fewer than two feet on the ground.
+    """
+    plane = _plane_axes(np.array([parameters[name] for name in vector_names("gravity")]))
+    feet = np.ascontiguousarray(plane @ recording.foot_vectors("position").transpose(1, 2, 0))  # (6, 2, rows)
+    centre = plane @ centre_of_mass(recording, parameters).T
+    standing = recording.feet("contact") > 0.5
+    parts = [slice(begin, begin + ROWS_AT_ONCE) for begin in range(0, len(standing), ROWS_AT_ONCE)]
+    return np.concatenate([polygon_margins(feet[..., part], standing[part], centre[:, part]) for part in parts])
+
+
+def _plane_axes(gravity: Array) -> Array:
+    """(2, 3) two axes that make a right-handed frame with the upward direction; x and y where gravity is along -z."""
+    up = -gravity / np.linalg.norm(gravity) if np.any(gravity) else np.array([0.0, 0.0, 1.0])
+    first = np.array([1.0, 0.0, 0.0]) - up[0] * up if abs(up[0]) < 0.9 else np.array([0.0, 1.0, 0.0]) - up[1] * up
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(up, first)])
+
+
+def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
+    """(rows,) signed distances of points (2, rows) from the hulls of those feet (6, 2, rows) that stand (rows, 6); positive inside."""
+    margin = np.full(len(standing), np.nan)
+    patterns, pattern_of = np.unique(standing @ (1 << np.arange(standing.shape[1])), return_inverse=True)
+    for number, pattern in enumerate(patterns.tolist()):
+        legs = [leg for leg in range(standing.shape[1]) if pattern >> leg & 1]
+        if len(legs) > 1:
+            rows = np.flatnonzero(pattern_of == number)
+            margin[rows] = _hull_margins(feet[legs].take(rows, axis=2), centre.take(rows, axis=1))
+    return margin
+
+
+def _hull_margins(feet: Array, centre: Array) -> Array:
+    """(rows,) the same for feet (n, 2, rows) that all stand, and points (2, rows)."""
+    first, last = np.array(list(combinations(range(len(feet)), 2))).T
+    begin = feet[first]  # (pairs, 2, rows)
+    edge = feet[last] - begin
+    length = np.sqrt(edge[:, 0] * edge[:, 0] + edge[:, 1] * edge[:, 1])
+    shown = np.maximum(length, COINCIDENT)
+    x, y = -edge[:, 1] / shown, edge[:, 0] / shown  # to the edge's left
+    offset = x * begin[:, 0] + y * begin[:, 1]
+    right, left = np.zeros_like(x), np.zeros_like(x)  # how far feet lie to either side of the edge
+    for foot_x, foot_y in feet:
+        beside = x * foot_x + y * foot_y - offset
+        np.minimum(right, beside, out=right)
+        np.maximum(left, beside, out=left)
+    inside = x * centre[0] + y * centre[1] - offset
+    # a line is one of the hull's edges, seen from the side where all feet are; for two feet from both
+    margin = np.minimum(np.where(right >= -COINCIDENT, inside, np.inf), np.where(left <= COINCIDENT, -inside, np.inf))
+    margin = np.where(length > COINCIDENT, margin, np.inf).min(axis=0)
+    return np.where(np.isfinite(margin), margin, np.nan)
+
+
+def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows, 3) centre of mass of the whole robot [m], world axes, from joint angles, torso pose and the FMU's own parameters."""
+    angle = np.ascontiguousarray(recording.joints("angle").transpose(2, 1, 0))  # (3, 6, rows)
+    borne, moment = np.zeros(len(LEG_NAMES)), np.zeros((len(LEG_NAMES), 3, 1))  # kg, kg m  of the links from here on, about their joint
+    for k, joint in reversed(list(enumerate(JOINT_NAMES))):
+        links = [f"{leg}.{joint}" for leg in LEG_NAMES]
+        mass, com, axis = (_of_links(parameters, links, part) for part in (("mass",), vector_names("com"), vector_names("axis")))
+        tip = _of_links(parameters, links, ("length", "offset_y", "offset_z"))
+        moment = _turned(axis, angle[k], moment + (mass * com + borne[:, None] * tip)[..., None])
+        borne = borne + mass[:, 0]
+    offset = _vector(parameters, "torso.com")
+    hips = np.array([_vector(parameters, f"{leg}.hip_position") - offset for leg in LEG_NAMES])
+    yaws = _about_z(np.array([parameters[f"{leg}.hip_yaw"] for leg in LEG_NAMES]))
+    total = parameters["torso.mass"] + borne.sum()
+    # (3, rows) torso axes, from its centre of mass
+    own = (np.concatenate(yaws, axis=1) @ moment.reshape(3 * len(LEG_NAMES), -1) + (borne @ hips)[:, None]) / total
+    rotation = rotation_matrices(recording.vector("torso.quaternion", 4))
+    return np.asarray(recording.vector("torso.position") + np.einsum("ijr,jr->ri", rotation, own))
+
+
+def _of_links(parameters: Mapping[str, float], links: Sequence[str], parts: Sequence[str]) -> Array:
+    """(links, parts)"""
+    return np.array([[parameters[f"{link}.{part}"] for part in parts] for link in links])
+
+
+def _turned(axis: Array, angle: Array, vector: Array) -> Array:
+    """(legs, 3, rows) vectors turned about axes (legs, 3) by angles (legs, rows): Rodrigues."""
+    x, y, z = (axis / np.linalg.norm(axis, axis=1, keepdims=True)).T
+    zero = np.zeros_like(x)
+    skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    turned = np.sin(angle)[:, None] * (skew @ vector)
+    turned += (1.0 - np.cos(angle))[:, None] * (skew @ skew @ vector)
+    turned += vector
+    return turned
+
+
+def _about_z(angle: Array) -> Array:
+    """(legs, 3, 3) rotations by angles (legs,)."""
+    return np.array([[[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]] for a in angle.tolist()])
+
+
+def _vector(parameters: Mapping[str, float], stem: str) -> Array:
+    return np.array([parameters[name] for name in vector_names(stem)])
+
+
+def rotation_matrices(quaternion: Array) -> Array:
+    """(3, 3, rows) body to world from quaternions (rows, 4) w x y z."""
+    w, x, y, z = np.ascontiguousarray(quaternion.T)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.array(rows)

@@ -1,0 +1,226 @@
+"""The part of a run that is judged: whole gait cycles after the first two, and means, paths and heights over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.interface.names import vector_names
+from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Recording
+from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
+
+Array = NDArray[np.float64]
+
+SKIPPED_CYCLES = 2  # the start is no walk yet
+CONTACT_SHARE = 0.01  # of the weight: a foot with less does not stand
+LEAST_DISTANCE = 0.01  # m    less is standing, not walking
+LEAST_TURN = 0.05  # rad    less is standing, not turning
+SHOWN_CYCLES = 3  # in figures of what happens within a gait cycle
+ROUND_OFF = 1e-6  # s    of a recorded time
+FLAT = TERRAINS.index("flat") + 1  # the FMU's number of it
+NONE, TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle"))  # the same
+
+
+@dataclass(frozen=True)
+class View:
+    """A run, as metrics and figures see it."""
+
+    recording: Recording
+    parameters: Mapping[str, float]  # of the FMU
+    period: float  # s    of the gait
+
+    @cached_property
+    def walk(self) -> Walk | None:
+        """Whole gait cycles after the first two; None when there is none."""
+        return _cut_walk(self)
+
+    def last_cycles(self) -> View:
+        """The end of the run."""
+        time = self.recording.time
+        begin = int(np.searchsorted(time, time[-1] - SHOWN_CYCLES * self.period))
+        return View(self.recording.rows(slice(begin, None)), self.parameters, self.period)
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The part of a run that is judged, and what it is measured by."""
+
+    whole: Recording  # the run
+    recording: Recording  # its rows from begin to end, both included
+    begin: float  # s
+    end: float  # s
+    period: float  # s    of the gait
+    distance: float  # m    walked; NaN when standing or turning on the spot
+    angle: float  # rad    turned on the spot; NaN when standing or walking
+    weight: float  # N
+    turned: Array  # rad    (rows,) commanded turn since the first row
+    heading: float  # rad    of the commanded path at the first row
+
+    @cached_property
+    def weights(self) -> Array:
+        """(rows,) share of the judged time that each row stands for, by the trapezoidal rule."""
+        return time_shares(self.recording.time)
+
+    @property
+    def duration(self) -> float:
+        """Judged time [s]."""
+        return self.end - self.begin
+
+    def gained(self, names: list[str]) -> Array:
+        """(names,) by how much cumulative outputs grew from begin to end, rows there or not."""
+        columns, time = self.whole.columns(names), self.whole.time
+        return np.array([np.diff(np.interp([self.begin, self.end], time, each))[0] for each in columns.T])
+
+    def rms(self, values: Array) -> float:
+        """Of values (rows,) about their mean over time."""
+        return float(np.sqrt(self.weights @ (values - self.weights @ values) ** 2))
+
+    def steps(self) -> slice:
+        """Rows of the whole run that tell of what happened after begin, up to the end."""
+        first, last = np.searchsorted(self.whole.time, np.array([self.begin, self.end]) + ROUND_OFF)
+        return slice(int(first), int(last))
+
+
+def time_shares(time: Array) -> Array:
+    """(rows,) weights of the trapezoidal rule, in shares of the whole time."""
+    steps = np.diff(time)
+    weights = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+    return np.asarray(weights / weights.sum())
+
+
+def _cut_walk(view: View) -> Walk | None:
+    recording, period = view.recording, view.period
+    time = recording.time
+    cycles = int((time[-1] - time[0] + ROUND_OFF) / period) if len(time) else 0
+    if cycles <= SKIPPED_CYCLES:
+        return None
+    begin, end = time[0] + SKIPPED_CYCLES * period, time[0] + cycles * period
+    part = _between(recording, begin, end)
+    turned = held_integral(part.time, part.column("command.yaw_rate"))
+    yaw = np.unwrap(part.column("torso.yaw"))
+    marks = begin + period * np.arange(cycles - SKIPPED_CYCLES + 1)
+    distance, angle = _ways(part, yaw, marks)
+    # the torso's yaw swings within a cycle: the commanded path sets out along its mean over the first one
+    first = part.time <= begin + period + ROUND_OFF
+    heading = float(time_shares(part.time[first]) @ (yaw - turned)[first])
+    weight = robot_weight(view.parameters)
+    return Walk(recording, part, begin, end, period, distance, angle, weight, turned, heading)
+
+
+def _between(recording: Recording, begin: float, end: float) -> Recording:
+    """The rows from begin to end; where there is none at these times, one between its neighbours."""
+    time = recording.time
+    first, last = np.searchsorted(time, [begin - ROUND_OFF, end + ROUND_OFF])
+    ends = [t for t, row in ((begin, first), (end, last - 1)) if abs(time[row] - t) > ROUND_OFF]
+    if not ends:
+        return recording.rows(slice(first, last))
+    added = np.array([_row_at(recording, t) for t in ends])
+    data = np.concatenate([recording.data[first:last], added])
+    return Recording(recording.names, data[np.argsort(data[:, 0], kind="stable")])
+
+
+def _row_at(recording: Recording, t: float) -> Array:
+    """A row between two: in between, but for commands, which hold from a row to the next."""
+    after = int(np.searchsorted(recording.time, t))
+    before, behind = recording.data[after - 1], recording.data[after]
+    share = (t - before[0]) / (behind[0] - before[0])
+    row = before + share * (behind - before)
+    held = [k for k, name in enumerate(recording.names) if name in COMMAND_COLUMNS]
+    row[held] = before[held]
+    return np.asarray(row)
+
+
+def _ways(part: Recording, yaw: Array, marks: Array) -> tuple[float, float]:
+    """Metres walked and radians turned on the spot, from cycle to cycle, so that no bobbing counts.
+
+    A robot that no row tells to walk turns on the spot, whatever way its feet slip meanwhile. NaN
+    is what it does not do.
+    """
+    places = [np.interp(marks, part.time, each) for each in part.vector("torso.position").T]
+    walked = float(np.linalg.norm(np.diff(np.column_stack(places), axis=0), axis=1).sum())
+    turned = float(np.abs(np.diff(np.interp(marks, part.time, yaw))).sum())
+    on_the_spot = not part.columns(["command.vx", "command.vy"])[:-1].any()
+    if on_the_spot and turned >= LEAST_TURN:
+        return np.nan, turned
+    return (walked if walked >= LEAST_DISTANCE else np.nan), np.nan
+
+
+def robot_weight(parameters: Mapping[str, float]) -> float:
+    """Weight [N] of the robot that an FMU's parameters describe."""
+    mass = sum(value for name, value in parameters.items() if name.endswith(".mass"))
+    return float(mass * np.linalg.norm([parameters[name] for name in vector_names("gravity")]))
+
+
+def held_integral(time: Array, rate: Array) -> Array:
+    """Running integral of a rate that is held from each row to the next."""
+    return np.concatenate([[0.0], np.cumsum(rate[:-1] * np.diff(time))])
+
+
+def running_integral(time: Array, values: Array) -> Array:
+    """Of values (rows, ...) over time, 0 at the first row; the trapezoidal rule."""
+    steps = 0.5 * (values[1:] + values[:-1])
+    width = np.diff(time).reshape(-1, *(1 for _ in values.shape[1:]))
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps * width, axis=0)])
+
+
+def bearing_load(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.bool_]:
+    """(rows, 6) whether a foot bears more than CONTACT_SHARE of the weight: only then can it slip."""
+    return np.asarray(recording.feet("normal_force") > CONTACT_SHARE * robot_weight(parameters))
+
+
+def slip_under_load(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows, 6) speed along the ground [m/s], 0 of a foot that bears no load."""
+    return np.where(bearing_load(recording, parameters), recording.feet("slip_speed"), 0.0)
+
+
+def commanded_path(recording: Recording, *, heading: float | None = None) -> Array:
+    """(rows, 2) where the body command leads from the first row's position on, world x and y [m].
+
+    `heading` [rad] is the direction it sets out in; by default the torso's own at the first row.
+    """
+    begin = recording.vector("torso.position")[0, :2]
+    heading = float(recording.column("torso.yaw")[0]) if heading is None else heading
+    angle = heading + held_integral(recording.time, recording.column("command.yaw_rate"))
+    vx, vy = recording.column("command.vx"), recording.column("command.vy")
+    velocity = (vx * np.cos(angle) - vy * np.sin(angle), vx * np.sin(angle) + vy * np.cos(angle))
+    return begin + np.column_stack([held_integral(recording.time, part) for part in velocity])
+
+
+def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows,) height of the torso above the ground along z [m]."""
+    x, y, z = part.vector("torso.position").T
+    heading = parameters.get("terrain.heading", 0.0)
+    rise = x * np.cos(heading) + y * np.sin(heading)
+    ground: Array = parameters.get("terrain.height", 0.0) + np.tan(_incline(parameters)) * rise
+    return np.asarray(z - ground)
+
+
+def ground_normal(parameters: Mapping[str, float]) -> Array:
+    """(3,) of the ground, world axes, upwards."""
+    heading, incline = parameters.get("terrain.heading", 0.0), _incline(parameters)
+    sine = np.sin(incline)
+    return np.array([-sine * np.cos(heading), -sine * np.sin(heading), np.cos(incline)])
+
+
+def _incline(parameters: Mapping[str, float]) -> float:
+    """Of the ground [rad]: flat ground has none, whatever is set."""
+    flat = parameters.get("terrain.kind", FLAT) == FLAT
+    return 0.0 if flat else float(parameters.get("terrain.incline", 0.0))
+
+
+def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
+    """(rows, 6, 3) the feet's centres in the torso's frame [m], from what the plant gives in the world's."""
+    w, x, y, z = recording.vector("torso.quaternion", 4).T
+    turn = np.array([
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ])  # fmt: skip
+    centres = recording.foot_vectors("position") + parameters["foot.radius"] * ground_normal(parameters)
+    arms = centres - recording.vector("torso.position")[:, None, :]
+    com = np.array([parameters[name] for name in vector_names("torso.com")])
+    return np.asarray(np.einsum("jir,rlj->rli", turn, arms) + com)

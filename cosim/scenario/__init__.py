@@ -1,0 +1,1 @@
+"""What is run: scenarios read from TOML and checked. Imports `common` and `interface`."""

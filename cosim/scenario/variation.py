@@ -1,0 +1,90 @@
+"""Small changes to a run, drawn from its seed: attitude, height and joint angles at the start, and when commands come."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, joint_names, vector_names
+from hexapod_cosim.cosim.scenario.records import Command, Variation
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.kinematics import foot_positions, quaternion_product, rotation_matrix
+from hexapod_cosim.models.terrain import ground
+
+Array = NDArray[np.float64]
+
+STREAM = 1  # of the seed's random numbers; the noise of sensors has the seed's own
+POSITION, QUATERNION = vector_names("initial.position"), vector_names("initial.quaternion", 4)
+ANGLE = [f"initial.{name}" for name in joint_names("angle")]
+
+# what no one sets up better by hand: a tenth of a degree of attitude and of joint angles (a step of the servos' encoders is 1.5 mrad),
+# the height of a sheet of cardboard, and a command that comes when it comes within a tenth of a gait period
+STANDARD = Variation(attitude=2e-3, height=1e-3, joint_angle=2e-3, command_delay=0.1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """What came out for one seed."""
+
+    rotation: Array  # (3,) rad    of the torso, small, world axes
+    height: float  # m    from which it drops
+    angle: Array  # (6, 3) rad    added to the joints'
+    command_delay: float  # s
+
+    def as_facts(self) -> dict[str, Any]:
+        """The same as plain numbers."""
+        return {
+            "rotation": self.rotation.tolist(), "height": self.height, "angle": self.angle.tolist(), "command_delay": self.command_delay,
+        }  # fmt: skip
+
+
+def draw(variation: Variation, *, seed: int) -> Drawn:
+    """The changes of a seed: the same numbers whatever their sizes, so that a size scales what is drawn."""
+    generator = np.random.default_rng([seed, STREAM])
+    rotation, angle = generator.standard_normal(3), generator.standard_normal((LEGS, JOINTS))
+    height, delay = generator.random(2).tolist()
+    return Drawn(
+        rotation=variation.attitude * rotation, height=variation.height * height, angle=variation.joint_angle * angle,
+        command_delay=variation.command_delay * delay,
+    )  # fmt: skip
+
+
+def delayed(commands: Sequence[Command], delay: float) -> tuple[Command, ...]:
+    """All commands later by `delay` [s], the first one too: the robot stands until then."""
+    if not delay:
+        return tuple(commands)
+    return (Command(), *(replace(command, time=command.time + delay) for command in commands))
+
+
+def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) -> dict[str, float]:
+    """The FMU's parameters initial.*, changed as drawn.
+
+    The torso goes up by as much as keeps every foot from being deeper in the ground than it was, and by the height drawn.
+    """
+    position, quaternion, angle = (np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE))
+    turn = np.array([1.0, *(0.5 * drawn.rotation)])
+    turned = quaternion_product(turn / np.linalg.norm(turn), quaternion)
+    bent = angle + drawn.angle.ravel()
+    deeper = _depths(robot, position, turned, bent) - _depths_at_rest(robot, tuple(position), tuple(quaternion), tuple(angle))
+    raised = position + np.array([0.0, 0.0, max(float(deeper.max()), 0.0) + drawn.height])
+    pairs = ((POSITION, raised), (QUATERNION, turned), (ANGLE, bent))
+    return {name: value for names, values in pairs for name, value in zip(names, values.tolist(), strict=True)}
+
+
+@lru_cache(maxsize=64)
+def _depths_at_rest(robot: Robot, *pose: tuple[float, ...]) -> Array:
+    """The same, remembered: runs of one robot begin from one pose."""
+    position, quaternion, angle = map(np.array, pose)
+    return _depths(robot, position, quaternion, angle)
+
+
+def _depths(robot: Robot, position: Array, quaternion: Array, angle: Array) -> Array:
+    """(6,) penetration of the feet [m], negative above the ground."""
+    feet = foot_positions(robot, angle.reshape(LEGS, JOINTS)) - np.array(robot.torso.com)
+    centres = position + feet @ rotation_matrix(quaternion / np.linalg.norm(quaternion)).T
+    return np.array([robot.foot.radius - ground(robot.terrain, centre)[0] for centre in centres])

@@ -1,0 +1,1 @@
+"""What a study runs: its file, factors, design points and identities of runs. Imports no other room of `study`."""

@@ -1,0 +1,177 @@
+"""Figures of a study with an axis for a factor, a metric or the trials: what a factor does, slip against cost, how an optimiser got on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.study.plan.records import Factor, Study
+from hexapod_cosim.cosim.study.report.marks import (
+    COLOURS,
+    COST,
+    MARKS,
+    NAMES,
+    SLIP,
+    Array,
+    label_of,
+    mean_of,
+    named,
+    place_of,
+    some_of,
+    ticks_of,
+)
+from hexapod_cosim.cosim.study.store.table import Point
+from hexapod_cosim.cosim.study.store.trials import Trial
+
+MOST_EFFECTS, ACROSS = 9, 3  # factors that get a panel, panels side by side
+WIDE = 10.0  # largest over least value beyond which an axis is logarithmic
+GREY = "0.55"
+
+
+def response(points: Sequence[Point], factor: Factor, study: Study) -> Figure:
+    """Slip and cost over one factor, with the intervals over the seeds."""
+    figure = Figure(figsize=(9.0, 3.4))
+    for axes, metric in zip(figure.subplots(1, 2), (SLIP, COST), strict=True):
+        for control in study.run_controls:
+            _curve(axes, points, factor, (control, metric), joined=not named(factor))
+        _factor_axis(axes, factor)
+        axes.set(ylabel=NAMES[metric], ylim=(0.0, None))
+    figure.axes[0].legend()
+    return figure
+
+
+def _curve(axes: Axes, points: Sequence[Point], factor: Factor, what: tuple[str, str], *, joined: bool) -> None:
+    control, metric = what
+    shown = sorted((place_of(factor, item.values[factor.name]), item.means[control][metric]) for item in points)
+    x, mean, half = np.array([(place, item.value, item.half_width) for place, item in shown]).reshape(-1, 3).T
+    half = np.where(np.isfinite(half), half, 0.0)
+    line = "-" if joined else ""
+    axes.errorbar(
+        x,
+        mean,
+        half,
+        marker=MARKS[control],
+        color=COLOURS[control],
+        markersize=4,
+        linestyle=line,
+        linewidth=1.2,
+        capsize=2.5,
+        label=control,
+    )
+
+
+def _factor_axis(axes: Axes, factor: Factor) -> None:
+    if named(factor):
+        names = ticks_of(factor)
+        axes.set_xticks(range(len(names)), names, rotation=20 if max(map(len, names)) > 8 else 0)
+        axes.set_xlim(-0.5, len(names) - 0.5)
+    axes.set_xlabel(label_of(factor))
+
+
+def effects(points: Sequence[Point], study: Study) -> Figure:
+    """Slip over each factor by itself; points at which no run walked along the lower edge."""
+    factors = shown_effects(study)
+    across = min(len(factors), ACROSS)
+    down = math.ceil(len(factors) / across)
+    figure = Figure(figsize=(3.1 * across + 0.6, 2.5 * down + 0.5))
+    panels = np.atleast_1d(figure.subplots(down, across, sharey=True, squeeze=False).ravel())
+    for axes, factor in zip(panels, factors, strict=False):
+        for control in study.run_controls:
+            _marks(axes, some_of(points), factor, control)
+        _factor_axis(axes, factor)
+        axes.set_yscale("log")
+        axes.margins(x=0.05, y=0.12)
+    for axes in panels[len(factors) :]:
+        axes.set_visible(False)
+    for axes in panels[::across]:
+        axes.set_ylabel(NAMES[SLIP])
+    panels[0].legend(fontsize=7)
+    return figure
+
+
+def shown_effects(study: Study) -> list[Factor]:
+    """Factors that vary, not more than can be looked at."""
+    return [factor for factor in study.factors if len(set(factor.values)) != 1][:MOST_EFFECTS]
+
+
+def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str) -> None:
+    place = np.array([place_of(factor, item.values[factor.name]) for item in points])
+    slip = np.array([mean_of(item, control, SLIP) for item in points])
+    lost = np.array([item.runs[control] > 0 and item.walked[control] == 0 for item in points], dtype=np.bool_)
+    axes.plot(place, slip, linestyle="", marker=MARKS[control], markersize=4, alpha=0.6, color=COLOURS[control], label=control)
+    height = 0.02 if control == "kinematic" else 0.07
+    axes.plot(
+        place[lost], np.full(np.sum(lost), height), linestyle="", marker="x", markersize=4, color=COLOURS[control],
+        transform=axes.get_xaxis_transform(),
+    )  # fmt: skip
+
+
+def pareto(points: Sequence[Point], study: Study) -> Figure:
+    """Slip against cost of transport with the front of each control."""
+    figure = Figure(figsize=(6.4, 4.2))
+    axes = figure.subplots()
+    for control in study.run_controls:
+        pairs = slip_and_cost([point for point in points if not point.held_out], control)
+        if not len(pairs):
+            continue
+        shown = some_of(pairs.tolist())
+        axes.plot(*np.array(shown).T, linestyle="", marker=MARKS[control], markersize=4, alpha=0.5, color=COLOURS[control], label=control)
+        edge = front(pairs)
+        axes.plot(*edge.T, drawstyle="steps-post", color=COLOURS[control], linewidth=1.4)
+        axes.plot(*edge.T, linestyle="", marker=MARKS[control], markersize=5.5, color=COLOURS[control])
+    costs, slips = (np.concatenate([line.get_data()[k] for line in axes.lines]) for k in (0, 1))
+    for name, values in (("xscale", np.asarray(costs)), ("yscale", np.asarray(slips))):
+        axes.set(**{name: "log" if values.min() > 0.0 and values.max() > WIDE * values.min() else "linear"})
+    axes.set(xlabel=NAMES[COST], ylabel=NAMES[SLIP])
+    axes.margins(0.05)
+    axes.legend(title="line: the front")
+    return figure
+
+
+def slip_and_cost(points: Sequence[Point], control: str) -> Array:
+    """(k, 2) cost of transport and slip of the points that have both."""
+    pairs = np.array([(mean_of(point, control, COST), mean_of(point, control, SLIP)) for point in points]).reshape(-1, 2)
+    return np.asarray(pairs[np.isfinite(pairs).all(axis=1)])
+
+
+def front(pairs: Array) -> Array:
+    """(k, 2) the points, by their first figure, that no other is below or equal to in both."""
+    kept, best = [], math.inf
+    for first, second in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
+        if second < best:
+            kept.append((first, second))
+            best = second
+    return np.array(kept, dtype=np.float64).reshape(-1, 2)
+
+
+def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:
+    """The first metric of each trial, the best so far, and what it began from."""
+    assert study.optimise is not None
+    name = study.optimise.metrics[0]
+    unit, less, _ = METRICS[name]
+    figure = Figure(figsize=(8.0, 3.4))
+    axes = figure.subplots()
+    for feasible, mark, label in ((True, "o", "trial"), (False, "x", "breaks a constraint")):
+        some = [(trial.number, trial.means[name]) for trial in trials if trial.feasible is feasible and math.isfinite(trial.means[name])]
+        if some:
+            colour = "#0072B2" if feasible else GREY
+            axes.plot(*zip(*some, strict=True), linestyle="", marker=mark, markersize=4.5, color=colour, label=label)
+    lost = [trial.number for trial in trials if not math.isfinite(trial.means[name])]
+    if lost:
+        axes.plot(lost, [0.03] * len(lost), "|", color="#D55E00", label="no figure: a run fell", transform=axes.get_xaxis_transform())
+    able = [trial for trial in trials if trial.feasible and math.isfinite(trial.means[name])]
+    if able:
+        best = (np.minimum if less else np.maximum).accumulate([trial.means[name] for trial in able])
+        axes.step([trial.number for trial in able], best, where="post", color="#009E73", label="best so far")
+    if math.isfinite(before):
+        axes.axhline(before, color="#D55E00", linestyle="--", linewidth=1.2, label="before")
+    axes.set(xlabel="trial", ylabel=f"{name} [{unit}]", xlim=(-0.5, max(study.optimise.trials - 0.5, 0.5)))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    figure.legend(loc="outside upper center", ncols=5)
+    return figure

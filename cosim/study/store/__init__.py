@@ -1,0 +1,1 @@
+"""Keeps the runs of a study on disk and reads results from them. Imports `plan`."""

@@ -1,0 +1,166 @@
+"""What runs of a point come to: means with 95 % intervals over seeds, and paired changes from the first control to the second.
+
+All are of walks that came to their end: what a fall leaves behind is no figure of a walk, and stands in results.parquet alone.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from hexapod_cosim.cosim.results.comparison import Change, made_change
+from hexapod_cosim.cosim.results.metrics import OF_THE_RUN
+from hexapod_cosim.cosim.study.plan.records import SCENARIO_FACTOR, Study
+from hexapod_cosim.cosim.study.store.columns import FIGURES
+from hexapod_cosim.cosim.study.store.moments import no_moments, ratio_half_widths
+from hexapod_cosim.cosim.study.store.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, Sums
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Of a metric over the walks of a point."""
+
+    value: float  # NaN where no walk has the metric
+    half_width: float  # of its 95 % interval; NaN for fewer than two walks
+    runs: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """A point's runs, by control."""
+
+    number: int
+    case: str
+    values: Mapping[str, Any]  # of the factors
+    held_out: bool
+    runs: Mapping[str, int]  # by control; 0 where none has run
+    walked: Mapping[str, int]
+    pairs: int  # in which both walked
+    means: Mapping[str, Mapping[str, Mean]]  # by control, then metric
+    changes: Mapping[str, Change]  # by metric; empty for a single control
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overall:
+    """All runs of a study."""
+
+    runs: int
+    walked: Mapping[str, int]  # by control
+    total: Mapping[str, int]
+    pairs: int  # in which both walked
+    failures: Mapping[tuple[str, str, str], int]  # by control, status and reason, the most frequent first
+    changes: Mapping[str, Change]  # over all pairs
+    means: Mapping[str, Mapping[str, Mean]]
+    walks: Mapping[tuple[str, str], tuple[int, int]]  # by scenario and control: how many walked, how many of these have any figure
+
+
+MOST_REASONS = 30
+MOST_KINDS = 1000  # of reasons that are told apart, so that their number does not grow with the runs
+OTHER = "other reasons"
+DIGITS = str.maketrans("0123456789", "#" * 10)
+
+
+def point_at(block: Block, place: int, study: Study) -> Point:
+    """One of a block's points."""
+    row, sums, controls = block.first.slice(place, 1).to_pylist()[0], block.sums[place : place + 1], study.run_controls
+    return Point(
+        number=row["point"], case=row["case"], held_out=bool(block.held_out[place]),
+        values={factor.name: row["case" if factor.name == SCENARIO_FACTOR else factor.name] for factor in study.factors},
+        runs=dict(zip(controls, sums.runs[0].tolist(), strict=True)), walked=dict(zip(controls, sums.walked[0].tolist(), strict=True)),
+        pairs=int(sums.pairs[0]), means=_means(sums, study), changes=_changes(sums, study),
+    )  # fmt: skip
+
+
+def _means(sums: Sums, study: Study) -> dict[str, dict[str, Mean]]:
+    """By control and metric, of the first group."""
+    found = {}
+    for k, control in enumerate(study.run_controls):
+        part = sums.moments[0, k]
+        parts = zip(FIGURES, part.value.tolist(), part.half_width.tolist(), part.count.astype(int).tolist(), strict=True)
+        found[control] = {name: Mean(value, half_width, runs) for name, value, half_width, runs in parts}
+    return found
+
+
+def _changes(sums: Sums, study: Study) -> dict[str, Change]:
+    """By metric, of the first group; as `hexapod compare` has them, of the pairs in which both walked."""
+    if len(study.run_controls) != 2:
+        return {}
+    before, after, difference = (sums.moments[0, part] for part in (BEFORE, AFTER, DIFFERENCE))
+    ratio = ratio_half_widths(before, after, difference)
+    parts = (before.value, after.value, difference.half_width, ratio, difference.count.astype(int))
+    return {
+        name: made_change(name, before=first, after=second, half_width=half, log_half_width=log_half, pairs=pairs)
+        for name, first, second, half, log_half, pairs in zip(FIGURES, *(part.tolist() for part in parts), strict=True)
+    }
+
+
+class Tally:
+    """Adds runs up, table by table, and keeps none of them."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._sums: Sums | None = None
+        self._failures = Counter[tuple[str, str, str]]()
+        self._walks: dict[tuple[str, str], tuple[int, int]] = {}
+
+    def add(self, rows: Rows) -> None:
+        """Runs of which no pair is cut."""
+        sums = rows.sums(np.zeros(1, dtype=np.int64))
+        self._sums = sums if self._sums is None else self._sums.merged(sums)
+        for case, control, walked, figured in _walks(rows.table):
+            before = self._walks.get((case, control), (0, 0))
+            self._walks[case, control] = before[0] + walked, before[1] + figured
+        lost = rows.table.filter(pc.invert(rows.table["walked"])).select(["control", "status", "reason", "warnings"])
+        for row in lost.to_pylist():
+            kind = (row["control"], row["status"], _reason(row))
+            if kind not in self._failures and len(self._failures) >= MOST_KINDS:
+                kind = (row["control"], row["status"], OTHER)
+            self._failures[kind] += 1
+
+    def overall(self) -> Overall:
+        """All that was added."""
+        controls, sums = self._study.run_controls, self._sums or _no_sums(self._study)
+        runs, walked = sums.runs[0].tolist(), sums.walked[0].tolist()
+        return Overall(
+            runs=sum(runs), walked=dict(zip(controls, walked, strict=True)), total=dict(zip(controls, runs, strict=True)),
+            pairs=int(sums.pairs[0]), failures=dict(self._failures.most_common(MOST_REASONS)), changes=_changes(sums, self._study),
+            means=_means(sums, self._study), walks=dict(self._walks),
+        )  # fmt: skip
+
+
+def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
+    """By scenario and control: how many walked, and how many of these have any figure."""
+    kept = table.filter(table["walked"])
+    figured = pc.is_valid(pc.coalesce(*(kept[name] for name in FIGURES if name not in OF_THE_RUN)))
+    groups = pa.table({"case": kept["case"], "control": kept["control"], "figured": figured}).group_by(["case", "control"])
+    return [
+        (row["case"], row["control"], row["figured_count"], row["figured_sum"])
+        for row in groups.aggregate([("figured", "count"), ("figured", "sum")]).to_pylist()
+    ]
+
+
+def _no_sums(study: Study) -> Sums:
+    size = len(study.run_controls)
+    none = np.zeros((1, size), dtype=np.int64)
+    return Sums(runs=none, walked=none, pairs=none[:, 0], moments=no_moments(1, size + 3, len(FIGURES)))
+
+
+def _reason(row: Row) -> str:
+    """Why a run did not walk to its end, without the figures in it, so that like is counted with like."""
+    text = str(row["reason"] or row["warnings"].partition(" | ")[0] or "the robot fell")
+    return _without_numbers(text)
+
+
+def _without_numbers(text: str) -> str:
+    words = text.translate(DIGITS)
+    while "##" in words:
+        words = words.replace("##", "#")
+    return words.replace("#.#", "#")

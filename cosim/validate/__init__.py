@@ -1,0 +1,1 @@
+"""Checks FMU archives against the FMI standard. Imports `common` to `export`."""

@@ -1,0 +1,104 @@
+"""Is this FMU one of ours, and sound? fmpy's checks, then what no general checker sees."""
+
+from __future__ import annotations
+
+import zipfile
+from contextlib import chdir
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from xml.etree import ElementTree
+
+from fmpy import extract
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
+from fmpy.validation import validate_fmu
+
+from hexapod_cosim.cosim.common.components import CONTROLLER
+from hexapod_cosim.cosim.common.plant_files import fmi2_platform, packed_binary
+from hexapod_cosim.cosim.interface.descriptions import open_description, read_description
+from hexapod_cosim.cosim.master.fmu import Fmu
+from hexapod_cosim.cosim.master.signals import Signals
+from hexapod_cosim.cosim.validate.archive import DESCRIPTION, archive_problems
+from hexapod_cosim.cosim.validate.description import description_problems, schema_problems
+from hexapod_cosim.cosim.validate.description3 import description_problems3
+from hexapod_cosim.cosim.validate.start_value import START_VALUES, start_value_problems
+from hexapod_cosim.cosim.validate.validation3 import find_own_problems3
+from hexapod_cosim.models import FmuError, HexapodError
+
+TRIAL_STEP = 0.001  # s
+FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
+
+
+def find_problems(path: Path) -> list[str]:
+    """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when it is no FMU at all."""
+    try:
+        description = open_description(path)
+    except FmuError:
+        problems = _unread_problems(path)
+        if not problems:
+            raise
+        return problems
+    if description.fmiVersion.startswith("3.") and description.coSimulation is not None:
+        return [*map(str, validate_fmu(str(path))), *find_own_problems3(path, description)]
+    read_description(path)
+    return [*map(str, validate_fmu(str(path))), *find_own_problems(path)]
+
+
+def _unread_problems(path: Path) -> list[str]:
+    """Of a modelDescription.xml that fmpy makes no sense of: it refers to what is not there, say. Empty if it cannot be parsed at all."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            data = archive.read(DESCRIPTION)
+        root = ElementTree.fromstring(data)
+    except (OSError, zipfile.BadZipFile, KeyError, ElementTree.ParseError):
+        return []
+    fmi3 = root.get("fmiVersion", "").startswith("3.")
+    broken = schema_problems(DESCRIPTION, data, "fmi3/fmi3ModelDescription.xsd" if fmi3 else "fmi2/fmi2ModelDescription.xsd")
+    return broken or (description_problems3 if fmi3 else description_problems)(root)
+
+
+def find_own_problems(path: Path) -> list[str]:
+    """The same without fmpy's checks; what was packed for other machines alone is not run. Raises FmuError when it is no FMU at all."""
+    description, problems = read_description(path), archive_problems(path)
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+        data = archive.read(START_VALUES) if START_VALUES in names else None
+        problems += start_value_problems(data, description.guid, description)
+        runs_here = any(name.startswith(f"binaries/{fmi2_platform()}/") for name in names)
+    return problems + (_run_problems(path) + _guid_problems(path, description) if runs_here else [])
+
+
+def _run_problems(path: Path) -> list[str]:
+    """Loads the binary, starts it, takes a step."""
+    try:
+        with Fmu(path, name="validate") as plant:
+            plant.initialise(0.0, 1.0)
+            if plant.description.coSimulation.modelIdentifier == CONTROLLER.identifier:
+                plant.block(plant.names("output")).get()
+            else:
+                Signals(plant).read()
+            plant.step(0.0, TRIAL_STEP)
+    except HexapodError as error:
+        return [str(error)]
+    return []
+
+
+def _guid_problems(path: Path, description: Any) -> list[str]:
+    """A binary that takes any GUID would run with another model's description."""
+    callbacks = fmi2CallbackFunctions()
+    with TemporaryDirectory(prefix="hexapod-validate-") as folder:
+        extract(path, folder)
+        identifier = description.coSimulation.modelIdentifier
+        try:
+            with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
+                facts = {"guid": FOREIGN_GUID, "modelIdentifier": identifier, "libraryPath": packed_binary(folder, identifier)}
+                slave = FMU2Slave(unzipDirectory=folder, instanceName="validate", **facts)
+        except Exception:  # fmpy's errors have no common type; that it does not load is told elsewhere
+            return []
+        try:
+            slave.instantiate(callbacks=callbacks)
+        except Exception:  # as it should
+            slave.freeLibrary()
+            return []
+        slave.freeInstance()
+    return [f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of modelDescription.xml alone"]

@@ -1,0 +1,224 @@
+"""The hexapod command: shapes of its JSON, exit codes, what it writes."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command import COMMAND, QUICK, Call
+
+from hexapod_cosim.cosim.results.comparison import read_seeds
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.recordings import read_csv
+from hexapod_cosim.cosim.scenario.records import Variation
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
+
+CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]  # the shortest walk with figures
+RUN = {"commands.csv", "metrics.json", "results.csv", "results.parquet", "run.json", "scenario.toml"}
+TWINS = {
+    "slip_per_radian", "path_error_per_radian", "yaw_drift_per_radian", "heat_per_radian", "cost_per_radian", "electrical_cost_per_radian",
+}  # of robots that turn on the spot  # fmt: skip
+SHOWN = set(METRICS) - TWINS - {"slip_net_per_metre"}
+FIGURES = {"foot_forces", "slip", "feet", "posture", "path", "torques", "energy", "footfall"}
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory, plant_build: Path) -> tuple[Path, dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("compare") / "out"
+    command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "2", "--json", *CYCLES]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return folder, json.loads(done.stdout)
+
+
+def test_compare_prints_the_shape_of_the_contract(compared: tuple[Path, dict[str, Any]]) -> None:
+    folder, printed = compared
+    assert list(printed) == ["kinematic", "compliant", "change", "seeds", "walked", "report"]
+    for control in ("kinematic", "compliant"):
+        assert list(printed[control]) == list(METRICS)
+        assert {name for name, value in printed[control].items() if value is None} == TWINS
+        assert all(isinstance(printed[control][name], float) for name in METRICS if name not in TWINS)
+    assert list(printed["change"]) == list(METRICS)
+    assert (printed["seeds"], printed["walked"]) == (2, {"kinematic": 2, "compliant": 2})
+    for name in METRICS:
+        change = printed["change"][name]
+        assert change["pairs"] == (0 if name in TWINS else 2)
+        if name not in TWINS:
+            assert change["difference"] == pytest.approx(printed["compliant"][name] - printed["kinematic"][name])
+    assert Path(printed["report"]) == folder / "report.html"
+
+
+def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_seed(compared: tuple[Path, dict[str, Any]]) -> None:
+    folder, printed = compared
+    runs = read_seeds(folder / "seeds.csv")
+    for control in ("kinematic", "compliant"):
+        assert [run.seed for run in runs[control]] == [0, 1]
+        told = json.loads((folder / control / "metrics.json").read_text())
+        assert {name: value for name, value in runs[control][0].metrics.items() if name not in TWINS} == {
+            name: value for name, value in told.items() if name not in TWINS
+        }
+        assert all(told[name] is None for name in TWINS)
+        slips = [run.metrics["slip_per_metre"] for run in runs[control]]
+        assert slips[0] != slips[1]
+        assert printed[control]["slip_per_metre"] == pytest.approx(sum(slips) / 2.0)
+        assert load_scenario(folder / control / "scenario.toml").variation == STANDARD
+
+
+def test_compare_with_one_seed_is_the_plain_walk_without_intervals(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("compare", "walk_flat", "-o", tmp_path / "one", "--seeds", "1", "--json", *QUICK)
+    printed = json.loads(out)
+    assert (code, printed["seeds"]) == (0, 1)
+    assert printed["change"]["realtime_factor"]["low"] is None
+    assert load_scenario(tmp_path / "one" / "scenario.toml").variation is None
+    assert call("simulate", "walk_flat", "-o", tmp_path / "plain", *QUICK)[0] == 0
+    assert (tmp_path / "one" / "kinematic" / "results.csv").read_bytes() == (tmp_path / "plain" / "results.csv").read_bytes()
+    assert "95 %" not in metric_table(tmp_path / "one")
+
+
+def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("compare", "walk_flat", "-o", tmp_path, "--seeds", "2", *QUICK, "--set", "variation.height=2 mm", "--set", "seed=5")
+    assert code == 0
+    assert "95 % interval" in out
+    assert "2 of 2" in out
+    assert "2 seeds (5 to 6)" in out
+    assert load_scenario(tmp_path / "scenario.toml").variation == Variation(height=0.002)
+
+
+def test_compare_leaves_results_figures_report_and_the_scenario_as_run(compared: tuple[Path, dict[str, Any]]) -> None:
+    folder, printed = compared
+    assert {path.name for path in folder.iterdir()} == {
+        "kinematic", "compliant", "plots", "metrics.json", "report.html", "run.json", "scenario.toml", "seeds.csv",
+    }  # fmt: skip
+    assert {path.name for path in (folder / "plots").iterdir()} == {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
+    for control in ("kinematic", "compliant"):
+        assert {path.name for path in (folder / control).iterdir()} == RUN
+        assert load_scenario(folder / control / "scenario.toml").control == control
+    assert json.loads((folder / "run.json").read_text())["status"] == "completed"
+    assert json.loads((folder / "metrics.json").read_text()) == {key: value for key, value in printed.items() if key != "report"}
+
+
+def test_the_report_needs_no_other_file(compared: tuple[Path, dict[str, Any]]) -> None:
+    page = (compared[0] / "report.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in page
+    assert not re.findall(r'(?:src|href)="(?!plots/)', page.partition("<script")[0])
+    assert all((compared[0] / "plots" / f"{name}.svg").is_file() and f'href="plots/{name}.svg"' in page for name in FIGURES)
+    assert all(f"<code>{name}</code>" in page for name in SHOWN)
+    assert "sha256" in page
+    assert "95 % interval" in page
+    assert "2 seeds (0 to 1)" in page
+
+
+def metric_table(folder: Path) -> str:
+    return (folder / "report.html").read_text(encoding="utf-8").partition("<h2>Metrics</h2>")[2].partition("</table>")[0]
+
+
+def test_report_makes_figures_and_page_again(compared: tuple[Path, dict[str, Any]], call: Call) -> None:
+    folder, _ = compared
+    before = {path.name: path.read_bytes() for path in (folder / "plots").glob("*.svg")}
+    rows = metric_table(folder)
+    (folder / "report.html").unlink()
+    code, out, _ = call("report", folder, "--json")
+    assert code == 0
+    assert json.loads(out)["report"] == str(folder / "report.html")
+    assert metric_table(folder) == rows
+    assert {path.name: path.read_bytes() for path in (folder / "plots").glob("*.svg")} == before
+
+
+def test_simulate_prints_metrics_and_what_it_wrote(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("simulate", "walk_flat", "-o", tmp_path / "out", "--json", *QUICK)
+    printed = json.loads(out)
+    assert code == 0
+    assert list(printed["metrics"]) == list(METRICS)
+    assert printed["status"] == "completed"
+    assert printed["walk"]["upright"] is True
+    assert all(Path(file).is_file() for file in printed["files"])
+    recording = read_csv(tmp_path / "out" / "results.csv")
+    np.testing.assert_allclose(recording.time, 0.005 * np.arange(41), atol=1e-15)
+
+
+def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("simulate", "stand", "-o", tmp_path / "out", *QUICK)
+    assert code == 0
+    assert all(name in out for name in SHOWN)
+    assert f"wrote {tmp_path / 'out'}/" in out
+
+
+@pytest.mark.parametrize(
+    ("duration", "period", "told"),
+    [
+        ("2.3", "0.8", "too short for metrics: got 2.3 s, expected 2.4 s, which is 3 whole gait cycles"),
+        ("2.4", "0.8", ""),
+    ],
+)
+def test_a_walk_too_short_for_metrics_says_why_and_how_long_is_enough(
+    call: Call, tmp_path: Path, duration: str, period: str, told: str
+) -> None:
+    options = ["--set", f"duration={duration}", "--set", f"gait.period={period}"]
+    _, out, err = call("simulate", "walk_flat", "-o", tmp_path, *options, "--json")
+    printed = json.loads(out)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert told in err
+    assert ("too short" in err, "too short for metrics" in page) == (bool(told), bool(told))
+    assert any("too short" in text for text in printed["warnings"]) == bool(told)
+    assert (printed["metrics"]["slip_per_metre"] is None) == bool(told)
+
+
+def test_recorded_columns_can_be_chosen(call: Call, tmp_path: Path) -> None:
+    code, _, _ = call("simulate", "stand", "-o", tmp_path / "out", *QUICK, "--set", "outputs.csv=['torso.roll', '*.contact']")
+    assert code == 0
+    names = read_csv(tmp_path / "out" / "results.csv").names
+    assert names == ("time", "torso.roll", *(f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")))
+
+
+def test_a_folder_of_an_earlier_run_is_written_anew(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2")[0] == 0
+    assert (folder / "report.html").is_file()
+    assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
+    assert {path.name for path in folder.iterdir()} == RUN
+
+
+@pytest.mark.parametrize("what", ["robots", "scenarios", "gaits", "terrains", "laws"])
+def test_list_names_what_there_is(call: Call, what: str) -> None:
+    code, out, _ = call("list", what, "--json")
+    rows = json.loads(out)
+    assert code == 0
+    assert rows
+    code, table, _ = call("list", what)
+    assert code == 0
+    assert all(row["name"] in table for row in rows)
+
+
+def test_export_makes_an_fmu_that_validate_accepts(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "phantomx.fmu"
+    code, out, _ = call("export", "--robot", "phantomx_mk4", "-o", path)
+    assert (code, out) == (0, f"wrote {path}\n")
+    code, out, _ = call("validate", path, "--json")
+    assert code == 0
+    assert json.loads(out) == {"fmu": str(path), "valid": True, "problems": []}
+
+
+def test_design_writes_gains_that_simulate_takes(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("design", "-o", tmp_path / "design", "--json")
+    assert code == 0
+    assert all(Path(file).is_file() for file in json.loads(out)["files"])
+    gains = tmp_path / "design" / "gains.toml"
+    code, _, err = call("simulate", "stand", "--control", "compliant", "--gains", gains, "-o", tmp_path / "out", *QUICK)
+    assert code == 0
+    assert "designed for" not in err
+    code, _, err = call("simulate", "phantomx_walk", "--control", "compliant", "--gains", gains, "-o", tmp_path / "out", *QUICK)
+    assert code == 0
+    assert "warning: compliant: the gains were designed for robot 'athena'" in err
+
+
+def test_help_names_every_command(call: Call) -> None:
+    code, out, _ = call("--help")
+    assert code == 0
+    for command in ("export", "simulate", "compare", "design", "report", "validate", "list"):
+        assert f"  {command} " in out
+        assert call(command, "--help")[0] == 0

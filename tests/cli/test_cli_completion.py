@@ -1,0 +1,102 @@
+"""What a shell is offered for half-typed words, asked for as the shells ask."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command import COMMAND
+
+from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
+from hexapod_cosim.models import HexapodError, list_robots
+
+Ask = Callable[..., list[str]]
+SLOW = {"scipy", "control", "matplotlib", "pyarrow", "mujoco", "pinocchio"}
+SHELLS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ".config/fish/completions/hexapod.fish"}
+
+
+@pytest.fixture
+def offered(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Ask:
+    """What bash is offered after these words, of which the last is being typed."""
+
+    def ask(*words: str) -> list[str]:
+        monkeypatch.setenv("COMP_WORDS", " ".join(["hexapod", *words]))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        monkeypatch.setenv("_HEXAPOD_COMPLETE", "complete_bash")
+        assert main([]) == 0
+        out, err = capsys.readouterr()
+        assert err == ""
+        return out.split()
+
+    return ask
+
+
+def test_names_are_offered_where_they_go(offered: Ask) -> None:
+    assert set(offered("simulate", "")) == set(offered("compare", "")) == set(list_scenarios())
+    assert offered("simulate", "walk_f") == ["walk_flat"]
+    assert offered("export", "--robot", "") == offered("design", "--robot", "") == list_robots()
+    assert offered("simulate", "--control", "c") == offered("export", "--controller", "c") == ["compliant"]
+    assert offered("export", "--gait", "w") == ["wave"]
+    assert offered("list", "sc") == ["scenarios"]
+    assert "simulate" in offered("")
+    assert "--output" in offered("simulate", "--")
+
+
+def test_keys_of_set_are_those_of_the_scenario_and_of_the_fmu(offered: Ask) -> None:
+    assert offered("simulate", "--set", "dura") == ["duration="]
+    assert {"gait.name=", "gait.period="} <= set(offered("compare", "--set", "gait."))
+    assert offered("simulate", "--set", "gravity") == ["gravity=", "gravity[1]=", "gravity[2]=", "gravity[3]="]
+    assert offered("simulate", "--set", "LF.coxa.m") == ["LF.coxa.mass="]
+    assert offered("simulate", "--set", "torso.push") == []  # an input
+    assert offered("design", "--set", "phase") == ["phase_margin="]
+
+
+@pytest.mark.parametrize("typed", ["gait", "command.", "sensors.", "torso.ma", "solver.s"])
+def test_a_key_that_is_offered_is_a_key(offered: Ask, typed: str) -> None:
+    """Known by its name; the value 1 may be refused."""
+    keys = offered("simulate", "--set", typed)
+    assert keys
+    assert not any("unknown" in refusal(f"{key}1") for key in keys)
+
+
+def refusal(setting: str) -> str:
+    """Why a setting cannot be, "" when it can."""
+    try:
+        load_scenario("walk_flat", overrides=[setting])
+    except HexapodError as error:
+        return str(error)
+    return ""
+
+
+def ask_shell(shell: str, typed: str) -> list[str]:
+    environment = os.environ | {
+        "_HEXAPOD_COMPLETE": f"complete_{shell}", "_TYPER_COMPLETE_ARGS": typed, "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        "COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split(" ")) - 1),
+    }  # fmt: skip
+    return subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True).stdout.splitlines()
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_every_shells_protocol_is_answered(shell: str) -> None:
+    found = ask_shell(shell, "hexapod simulate walk_f")
+    assert any("walk_flat" in line for line in found)
+    assert not any("wave" in line for line in found)
+
+
+@pytest.mark.parametrize(("shell", "file"), SHELLS.items(), ids=list(SHELLS))
+def test_completion_is_installed_for_every_shell(tmp_path: Path, shell: str, file: str) -> None:
+    environment = os.environ | {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    subprocess.run([*COMMAND, "--install-completion", shell], env=environment, capture_output=True, text=True, check=True)
+    assert (tmp_path / file).is_file()
+    assert any("_HEXAPOD_COMPLETE" in path.read_text() for path in tmp_path.rglob("*") if path.is_file())
+
+
+def test_completion_imports_nothing_slow() -> None:
+    script = "import sys, hexapod_cosim.cosim.cli.app; print(*{name.partition('.')[0] for name in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert not SLOW & set(done.stdout.split())

@@ -1,0 +1,198 @@
+"""Runs of the hexapod command that do not complete: what was recorded is kept, under another name."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import COMMAND, QUICK, Call, assert_refused, settings
+
+from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.recordings import read_csv, write_commands
+from hexapod_cosim.cosim.results.summary import Summary, refused
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.models import HexapodError
+
+PARTIAL = {"results.partial.csv", "results.partial.parquet", "run.json", "scenario.toml"}
+# an explicit method of fixed step without error control has nowhere to go under an endless force
+REFUSED = ["solver.method=rk4", "solver.step=0.005", "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"]
+
+
+def test_a_run_that_ends_early_keeps_what_was_recorded_under_another_name(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "walk_flat", "-o", folder, *QUICK)[0] == 0
+    code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK, *settings(*REFUSED))
+    assert (code, out) == (1, "")
+    ended = re.search(r"the run ended at (0\.1\d\d) s of 0\.2 s", err)
+    assert ended
+    assert "not finite" in err
+    assert "Traceback" not in err
+    assert {path.name for path in folder.iterdir()} == PARTIAL
+    assert read_csv(folder / "results.partial.csv").time[-1] == pytest.approx(float(ended[1]))
+    assert json.loads((folder / "run.json").read_text())["status"] == "failed"
+    assert_refused(call("report", folder), "the run did not complete")
+
+
+def test_a_comparison_that_ends_early_says_so_in_both_folders(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert call("compare", "walk_flat", "-o", folder, *QUICK, *settings(*REFUSED))[0] == 1
+    assert {path.name for path in folder.iterdir()} == {"kinematic", "run.json"}
+    assert {path.name for path in (folder / "kinematic").iterdir()} == PARTIAL
+    assert all(json.loads((place / "run.json").read_text())["status"] == "failed" for place in (folder, folder / "kinematic"))
+
+
+def test_ctrl_c_keeps_what_was_recorded_under_another_name(plant_build: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    command = [*COMMAND, "simulate", "walk_flat", "-o", str(folder), "--set", "duration=900", "--set", "outputs.csv=['torso.*']"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        deadline = time.monotonic() + 60.0
+        while not (folder / "run.json").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(1.0)  # into the loop, which takes some ten times as long
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=120.0)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert out == ""
+    assert "Traceback" not in err
+    assert {path.name for path in folder.iterdir()} == PARTIAL
+    recording = read_csv(folder / "results.partial.csv")
+    np.testing.assert_allclose(recording.time, 0.005 * np.arange(len(recording.time)), atol=1e-9)
+    assert json.loads((folder / "run.json").read_text())["status"] == "interrupted"
+
+
+def test_a_controller_that_raises_keeps_the_recording_and_fails(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    step = Controller.step
+
+    def broken(self: Controller, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        if t > 0.1:
+            raise ValueError("shapes differ")
+        return step(self, t, command, measurement)
+
+    monkeypatch.setattr(Controller, "step", broken)
+    monkeypatch.setattr("hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None)  # it tries the controller out
+    folder = tmp_path / "out"
+    code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK)
+    assert (code, out) == (1, "")
+    assert "ValueError: shapes differ" in err
+    assert read_csv(folder / "results.partial.csv").time[-1] == pytest.approx(0.1)
+    facts = json.loads((folder / "run.json").read_text())
+    assert (facts["status"], facts["reason"]) == ("failed", "ValueError: shapes differ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_while_results_are_written_waits_for_them(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    def struck(recording: Recording, path: Path) -> None:
+        signal.raise_signal(number)
+        write_commands(recording, path)
+
+    monkeypatch.setattr("hexapod_cosim.cosim.results.results.write_commands", struck)
+    folder = tmp_path / "out"
+    code, out, err = call("simulate", "stand", "-o", folder, *QUICK)
+    assert (code, out) == (130, "")
+    assert "hexapod: interrupted" in err
+    assert len(read_csv(folder / "results.csv").time) == 41
+    assert json.loads((folder / "run.json").read_text())["status"] == "completed"
+
+
+def test_an_interrupt_while_figures_are_drawn_says_what_is_there(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    def struck(*_: object, **__: object) -> list[Path]:
+        signal.raise_signal(signal.SIGINT)
+        return []
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.write_report", struck)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background starts with it ignored
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
+    code, _, err = call("simulate", "stand", "-o", tmp_path / "out", "--set", "duration=0.2")
+    assert code == 130
+    assert f"`hexapod report {tmp_path / 'out'}` draws them" in err
+    assert (tmp_path / "out" / "results.csv").is_file()
+
+
+def test_a_refused_run_leaves_the_earlier_results(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert call("simulate", "stand", "-o", folder, *QUICK, *settings("torso.mass=0"))[0] == 1
+    assert call("simulate", "stand", "-o", folder, *QUICK, "--fmu", "nope.fmu")[0] == 1
+    assert call("compare", "walk_flat", "-o", folder, *QUICK, *settings("torso.mass=0"))[0] == 1
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert call("simulate", "-o", tmp_path / "new" / "place", "--fmu", "nope.fmu")[0] == 1
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_torso_that_sinks_has_fallen(call: Call, tmp_path: Path) -> None:
+    arguments = ["simulate", "stand", "-o", tmp_path / "out", "--json", *settings("servo.mode=torque", "duration=2", "outputs.plots=false")]
+    code, out, err = call(*arguments)
+    assert code == 3  # falls have an exit code of their own
+    assert "warning: kinematic: the robot fell at" in err
+    assert json.loads(out)["walk"]["upright"] is False
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
+    assert {"metrics.json", "results.parquet"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.parametrize(("upright", "code"), [((True, True), 0), ((False, True), 3), ((True, False), 3), ((False, False), 3)])
+def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, upright: tuple[bool, bool], code: int
+) -> None:
+    def others(scenarios: Sequence[Scenario], **_: object) -> Generator[Summary, None, None]:
+        for scenario in scenarios:
+            stands = upright[("kinematic", "compliant").index(scenario.control)]
+            yield replace(refused(scenario, HexapodError("")), status="completed", upright=stands, warnings=() if stands else ("it fell",))
+
+    monkeypatch.setattr("hexapod_cosim.cosim.cli.compare_command.run_batch", others)
+    returned, out, _ = call("compare", "stand", "-o", tmp_path / "out", "--seeds", "2", "--json", "--set", "duration=0.2")
+    assert returned == code
+    assert json.loads(out)["walked"] == {"kinematic": 1 + upright[0], "compliant": 1 + upright[1]}
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+@pytest.mark.parametrize(("modes", "code"), [(["torque"], 3), (["position", "torque"], 0)])
+def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
+    call: Call, tmp_path: Path, modes: list[str], code: int
+) -> None:
+    text = f'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n[factors]\nservo.mode = {json.dumps(modes)}\n'
+    (tmp_path / "sinks.toml").write_text(text)
+    returned, out, _ = call("study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json")
+    assert returned == code, out
+
+
+def test_the_exit_codes_are_told_by_help(call: Call) -> None:
+    said = " ".join(call("--help")[1].split())
+    assert "0 success; 1 an error" in said
+    assert "3 the robot fell" in said
+    for command in ("simulate", "compare", "study"):
+        assert "xit code 3" in " ".join(call(command, "--help")[1].split())
+
+
+def test_what_has_no_effect_is_told(call: Call, tmp_path: Path) -> None:
+    idle = settings("events=[{time=5, duration=0.1, force=[0, 1, 0]}]", "terrain.incline=0.1")
+    _, _, err = call("simulate", "stand", "-o", tmp_path / "out", *QUICK, *idle)
+    assert "the event at 5 s does nothing" in err
+    assert "terrain.incline does nothing on flat ground" in err
+
+
+def test_report_skips_figures_whose_columns_were_not_kept(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, *QUICK, "--set", "outputs.csv=['torso.*']", "--set", "outputs.formats=['csv']")[0] == 0
+    code, _, err = call("report", folder)
+    assert code == 0
+    assert "Slip is not drawn: " in err
+    assert "Slip is not drawn" in (folder / "report.html").read_text()
+    assert (folder / "plots" / "posture.png").is_file()

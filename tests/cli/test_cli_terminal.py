@@ -1,0 +1,301 @@
+"""What is on a terminal and what is not: progress there, nothing but results in pipes, JSON from every command."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import struct
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command import COMMAND, QUICK, Call, assert_refused
+from typer.main import get_command
+
+from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.cli import terminal as terminal_module
+from hexapod_cosim.cosim.cli.app import app
+from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
+from hexapod_cosim.cosim.results.results import NEEDED
+
+ESCAPE = "\x1b"
+COMMANDS = {name: command for name, command in get_command(app).commands.items() if not command.hidden}  # type: ignore[attr-defined]
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[[], Terminal]:
+    """Puts one in the place of stderr, from within a test: pytest's own takes its place again before."""
+
+    def install() -> Terminal:
+        terminal = Terminal()
+        monkeypatch.setenv("COLUMNS", "120")
+        monkeypatch.setattr(sys, "stderr", terminal)
+        return terminal
+
+    return install
+
+
+def test_a_run_shows_simulated_time_its_speed_and_what_is_left(terminal: Callable[[], Terminal]) -> None:
+    screen = terminal()
+    with progress_bar("kinematic", 8.0) as tell:
+        assert tell is not None
+        tell(0.0)
+        tell(2.0)
+    shown = screen.getvalue()
+    assert "2.0 of 8 s" in shown
+    assert "x real time" in shown
+    assert "left" in shown
+
+
+def test_runs_are_counted_with_their_rate_and_in_the_end_their_time(terminal: Callable[[], Terminal]) -> None:
+    screen = terminal()
+    with counting_bar("seeds", 6) as tell:
+        tell(2)
+        tell(3)
+        tell(6, 4)
+    shown = screen.getvalue()
+    assert "4 failed" in shown
+    assert "6 of 6 runs" in shown
+    assert "a minute" in shown
+    assert "in 0:0" in shown
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
+def test_a_terminal_sees_progress(plant_build: Path, tmp_path: Path) -> None:
+    import pty  # noqa: PLC0415  Unix only
+
+    ours, theirs = pty.openpty()
+    command = [*COMMAND, "simulate", "stand", "-o", str(tmp_path / "out"), *QUICK]
+    done = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env=os.environ | {"TERM": "xterm", "COLUMNS": "120"})
+    os.close(theirs)
+    shown = b""
+    while chunk := _read(ours):
+        shown += chunk
+    out, _ = done.communicate()
+    assert done.returncode == 0
+    assert b"x real time" in shown
+    assert ESCAPE.encode() not in out
+
+
+def _read(descriptor: int) -> bytes:
+    try:
+        return os.read(descriptor, 65536)
+    except OSError:  # the other end is closed
+        return b""
+
+
+def test_pipes_get_results_and_nothing_else(plant_build: Path, tmp_path: Path) -> None:
+    """Even where the environment asks for colours."""
+    environment = os.environ | {"FORCE_COLOR": "1", "TERM": "xterm-256color"}
+    command = [*COMMAND, "simulate", "walk_flat", "-o", str(tmp_path / "out"), *QUICK]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    assert ESCAPE not in done.stdout + done.stderr
+    assert "\r" not in done.stdout + done.stderr
+    assert all(line.startswith("warning: ") for line in done.stderr.splitlines())
+    assert "wrote " in done.stdout
+
+
+def test_pipes_get_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", pipe)
+    with counting_bar("seeds", 2) as tell, progress_bar("kinematic", 1.0) as none, waiting("drawing"):
+        tell(2)
+        assert none is None
+    assert pipe.getvalue() == ""
+
+
+def test_a_log_gets_a_line_of_progress_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, clock = io.StringIO(), [0.0]
+    monkeypatch.setattr(sys, "stderr", log)
+    monkeypatch.setattr(terminal_module, "monotonic", lambda: clock[0])
+    with counting_bar("runs", 1000, plain=True) as tell:
+        for second, done in enumerate(range(100, 200)):
+            clock[0] = float(second)
+            tell(done, 3)
+    assert log.getvalue().splitlines() == [
+        "runs: 130 of 1000, 60 a minute, 14:30 left, 3 failed",
+        "runs: 160 of 1000, 60 a minute, 14:00 left, 3 failed",
+        "runs: 190 of 1000, 60 a minute, 13:30 left, 3 failed",
+    ]
+
+
+def test_columns_of_a_table_are_aligned(call: Call) -> None:
+    _, table, _ = call("list", "scenarios")
+    head, *rows = table.splitlines()
+    start = head.index("about")
+    assert all(row[start - 1] == " " and row[start] != " " for row in rows)
+
+
+# narrow terminals
+
+
+@pytest.fixture
+def narrow(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Terminal]:
+    """Puts a terminal of 60 columns in the place of a stream, from within a test."""
+
+    def install(name: str) -> Terminal:
+        terminal = Terminal()
+        monkeypatch.setenv("COLUMNS", "60")
+        monkeypatch.setattr(sys, name, terminal)
+        return terminal
+
+    return install
+
+
+def plain(text: str) -> list[str]:
+    """Its lines without colours and trailing blanks."""
+    return [line.rstrip() for line in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text).splitlines()]
+
+
+def lines_of(screen: Terminal) -> list[str]:
+    return plain(screen.getvalue())
+
+
+@pytest.mark.parametrize("what", ["robots", "scenarios", "studies", "gaits", "terrains", "laws"])
+def test_every_list_fits_sixty_columns_and_loses_nothing(call: Call, narrow: Callable[[str], Terminal], what: str) -> None:
+    _, wide, _ = call("list", what)
+    screen = narrow("stdout")
+    main(["list", what])
+    shown = lines_of(screen)
+    assert max(map(len, shown)) <= 60
+    assert sorted(" ".join(shown).split()) == sorted(wide.split())
+
+
+def test_a_table_too_wide_goes_on_below_its_first_column(narrow: Callable[[str], Terminal]) -> None:
+    screen = narrow("stdout")
+    names = ["metric", "unit", "kinematic", "compliant", "change", "95 % interval", ""]
+    slip = ["slip_per_metre", "m/m", "0.3042", "0.02133", "-93.0 %", "-93.4 to -92.6 %", "better"]
+    rows = [slip, ["peak_force", "BW", "0.65", "0.51", "", "", "same"]]
+    terminal_module.show_table(names, rows, right=[2, 3, 4, 5])
+    assert lines_of(screen) == [
+        "metric          unit  kinematic  compliant   change",
+        "slip_per_metre  m/m      0.3042    0.02133  -93.0 %",
+        "peak_force      BW         0.65       0.51",
+        "",
+        "metric             95 % interval",
+        "slip_per_metre  -93.4 to -92.6 %  better",
+        "peak_force                        same",
+    ]
+
+
+@pytest.mark.parametrize("say", [terminal_module.warn, terminal_module.show_text])
+def test_sentences_are_broken_between_words_on_a_terminal_and_not_in_a_pipe(
+    capsys: pytest.CaptureFixture[str], narrow: Callable[[str], Terminal], say: Callable[[str], None]
+) -> None:
+    text = "kinematic: servo LM.femur works at 1.24 N m RMS, above the limit; see /a/path/that/no/one/may/break/for/it/is/one/word/and/long"
+    say(text)
+    piped = "".join(capsys.readouterr())
+    assert piped.count("\n") == 1
+    screen = narrow("stderr" if say is terminal_module.warn else "stdout")
+    say(text)
+    shown = lines_of(screen)
+    assert all(len(line) <= 60 for line in shown if "/a/path" not in line)
+    assert " ".join(" ".join(shown).split()) == piped.strip()
+
+
+def test_an_error_is_broken_between_words_on_a_terminal(narrow: Callable[[str], Terminal]) -> None:
+    screen = narrow("stderr")
+    assert main(["simulate", "walk_flt"]) == 1
+    shown = lines_of(screen)
+    assert max(map(len, shown)) <= 60
+    assert " ".join(" ".join(shown).split()).endswith("wave; did you mean 'walk_flat'?")
+
+
+def test_a_bar_of_progress_stays_on_its_line(narrow: Callable[[str], Terminal]) -> None:
+    screen = narrow("stderr")
+    with progress_bar("kinematic", 8.0) as tell:
+        assert tell is not None
+        tell(0.0)
+        tell(8.0)
+    last = [line for line in lines_of(screen) if line][-1]
+    assert last.startswith("kinematic")
+    assert "x real time in 0:0" in last
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")
+def test_a_table_fits_a_real_terminal_of_sixty_columns() -> None:
+    import fcntl  # noqa: PLC0415  Unix only
+    import pty  # noqa: PLC0415
+    import termios  # noqa: PLC0415
+
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 60, 0, 0))
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {"TERM": "xterm"}
+    done = subprocess.Popen([*COMMAND, "list", "gaits"], stdout=theirs, env=environment)
+    os.close(theirs)
+    shown = b""
+    while chunk := _read(ours):
+        shown += chunk
+    assert done.wait() == 0
+    lines = plain(shown.decode().replace("\r", ""))
+    assert max(map(len, lines)) <= 60
+    assert [line.split()[-1] for line in lines] == ["RR", "0", "0.6667", "0.6667", "0"]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_speaks_json(name: str) -> None:
+    assert any("--json" in option.opts for option in COMMANDS[name].params)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["export", "-o", "athena.fmu"], ["export", "--fmi", "3", "-o", "athena.fmu"], ["export", "--urdf"], ["export", "--mjcf"],
+        ["export", "--controller", "kinematic"], ["export", "--ssp", "--controller", "kinematic"], ["list", "laws"], ["list", "robots"],
+        ["simulate", "stand", *QUICK],
+    ],
+    ids=" ".join,
+)  # fmt: skip
+def test_json_is_all_that_is_printed(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = call(*arguments, "--json")
+    assert code == 0
+    assert json.loads(out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["simulate", "--nope"], ["No such option: --nope", "hexapod simulate [OPTIONS]", "`hexapod simulate --help`"]),
+        (["simulat"], ["Did you mean 'simulate'", "COMMAND", "--help"]),
+        (["export", "--fmi", "two"], ["--fmi", "integer"]),
+        (["compare", "--seeds", "1.5"], ["--seeds", "integer"]),
+        (["simulate", "stand", "walk_flat"], ["(walk_flat)", "[SCENARIO]"]),
+        (["simulate", "--set"], ["'--set' requires an argument"]),
+        (["report"], ["Missing argument 'DIR'"]),
+        (["list"], ["Missing argument", "robots|scenarios"]),
+        (["report", "nowhere"], ["not a results folder", "got 'nowhere'", "run.json", "hexapod simulate"]),
+        (["report", "file"], ["not a results folder", "got 'file'"]),
+        (["report", "broken"], ["run.json: damaged file", "expected JSON", "run the scenario again"]),
+        (["report", "failed"], ["failed: ", "did not complete", "got 'failed: it fell'", "run it again"]),
+        (["report", "foreign"], ["damaged or foreign results", "got 'no title", "all facts of a run", "run the scenario again"]),
+        (["report", "bare"], ["no recording", "got 'bare'", "results.parquet or results.csv", "hexapod simulate"]),
+        (["validate", "file"], ["not an FMU", "ZIP"]),
+        (["simulate", "--gains", "file"], ["not a TOML file", "TOML 1.0"]),
+        (["simulate", "file"], ["not a TOML file", "correct that line"]),
+        (["export", "--robot", "file"], ["not a TOML file"]),
+    ],
+)
+def test_a_misuse_is_told_in_one_paragraph_of_what_got_expected_and_fix(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("root:x:0", encoding="utf-8")
+    bare = json.dumps(dict.fromkeys(NEEDED, "") | {"status": "completed"})
+    facts = {"broken": "{", "failed": '{"status": "failed", "reason": "it fell"}', "foreign": '{"status": "completed"}', "bare": bare}
+    for name, text in facts.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.json").write_text(text, encoding="utf-8")
+        (tmp_path / name / "metrics.json").write_text("{}", encoding="utf-8")
+    outcome = call(*arguments)
+    assert_refused(outcome, *parts, "got ", "expected ")
+    assert outcome[2].rpartition("; ")[2].strip()  # the fix

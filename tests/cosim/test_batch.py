@@ -1,0 +1,154 @@
+"""Many runs at once: the same figures in whatever processes, nothing lost, nothing left behind."""
+
+from __future__ import annotations
+
+import json
+import math
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from command import COMMAND, settings
+
+from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
+from hexapod_cosim.cosim.results.comparison import read_seeds
+from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
+from hexapod_cosim.cosim.run.batch import run_batch
+from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.cosim.scenario.variation import STANDARD
+
+PATIENCE = 60.0  # s    for what takes a second or two on an idle machine
+
+
+def short(*changes: str) -> Scenario:
+    scenario = load_scenario("walk_flat", overrides=["duration=1.2", "gait.period=0.4", *changes])
+    return replace(scenario, variation=STANDARD)
+
+
+def steady(summary: Summary) -> Summary:
+    """Without the one figure that the machine's load decides and without those that there are none of: no NaN is equal to another."""
+    figures = {name: value for name, value in summary.metrics.items() if name != "realtime_factor" and math.isfinite(value)}
+    return replace(summary, metrics=figures)
+
+
+def test_runs_come_in_order_and_do_not_depend_on_the_processes(plant_build: Path) -> None:
+    kinds = ((2, "kinematic", "athena"), (0, "compliant", "athena"), (1, "kinematic", "phantomx_mk4"))
+    plans = [replace(short(f"control={control}", f"robot={robot}"), seed=seed) for seed, control, robot in kinds]
+    serial, parallel = (list(run_batch(plans, workers=workers)) for workers in (1, 2))
+    assert [(run.seed, run.control) for run in serial] == [(plan.seed, plan.control) for plan in plans]
+    assert list(map(steady, serial)) == list(map(steady, parallel))
+    assert all(run.walked for run in serial)
+    assert serial[0].metrics["slip_per_metre"] != serial[1].metrics["slip_per_metre"]
+
+
+def test_a_run_of_a_batch_is_the_run_by_itself(plant_build: Path) -> None:
+    plan = short("friction.mu=0.5", "torso.mass=3.1")
+    (run,) = run_batch([plan], workers=1)
+    assert steady(run) == steady(summarise(simulate(plan)))
+
+
+def test_a_run_that_fails_or_cannot_begin_says_why_and_the_others_go_on(plant_build: Path) -> None:
+    endless = "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"
+    plans = [
+        short(),
+        short("command.vx=10"),
+        short("robot=nowhere.toml"),
+        short("solver.method=rk4", "solver.step=0.005", endless),
+        short(),
+    ]
+    runs = list(run_batch(plans, workers=2))
+    assert [run.status for run in runs] == [COMPLETED, REFUSED, REFUSED, FAILED, COMPLETED]
+    assert "do not reach" in runs[1].reason
+    assert "nowhere.toml" in runs[2].reason
+    assert "not finite" in runs[3].reason
+    assert not any(run.walked for run in runs[1:4])
+    assert steady(runs[0]) == steady(runs[4])
+
+
+def test_an_empty_batch_is_over_at_once() -> None:
+    assert list(run_batch([])) == []
+
+
+def test_leaving_a_batch_early_ends_the_runs_under_way(plant_build: Path) -> None:
+    plans = [short(), *[replace(short(), duration=60.0)] * 400]
+    begin = time.monotonic()
+    with closing(run_batch(plans, workers=2)) as runs:
+        assert next(runs).walked
+        until_first = time.monotonic() - begin
+    assert time.monotonic() - begin < 5.0 * until_first  # the rest takes some hundred times as long
+    assert multiprocessing.active_children() == []
+
+
+def alive(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def _hear_interrupts() -> None:
+    """A test run in the background starts with them ignored, and its children with it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def begun(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
+    """A comparison in a process group of its own, whose batch has come to run."""
+    plain = settings(long, "gait.period=0.4", "outputs.csv=['torso.roll']")
+    command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "200", *plain]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=_hear_interrupts,  # noqa: PLW1509  no other thread runs here
+    )  # fmt: skip
+    deadline = time.monotonic() + PATIENCE
+    done = folder / "compliant" / "run.json"
+    while time.monotonic() < deadline and not (done.exists() and json.loads(done.read_text())["status"] == COMPLETED):
+        time.sleep(0.05)
+    time.sleep(3.0)  # into the batch
+    return process
+
+
+def assert_none_left(group: int) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while alive(group) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not alive(group)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_comparison_keeps_whole_runs_and_leaves_no_process(
+    plant_build: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    folder = tmp_path / "out"
+    process = begun(folder)
+    try:
+        os.killpg(process.pid, number) if number == signal.SIGINT else process.send_signal(number)
+        out, err = process.communicate(timeout=PATIENCE)
+        assert_none_left(process.pid)
+    finally:
+        process.kill()
+    assert (process.returncode, out) == (130, "")
+    assert "Traceback" not in err
+    assert "seeds.partial.csv" in err
+    assert json.loads((folder / "run.json").read_text())["status"] == "interrupted"
+    runs = read_seeds(folder / "seeds.partial.csv")
+    assert all(run.status == COMPLETED for control in runs.values() for run in control)
+    assert (folder / "kinematic" / "results.csv").is_file()
+    assert not (folder / "seeds.csv").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
+def test_workers_end_when_the_command_is_killed(plant_build: Path, tmp_path: Path) -> None:
+    process = begun(tmp_path / "out")
+    process.kill()
+    process.communicate(timeout=PATIENCE)
+    assert_none_left(process.pid)

@@ -1,0 +1,373 @@
+"""The co-simulation loop: order, times, what is recorded, and how a run ends that does not complete."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_plant import SPEED, FakeController, FakePlant
+
+from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
+from hexapod_cosim.cosim.interface.names import joint_names
+from hexapod_cosim.cosim.master.fmu import Fmu, StepError
+from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, insides, run
+from hexapod_cosim.cosim.master.recorder import Recorder, Recording
+from hexapod_cosim.cosim.master.signals import MEASURED, Signals
+from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.walk import View
+from hexapod_cosim.cosim.results.warnings import describe_walk
+from hexapod_cosim.cosim.run.run import adopt_settings, make_sensor, simulate
+from hexapod_cosim.cosim.scenario.records import Push, Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
+from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
+from hexapod_cosim.models import FmuError, HexapodError, RobotError, load_robot
+
+SHORT = ("duration=0.5", "outputs.plots=false")
+
+
+def scenario_of(*settings: str) -> Scenario:
+    return load_scenario("walk_flat", overrides=settings)
+
+
+def run_fake(plant: FakePlant, controller: JointController, scenario: Scenario) -> Outcome:
+    schedule = make_schedule(scenario)
+    signals = Signals(plant, sensor=make_sensor(scenario, schedule))
+    return run(plant, signals, controller, schedule, Recorder(signals, schedule.times, schedule.rows), h=scenario.macro_step)
+
+
+def test_each_macro_step_reads_controls_sets_and_steps_in_this_order() -> None:
+    plant = FakePlant()
+    run_fake(plant, FakeController(plant.log), scenario_of("duration=0.01"))
+    once = ["controller", "set", "step", "get", "get"]
+    assert plant.log == ["get", "get", *once, *once]
+
+
+def test_times_are_start_plus_k_h_and_not_a_running_sum() -> None:
+    plant, controller = FakePlant(), FakeController()
+    outcome = run_fake(plant, controller, scenario_of("duration=3", "macro_step=0.001", "start=0.1"))
+    expected = [0.1 + k * 0.001 for k in range(3001)]
+    assert outcome.recording.time.tolist() == expected
+    assert controller.times == expected[:-1]
+    assert plant.steps == [(t, 0.001) for t in expected[:-1]]
+
+
+def test_a_row_holds_the_outputs_read_and_the_inputs_set_at_its_time() -> None:
+    outcome = run_fake(FakePlant(), FakeController(), scenario_of("duration=0.05"))
+    recording = outcome.recording
+    assert len(recording.time) == 11
+    np.testing.assert_array_equal(recording.joints("torque_ref")[:-1, 0, 0], recording.time[:-1])
+    np.testing.assert_array_equal(recording.joints("angle")[1:], recording.joints("angle_ref")[:-1])
+    np.testing.assert_allclose(
+        recording.column("torso.position[1]") - recording.column("torso.position[1]")[0], SPEED * recording.time, atol=1e-15
+    )
+
+
+def test_measurements_are_views_on_what_the_plant_gave() -> None:
+    plant = FakePlant()
+    for number, name in enumerate(name for names in MEASURED.values() for name in names):
+        plant.values[name] = float(number)
+    plant.values["LM.foot.contact"] = 1.0
+    signals = Signals(plant)
+    signals.read()
+    measured = signals.measurement
+    shown = [measured.angle, measured.speed, measured.foot_force, measured.quaternion, measured.angular_velocity]
+    assert np.concatenate([array.ravel() for array in shown]).tolist() == list(range(61))
+    assert measured.contact.tolist() == [False, True, False, False, False, False]
+    assert all(np.shares_memory(array, signals.outputs.values) for array in shown)
+    row = dict(zip(signals.names, signals.values.tolist(), strict=True))
+    assert (row["LF.femur.angle"], row["LF.foot.contact"], row["LM.foot.contact"]) == (1.0, 0.0, 1.0)
+
+
+def test_a_step_that_the_plant_refuses_ends_the_run_and_keeps_its_rows() -> None:
+    outcome = run_fake(FakePlant(refuse_at=0.02), FakeController(), scenario_of("duration=0.1"))
+    assert outcome.status == FAILED
+    assert "from 0.02 s" in outcome.reason
+    assert "left the numbers" in outcome.reason
+    np.testing.assert_allclose(outcome.recording.time, [0.0, 0.005, 0.01, 0.015, 0.02])
+    assert outcome.simulated == pytest.approx(0.02)
+
+
+def test_an_interrupt_ends_the_run_and_keeps_its_rows() -> None:
+    outcome = run_fake(FakePlant(refuse_at=0.02, interrupt=True), FakeController(), scenario_of("duration=0.1"))
+    assert outcome.status == INTERRUPTED
+    assert len(outcome.recording.time) == 5
+
+
+def test_a_controller_that_gives_up_ends_the_run() -> None:
+    class Tired(FakeController):
+        def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+            if t > 0.01:
+                raise HexapodError("no more")
+            return super().step(t, command, measurement)
+
+    outcome = run_fake(FakePlant(), Tired(), scenario_of("duration=0.1"))
+    assert (outcome.status, outcome.reason) == (FAILED, "no more")
+    assert len(outcome.recording.time) == 3
+
+
+def test_any_error_of_a_controller_ends_the_run_and_keeps_its_rows() -> None:
+    class Broken(FakeController):
+        def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+            if t > 0.01:
+                raise ValueError("shapes differ")
+            return super().step(t, command, measurement)
+
+    outcome = run_fake(FakePlant(), Broken(), scenario_of("duration=0.1"))
+    assert (outcome.status, outcome.reason) == (FAILED, "ValueError: shapes differ")
+    assert len(outcome.recording.time) == 3
+
+
+class Cautious(FakeController):
+    """Does not believe one foot's sensor in the last quarter of 0.1 s."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        six, never = np.zeros(6), np.zeros(6, dtype=np.bool_)
+        plane = np.zeros(6, dtype=np.complex128)
+        self.diagnostics = Diagnostics(
+            swinging=never, planned=np.zeros((6, 3)), shift=plane, lift=six, unreachable=never, fallback=never.copy()
+        )
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        self.diagnostics.fallback[4] = t > 0.0749
+        return super().step(t, command, measurement)
+
+
+def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told() -> None:
+    scenario, controller = scenario_of("duration=0.1"), Cautious()
+    signals, schedule = Signals(FakePlant()), make_schedule(scenario)
+    recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
+    recording = run(FakePlant(), signals, controller, schedule, recorder, h=scenario.macro_step).recording
+    assert recording.column("controller.RM.fallback").tolist() == [0.0] * 15 + [1.0] * 6
+    assert not recording.column("controller.LM.fallback").any()
+    told = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
+    assert told["fallback"] == pytest.approx(6 / 21)
+
+
+def test_progress_reaches_the_whole_duration() -> None:
+    told: list[float] = []
+    plant = FakePlant()
+    signals, schedule = Signals(plant), make_schedule(scenario_of("duration=1"))
+    run(plant, signals, FakeController(), schedule, Recorder(signals, schedule.times, schedule.rows), h=0.005, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == pytest.approx(1.0)
+
+
+def test_a_command_holds_from_its_time_on() -> None:
+    scenario = scenario_of("duration=0.1", "command=[{vx=0.1}, {time=0.05, yaw_rate=0.2, height='5 mm'}]")
+    controller = FakeController()
+    outcome = run_fake(FakePlant(), controller, scenario)
+    assert controller.commands[9] == BodyCommand(0.1, 0.0, 0.0)
+    assert controller.commands[10] == BodyCommand(0.0, 0.0, 0.2, 0.005)
+    assert outcome.recording.column("command.yaw_rate").tolist() == [0.0] * 10 + [0.2] * 11
+
+
+@pytest.mark.parametrize("h", [0.001, 0.003, 0.005, 0.02])
+def test_the_impulse_of_a_push_does_not_depend_on_the_macro_step(h: float) -> None:
+    push = Push(time=0.0512, duration=0.0371, force=(0.0, 40.0, 0.0), torque=(0.0, 0.0, 2.0))
+    rows = push_rows([push], h * np.arange(100.0, dtype=np.float64), h)
+    np.testing.assert_allclose(rows.sum(axis=0) * h, 0.0371 * np.array([0, 40, 0, 0, 0, 2]), rtol=1e-12)
+
+
+def test_a_push_reaches_the_plant_only_while_it_lasts() -> None:
+    outcome = run_fake(FakePlant(), FakeController(), scenario_of("duration=0.1", "events=[{time=0.02, duration=0.03, force=[1, 2, 3]}]"))
+    pushed = outcome.recording.columns(["torso.push_force[1]", "torso.push_force[3]"])
+    np.testing.assert_allclose(pushed[4:10], [[1.0, 3.0]] * 6)
+    np.testing.assert_allclose(np.delete(pushed, range(4, 10), axis=0), 0.0)
+
+
+def forces_told(seed: int, noise: float) -> np.ndarray:
+    plant, controller = FakePlant(), FakeController()
+    plant.values["LF.foot.force[3]"] = 10.0
+    run_fake(plant, controller, scenario_of("duration=2", f"seed={seed}", f"sensors.foot_force_noise={noise}"))
+    return np.array(controller.forces)
+
+
+def test_force_noise_is_seeded_unbiased_and_of_the_size_asked_for() -> None:
+    told = forces_told(1, 0.05)
+    np.testing.assert_array_equal(told, forces_told(1, 0.05))
+    assert not np.array_equal(told, forces_told(2, 0.05))
+    vertical = told[:, 0, 2]
+    assert vertical.std() == pytest.approx(0.5, rel=0.15)  # 400 samples: 3.5 % standard error
+    assert vertical.mean() == pytest.approx(10.0, abs=0.1)
+    assert not told[:, 1:].any()
+
+
+def test_a_plant_that_lacks_a_variable_is_refused_by_its_name() -> None:
+    with pytest.raises(FmuError, match=r"not a hexapod plant: got 'no LM.femur.angle_ref'"):
+        Signals(FakePlant(missing=["LM.femur.angle_ref"]))
+
+
+def test_a_plant_made_before_acceleration_ref_is_driven_without_it() -> None:
+    old = FakePlant(missing=joint_names("acceleration_ref"))
+    signals = Signals(old)
+    assert not [name for name in signals.names if name.endswith(".acceleration_ref")]
+    signals.push[:] = np.arange(6.0)
+    signals.write(JointCommand(angle_ref=np.full((6, 3), 0.5), acceleration_ref=np.full((6, 3), 7.0)))
+    assert (old.values["RR.tibia.angle_ref"], old.values["torso.push_torque[3]"]) == (0.5, 5.0)
+    new = FakePlant()
+    Signals(new).write(JointCommand(acceleration_ref=np.full((6, 3), 7.0)))
+    assert new.values["RR.tibia.acceleration_ref"] == 7.0
+
+
+def test_a_recording_survives_its_csv_file_bit_for_bit(tmp_path: Path) -> None:
+    data = np.array([[0.0, 1.0 / 3.0, -0.0], [0.005, 1e-300, 1.0]])
+    recording = Recording(("time", "torso.position[1]", "LF.foot.contact"), data)
+    write_csv(recording, tmp_path / "results.csv")
+    again = read_csv(tmp_path / "results.csv")
+    assert again.names == recording.names
+    assert again.data.tobytes() == data.tobytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
+
+
+def test_columns_are_chosen_by_pattern_and_a_misspelt_one_is_refused() -> None:
+    recording = Recording(("time", "torso.position[1]", "torso.position[2]", "LF.foot.contact"), np.zeros((2, 4)))
+    assert recording.chosen(["torso.*[2]", "*.contact"]).names == ("time", "torso.position[2]", "LF.foot.contact")
+    with pytest.raises(HexapodError, match=r"did you mean 'torso.position\[1\]'"):
+        recording.chosen(["torso.positon[1]"])
+    with pytest.raises(HexapodError, match=r"did you mean 'LF.foot.contact'"):
+        recording.column("LF.foot.contakt")
+
+
+# ------------------------------------------------------------------------------------------------ the real FMU
+
+
+def test_fmpy_reads_our_csv_and_our_block_reads_what_fmpy_reads(athena_fmu: Path, tmp_path: Path) -> None:
+    from fmpy.util import read_csv as fmpy_read_csv  # noqa: PLC0415
+
+    with Fmu(athena_fmu) as plant:
+        plant.initialise(0.0, 1.0)
+        block = plant.block(joint_names("angle"))
+        block.get()
+        references = [plant.variables[name].valueReference for name in block.names]
+        assert block.values.tolist() == plant._slave.getReal(references)
+    write_csv(Recording(("time", *block.names), np.array([[0.0, *block.values]])), tmp_path / "results.csv")
+    table = fmpy_read_csv(tmp_path / "results.csv")
+    assert table.dtype.names == ("time", *block.names)
+    assert table["LF.femur.angle"][0] == block.values[1]
+
+
+def test_a_block_fills_the_buffer_it_is_given_and_refuses_one_that_does_not_fit(athena_fmu: Path) -> None:
+    names = joint_names("angle")
+    with Fmu(athena_fmu) as plant:
+        plant.initialise(0.0, 1.0)
+        own, row = plant.block(names), np.full(40, np.nan)
+        given = plant.block(names, row[3:21])
+        own.get()
+        given.get()
+        np.testing.assert_array_equal(row[3:21], own.values)
+        assert np.isnan(row[:3]).all()
+        assert np.isnan(row[21:]).all()
+        for buffer in (row[:17], row[:36:2], np.zeros(18, dtype=np.int32)):
+            with pytest.raises(FmuError, match="not a buffer for these variables"):
+                plant.block(names, buffer)
+
+
+@pytest.fixture(scope="module")
+def walked(plant_build: Path) -> Result:
+    return simulate(scenario_of(*SHORT))
+
+
+def test_the_robot_sets_out_and_stays_up(walked: Result) -> None:
+    assert walked.outcome.status == COMPLETED
+    assert walked.facts["walk"]["upright"]
+    position = walked.outcome.recording.vector("torso.position")
+    assert position[-1, 0] - position[0, 0] > 0.002  # m: half a second, most of it ramp
+
+
+def test_a_run_repeated_is_the_same_bit_for_bit(walked: Result) -> None:
+    again = simulate(scenario_of(*SHORT))
+    np.testing.assert_array_equal(again.outcome.recording.data, walked.outcome.recording.data)
+
+
+def test_a_given_fmu_of_the_robot_walks_like_the_exported_one(walked: Result, athena_fmu: Path) -> None:
+    again = simulate(scenario_of(*SHORT), fmu=athena_fmu)
+    np.testing.assert_array_equal(again.outcome.recording.data, walked.outcome.recording.data)
+
+
+def test_settings_reach_a_given_fmu(athena_fmu: Path) -> None:
+    robot = scenario_robot(scenario_of("friction.mu=0.4", "contact.law=flores", "servo.kp=50"))
+    with Fmu(athena_fmu) as plant:
+        adopt_settings(plant, robot)
+        parameters = plant.parameters()
+    assert (parameters["friction.mu"], parameters["contact.law"], parameters["servo.kp"]) == (0.4, 2, 50.0)
+
+
+def test_the_fmu_of_another_robot_is_refused(athena_fmu: Path) -> None:
+    with Fmu(athena_fmu) as plant, pytest.raises(FmuError, match=r"the FMU holds another robot: torso\.mass: got 2\.6, expected 1\.52"):
+        adopt_settings(plant, load_robot("phantomx_mk4"))
+
+
+def test_a_parameter_of_the_fmu_can_be_set_by_name(plant_build: Path) -> None:
+    scenario = scenario_of("duration=0.05", "torso.mass=3.6")
+    result = simulate(scenario)
+    assert result.parameters["torso.mass"] == 3.6
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"torso.mas": 1.0}, "the FMU has no such variable: got 'torso.mas'; did you mean 'torso.mass'"),
+        ({"LF.coxa.angle": 1.0}, "not a parameter: got 'LF.coxa.angle', expected a parameter, and this is an output"),
+        ({"torso.mass": -1.0}, r"athena.fmu: torso.mass: got -1"),
+        ({"torso.mass": "heavy"}, "parameter torso.mass is refused: got 'heavy', expected a number"),
+        ({"contact.law": "herz"}, "unknown choice for contact.law: got 'herz'.*did you mean 'hertz'"),
+    ],
+)
+def test_a_wrong_parameter_is_refused_by_name(athena_fmu: Path, values: dict[str, object], message: str) -> None:
+    with Fmu(athena_fmu) as plant, pytest.raises(FmuError, match=message):
+        plant.set_parameters(values)
+
+
+@pytest.mark.parametrize("h", [-0.005, float("nan")])
+def test_an_impossible_step_is_refused_with_the_fmus_words(athena_fmu: Path, h: float) -> None:
+    with Fmu(athena_fmu) as plant:
+        plant.initialise(0.0, 1.0)
+        with pytest.raises(StepError, match=r"the step from 0 s: got '.+'"):
+            plant.step(0.0, h)
+
+
+def test_a_robot_that_cannot_be_is_refused_at_initialisation(athena_fmu: Path) -> None:
+    with Fmu(athena_fmu) as plant:
+        plant.set_parameters({"torso.inertia_xx": 10.0})
+        with pytest.raises(FmuError, match="inertia"):
+            plant.initialise(0.0, 1.0)
+
+
+def make_zip(path: Path, members: dict[str, str]) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in members.items():
+            archive.writestr(name, text)
+    return path
+
+
+def test_what_is_no_fmu_is_refused_before_anything_is_loaded(tmp_path: Path, athena_fmu: Path) -> None:
+    plain = tmp_path / "plain.fmu"
+    plain.write_text("no archive")
+    with zipfile.ZipFile(athena_fmu) as archive:
+        description = archive.read("modelDescription.xml").decode("utf-8")
+    cases = {
+        "no such FMU": tmp_path / "missing.fmu",
+        "not an FMU": plain,
+        "not an FMU: got .There is no item": make_zip(tmp_path / "empty.fmu", {"other.txt": ""}),
+        "cannot be read": make_zip(tmp_path / "broken.fmu", {"modelDescription.xml": "<fmi"}),
+        "the FMU cannot be loaded": make_zip(tmp_path / "hollow.fmu", {"modelDescription.xml": description}),
+    }
+    for message, path in cases.items():
+        folder = Path.cwd()
+        with pytest.raises(FmuError, match=message):
+            Fmu(path)
+        assert Path.cwd() == folder
+
+
+def test_settings_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(RobotError, match="rk4 has no error control"):
+        scenario_robot(scenario_of("solver.method=rk4"))
+
+
+def test_the_gait_of_the_scenario_leaves_the_robot_what_it_is() -> None:
+    assert scenario_robot(scenario_of("gait.name=wave")) == replace(load_robot("athena"))

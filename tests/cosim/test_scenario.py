@@ -1,0 +1,343 @@
+"""Scenario files: what they may say, what --set does, and that every mistake is told by file, key, what was got and what is allowed."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.controller import Controller, Parts, make_gait
+from hexapod_cosim.cosim.common.toml_text import to_toml
+from hexapod_cosim.cosim.run.run import known_robot
+from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
+from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_a_bundled_scenario_loads_and_fits_its_robot(name: str) -> None:
+    scenario = load_scenario(name)
+    robot = scenario_robot(scenario)
+    gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
+    Controller(robot, period=scenario.macro_step, gait=gait, gains=None)
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_the_scenario_as_run_reads_back_as_the_same(name: str) -> None:
+    scenario = load_scenario(name)
+    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+
+
+def test_the_default_scenario_is_the_papers_walk() -> None:
+    scenario = load_scenario("walk_flat")
+    assert (scenario.robot, scenario.control, scenario.duration, scenario.macro_step, scenario.seed) == (
+        "athena",
+        "kinematic",
+        10.0,
+        0.005,
+        0,
+    )
+    assert scenario.commands[0].vx == 0.08
+    assert scenario.settings["gait"] == {"name": "tripod"}
+    assert scenario.steps == 2000
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [("macro_step=5 ms", 0.005), ("macro_step=0.004", 0.004), ("duration=1 min", 60.0), ("duration=2", 2.0), ("start=-3", -3.0)],
+)
+def test_a_quantity_may_say_its_unit(setting: str, value: float) -> None:
+    key = setting.partition("=")[0]
+    assert getattr(load_scenario("walk_flat", overrides=[setting]), key) == value
+
+
+def test_units_reach_into_commands_events_and_settings() -> None:
+    overrides = [
+        "command.yaw_rate=10 deg/s",
+        "command.height=-5 mm",
+        "terrain.kind=slope",
+        "terrain.incline=5 deg",
+        "events=[{time='10 ms', duration=1, force=['1 kN', 0, 0]}]",
+    ]
+    scenario = load_scenario("walk_flat", overrides=overrides)
+    assert scenario.commands[0].yaw_rate == pytest.approx(math.radians(10.0))
+    assert scenario.commands[0].height == -0.005
+    assert scenario.settings["terrain"]["incline"] == pytest.approx(math.radians(5.0))
+    assert (scenario.pushes[0].time, scenario.pushes[0].force) == (0.01, (1000.0, 0.0, 0.0))
+
+
+def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
+    overrides = ["robot=phantomx_mk4", "contact.law=hertz", "LF.femur.mass=0.3", "outputs.csv=['torso.*']"]
+    scenario = load_scenario("walk_flat", overrides=overrides)
+    assert scenario.robot == "phantomx_mk4"
+    assert scenario.settings["contact"] == {"law": "hertz"}
+    assert scenario.parameters == {"LF.femur.mass": 0.3}
+    assert scenario.outputs.csv == ("torso.*",)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "gravity"),
+    [
+        (["gravity=1.62"], (0.0, 0.0, -1.62)),
+        (["gravity=3.71 m/s2"], (0.0, 0.0, -3.71)),
+        (["gravity=[0.5, 0, -1.5]"], (0.5, 0.0, -1.5)),
+        (["gravity[3]=-1.62"], (0.0, 0.0, -1.62)),
+        (["gravity[1]=0.5"], (0.5, 0.0, -9.81)),
+        (["gravity=3.71", "gravity[2]=0.1"], (0.0, 0.1, -3.71)),
+    ],
+)
+def test_gravity_is_a_number_a_vector_or_an_fmu_parameter_and_all_are_one_key(
+    overrides: list[str], gravity: tuple[float, float, float]
+) -> None:
+    scenario = load_scenario("walk_flat", overrides=overrides)
+    assert scenario.gravity == gravity
+    assert scenario.parameters == {}
+    assert scenario_robot(scenario).gravity == known_robot(scenario).gravity == gravity
+    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+
+
+def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
+    scenario = load_scenario("walk_flat")
+    assert scenario.gravity is None
+    assert scenario_robot(scenario).gravity == (0.0, 0.0, -9.81)
+    assert "gravity" not in scenario.to_table()
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("gravity=-1.62", r"walk_flat\.toml: gravity: value not allowed: got -1\.62, expected a finite number > 0 \[m/s2\]"),
+        ("gravity=0", r"gravity: value not allowed: got 0, expected a finite number > 0"),
+        ("gravity=[0, -1.62]", r"gravity: wrong length: got \[0, -1\.62\], expected 3 numbers \[m/s2\]"),
+        ("gravity=1.62 m", r"gravity: wrong unit: got '1\.62 m', expected a value in m/s2"),
+        ("gravity[3]=low", r"parameters\.gravity\[3\]: wrong type: got 'low'"),
+    ],
+)
+def test_impossible_gravity_is_refused(override: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("walk_flat", overrides=[override])
+
+
+@pytest.mark.parametrize("override", ["gravity=[0, 0, 1.62]", "gravity[3]=1.62", "gravity=[0, 0, 0]"])
+def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(override: str) -> None:
+    scenario = load_scenario("walk_flat", overrides=[override])
+    with pytest.raises(ScenarioError, match=r"gravity: nothing stands under this gravity: .* write gravity = 1\.62"):
+        scenario_robot(scenario)
+
+
+def test_static_friction_is_the_kinetic_one_unless_said() -> None:
+    robot = scenario_robot(load_scenario("walk_flat", overrides=["friction.mu=0.9"]))
+    assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.0)
+
+
+@pytest.mark.parametrize("law", ["tanh", "none"])
+def test_static_friction_is_refused_where_it_has_no_effect(law: str) -> None:
+    scenario = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"])
+    message = rf"friction\.mu_static: static friction that has no effect: got '0\.8 with the law {law}', expected friction\.law = bristle"
+    with pytest.raises(RobotError, match=message):
+        scenario_robot(scenario)
+    sticks = load_scenario("walk_flat", overrides=["friction.law=bristle", "friction.mu_static=0.8"])
+    assert scenario_robot(sticks).friction.mu_static == 0.8
+    same = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"])  # the kinetic one's
+    assert scenario_robot(same).friction.mu_static == 0.7
+
+
+def test_a_first_command_later_than_the_start_is_preceded_by_standing() -> None:
+    scenario = load_scenario("walk_flat", overrides=["command=[{time=1, vx=0.1}]"])
+    assert [(command.time, command.vx) for command in scenario.commands] == [(0.0, 0.0), (1.0, 0.1)]
+
+
+def test_a_robot_file_is_found_beside_its_scenario(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('robot = "robot.toml"\n')
+    (tmp_path / "robot.toml").write_text("name = 3\n")
+    scenario = load_scenario(tmp_path / "mine.toml")
+    assert Path(scenario.robot) == tmp_path / "robot.toml"
+    with pytest.raises(RobotError, match=r"robot\.toml"):
+        scenario_robot(scenario)
+
+
+EVERYTHING = [
+    "events=[{time=1, leg='LM', fault='stuck'}, {time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
+    "sensors.foot_force_delay=7 ms", "compliance.slip_pid=false", "variation.attitude=1 deg", "variation.command_delay=50 ms",
+]  # fmt: skip
+
+
+def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
+    scenario = load_scenario("walk_flat", overrides=EVERYTHING)
+    assert [(event.leg, event.fault, event.duration) for event in scenario.faults] == [("LM", "stuck", math.inf), ("RF", "dead", 0.02)]
+    assert [event.force for event in scenario.pushes] == [(1.0, 2.0, 3.0)]
+    assert scenario.sensors.foot_force_delay == 0.007
+    assert scenario.compliance == Parts(slip_pid=False)
+    assert scenario.variation == Variation(attitude=math.radians(1.0), command_delay=0.05)
+    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+
+
+def test_every_part_of_the_compliance_is_a_switch_that_is_on() -> None:
+    assert asdict(load_scenario("walk_flat").compliance) == asdict(Parts())
+    for name in asdict(Parts()):
+        parts = asdict(load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance)
+        assert [key for key, on in parts.items() if not on] == [name]
+
+
+MISTAKES = {
+    "duraton=3": ["--set", "'duraton'", "did you mean 'duration'"],
+    "duration": ["'duration'", "expected NAME=VALUE"],
+    "duration=": ["expected NAME=VALUE"],
+    "contact.stifness=1": ["walk_flat.toml", "contact", "'stifness'", "did you mean 'stiffness'"],
+    "contact.law=herz": ["contact.law", "'herz'", "did you mean 'hertz'"],
+    "control=complaint": ["control", "'complaint'", "did you mean 'compliant'"],
+    "macro_step=5 mm": ["macro_step", "'5 mm'", "a value in s or ms"],
+    "macro_step=0": ["macro_step", "got 0", "> 0"],
+    "macro_step=-0.005": ["macro_step", "got -0.005", "> 0"],
+    "macro_step=1": ["macro_step", "<= 0.1"],
+    "macro_step=0.003": ["duration", "multiple of macro_step = 0.003", "9.999"],
+    "duration=1e9": ["walk_flat.toml: duration: ", "too many macro-steps", "at most 1000000 macro-steps, 5000 s", "lengthen macro_step"],
+    "duration=1e308": ["too many macro-steps"],
+    "outputs.interval=0.012": ["outputs.interval", "got 0.012", "multiple of macro_step = 0.005", "0.01 is the nearest"],
+    "outputs.interval=0.001": ["outputs.interval", "multiple of macro_step = 0.005", "0.005 is the nearest"],
+    "outputs.interval=-0.01": ["outputs.interval", "got -0.01", ">= 0"],
+    "outputs.interval=often": ["outputs.interval", "'often'"],
+    "macro_step=1e-9": ["too many macro-steps", "0.001 s with macro_step = 1e-09 s"],
+    "macro_step=5e-324": ["too many macro-steps"],
+    "fricton.mu=1": ["--set fricton.mu: ", "did you mean 'friction.mu'"],
+    "gat.period=1": ["--set gat.period: ", "did you mean 'gait.period'"],
+    "torso.mas=1": ["--set torso.mas: ", "did you mean 'torso.mass'"],
+    "torso.roll=1": ["--set torso.roll: ", "a parameter of the FMU; this is an output"],
+    "duration=-1": ["duration", "got -1"],
+    "duration=nan": ["duration", "got nan", "finite"],
+    "duration=ten": ["duration", "'ten'", "number"],
+    "seed=-1": ["seed", "got -1", "whole number"],
+    "seed=0.5": ["seed", "got 0.5", "whole number"],
+    "robot=3": ["robot", "got 3", "text"],
+    "gait.stride=0.1": ["gait", "'stride'", "period"],
+    "gait.duty=1": ["gait.duty", "got 1", "< 1"],
+    "command.vz=1": ["command", "'vz'", "vx"],
+    "command=[{time=1},{time=0}]": ["command", "order", "time"],
+    "command=3": ["command", "got 3", "table"],
+    "events={time=1}": ["events", "[[events]]"],
+    "events=[{time=1}]": ["events[0].duration", "missing key"],
+    "events=[{time=1, duration=1, force=[1, 2]}]": ["events[0].force", "3 numbers"],
+    "events=[{time=1, duration=1, force=['1 N', '2 Nm', 0]}]": ["events[0].force[1]", "'2 Nm'", "N"],
+    "sensors.foot_force_noise=2": ["foot_force_noise", "got 2", "< 1"],
+    "events=[{time=1, leg='LF'}]": ["events[0].fault", "missing key", "dead, stuck"],
+    "events=[{time=1, leg='LX', fault='dead'}]": ["events[0].leg", "'LX'", "LF, LM"],
+    "events=[{time=1, leg='LF', fault='deaf'}]": ["events[0].fault", "did you mean 'dead'"],
+    "events=[{time=1, leg='LF', fault='dead', duration=0}]": ["events[0].duration", "> 0"],
+    "events=[{time=1, leg='LF', fault='dead', force=[1,2,3]}]": ["events[0]", "'force'", "leg"],
+    "events=[{time=1, leg='LF', falt='dead'}]": ["events[0]", "did you mean 'fault'"],
+    "events=[3]": ["events[0]", "got 3", "table"],
+    "sensors.foot_force_delay=-0.01": ["foot_force_delay", ">= 0"],
+    "sensors.foot_force_delay=10 mm": ["foot_force_delay", "'10 mm'", "ms"],
+    "compliance.slip_pd=false": ["compliance", "did you mean 'slip_pid'"],
+    "compliance.slip_pid=0": ["compliance.slip_pid", "got 0", "true or false"],
+    "complaince.slip_pid=false": ["--set complaince.slip_pid: ", "did you mean 'compliance.slip_pid'"],
+    "compliance=3": ["compliance", "got 3", "table"],
+    "variation.height=-1 mm": ["variation.height", ">= 0"],
+    "variation.hight=1 mm": ["variation", "did you mean 'height'"],
+    "outputs.csv=torso": ["outputs.csv", "list"],
+    "outputs.formats=['xlsx']": ["outputs.formats", "xlsx", "parquet, csv"],
+    "outputs.formats=csv": ["outputs.formats", "list"],
+    "outputs.formats=[]": ["outputs.formats", "one or both"],
+    "outputs.plots=1": ["outputs.plots", "true or false"],
+    "outputs.png=true": ["outputs", "'png'", "plots"],
+    "contact=3": ["contact", "got 3", "table"],
+}
+
+
+@pytest.mark.parametrize("setting", MISTAKES)
+def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("walk_flat", overrides=[setting])
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in MISTAKES[setting]:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("macro_step = 0", "macro_step"),
+        ("macro_step = '5 mm'", "macro_step"),
+        ("duration = 1e9", "duration"),
+        ("duration = 0.0123", "duration"),
+        ("seed = -1", "seed"),
+        ("robot = 3", "robot"),
+        ("command = {vx = 'a'}", "command.vx"),
+        ("command = {vx = '1 kg'}", "command.vx"),
+        ("events = 3", "events"),
+        ("events = [{time = 1}]", "events[0].duration"),
+        ("gait = {duty = 1}", "gait.duty"),
+        ("gait = {duti = 1}", "gait"),
+        ("outputs = {plots = 1}", "outputs.plots"),
+        ("parameters = 3", "parameters"),
+        ("parameters = {'fricton.mu' = 1}", "parameters"),
+        ("parameters = {torso.mass = 1}", "parameters"),
+    ],
+)
+def test_a_mistake_in_a_file_is_told_by_file_then_key(tmp_path: Path, text: str, place: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(path)
+    assert caught.value.where == f"{path}: {place}"
+
+
+def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_without_quotes_with_them(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("parameters = {'torso.mas' = 1}")
+    with pytest.raises(ScenarioError, match=r"got 'torso\.mas'.*did you mean 'torso\.mass'"):
+        load_scenario(path)
+    path.write_text("parameters = {torso.mass = 1}")
+    with pytest.raises(ScenarioError, match=r"in quotes: \"torso\.mass\""):
+        load_scenario(path)
+
+
+def test_the_longest_run_allowed_is_allowed() -> None:
+    assert load_scenario("walk_flat", overrides=[f"duration={0.005 * MAX_STEPS}"]).steps == MAX_STEPS
+
+
+def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
+    with pytest.raises(ScenarioError, match="did you mean 'walk_flat'"):
+        load_scenario("walk_flt")
+    with pytest.raises(RobotError, match="did you mean 'athena'"):
+        scenario_robot(load_scenario("walk_flat", overrides=["robot=atena"]))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("duration = ", "not a TOML file"), ("durration = 1", "did you mean 'duration'"), ("\udc80", "not a TOML file")]
+)
+def test_a_bad_file_is_told_by_its_name(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_bytes(text.encode("utf-8", errors="surrogateescape"))
+    with pytest.raises(ScenarioError, match=message) as caught:
+        load_scenario(path)
+    assert "mine.toml" in str(caught.value)
+    with pytest.raises(ScenarioError, match="cannot read the scenario"):
+        load_scenario(tmp_path / "missing.toml")
+
+
+def test_all_errors_share_the_one_base() -> None:
+    with pytest.raises(HexapodError):
+        load_scenario("walk_flat", overrides=["duration=0"])
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"a": 1, "b": 0.1, "c": True, "d": 'say "ü"\n', "e": [1, 2.5, "x"], "f": []},
+        {"plain": 1, "table": {"inner": {"deep": -1e-300}}, "list": [{"a": 1}, {"a": 2, "b": {"c": [1]}}]},
+        {"dotted.key": {"torso.com[1]": 0.5}, "spaced key": 1},
+    ],
+)
+def test_toml_text_reads_back_as_the_table(table: dict[str, object]) -> None:
+    assert tomllib.loads(to_toml(table)) == table
+
+
+def test_the_robots_gait_is_used_where_the_scenario_gives_none() -> None:
+    robot = load_robot("phantomx_mk4")
+    scenario = load_scenario("phantomx_walk")
+    assert make_gait(robot, **dict(scenario.settings.get("gait", {}))).period == robot.gait.period

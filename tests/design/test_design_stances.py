@@ -1,0 +1,258 @@
+"""Where the design looks at a robot: at rest on six legs and on tripods, or not at all.
+
+Whatever its size, and wherever its masses are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_robots import centre_of_mass
+from scaled_robots import scaled_robot
+
+from hexapod_cosim.controller import GainsError, LegSolver, Requirements
+from hexapod_cosim.controller.design import StandingPlant, design_gains
+from hexapod_cosim.controller.design.standing import answers
+from hexapod_cosim.controller.size import requirements_for
+from hexapod_cosim.cosim.design.design import STANCES, design_for, examine_stances, level_fmu
+from hexapod_cosim.cosim.design.linearise import Bench, linearise
+from hexapod_cosim.cosim.design.standing import StanceError, lifted_stance, loads, rest
+from hexapod_cosim.models import Robot, load_robot
+
+PERIOD = 0.005  # s
+STILL = 1e-3  # m or rad    that a robot at rest moves by in a second; feet creep by some 0.1 mm
+ROUNDING = 1e-9
+TRIPOD = STANCES["tripod LF LR RM"]
+pytestmark = pytest.mark.usefixtures("plant_build")
+
+
+def off_centre(x: float, y: float, z: float) -> Robot:
+    robot = load_robot("athena")
+    return replace(robot, torso=replace(robot.torso, com=(x, y, z)))
+
+
+def soft(kp: float) -> Robot:
+    robot = load_robot("athena")
+    return replace(robot, servo=replace(robot.servo, kp=kp))
+
+
+def strong(torque_max: float) -> Robot:
+    robot = load_robot("athena")
+    return replace(robot, servo=replace(robot.servo, torque_max=torque_max))
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [soft(28.0), off_centre(0.05, 0.05, 0.1), scaled_robot(load_robot("athena"), 0.3)],
+    ids=["soft", "off", "small"],
+)
+@pytest.mark.parametrize("load", [0.1, 2.0])
+def test_a_robot_at_rest_stays_where_it_is(robot: Robot, load: float) -> None:
+    with level_fmu(robot) as fmu:
+        motion, inputs = rest(fmu, robot, standing=TRIPOD, load=load)
+        bench = Bench(fmu, robot, coulomb_friction=0.0, slope=0.1 * robot.friction.slope, period=0.05)
+        bench.start(motion, inputs)
+        forces = bench.force()[2::3]
+        for k in range(20):
+            bench.step(k)
+        moved = bench.motion().less(motion)[:24]
+    assert (forces > 0.0).tolist() == [True, False, True, False, True, False]
+    assert forces.sum() == pytest.approx(load * robot.weight, rel=1e-3)
+    assert np.abs(moved).max() < STILL
+
+
+@pytest.mark.parametrize("load", [0.1, 1.0, 2.0])
+@pytest.mark.parametrize("stance", list(STANCES))
+def test_a_push_that_makes_a_load_leaves_every_foot_at_least_half_its_share(stance: str, load: float) -> None:
+    """Statics: forces, weight and push are in balance about any point.
+
+    The share is what the foot has under the weight alone.
+    """
+    robot = off_centre(0.12, 0.03, 0.0)
+    angle, standing = lifted_stance(robot, STANCES[stance]), STANCES[stance]
+    feet, com = LegSolver(robot).forward(angle)[:, :2], np.array(robot.torso.com)[:2]
+    share, push = loads(robot, angle, standing, load=load)
+    # a mean of that many thirds is the weight
+    alone = loads(robot, angle, standing, load=3.0 / len(standing))[0]
+    whole = load * len(standing) / 3.0  # 1    of the weight
+    assert share.sum() == pytest.approx(whole * robot.weight, rel=ROUNDING)
+    assert push[[0, 1, 5]].tolist() == [0.0, 0.0, 0.0]
+    np.testing.assert_array_less(0.5 * whole * alone - ROUNDING, share)
+    # about the torso's origin: sum f x = W x_c - F x_t + tau_y, sum f y = W y_c - F y_t - tau_x
+    moment = robot.weight * lifted_centre(robot, angle) - push[2] * com + np.array([push[4], -push[3]])
+    np.testing.assert_allclose(share @ feet, moment, atol=1e-9)
+
+
+def lifted_centre(robot: Robot, angle: np.ndarray) -> np.ndarray:
+    posed = replace(
+        robot,
+        legs=tuple(replace(leg, stance=tuple(row)) for leg, row in zip(robot.legs, angle.tolist(), strict=True)),
+    )
+    return centre_of_mass(posed)
+
+
+def test_a_torso_whose_feet_keep_their_shares_is_pushed_at_its_own_centre() -> None:
+    for name in ("athena", "phantomx_mk4"):
+        robot = load_robot(name)
+        for standing in STANCES.values():
+            push = loads(robot, lifted_stance(robot, standing), standing, load=0.1)[1]
+            assert push[3:].tolist() == [0.0, 0.0, 0.0]
+            assert push[2] == pytest.approx((1.0 - 0.1 * len(standing) / 3.0) * robot.weight)
+
+
+def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> None:
+    robot = load_robot("athena")
+
+    def lifts(robot: Robot) -> np.ndarray:
+        legs = LegSolver(robot)
+        return (legs.forward(lifted_stance(robot, TRIPOD)) - legs.forward(robot.stance))[:, 2]
+
+    def bending(most: float) -> Robot:
+        """With tibias that bend by so much beyond the stance [rad]."""
+        links = [(*leg.links[:2], replace(leg.links[2], angle_max=leg.stance[2] + most)) for leg in robot.legs]
+        return replace(
+            robot,
+            legs=tuple(replace(leg, links=of) for leg, of in zip(robot.legs, links, strict=True)),
+        )
+
+    lifted = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0])
+    np.testing.assert_allclose(lifts(robot), 0.04 * lifted, atol=1e-12)
+    np.testing.assert_allclose(lifts(scaled_robot(robot, 0.5)), 0.04 * 0.16 / 0.22 * lifted, atol=1e-12)  # legs of 0.16 m
+    np.testing.assert_allclose(lifts(scaled_robot(robot, 2.0)), 0.04 * 0.64 / 0.44 * lifted, atol=1e-12)
+    np.testing.assert_allclose(lifts(bending(0.2)), 0.02 * lifted, atol=1e-12)
+    with pytest.raises(
+        StanceError,
+        match=r"a foot cannot be lifted: got 'leg LM', expected 0.01 m within the joints' limits; widen",
+    ):
+        lifts(bending(0.01))
+
+
+def test_servos_however_weak_carry_any_load_while_the_plant_is_looked_at() -> None:
+    found = []
+    for most in (3.0, 300.0):
+        robot = strong(most)
+        with level_fmu(robot) as fmu:
+            motion, inputs = rest(fmu, robot, standing=TRIPOD, load=2.0)
+            found.append(linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=0.0))
+    assert np.abs(found[0].torque).max() > 6.0
+    np.testing.assert_allclose(found[0].force, found[1].force, atol=1e-6)
+    np.testing.assert_allclose(found[0].system.A, found[1].system.A, atol=1e-6)
+
+
+def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
+    """Tripods have no foot before the centre of mass of a torso so heavy in front; six legs have."""
+    gains = design_for(off_centre(0.3, 0.0, 0.0), PERIOD)
+    assert len(gains.caveats) == 3
+    for text, stance, y, leg in zip(gains.caveats, ("LF LR RM", "LM RF RR"), ("1", "-1"), ("LR", "RR"), strict=False):
+        assert text == (
+            f"the design leaves out tripod {stance}: the robot does not stay on its legs (got the centre of mass at (139, {y}) mm, "
+            f"under which foot {leg} carries nothing, expected between {stance})"
+        )
+    assert gains.caveats[2].startswith("the design's slip_rejection is 0.")
+    assert "six legs" in gains.margins.binding
+
+
+def test_loads_under_which_a_soft_robot_finds_no_rest_are_left_out() -> None:
+    plants, left_out = examine_stances(soft(15.0), PERIOD)
+    assert [name for name in plants if "load 2" in name] == [
+        "six legs, load 2, gears stick",
+        "six legs, load 2, gears slip",
+    ]
+    assert [text.split(":")[0] for text in left_out] == [f"tripod {legs} under 2 times its weight" for legs in ("LF LR RM", "LM RF RR")]
+    assert all("the robot does not stay on its legs (got " in text and " rad/s after " in text for text in left_out)
+
+
+def test_stances_that_the_servos_do_not_carry_are_left_out_and_a_robot_that_none_carries_is_refused(
+    plants: dict[str, StandingPlant],
+) -> None:
+    """Static torque of the ATHENA-like robot: 3.14 N m on a tripod, 2.20 N m on six legs."""
+    gains = design_gains(strong(3.0), PERIOD, plants=plants)
+    limit = "expected at most 2.7 N m, torque_share x servo.torque_max)"
+    assert gains.caveats == tuple(
+        f"the design leaves out standing on {legs}: the servos do not carry the robot (got 3.14 N m, {limit}"
+        for legs in ("LF LR RM", "LM RF RR")
+    )
+    assert gains.margins.support_torque == pytest.approx(2.2, abs=0.01)
+    assert design_gains(strong(3.6), PERIOD, plants=plants).caveats == ()
+    with pytest.raises(
+        GainsError,
+        match=r"the servos do not carry the robot: got '2.2 N m', expected at most 1.8 N m.*; stronger servos",
+    ):
+        design_gains(strong(2.0), PERIOD, plants=plants)
+
+
+@pytest.fixture(scope="module")
+def plants(plant_build: object) -> dict[str, StandingPlant]:
+    return examine_stances(load_robot("athena"), PERIOD)[0]
+
+
+def test_a_robot_that_stands_on_no_legs_is_refused() -> None:
+    """Hips so far back that the torso's weight lies before all feet."""
+    robot = load_robot("athena")
+    legs = tuple(replace(leg, hip_position=(leg.hip_position[0] - 0.5, *leg.hip_position[1:])) for leg in robot.legs)
+    with pytest.raises(GainsError, match="does not stand"):
+        design_for(replace(robot, legs=legs), PERIOD)
+
+
+def test_answers_go_with_the_load_up_to_two_thirds_of_the_weight(
+    plants: dict[str, StandingPlant],
+) -> None:
+    robot, plant = load_robot("athena"), plants["six legs, load 1, gears slip"]
+    share = robot.weight / 3.0
+    uneven = replace(
+        plant,
+        force=plant.force * 0.0 + share * np.outer([0.5, 1.0, 1.9, 2.1, 3.0, 4.1], [0.0, 0.0, 1.0]),
+    )
+    np.testing.assert_allclose(answers(robot, uneven)[0], [0.5, 1.0, 1.9, 2.0, 2.0, 2.0])
+
+
+def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
+    """Froude: a robot twice as large, with a period and delays that are sqrt(2) times as long.
+
+    All its times are sqrt(2) times as long.
+    """
+    period, found = 0.007, []
+    for by in (2.0, 4.0):
+        time, robot = (by / 2.0) ** 0.5, scaled_robot(load_robot("athena"), by)
+        needs = requirements_for(robot, force_delay=0.014 * time, filter_time=0.014 * time)
+        found.append(design_for(robot, period * time, needs))
+    small, large = found
+    length, time, force = 2.0, 2.0**0.5, 8.0
+    assert large.slip.ki * time == pytest.approx(small.slip.ki, rel=1e-4)
+    assert (large.slip.kp, large.slip.limit) == pytest.approx((small.slip.kp, small.slip.limit), rel=1e-4)
+    assert large.slip.kd == pytest.approx(small.slip.kd * time, rel=1e-4)
+    assert large.slip.load_time == pytest.approx(small.slip.load_time * time)
+    assert large.suspension.stiffness == pytest.approx(small.suspension.stiffness * force / length)
+    assert large.suspension.mass == pytest.approx(small.suspension.mass * force / length * time**2)
+    assert large.suspension.limit == pytest.approx(small.suspension.limit * length)
+    for name, by in (
+        ("attitude_rate", 1.0 / time), ("height_rate", 1.0 / time), ("ground_time", time), ("angle_limit", 1.0),
+        ("height_limit", length), ("path_rate", 1.0 / time), ("speed_limit", length / time), ("turn_limit", 1.0 / time),
+    ):  # fmt: skip
+        assert getattr(large.hold, name) == pytest.approx(by * getattr(small.hold, name)), name
+    assert large.support.handover_time == pytest.approx(small.support.handover_time * time)
+    assert large.support.weight_time == pytest.approx(small.support.weight_time * time)
+    assert large.margins.slip_crossover * time == pytest.approx(small.margins.slip_crossover, rel=1e-3)
+    assert large.margins.slip_rejection == pytest.approx(small.margins.slip_rejection, rel=1e-3)
+
+
+def test_figures_are_those_of_the_package_for_legs_of_22_to_44_cm() -> None:
+    robot = load_robot("athena")  # legs of 0.32 m
+    for by in (0.69, 1.0, 1.37):
+        assert requirements_for(scaled_robot(robot, by)) == Requirements()
+    assert requirements_for(load_robot("phantomx_mk4")) == Requirements()
+    half, double = (requirements_for(scaled_robot(robot, by)) for by in (0.5, 2.0))
+    assert half.height_limit == pytest.approx(0.010 * 0.16 / 0.22)
+    assert double.height_limit == pytest.approx(0.010 * 0.64 / 0.44)
+    assert double.handover_time == pytest.approx(0.050 * (0.64 / 0.44) ** 0.5)
+    assert requirements_for(scaled_robot(robot, 2.0), handover_time=0.04).handover_time == 0.04
+
+
+def test_the_suspension_of_stiff_servos_yields_at_most_one_and_a_half_times_what_they_do() -> None:
+    """Six feet under a third of the weight each, on servos told nothing of it."""
+    robot = soft(400.0)
+    vertical = (LegSolver(robot).jacobian(robot.stance)[:, 2] ** 2).sum(axis=1) / 400.0  # m/N
+    assert requirements_for(robot).deflection == pytest.approx(1.5 * vertical.mean() * robot.weight / 3.0)
+    assert requirements_for(robot, deflection=0.003).deflection == 0.003

@@ -1,0 +1,61 @@
+"""The how-to pages: what can be run here runs as typed, and their links lead somewhere."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from pages import blocks, commands, run
+
+PAGES = Path(__file__).parents[2] / "docs" / "howto"
+COMMANDS = commands(PAGES / "fmpy.md", "fmpy")
+PYTHON = [text for kind, text in blocks(PAGES / "fmpy.md") if kind == "python"]
+SHORT = "0.5"  # s
+
+
+@pytest.fixture(scope="module")
+def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the reader is: the FMU and a recorded walk are there."""
+    folder = tmp_path_factory.mktemp("reader")
+    run(folder, "hexapod", "export", "-o", "athena.fmu")
+    run(folder, "hexapod", "simulate", "walk_flat", "--set", f"duration={SHORT}", "-o", "out/walk")
+    return folder
+
+
+def test_the_page_on_fmpy_has_commands_and_code() -> None:
+    assert len(COMMANDS) >= 4
+    assert len(PYTHON) == 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_of_the_page_on_fmpy_works(folder: Path, command: str) -> None:
+    run(folder, *shlex.split(re.sub(r"--stop-time \d+", f"--stop-time {SHORT}", command.replace("--show-plot", ""))))
+
+
+def test_the_code_of_the_page_on_fmpy_walks(folder: Path) -> None:
+    shorter = PYTHON[0].replace("stop_time=10.0", f"stop_time={SHORT}")
+    assert shorter != PYTHON[0]
+    assert float(run(folder, sys.executable, "-c", shorter + '\nprint(abs(result["torso.position[1]"][-1]))')) > 1e-3
+
+
+@pytest.fixture(scope="module")
+def robots(folder: Path) -> Path:
+    """Where a reader with a robot of one's own is: it lies there as a robot file and as a URDF."""
+    shutil.copy(Path(__file__).parents[2] / "models" / "athena.toml", folder / "my.toml")
+    run(folder, "hexapod", "export", "-o", "my.urdf")
+    return folder
+
+
+def test_the_pages_on_robots_and_packages_have_commands() -> None:
+    assert len(commands(PAGES / "my-robot.md", "hexapod")) >= 4
+    assert len(commands(PAGES / "libcosim_ecos.md", "hexapod")) >= 2
+
+
+@pytest.mark.parametrize("command", [line for page in ("my-robot.md", "libcosim_ecos.md") for line in commands(PAGES / page, "hexapod")])
+def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
+    shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
+    assert run(robots, *shlex.split(command), *shorter)

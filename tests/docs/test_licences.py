@@ -1,0 +1,114 @@
+"""What others must be told of licences travels with everything that holds software: the report's viewer, the wheel, every FMU."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import zipfile
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from command import Call
+
+from hexapod_cosim.cosim.export.controller_export import export_controller
+from hexapod_cosim.cosim.export.export import export_fmu
+from hexapod_cosim.cosim.run.controller_setup import make_setup
+from hexapod_cosim.models import load_robot
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ROOT / "cosim" / "viewer" / "node_modules"
+OURS = "Copyright (c) 2026 The hexapod-cosim developers"
+PERMISSION = "Permission is hereby granted, free of charge, to any person obtaining a copy"
+
+
+def build_viewer() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("build_viewer", ROOT / "tools" / "build_viewer.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def licences() -> dict[str, str]:
+    """Texts by package of all that esbuild says it took code from; the bundle is made anew if its sources have changed."""
+    tool = build_viewer()
+    tool.bundle()
+    tool.install_packages(all_of_them=False)
+    inputs = json.loads((ROOT / "build" / "viewer" / "metafile.json").read_text(encoding="utf-8"))["inputs"]
+    foreign = [path for path in inputs if not path.startswith("src/")]
+    names = {re.findall(r"node_modules/((?:@[^/]+/)?[^/]+)/", path)[-1] for path in foreign}
+    return {name: (PACKAGES / name / "LICENSE").read_text(encoding="utf-8").strip() for name in names}
+
+
+def test_the_viewer_bundles_the_packages_that_are_known(licences: dict[str, str]) -> None:
+    assert set(licences) == {"three", "uplot"}
+    assert "three.js authors" in licences["three"]
+    assert "Leon Sorokin" in licences["uplot"]
+    assert all(PERMISSION in text for text in licences.values())
+
+
+def test_the_bundle_begins_with_every_licence(licences: dict[str, str]) -> None:
+    bundle = (ROOT / "build" / "viewer" / "viewer.js").read_text(encoding="utf-8")
+    head, _, code = bundle.partition("*/")
+    assert head.startswith("/*!")
+    assert all(text in head for text in [OURS, *licences.values()])
+    assert code.lstrip().startswith('"use strict"')
+
+
+def test_a_report_holds_every_licence(licences: dict[str, str], call: Call, tmp_path: Path) -> None:
+    code, _, errors = call("simulate", "stand", "--set", "duration=0.1", "-o", tmp_path)
+    assert code == 0, errors
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(text in page for text in [OURS, *licences.values()])
+
+
+def test_the_installed_wheel_holds_every_licence(licences: dict[str, str]) -> None:
+    files = {str(path): path for path in metadata.files("hexapod-cosim") or []}
+    viewer, text = (files[f"hexapod_cosim/plant/viewer/{name}"].read_text() for name in ("viewer.js", "LICENSES.txt"))
+    for licence in [OURS, *licences.values()]:
+        assert licence in viewer, "run make setup"
+        assert licence in text
+    assert "hexapod_cosim/plant/LICENSE" in files
+    assert OURS in next(path for name, path in files.items() if name.endswith(".dist-info/licenses/LICENSE")).read_text()
+
+
+def test_a_package_without_a_licence_is_not_bundled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tool = build_viewer()
+    package = tmp_path / "node_modules" / "@somebody" / "nameless"
+    package.mkdir(parents=True)
+    (package / "package.json").write_text('{"name": "@somebody/nameless", "version": "1.0.0"}', encoding="utf-8")
+    metafile = tmp_path / "metafile.json"
+    metafile.write_text('{"inputs": {"src/main.ts": {}, "node_modules/@somebody/nameless/index.js": {}}}', encoding="utf-8")
+    for name, path in {"VIEWER": tmp_path, "METAFILE": metafile, "BUNDLE": tmp_path / "viewer.js", "LICENCES": tmp_path / "texts"}.items():
+        monkeypatch.setattr(tool, name, path)
+    (tmp_path / "viewer.js").write_text("code", encoding="utf-8")
+    with pytest.raises(tool.ViewerError, match=r"no licence's text in .*nameless"):
+        tool.add_licences()
+    (package / "LICENCE.md").write_text("do as you like", encoding="utf-8")
+    tool.add_licences()
+    assert "---- @somebody/nameless 1.0.0 ----\n\ndo as you like" in (tmp_path / "viewer.js").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("platforms", [None, ["sources"]], ids=["binary", "sources alone"])
+def test_an_fmu_holds_the_projects_licence(plant_build: Path, tmp_path: Path, fmi: int, platforms: list[str] | None) -> None:
+    robot = load_robot("athena")
+    plant = export_fmu(robot, tmp_path / "plant.fmu", fmi=fmi, platforms=platforms)
+    setup = make_setup(robot, control="kinematic", period=0.005)
+    controller = export_controller(setup, tmp_path / "controller.fmu", fmi=fmi, platforms=platforms)
+    for path in (plant, controller):
+        with zipfile.ZipFile(path) as archive:
+            assert any(name.startswith("sources/src/") for name in archive.namelist())
+            text = archive.read("documentation/licenses/license.txt").decode()
+        assert OURS in text
+        assert PERMISSION in text
+
+
+def test_the_fmu_that_cmake_packs_holds_the_projects_licence(athena_fmu: Path) -> None:
+    with zipfile.ZipFile(athena_fmu) as archive:
+        assert OURS in archive.read("documentation/licenses/license.txt").decode()

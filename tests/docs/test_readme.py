@@ -1,0 +1,75 @@
+"""What the README says to type works as typed."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import zipfile
+from functools import partial
+from pathlib import Path
+
+import pages
+import pytest
+from pages import blocks, run
+
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = blocks(ROOT / "README.md")
+commands = partial(pages.commands, ROOT / "README.md")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the README's reader is: the FMU is there from the first command on, and a URDF of one's own."""
+    folder = tmp_path_factory.mktemp("reader")
+    run(folder, *shlex.split(commands("hexapod export")[0]))
+    run(folder, "hexapod", "export", "-o", "my.urdf")
+    return folder
+
+
+def test_the_readme_exports_every_kind_of_file() -> None:
+    lines = " ".join(commands("hexapod export"))
+    assert all(option in lines for option in ("--fmi 3", "--robot my.urdf", "--controller", "--ssp"))
+
+
+@pytest.mark.parametrize("command", commands("hexapod export")[1:])
+def test_an_export_of_the_readme_writes_its_file(folder: Path, command: str) -> None:
+    assert shlex.split(command)[-1] in run(folder, *shlex.split(command))
+    assert zipfile.is_zipfile(folder / shlex.split(command)[-1])
+
+
+@pytest.mark.parametrize("command", [line for line in commands("hexapod") if "simulate" in line or "list" in line or "design" in line])
+def test_a_command_of_the_readme_works(folder: Path, command: str) -> None:
+    shorter = ["--set", "duration=4"] if "simulate" in command else []
+    assert run(folder, *shlex.split(command), *shorter)
+
+
+def test_the_readme_compares_and_simulates_the_bare_fmu_too() -> None:
+    assert commands("hexapod compare")  # run in full by tests/cli/test_cli.py
+    assert commands("fmpy simulate")
+
+
+def test_the_bare_fmu_simulates(folder: Path) -> None:
+    command = shlex.split(commands("fmpy simulate")[0].replace("--show-plot", "--output-file result.csv"))
+    run(folder, *command)
+    assert (folder / "result.csv").stat().st_size > 0
+
+
+def test_the_python_of_the_readme_prints_a_standing_height(folder: Path) -> None:
+    (snippet,) = (text for kind, text in BLOCKS if kind == "python")
+    assert 0.12 < float(run(folder, sys.executable, "-c", snippet)) < 0.14
+
+
+def test_the_scenario_of_the_readme_is_valid(folder: Path) -> None:
+    (text,) = (text for kind, text in BLOCKS if kind == "toml")
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    assert load_scenario(str(path)).settings["gait"]["name"] == "ripple"
+
+
+def test_the_make_targets_of_the_readme_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for line in commands("make"):
+        assert f"\n{line.split()[1]}:" in makefile

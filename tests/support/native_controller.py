@@ -1,0 +1,147 @@
+"""The C controller from Python: one instance that steps like `Controller`, set up through the C library's own table of ranges."""
+
+from __future__ import annotations
+
+import ctypes as ct
+from typing import Any
+
+import numpy as np
+from mirror import LEGS, OK, PerJoint, Real, record
+
+from hexapod_cosim.controller import BodyCommand, Measurement
+from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup, load_controller_interface
+
+Flags = ct.c_int * LEGS
+COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
+HxRange = record(
+    "HxRange", ("name", ct.c_char_p), ("unit", ct.c_char_p), ("min", Real), ("max", Real), ("offset", ct.c_size_t), ("is_int", ct.c_int)
+)
+HxControllerInput = record(
+    "HxControllerInput", ("command", Real * 6), ("angle", PerJoint), ("foot_force", PerJoint), ("quaternion", Real * 4)
+)
+HxControllerOutput = record(
+    "HxControllerOutput", ("angle_ref", PerJoint), ("speed_ref", PerJoint), ("torque_ref", PerJoint), ("swinging", Flags),
+    ("unreachable", Flags), ("fallback", Flags), ("shift", (Real * 2) * LEGS), ("lift", Real * LEGS), ("planned", (Real * 3) * LEGS),
+    ("acceleration_ref", PerJoint),
+)  # fmt: skip
+
+
+class NativeError(Exception):
+    """A call that the controller refused: its status and message."""
+
+    def __init__(self, status: int, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+def bound(core: ct.CDLL) -> ct.CDLL:
+    """The library with its functions' types declared; harmless to repeat."""
+    controller, status, ranges = ct.c_void_p, ct.c_int, [ct.POINTER(ct.POINTER(HxRange))]
+    signatures: dict[str, tuple[Any, list[Any]]] = {
+        "hx_controller_definition_default": (None, [ct.c_void_p]),
+        "hx_controller_definition_ranges": (ct.c_size_t, ranges),
+        "hx_controller_input_ranges": (ct.c_size_t, ranges),
+        "hx_controller_definition_check": (status, [ct.c_void_p, ct.c_char_p]),
+        "hx_controller_create": (controller, []),
+        "hx_controller_destroy": (None, [controller]),
+        "hx_controller_reset": (status, [controller, ct.c_void_p, Real]),
+        "hx_controller_output": (None, [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerOutput)]),
+        "hx_controller_step": (status, [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerInput), Real]),
+        "hx_controller_time": (Real, [controller]),
+        "hx_controller_message": (ct.c_char_p, [controller]),
+        "hx_controller_state_size": (ct.c_size_t, []),
+        "hx_controller_get_state": (None, [controller, ct.c_char_p]),
+        "hx_controller_set_state": (status, [controller, ct.c_char_p, ct.c_size_t]),
+    }
+    for name, (result, arguments) in signatures.items():
+        function = getattr(core, name)
+        function.restype, function.argtypes = result, arguments
+    return core
+
+
+def ranges_of(core: ct.CDLL, member: str) -> dict[str, Any]:
+    """The C library's table for "definition" or "input" by variable names."""
+    table = ct.POINTER(HxRange)()
+    count = getattr(core, f"hx_controller_{member}_ranges")(ct.byref(table))
+    return {table[k].name.decode(): table[k] for k in range(count)}
+
+
+class Definition:
+    """The bytes of an hxControllerDefinition, written by variable names."""
+
+    def __init__(self, core: ct.CDLL, setup: ControllerSetup) -> None:
+        self.ranges = ranges_of(core, "definition")
+        last = max(entry.offset for entry in self.ranges.values())
+        self.bytes = ct.create_string_buffer(last + ct.sizeof(Real))
+        core.hx_controller_definition_default(self.bytes)
+        for variable in load_controller_interface(setup).of_causality("parameter"):
+            self[variable.name] = variable.start
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        entry = self.ranges[name]
+        kind = ct.c_int if entry.is_int else Real
+        kind.from_buffer(self.bytes, entry.offset).value = int(value) if entry.is_int else value
+
+
+class NativeController:
+    """One C controller. `step` is that of `Controller`; `out` holds the last commands."""
+
+    def __init__(self, core: ct.CDLL, setup: ControllerSetup, *, start: float = 0.0) -> None:
+        self._core, self.period, self.definition = bound(core), setup.period, Definition(core, setup)
+        self._handle = core.hx_controller_create()
+        self.input, self.out = HxControllerInput(), HxControllerOutput()
+        self.reset(start)
+
+    def __del__(self) -> None:
+        self._core.hx_controller_destroy(self._handle)
+
+    def _checked(self, status: int) -> None:
+        if status != OK:
+            raise NativeError(status, self._core.hx_controller_message(self._handle).decode())
+
+    def reset(self, t: float = 0.0) -> None:
+        """To the start, by the definition as it stands."""
+        self._checked(self._core.hx_controller_reset(self._handle, self.definition.bytes, t))
+
+    def output(self) -> Any:
+        """Of the input as it stands, at the present time."""
+        self._core.hx_controller_output(self._handle, ct.byref(self.input), ct.byref(self.out))
+        return self.out
+
+    def go(self, t_end: float, *, rate: Any = None) -> None:
+        """To t_end under the input as it stands, which changes at a rate [1/s]."""
+        self._checked(self._core.hx_controller_step(self._handle, ct.byref(self.input), None if rate is None else ct.byref(rate), t_end))
+
+    def sense(self, command: BodyCommand, measurement: Measurement) -> None:
+        """Sets the input."""
+        values = (command.vx, command.vy, command.yaw_rate, command.height, command.roll, command.pitch)
+        self.input.command[:] = values
+        for name in ("angle", "foot_force"):
+            np.ctypeslib.as_array(getattr(self.input, name))[...] = getattr(measurement, name)
+        self.input.quaternion[:] = measurement.quaternion.tolist()
+
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
+        """The joint commands for [t, t + period): the outputs at t, after which time goes on."""
+        self.sense(command, measurement)
+        out = self.output()
+        self.go(t + self.period)
+        return out
+
+    @property
+    def time(self) -> float:
+        return float(self._core.hx_controller_time(self._handle))
+
+    def save(self) -> bytes:
+        """A saved state."""
+        state = ct.create_string_buffer(self._core.hx_controller_state_size())
+        self._core.hx_controller_get_state(self._handle, state)
+        return state.raw
+
+    def restore(self, state: bytes) -> None:
+        """Goes back to a saved state."""
+        self._checked(self._core.hx_controller_set_state(self._handle, state, len(state)))
+
+
+def commands(out: Any) -> np.ndarray:
+    """(4, 6, 3) angle_ref, speed_ref, torque_ref and acceleration_ref, copied."""
+    return np.array([np.ctypeslib.as_array(getattr(out, name)) for name in COMMANDS])
