@@ -18,7 +18,6 @@ GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")  # of the plant's, in every component
 SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
 LOOP = "hexapod_master"  # the shared library of the co-simulation loop
-PLANT_ALONE = "plant.c"  # of the FMI layer: the plant as a component
 FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"  # each needs the headers of its own standard alone
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
 X86 = {"x86_64", "amd64", "i386", "i486", "i586", "i686", "x86"}  # as platform.machine() has them in lower case
@@ -59,7 +58,7 @@ def code_hash() -> str:
 
 def source_files(component: Component = PLANT) -> dict[str, Path]:
     """A component's C sources and headers, by their path below an FMU's sources folder; includes resolve with -I sources."""
-    found = _own_sources(component)
+    found = _own_sources(component) | _sources_in("fmi", _fmi_folder())
     if component is not PLANT:
         found |= {name: path for name, path in _own_sources(PLANT).items() if _is_shared(name)}
     return dict(sorted(found.items()))
@@ -67,16 +66,25 @@ def source_files(component: Component = PLANT) -> dict[str, Path]:
 
 def _own_sources(component: Component) -> dict[str, Path]:
     root = _HERE.parent / component.tree if in_source_tree() else _HERE.parent / component.installed / "sources"
-    folders = {"src": root / "src", "fmi": root / "fmi"}
-    folders["hexapod"] = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
-    found = {f"{name}/{path.relative_to(folder).as_posix()}": path for name, folder in folders.items() for path in folder.rglob("*.[ch]")}
+    headers = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
+    found = _sources_in("src", root / "src") | _sources_in("hexapod", headers) | {"component.c": root / "component.c"}
     return found | {f"generated/{name}": root / "generated" / name for name in GENERATED_SOURCES}
 
 
+def _fmi_folder() -> Path:
+    """The folder of the FMI layer, which all components share."""
+    return _TREE.parent / "fmi" if in_source_tree() else _INSTALLED / "sources" / "fmi"
+
+
+def _sources_in(name: str, folder: Path) -> dict[str, Path]:
+    """C sources and headers of a folder, by their path below an FMU's sources folder, where it is called `name`."""
+    return {f"{name}/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*.[ch]")}
+
+
 def _is_shared(name: str) -> bool:
-    """Whether a source of the plant is part of every component: the FMI layer, statuses and checksums."""
+    """Whether a source of the plant is part of every component: statuses and checksums."""
     folder, _, file = name.partition("/")
-    return {"src": file in SHARED_SOURCES, "hexapod": file in SHARED_HEADERS, "fmi": file != PLANT_ALONE}.get(folder, False)
+    return {"src": file in SHARED_SOURCES, "hexapod": file in SHARED_HEADERS}.get(folder, False)
 
 
 def licence_file() -> Path:

@@ -39,9 +39,10 @@ def output(*command: str | Path, **variables: str) -> str:
 
 @pytest.fixture(scope="module")
 def vendored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The plant's folder in somebody else's tree, with its licence and without the Python project."""
+    """The plant and the FMI layer in another tree, with the licence and without the Python project."""
     folder = tmp_path_factory.mktemp("vendor") / "hexapod"
     shutil.copytree(ROOT / "plant_fmu", folder)
+    shutil.copytree(ROOT / "fmi", folder / "fmi")
     shutil.copy(ROOT / "LICENSE", folder)
     return folder
 
