@@ -1,9 +1,11 @@
-"""How many walks a minute: the compiled controller and the Python one, on one process and on all, and what a run costs beside its loop.
+"""How many walks a minute: the compiled controller and the Python one, on one process and on all,
+and what a run costs beside its loop.
 
 usage: python -m benchmarks.batch [--walks N] [--memory-runs N]
 
-Walks are `walk_flat`, 10 s, each with variations of its own. Prints a table and writes benchmarks/results/<machine>/batch.csv. Nothing is
-asserted: machines are noisy, and what else runs on this one is in every wall time; processor time tells less of that.
+Walks are `walk_flat`, 10 s, each with variations of its own. Prints a table and writes
+benchmarks/results/<machine>/batch.csv. Nothing is asserted: machines are noisy, and what else runs
+on this one is in every wall time; processor time tells less of that.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
-FAST = ("solver.method=ros2", "solver.tolerance=0.01")  # docs/architecture.md says what it costs in accuracy
+FAST = (
+    "solver.method=ros2",
+    "solver.tolerance=0.01",
+)  # docs/architecture.md says what it costs in accuracy
 SETTINGS: dict[str, tuple[str, ...]] = {"default solver": (), "fast solver": FAST}
 CONTROLS = ("compliant", "kinematic")
 WARM = 4  # walks after which everything that is made once has been made
@@ -43,7 +48,9 @@ def scenarios(control: str, settings: Sequence[str], count: int) -> list[Scenari
     return [replace(scenario, seed=seed, variation=STANDARD) for seed in range(count)]
 
 
-def per_minute(plans: Sequence[Scenario], gains: Gains | None, *, workers: int, compiled: bool) -> float:
+def per_minute(
+    plans: Sequence[Scenario], gains: Gains | None, *, workers: int, compiled: bool
+) -> float:
     """Walks a minute once all workers are at work: from the first result on."""
     times = []
     with closing(run_batch(plans, gains=gains, workers=workers, compiled=compiled)) as runs:
@@ -55,7 +62,9 @@ def per_minute(plans: Sequence[Scenario], gains: Gains | None, *, workers: int, 
 
 
 def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
-    """Medians of one process' runs [ms of processor time], the loop's and what is beside it; bytes of what a run sends back."""
+    """Medians of one process' runs [ms of processor time], the loop's and what is beside it;
+    bytes of what a run sends back.
+    """
     totals, loops = [], []
     with Walker() as walker:
         for plan in plans:
@@ -65,8 +74,14 @@ def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
             loops.append(1e3 * walker.loop_time)
     overheads = [total - loop for total, loop in zip(totals, loops, strict=True)][WARM:]
     found = {"run": totals[WARM:], "loop": loops[WARM:], "overhead": overheads}
-    told: dict[str, float] = {f"{name}_ms": round(statistics.median(values), 2) for name, values in found.items()}
-    return told | {"best_run_ms": round(min(totals), 2), "best_overhead_ms": round(min(overheads), 2), "bytes": len(pickle.dumps(summary))}
+    told: dict[str, float] = {
+        f"{name}_ms": round(statistics.median(values), 2) for name, values in found.items()
+    }
+    return told | {
+        "best_run_ms": round(min(totals), 2),
+        "best_overhead_ms": round(min(overheads), 2),
+        "bytes": len(pickle.dumps(summary)),
+    }
 
 
 def measured(count: int) -> Iterator[dict[str, Any]]:
@@ -76,14 +91,30 @@ def measured(count: int) -> Iterator[dict[str, Any]]:
         gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
         for setting, changes in SETTINGS.items():
             plans = scenarios(control, changes, count)
-            alone, together = (round(per_minute(plans, gains, workers=workers, compiled=True)) for workers in (1, most))
+            alone, together = (
+                round(per_minute(plans, gains, workers=workers, compiled=True))
+                for workers in (1, most)
+            )
             yield {
-                "controller": "compiled", "control": control, "setting": setting, "one_process": alone, "processes": most, "all": together,
-                "of_ideal": round(together / alone / most, 3), **costs(plans, gains),
-            }  # fmt: skip
+                "controller": "compiled",
+                "control": control,
+                "setting": setting,
+                "one_process": alone,
+                "processes": most,
+                "all": together,
+                "of_ideal": round(together / alone / most, 3),
+                **costs(plans, gains),
+            }
         few = scenarios(control, (), PYTHON_WALKS + max(WARM, 2 * most))
-        alone, together = (round(per_minute(few, gains, workers=workers, compiled=False)) for workers in (1, most))
-        shown = {"one_process": alone, "processes": most, "all": together, "of_ideal": round(together / alone / most, 3)}
+        alone, together = (
+            round(per_minute(few, gains, workers=workers, compiled=False)) for workers in (1, most)
+        )
+        shown = {
+            "one_process": alone,
+            "processes": most,
+            "all": together,
+            "of_ideal": round(together / alone / most, 3),
+        }
         yield {"controller": "Python", "control": control, "setting": "default solver", **shown}
 
 
@@ -109,7 +140,12 @@ def main() -> int:
     """Measures and prints; returns the exit code."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--walks", type=int, default=100, help="of each kind")
-    parser.add_argument("--memory-runs", type=int, default=1000, help="short ones, one after the other in one process")
+    parser.add_argument(
+        "--memory-runs",
+        type=int,
+        default=1000,
+        help="short ones, one after the other in one process",
+    )
     given = parser.parse_args()
     rows = []
     for row in measured(given.walks):
@@ -123,7 +159,9 @@ def main() -> int:
         writer.writerows(rows)
     if given.memory_runs:
         begin, end = growth(given.memory_runs)
-        print(f"memory after {given.memory_runs // 10} runs {begin:.1f} MB, after {given.memory_runs} {end:.1f} MB")
+        print(
+            f"memory after {given.memory_runs // 10} runs {begin:.1f} MB, after {given.memory_runs} {end:.1f} MB"
+        )
     return 0
 
 

@@ -1,16 +1,21 @@
-"""A walk in Drake: `drake_walk.py WALK METHOD STEP REPEATS PATH_OUT`, as the native drivers are called and answering as they do.
+"""A walk in Drake: `drake_walk.py WALK METHOD STEP REPEATS PATH_OUT`, as the native drivers are
+called and answering as they do.
 
-The robot is the plant's: same tree, inertias, reflected rotor inertias and PD gains. The contact is Drake's own, since Drake's wheel
-brings no C++ headers and a law called back in Python would time Python: point contact between foot and half space, linear in depth with
-Hunt-Crossley dissipation, regularised Coulomb friction. Its stiffness gives the standing robot the same depth, its dissipation the
-restitution asked for at IMPACT_SPEED, its stiction tolerance friction's slope at rest. The motors are Drake's PD actuators with their
-effort limit; Drake has no torque-speed line, and the gears' dry friction is left out. So the paths are another robot's, and each of
-Drake's three models has a limit of its own to be judged by: the continuous plant's (runge_kutta3 at 1e-5), CENIC's (cenic at 1e-6) and
-the time-stepping plant's (discrete at 5e-5 s). Their friction differs.
+The robot is the plant's: same tree, inertias, reflected rotor inertias and PD gains. The contact is
+Drake's own, since Drake's wheel brings no C++ headers and a law called back in Python would time
+Python: point contact between foot and half space, linear in depth with Hunt-Crossley dissipation,
+regularised Coulomb friction. Its stiffness gives the standing robot the same depth, its dissipation
+the restitution asked for at IMPACT_SPEED, its stiction tolerance friction's slope at rest. The
+motors are Drake's PD actuators with their effort limit; Drake has no torque-speed line, and the
+gears' dry friction is left out. So the paths are another robot's, and each of Drake's three models
+has a limit of its own to be judged by: the continuous plant's (runge_kutta3 at 1e-5), CENIC's
+(cenic at 1e-6) and the time-stepping plant's (discrete at 5e-5 s). Their friction differs.
 
-METHOD: one of Drake's integration schemes, STEP its accuracy; or `discrete`, the time-stepping plant (lagged), STEP its period in s.
-Evaluations: of the right-hand side; steps where Drake counts none. Microseconds per evaluation: CalcTimeDerivatives at a new state, less
-the time of setting it; unknown where the plant is discrete, and not what CENIC calls, which solves one convex problem a step.
+METHOD: one of Drake's integration schemes, STEP its accuracy; or `discrete`, the time-stepping
+plant (lagged), STEP its period in s. Evaluations: of the right-hand side; steps where Drake counts
+none. Microseconds per evaluation: CalcTimeDerivatives at a new state, less the time of setting it;
+unknown where the plant is discrete, and not what CENIC calls, which solves one convex problem a
+step.
 """
 
 from __future__ import annotations
@@ -32,7 +37,12 @@ from numpy.typing import NDArray
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    CoulombFriction,
+    MultibodyPlant,
+    MultibodyPlantConfig,
+)
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     PdControllerGains,
@@ -70,7 +80,11 @@ def read_walk(path: str) -> Walk:
     start = ct.sizeof(HxDefinition)
     n, h = struct.unpack_from("=qd", data, start)
     first = start + struct.calcsize("=qd")
-    return Walk(robot=robot, h=h, inputs=[HxInput.from_buffer_copy(data, first + k * ct.sizeof(HxInput)) for k in range(n)])
+    return Walk(
+        robot=robot,
+        h=h,
+        inputs=[HxInput.from_buffer_copy(data, first + k * ct.sizeof(HxInput)) for k in range(n)],
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,12 +117,19 @@ def build(robot: Any, *, time_step: float) -> Model:
 
 def add_link(plant: MultibodyPlant, name: str, link: Any) -> RigidBody:
     """A body with mass, com [m] and inertia [kg m2] about it."""
-    return plant.AddRigidBody(name, SpatialInertia.MakeFromCentralInertia(link.mass, np.array(link.com), RotationalInertia(*link.inertia)))
+    return plant.AddRigidBody(
+        name,
+        SpatialInertia.MakeFromCentralInertia(
+            link.mass, np.array(link.com), RotationalInertia(*link.inertia)
+        ),
+    )
 
 
 def add_leg(plant: MultibodyPlant, robot: Any, leg: int, torso: RigidBody) -> None:
     """Three links with their joints and motors, and a foot."""
-    hip = RigidTransform(RotationMatrix.MakeZRotation(robot.leg[leg].hip_yaw), np.array(robot.leg[leg].hip_position))
+    hip = RigidTransform(
+        RotationMatrix.MakeZRotation(robot.leg[leg].hip_yaw), np.array(robot.leg[leg].hip_position)
+    )
     parent, place = torso, hip
     for k in range(JOINTS):
         link, name = robot.leg[leg].link[k], f"{leg}-{k}"
@@ -120,30 +141,47 @@ def add_leg(plant: MultibodyPlant, robot: Any, leg: int, torso: RigidBody) -> No
         actuator.set_default_gear_ratio(1.0)
         actuator.set_controller_gains(PdControllerGains(p=robot.servo.kp, d=robot.servo.kd))
         parent, place = body, RigidTransform(np.array([link.length, link.offset_y, link.offset_z]))
-    plant.RegisterCollisionGeometry(parent, place, Sphere(robot.foot_radius), f"foot-{leg}", foot_material(robot))
+    plant.RegisterCollisionGeometry(
+        parent, place, Sphere(robot.foot_radius), f"foot-{leg}", foot_material(robot)
+    )
 
 
 def foot_material(robot: Any) -> ProximityProperties:
-    """Stiffness as deep under the standing robot's sixth as the plant's, dissipation for its restitution at IMPACT_SPEED."""
+    """Stiffness as deep under the standing robot's sixth as the plant's, dissipation for its
+    restitution at IMPACT_SPEED.
+    """
     masses = robot.torso.mass + sum(link.mass for leg in robot.leg for link in leg.link)
     load = masses * float(np.linalg.norm(robot.gravity)) / LEGS
     depth = (load / robot.contact.stiffness) ** (2.0 / 3.0)
-    return material(load / depth, exact_restitution_chi(robot.contact.restitution) / IMPACT_SPEED, robot.friction.mu)
+    return material(
+        load / depth,
+        exact_restitution_chi(robot.contact.restitution) / IMPACT_SPEED,
+        robot.friction.mu,
+    )
 
 
 def material(stiffness: float, dissipation: float, mu: float) -> ProximityProperties:
     """Stiffness [N/m], Hunt-Crossley dissipation [s/m], friction."""
     properties = ProximityProperties()
-    AddContactMaterial(dissipation=dissipation, point_stiffness=stiffness, friction=CoulombFriction(mu, mu), properties=properties)
+    AddContactMaterial(
+        dissipation=dissipation,
+        point_stiffness=stiffness,
+        friction=CoulombFriction(mu, mu),
+        properties=properties,
+    )
     return properties
 
 
 def exact_restitution_chi(e: float) -> float:
-    """The root of chi (1 + e) = ln[(1 + chi)/(1 - chi e)] other than 0; it does not depend on the elastic force's exponent."""
+    """The root of chi (1 + e) = ln[(1 + chi)/(1 - chi e)] other than 0; it does not depend on
+    the elastic force's exponent.
+    """
     low, high = 0.0, 1.0 / e
     for _ in range(100 if e < 1.0 else 0):
         chi = 0.5 * (low + high)
-        low, high = (chi, high) if math.log1p(chi) - math.log1p(-chi * e) < chi * (1.0 + e) else (low, chi)
+        low, high = (
+            (chi, high) if math.log1p(chi) - math.log1p(-chi * e) < chi * (1.0 + e) else (low, chi)
+        )
     return low
 
 
@@ -151,9 +189,17 @@ def add_ground(plant: MultibodyPlant, robot: Any) -> None:
     """A rigid half space through (0, 0, height), rising along the heading."""
     terrain = robot.terrain
     incline = terrain.incline if terrain.kind == 2 else 0.0
-    normal = np.array([-math.sin(incline) * math.cos(terrain.heading), -math.sin(incline) * math.sin(terrain.heading), math.cos(incline)])
+    normal = np.array(
+        [
+            -math.sin(incline) * math.cos(terrain.heading),
+            -math.sin(incline) * math.sin(terrain.heading),
+            math.cos(incline),
+        ]
+    )
     pose = HalfSpace.MakePose(normal, np.array([0.0, 0.0, terrain.height]))
-    plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), "ground", material(RIGID, 0.0, robot.friction.mu))
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), pose, HalfSpace(), "ground", material(RIGID, 0.0, robot.friction.mu)
+    )
 
 
 def put_at_start(model: Model, robot: Any, context: Context) -> None:
@@ -175,7 +221,9 @@ def tell(model: Model, context: Context, command: Any) -> None:
     plant = model.plant
     instance = plant.GetModelInstanceByName("DefaultModelInstance")
     own = plant.GetMyMutableContextFromRoot(context)
-    plant.get_desired_state_input_port(instance).FixValue(own, np.concatenate([np.ravel(command.angle_ref), np.ravel(command.speed_ref)]))
+    plant.get_desired_state_input_port(instance).FixValue(
+        own, np.concatenate([np.ravel(command.angle_ref), np.ravel(command.speed_ref)])
+    )
     plant.get_actuation_input_port(instance).FixValue(own, np.ravel(command.torque_ref))
 
 
@@ -208,7 +256,9 @@ def walk_once(model: Model, walk: Walk, method: str, step: float) -> tuple[float
         simulator.AdvanceTo((k + 1) * walk.h)
         path.append(torso_position(model, walk.robot, context))
     seconds = time.perf_counter() - begin
-    evaluations = 0 if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
+    evaluations = (
+        0 if method == "discrete" else simulator.get_integrator().get_num_derivative_evaluations()
+    )
     return seconds, evaluations or simulator.get_num_steps_taken(), np.array(path)
 
 
@@ -241,7 +291,9 @@ def mean_seconds(action: Callable[[], None]) -> float:
 
 def main(walk_path: str, method: str, step: str, repeats: str, path_out: str) -> None:
     """Runs, writes the path and prints the JSON line."""
-    logging.getLogger("drake").setLevel(logging.ERROR)  # half spaces and deformable bodies, of which there are none
+    logging.getLogger("drake").setLevel(
+        logging.ERROR
+    )  # half spaces and deformable bodies, of which there are none
     walk, size = read_walk(walk_path), float(step)
     discrete = method == "discrete"
     model = build(walk.robot, time_step=size if discrete else 0.0)
@@ -251,7 +303,11 @@ def main(walk_path: str, method: str, step: str, repeats: str, path_out: str) ->
         seconds.append(taken)
     path.tofile(path_out)
     each = None if discrete else microseconds_per_evaluation(model, walk)
-    print(json.dumps({"seconds": seconds, "evaluations": evaluations, "microseconds_per_evaluation": each}))
+    print(
+        json.dumps(
+            {"seconds": seconds, "evaluations": evaluations, "microseconds_per_evaluation": each}
+        )
+    )
 
 
 if __name__ == "__main__":

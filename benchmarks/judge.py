@@ -1,4 +1,6 @@
-"""From runs to the figures that are compared: which setting of a method meets an error over the whole family, and what it costs."""
+"""From runs to the figures that are compared: which setting of a method meets an error over the
+whole family, and what it costs.
+"""
 
 from __future__ import annotations
 
@@ -50,10 +52,14 @@ def _spread(group: Sequence[Run]) -> Spread:
     )  # fmt: skip
 
 
-def choose(runs: Sequence[Run], series: Series, target: float, *, every_walk: bool) -> Choice | None:
-    """The coarsest setting that meets an error [m] in every walk, or in the median walk, as all finer ones do too.
+def choose(
+    runs: Sequence[Run], series: Series, target: float, *, every_walk: bool
+) -> Choice | None:
+    """The coarsest setting that meets an error [m] in every walk, or in the median walk, as all
+    finer ones do too.
 
-    One setting for all walks, and no setting that looks good between worse ones: neither may be picked by luck.
+    One setting for all walks, and no setting that looks good between worse ones: neither may be
+    picked by luck.
     """
     chosen = None
     for spread in reversed(spreads(runs, series)):
@@ -63,14 +69,22 @@ def choose(runs: Sequence[Run], series: Series, target: float, *, every_walk: bo
     return None if chosen is None else Choice(series=series, spread=chosen)
 
 
-def best(runs: Sequence[Run], candidates: Iterable[Series], target: float, *, every_walk: bool = True) -> Choice | None:
+def best(
+    runs: Sequence[Run], candidates: Iterable[Series], target: float, *, every_walk: bool = True
+) -> Choice | None:
     """The fastest of several methods at an error."""
-    found = [choice for series in candidates if (choice := choose(runs, series, target, every_walk=every_walk))]
+    found = [
+        choice
+        for series in candidates
+        if (choice := choose(runs, series, target, every_walk=every_walk))
+    ]
     return max(found, key=lambda choice: choice.spread.realtime_factor, default=None)
 
 
 def agreement(runs: Sequence[Run], engine: str) -> float:
-    """m    how close an engine came to our converged paths: over its settings, the least median error. NaN: it never ran."""
+    """m    how close an engine came to our converged paths: over its settings, the least median
+    error. NaN: it never ran.
+    """
     groups: dict[tuple[str, float], list[float]] = {}
     for run in runs:
         if run.engine == engine and run.law == "plant":
@@ -80,6 +94,8 @@ def agreement(runs: Sequence[Run], engine: str) -> float:
 
 def per_evaluation(runs: Iterable[Run], engine: str, law: str) -> float:
     """us    median time of one evaluation of the right-hand side; NaN when no driver told."""
-    told = [run.microseconds_per_evaluation for run in runs if (run.engine, run.law) == (engine, law)]
+    told = [
+        run.microseconds_per_evaluation for run in runs if (run.engine, run.law) == (engine, law)
+    ]
     told = [value for value in told if math.isfinite(value)]
     return median(told) if told else math.nan

@@ -1,4 +1,6 @@
-"""The co-simulation's own cost: the whole loop against real time, and the master on an FMU that computes nothing."""
+"""The co-simulation's own cost: the whole loop against real time, and the master on an FMU that
+computes nothing.
+"""
 
 from __future__ import annotations
 
@@ -38,8 +40,15 @@ class Still:
 def realtime_factor(tools: Tools, control: str) -> float:
     """Of the whole loop, plant and Python controller, at a macro-step of 5 ms."""
     scenario = load_scenario(SCENARIO, overrides=[f"control={control}"])
-    gains = None if control == "kinematic" else design_for(load_robot(scenario.robot), scenario.macro_step)
-    return median(simulate(scenario, fmu=tools.fmu, gains=gains).outcome.realtime_factor for _ in range(REPEATS))
+    gains = (
+        None
+        if control == "kinematic"
+        else design_for(load_robot(scenario.robot), scenario.macro_step)
+    )
+    return median(
+        simulate(scenario, fmu=tools.fmu, gains=gains).outcome.realtime_factor
+        for _ in range(REPEATS)
+    )
 
 
 def master_overhead(tools: Tools) -> float:
@@ -66,5 +75,7 @@ def _idle_fmu(folder: Path, tools: Tools) -> Path:
     library = next(tools.native.glob("libbench_idle_fmu.*"))
     with zipfile.ZipFile(tools.fmu) as source, zipfile.ZipFile(idle, "w") as target:
         for name in source.namelist():
-            target.writestr(name, library.read_bytes() if name.startswith("binaries/") else source.read(name))
+            target.writestr(
+                name, library.read_bytes() if name.startswith("binaries/") else source.read(name)
+            )
     return idle

@@ -1,4 +1,6 @@
-"""Runs of drivers: time, evaluations, and the error against the converged solution of the same law."""
+"""Runs of drivers: time, evaluations, and the error against the converged solution of the same
+law.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,13 @@ class Bench:
 
     def run(self, series: Series, setting: float, walk: str) -> Run:
         """Measures one walk; short ones several times."""
-        facts: dict[str, Any] = {"engine": series.engine, "method": series.method, "law": series.law, "setting": setting, "walk": walk}
+        facts: dict[str, Any] = {
+            "engine": series.engine,
+            "method": series.method,
+            "law": series.law,
+            "setting": setting,
+            "walk": walk,
+        }
         try:
             told, path = self.call(series.engine, series.method, setting, walk)
             if told["seconds"][0] < SHORT:
@@ -69,7 +77,13 @@ class Bench:
                 told, path = self.call(series.engine, series.method, setting, walk, repeats=repeats)
             error = distance(path, self.reference(series, walk))
         except DriverError:
-            return Run(error=math.inf, seconds=math.inf, evaluations=math.nan, microseconds_per_evaluation=math.nan, **facts)
+            return Run(
+                error=math.inf,
+                seconds=math.inf,
+                evaluations=math.nan,
+                microseconds_per_evaluation=math.nan,
+                **facts,
+            )
         each = told["microseconds_per_evaluation"]
         return Run(
             error=error,
@@ -79,22 +93,35 @@ class Bench:
             **facts,
         )
 
-    def call(self, engine: str, method: str, setting: float, walk: str, *, repeats: int = 1) -> tuple[dict[str, Any], Array]:
+    def call(
+        self, engine: str, method: str, setting: float, walk: str, *, repeats: int = 1
+    ) -> tuple[dict[str, Any], Array]:
         """What a driver prints, and its path (n + 1, 3). Raises DriverError."""
         out = BUILD / f"path-{os.getpid()}.bin"
-        words = [*command(engine, self.tools), str(self.walks[walk]), method, repr(setting), str(repeats), str(out)]
+        words = [
+            *command(engine, self.tools),
+            str(self.walks[walk]),
+            method,
+            repr(setting),
+            str(repeats),
+            str(out),
+        ]
         told = json.loads(call(words))
         path = np.fromfile(out).reshape(-1, 3)
         out.unlink()
         return told, path
 
     def reference(self, series: Series, walk: str) -> Array:
-        """The converged path (n + 1, 3), kept in build/bench for as long as neither walk nor driver changes. Raises DriverError."""
+        """The converged path (n + 1, 3), kept in build/bench for as long as neither walk nor
+        driver changes. Raises DriverError.
+        """
         engine, method, setting = series.reference
         key = f"{engine}-{method}-{setting:g}-{walk}"
         if key not in self._references:
             driver = Path(command(engine, self.tools)[-1])  # binary or script
-            digest = hashlib.sha256(self.walks[walk].read_bytes() + driver.read_bytes()).hexdigest()[:16]
+            digest = hashlib.sha256(
+                self.walks[walk].read_bytes() + driver.read_bytes()
+            ).hexdigest()[:16]
             kept = BUILD / "converged" / f"{key}-{digest}.npy"
             if not kept.exists():
                 kept.parent.mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,8 @@
 
 usage: python -m benchmarks.opening
 
-Prints the median and best processor time of some repetitions, next to what is asked of them. Nothing here is asserted: machines are noisy.
+Prints the median and best processor time of some repetitions, next to what is asked of them.
+Nothing here is asserted: machines are noisy.
 """
 
 from __future__ import annotations
@@ -43,7 +44,11 @@ def main() -> int:
         root = fmpy.extract(str(fmu), str(Path(folder) / "unpacked"))
         rows = [
             ("model description parsed", 20.0, lambda: ElementTree.fromstring(_description(fmu))),
-            ("model description read by fmpy", 20.0, lambda: fmpy.read_model_description(root, validate=False)),
+            (
+                "model description read by fmpy",
+                20.0,
+                lambda: fmpy.read_model_description(root, validate=False),
+            ),
             ("instance made from its resources", 50.0, _instantiate(root)),
         ]
         for name, asked, action in rows:
@@ -61,7 +66,10 @@ def _instantiate(root: str) -> Callable[[], None]:
     """An instance made and freed, the library being loaded."""
     description = fmpy.read_model_description(root)
     slave = FMU2Slave(
-        guid=description.guid, modelIdentifier=description.coSimulation.modelIdentifier, unzipDirectory=root, instanceName="plant"
+        guid=description.guid,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        unzipDirectory=root,
+        instanceName="plant",
     )
     resources = (Path(root) / "resources").as_uri().encode()
     instantiate, free = slave.dll.fmi2Instantiate, slave.dll.fmi2FreeInstance

@@ -1,4 +1,6 @@
-"""What is measured of the plant alone: right-hand side, instructions, many instances, steep laws."""
+"""What is measured of the plant alone: right-hand side, instructions, many instances, steep
+laws.
+"""
 
 from __future__ import annotations
 
@@ -25,18 +27,28 @@ Figures = dict[str, float]
 
 def derivatives(tools: Tools, walks: Sequence[Path]) -> dict[str, Figures]:
     """us of one evaluation by kernel, "plain" and with "multipliers": medians over the walks."""
-    told = [json.loads(call([str(tools.driver("derivative")), str(walk), str(REPEATS)])) for walk in walks]
-    return {kernel: {kind: median(one[kernel][kind] for one in told) for kind in told[0][kernel]} for kernel in told[0]}
+    told = [
+        json.loads(call([str(tools.driver("derivative")), str(walk), str(REPEATS)]))
+        for walk in walks
+    ]
+    return {
+        kernel: {kind: median(one[kernel][kind] for one in told) for kind in told[0][kernel]}
+        for kernel in told[0]
+    }
 
 
 def instructions(tools: Tools, walk: Path, kernels: Sequence[str]) -> Figures:
-    """Instructions counted by callgrind: of one evaluation by kernel, without and with multipliers. Empty without valgrind."""
+    """Instructions counted by callgrind: of one evaluation by kernel, without and with
+    multipliers. Empty without valgrind.
+    """
     if shutil.which("valgrind") is None:
         return {}
     found = {}
     for kernel in kernels:
         for kind, flag in (("plain", "0"), ("multipliers", "1")):
-            count = _counted([str(tools.driver("derivative")), str(walk), "1", kernel, flag], "measure*")
+            count = _counted(
+                [str(tools.driver("derivative")), str(walk), "1", kernel, flag], "measure*"
+            )
             if count:  # a kernel that valgrind's processor does not have counts nothing
                 found[f"{kernel} {kind}"] = count / (ROUNDS * VISITS)
     return found
@@ -47,19 +59,30 @@ def instructions_per_step(bench: Bench, series: Series, setting: float, walk: st
     if shutil.which("valgrind") is None:
         return float("nan")
     path = bench.walks[walk]
-    words = [str(bench.tools.driver("plant")), str(path), series.method, repr(setting), "1", str(path.with_suffix(".counted"))]
+    words = [
+        str(bench.tools.driver("plant")),
+        str(path),
+        series.method,
+        repr(setting),
+        "1",
+        str(path.with_suffix(".counted")),
+    ]
     return _counted(words, "hx_plant_step") / VISITS
 
 
 def _counted(words: Sequence[str], function: str) -> float:
     options = ["--tool=callgrind", "--callgrind-out-file=/dev/null", f"--toggle-collect={function}"]
-    done = subprocess.run(["valgrind", *options, *words], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["valgrind", *options, *words], capture_output=True, text=True, check=False
+    )
     found = re.search(r"refs:\s+([\d,]+)", done.stderr)
     return float(found[1].replace(",", "")) if found and done.returncode == 0 else 0.0
 
 
 def instances(tools: Tools, walk: Path) -> list[dict[str, Any]]:
-    """By number of plants stepped in turn: us of one macro-step, bytes of an instance, allocations."""
+    """By number of plants stepped in turn: us of one macro-step, bytes of an instance,
+    allocations.
+    """
     told = []
     for count in COUNTS:
         line = call([str(tools.driver("instances")), str(walk), repr(TOLERANCE), str(count)])
@@ -72,10 +95,20 @@ def resident_bytes(told: Sequence[dict[str, Any]]) -> float:
     first, last = told[0], told[-1]
     if None in (first["resident_per_instance"], last["resident_per_instance"]):
         return float("nan")
-    grown = last["resident_per_instance"] * last["instances"] - first["resident_per_instance"] * first["instances"]
+    grown = (
+        last["resident_per_instance"] * last["instances"]
+        - first["resident_per_instance"] * first["instances"]
+    )
     return float(grown / (last["instances"] - first["instances"]))
 
 
-def cost_of(bench: Bench, series: Series, setting: float, pairs: Sequence[tuple[str, str]]) -> float:
-    """Time of changed walks over that of the unchanged ones, at one setting: median over pairs (changed, unchanged). inf: it gave up."""
-    return median(bench.run(series, setting, changed).seconds / bench.run(series, setting, plain).seconds for changed, plain in pairs)
+def cost_of(
+    bench: Bench, series: Series, setting: float, pairs: Sequence[tuple[str, str]]
+) -> float:
+    """Time of changed walks over that of the unchanged ones, at one setting: median over pairs
+    (changed, unchanged). inf: it gave up.
+    """
+    return median(
+        bench.run(series, setting, changed).seconds / bench.run(series, setting, plain).seconds
+        for changed, plain in pairs
+    )

@@ -1,4 +1,6 @@
-"""`python -m benchmarks.run [--quick]`: builds, measures, prints the table, writes CSV and figure into benchmarks/results/<machine>/."""
+"""`python -m benchmarks.run [--quick]`: builds, measures, prints the table, writes CSV and
+figure into benchmarks/results/<machine>/.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,14 @@ from benchmarks.figure import draw
 from benchmarks.judge import agreement, spreads
 from benchmarks.loop import master_overhead, realtime_factor
 from benchmarks.measure import Bench, Run
-from benchmarks.parts import cost_of, derivatives, instances, instructions, instructions_per_step, resident_bytes
+from benchmarks.parts import (
+    cost_of,
+    derivatives,
+    instances,
+    instructions,
+    instructions_per_step,
+    resident_bytes,
+)
 from benchmarks.series import OURS, PLANT_LAW, Series, command, ours, peers
 from benchmarks.table import Parts, Row, chosen_setting, rows, shown
 from benchmarks.toolchain import REQUIREMENTS, Tools, prepare
@@ -32,19 +41,31 @@ from benchmarks.walks import STIFF_RUBBER, STIFF_SLOPE, Walk, family, stiff, wri
 RESULTS = ROOT / "benchmarks" / "results"
 QUICK_WALKS = 5  # every n-th of the family; odd, so that both robots are among them
 QUICK_SETTINGS = 2  # every n-th
-STEEP = {f"friction slope {STIFF_SLOPE:g} s/m": {"slope": STIFF_SLOPE}, f"rubber of {STIFF_RUBBER:g} N/m^1.5": {"stiffness": STIFF_RUBBER}}
+STEEP = {
+    f"friction slope {STIFF_SLOPE:g} s/m": {"slope": STIFF_SLOPE},
+    f"rubber of {STIFF_RUBBER:g} N/m^1.5": {"stiffness": STIFF_RUBBER},
+}
 DERIVATIVE_WALKS = 4
 
 console = Console(width=180)
 
 
 def main() -> None:
-    """Everything, in about a quarter of an hour; --quick in a minute or two, into build/bench instead of the results."""
+    """Everything, in about a quarter of an hour; --quick in a minute or two, into build/bench
+    instead of the results.
+    """
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--quick", action="store_true", help="few walks and settings, no peer that takes long to build")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="few walks and settings, no peer that takes long to build",
+    )
     quick = parser.parse_args().quick
     tools = prepare(quick=quick)
-    series = [*_chosen(ours(), quick), *_chosen([one for one in peers() if command(one.engine, tools)], quick)]
+    series = [
+        *_chosen(ours(), quick),
+        *_chosen([one for one in peers() if command(one.engine, tools)], quick),
+    ]
     walks = family()[:: QUICK_WALKS if quick else 1]
     files = {walk.name: write(walk) for walk in walks}
     bench = Bench(tools, files | _steep_files(walks))
@@ -57,7 +78,9 @@ def main() -> None:
     _write_csv(folder / "instances.csv", scaling)
     _tell(runs, series, table, tools, folder)
     if quick:
-        console.print('quick: few walks, settings and peers; "the best of them" is the best of these only')
+        console.print(
+            'quick: few walks, settings and peers; "the best of them" is the best of these only'
+        )
 
 
 def _chosen(series: Sequence[Series], quick: bool) -> list[Series]:
@@ -72,7 +95,9 @@ def _steep_files(walks: Iterable[Walk]) -> dict[str, Path]:
 
 
 def measured(bench: Bench, series: Sequence[Series], walks: Sequence[str]) -> list[Run]:
-    """Every method at every setting on every walk; engines alternate, so that the machine's noise hits all of them."""
+    """Every method at every setting on every walk; engines alternate, so that the machine's
+    noise hits all of them.
+    """
     turns = max(len(one.settings) for one in series)
     return [
         bench.run(one, one.settings[k], walk)
@@ -99,11 +124,18 @@ def measured_parts(
             steep[name] = cost_of(bench, chosen.series, setting, pairs)
         per_step = instructions_per_step(bench, chosen.series, setting, walks[0].name)
     parts = Parts(
-        derivatives=kernels, steep=steep, loop={control: realtime_factor(bench.tools, control) for control in ("kinematic", "compliant")},
-        master=master_overhead(bench.tools), structure=scaling[0]["bytes_per_instance"], resident=resident_bytes(scaling),
-        allocations=sum(one["allocations"] for one in scaling), instructions=instructions(bench.tools, files[0], list(kernels)),
+        derivatives=kernels,
+        steep=steep,
+        loop={
+            control: realtime_factor(bench.tools, control) for control in ("kinematic", "compliant")
+        },
+        master=master_overhead(bench.tools),
+        structure=scaling[0]["bytes_per_instance"],
+        resident=resident_bytes(scaling),
+        allocations=sum(one["allocations"] for one in scaling),
+        instructions=instructions(bench.tools, files[0], list(kernels)),
         walk_instructions=per_step,
-    )  # fmt: skip
+    )
     return parts, scaling
 
 
@@ -112,7 +144,10 @@ def machine() -> str:
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         name = re.search(r"model name\s*:\s*(.+)", text)
-        family_number, model = re.search(r"cpu family\s*:\s*(\d+)", text), re.search(r"model\s*:\s*(\d+)", text)
+        family_number, model = (
+            re.search(r"cpu family\s*:\s*(\d+)", text),
+            re.search(r"model\s*:\s*(\d+)", text),
+        )
         words = [match[1] for match in (name, family_number, model) if match]
     except OSError:
         words = [platform.processor() or platform.machine()]
@@ -121,12 +156,19 @@ def machine() -> str:
 
 def _write_walks(folder: Path, runs: Sequence[Run], series: Sequence[Series], tools: Tools) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    _write_csv(folder / "walks.csv", [asdict(run) | {"realtime_factor": run.realtime_factor} for run in runs])
+    _write_csv(
+        folder / "walks.csv",
+        [asdict(run) | {"realtime_factor": run.realtime_factor} for run in runs],
+    )
     settings = [
-        {"engine": one.engine, "method": one.method, "law": one.law} | asdict(spread) for one in series for spread in spreads(runs, one)
+        {"engine": one.engine, "method": one.method, "law": one.law} | asdict(spread)
+        for one in series
+        for spread in spreads(runs, one)
     ]
     _write_csv(folder / "settings.csv", settings)
-    (folder / "machine.json").write_text(json.dumps(described(tools), indent=2) + "\n", encoding="utf-8")
+    (folder / "machine.json").write_text(
+        json.dumps(described(tools), indent=2) + "\n", encoding="utf-8"
+    )
     draw(runs, series, folder)
 
 
@@ -134,23 +176,44 @@ def _write_csv(path: Path, records: Sequence[dict[str, Any]]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(records[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()} for row in records)
+        writer.writerows(
+            {
+                key: f"{value:.6g}" if isinstance(value, float) else value
+                for key, value in row.items()
+            }
+            for row in records
+        )
 
 
 def described(tools: Tools) -> dict[str, Any]:
     """What the figures depend on."""
-    compiler = subprocess.run(["cc", "--version"], capture_output=True, text=True, check=False).stdout.partition("\n")[0]
-    wheels = [line for line in REQUIREMENTS.read_text(encoding="utf-8").splitlines() if "==" in line]
+    compiler = subprocess.run(
+        ["cc", "--version"], capture_output=True, text=True, check=False
+    ).stdout.partition("\n")[0]
+    wheels = [
+        line for line in REQUIREMENTS.read_text(encoding="utf-8").splitlines() if "==" in line
+    ]
     return {
-        "processor": machine(), "processors": os.cpu_count(), "system": platform.platform(terse=True), "compiler": compiler,
-        "python": platform.python_version(), "peers": wheels, "missing": tools.missing,
-    }  # fmt: skip
+        "processor": machine(),
+        "processors": os.cpu_count(),
+        "system": platform.platform(terse=True),
+        "compiler": compiler,
+        "python": platform.python_version(),
+        "peers": wheels,
+        "missing": tools.missing,
+    }
 
 
-def _tell(runs: Sequence[Run], series: Sequence[Series], table: Sequence[Row], tools: Tools, folder: Path) -> None:
+def _tell(
+    runs: Sequence[Run], series: Sequence[Series], table: Sequence[Row], tools: Tools, folder: Path
+) -> None:
     console.print(shown(table, title=f"{len({run.walk for run in runs})} walks on {machine()}"))
-    for engine in dict.fromkeys(one.engine for one in series if one.engine != OURS and one.law == PLANT_LAW):
-        console.print(f"{engine} comes as close to our converged paths as {agreement(runs, engine):.1e} m (median over the walks)")
+    for engine in dict.fromkeys(
+        one.engine for one in series if one.engine != OURS and one.law == PLANT_LAW
+    ):
+        console.print(
+            f"{engine} comes as close to our converged paths as {agreement(runs, engine):.1e} m (median over the walks)"
+        )
     for peer, reason in tools.missing.items():
         console.print(f"{peer} is missing: {reason}", markup=False)
     console.print(f"written to {folder}")

@@ -1,4 +1,6 @@
-"""What is measured: every integrator of ours and of the peers, each with its settings from coarse to fine."""
+"""What is measured: every integrator of ours and of the peers, each with its settings from
+coarse to fine.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ class Series:
     adaptive: bool
     law: str = PLANT_LAW  # an engine's own contact is judged by its own converged solution
     every: int = 1  # n-th walk only, for slow engines; odd, so that both robots are among them
-    converged: tuple[str, float] | None = None  # method and setting of this engine that it is judged by; None: its law's
+    converged: tuple[str, float] | None = (
+        None  # method and setting of this engine that it is judged by; None: its law's
+    )
     quick: bool = False  # measured in a quick run too, in every second setting
 
     @property
@@ -34,7 +38,26 @@ class Series:
         return (self.engine, *self.converged) if self.converged else REFERENCES[self.law]
 
 
-TOLERANCES = (1.0, 3e-1, 2e-1, 1.5e-1, 1e-1, 3e-2, 1e-2, 3e-3, 2e-3, 1e-3, 6e-4, 4e-4, 2e-4, 1e-4, 3e-5, 1e-5, 1e-6, 1e-7)
+TOLERANCES = (
+    1.0,
+    3e-1,
+    2e-1,
+    1.5e-1,
+    1e-1,
+    3e-2,
+    1e-2,
+    3e-3,
+    2e-3,
+    1e-3,
+    6e-4,
+    4e-4,
+    2e-4,
+    1e-4,
+    3e-5,
+    1e-5,
+    1e-6,
+    1e-7,
+)
 EXPLICIT_TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 STEPS = (5e-3, 2.5e-3, 1.25e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 EXPLICIT_STEPS = (1e-4, 5e-5, 2.5e-5)
@@ -44,26 +67,66 @@ OWN_STEPS = (2e-3, 1e-3, 5e-4)
 
 def ours() -> list[Series]:
     """Our integrators."""
-    implicit = [Series(engine=OURS, method=name, settings=TOLERANCES, adaptive=True, quick=True) for name in ("rosw3", "ros2")]
-    explicit = [Series(engine=OURS, method=name, settings=EXPLICIT_TOLERANCES, adaptive=True) for name in ("dp54", "bs32")]
-    fixed = [Series(engine=OURS, method=f"{name}-fixed", settings=STEPS, adaptive=False) for name in ("rosw3", "ros2")]
-    return [*implicit, *explicit, *fixed, Series(engine=OURS, method="rk4-fixed", settings=EXPLICIT_STEPS, adaptive=False)]
+    implicit = [
+        Series(engine=OURS, method=name, settings=TOLERANCES, adaptive=True, quick=True)
+        for name in ("rosw3", "ros2")
+    ]
+    explicit = [
+        Series(engine=OURS, method=name, settings=EXPLICIT_TOLERANCES, adaptive=True)
+        for name in ("dp54", "bs32")
+    ]
+    fixed = [
+        Series(engine=OURS, method=f"{name}-fixed", settings=STEPS, adaptive=False)
+        for name in ("rosw3", "ros2")
+    ]
+    return [
+        *implicit,
+        *explicit,
+        *fixed,
+        Series(engine=OURS, method="rk4-fixed", settings=EXPLICIT_STEPS, adaptive=False),
+    ]
 
 
 def peers() -> list[Series]:
-    """The peers' integrators: MuJoCo, Pinocchio and Simbody under the plant's law, MuJoCo and Drake under their own."""
+    """The peers' integrators: MuJoCo, Pinocchio and Simbody under the plant's law, MuJoCo and
+    Drake under their own.
+    """
     return [*_under_our_law(), *_under_their_own()]
 
 
 def _under_our_law() -> list[Series]:
     return [
         Series(engine="mujoco", method="law-RK4", settings=PEER_STEPS, adaptive=False, quick=True),
-        Series(engine="mujoco", method="law-implicitfast", settings=PEER_STEPS, adaptive=False, quick=True),
+        Series(
+            engine="mujoco",
+            method="law-implicitfast",
+            settings=PEER_STEPS,
+            adaptive=False,
+            quick=True,
+        ),
         Series(engine="pinocchio", method="rk4", settings=PEER_STEPS[1:], adaptive=False),
         Series(engine="pinocchio", method="semi-implicit", settings=PEER_STEPS, adaptive=False),
-        Series(engine="simbody", method="CPodesBDF", settings=(1e-1, 1e-2, 1e-3, 1e-4), adaptive=True, every=3),
-        Series(engine="simbody", method="RungeKuttaMerson", settings=(1e-1, 1e-2, 1e-3), adaptive=True, every=3),
-        Series(engine="simbody", method="SemiExplicitEuler", settings=(1e-3, 5e-4, 2.5e-4), adaptive=False, every=3),
+        Series(
+            engine="simbody",
+            method="CPodesBDF",
+            settings=(1e-1, 1e-2, 1e-3, 1e-4),
+            adaptive=True,
+            every=3,
+        ),
+        Series(
+            engine="simbody",
+            method="RungeKuttaMerson",
+            settings=(1e-1, 1e-2, 1e-3),
+            adaptive=True,
+            every=3,
+        ),
+        Series(
+            engine="simbody",
+            method="SemiExplicitEuler",
+            settings=(1e-3, 5e-4, 2.5e-4),
+            adaptive=False,
+            every=3,
+        ),
     ]
 
 
@@ -75,8 +138,20 @@ def _under_their_own() -> list[Series]:
         "runge_kutta3": (1e-1, 1e-2),
     }
     return [
-        Series(engine="mujoco", method="own-implicitfast", settings=OWN_STEPS, adaptive=False, law=MUJOCO_LAW),
-        Series(engine="mujoco", method="own-RK4", settings=OWN_STEPS[1:], adaptive=False, law=MUJOCO_LAW),
+        Series(
+            engine="mujoco",
+            method="own-implicitfast",
+            settings=OWN_STEPS,
+            adaptive=False,
+            law=MUJOCO_LAW,
+        ),
+        Series(
+            engine="mujoco",
+            method="own-RK4",
+            settings=OWN_STEPS[1:],
+            adaptive=False,
+            law=MUJOCO_LAW,
+        ),
         *(
             Series(
                 engine="drake",
@@ -106,6 +181,10 @@ def command(engine: str, tools: Tools) -> list[str]:
     """How the driver of an engine is called; [] when it is not there."""
     if engine == "drake":
         script = Path(__file__).parent / "drake_walk.py"
-        return [str(tools.python), str(script)] if script.exists() and "drake" not in tools.missing else []
+        return (
+            [str(tools.python), str(script)]
+            if script.exists() and "drake" not in tools.missing
+            else []
+        )
     driver = tools.driver("plant" if engine == OURS else engine)
     return [str(driver)] if driver.exists() and engine not in tools.missing else []

@@ -1,7 +1,9 @@
-"""`python -m benchmarks.solvers [--page]`: what a coarser solver costs in accuracy, metric by metric, and saves in steps.
+"""`python -m benchmarks.solvers [--page]`: what a coarser solver costs in accuracy, metric by
+metric, and saves in steps.
 
-Walks are `walk_flat`, 10 s, under both controls, with variations; errors are against a solver a thousand times as exact as the default one.
-Nothing here depends on the machine. Writes benchmarks/results/solvers.csv; with --page the table in docs/studies.md too.
+Walks are `walk_flat`, 10 s, under both controls, with variations; errors are against a solver a
+thousand times as exact as the default one. Nothing here depends on the machine. Writes
+benchmarks/results/solvers.csv; with --page the table in docs/studies.md too.
 """
 
 from __future__ import annotations
@@ -26,26 +28,46 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 SEEDS = 6
-SHOWN = ("slip_per_metre", "cost_of_transport", "torque_rms", "peak_force", "loading_rate", "path_error", "stability_margin")
+SHOWN = (
+    "slip_per_metre",
+    "cost_of_transport",
+    "torque_rms",
+    "peak_force",
+    "loading_rate",
+    "path_error",
+    "stability_margin",
+)
 STEPS = "solver.steps"
 REFERENCE = ("solver.tolerance=1e-7", "solver.step_max=0.001")
 SETTINGS: dict[str, tuple[str, ...]] = {
     "rosw3, 1e-4 (default)": (),
-    **{f"ros2, {tolerance}": ("solver.method=ros2", f"solver.tolerance={tolerance}") for tolerance in ("1e-3", "3e-3", "1e-2", "1e-1")},
+    **{
+        f"ros2, {tolerance}": ("solver.method=ros2", f"solver.tolerance={tolerance}")
+        for tolerance in ("1e-3", "3e-3", "1e-2", "1e-1")
+    },
 }
 Array = NDArray[np.float64]
 
 
-def walked(walker: Walker, control: str, gains: Gains | None, settings: Sequence[str]) -> tuple[Array, float]:
+def walked(
+    walker: Walker, control: str, gains: Gains | None, settings: Sequence[str]
+) -> tuple[Array, float]:
     """(seeds, SHOWN) figures of walks, and their mean number of steps."""
     scenario = load_scenario("walk_flat", overrides=[f"control={control}", *settings])
-    results = [walker.simulate(replace(scenario, seed=seed, variation=STANDARD), gains=gains) for seed in range(SEEDS)]
+    results = [
+        walker.simulate(replace(scenario, seed=seed, variation=STANDARD), gains=gains)
+        for seed in range(SEEDS)
+    ]
     figures = np.array([[result.metrics[name] for name in SHOWN] for result in results])
-    return figures, float(np.mean([result.outcome.recording.column(STEPS)[-1] for result in results]))
+    return figures, float(
+        np.mean([result.outcome.recording.column(STEPS)[-1] for result in results])
+    )
 
 
 def errors(control: str) -> list[dict[str, Any]]:
-    """For each setting: steps, and the largest error over the seeds of each metric, in its own unit and relative to its mean."""
+    """For each setting: steps, and the largest error over the seeds of each metric, in its own
+    unit and relative to its mean.
+    """
     gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
     rows = []
     with Walker(everything=True) as walker:
@@ -54,20 +76,32 @@ def errors(control: str) -> list[dict[str, Any]]:
             figures, steps = walked(walker, control, gains, settings)
             off = np.abs(figures - exact).max(axis=0)
             share = off / np.abs(exact).mean(axis=0)
-            rows.append({"control": control, "solver": name, "steps": round(steps)} | {
-                key: float(f"{value:.3g}") for metric, error, part in zip(SHOWN, off, share, strict=True)
-                for key, value in ((metric, error), (f"{metric} relative", part))
-            })  # fmt: skip
+            rows.append(
+                {"control": control, "solver": name, "steps": round(steps)}
+                | {
+                    key: float(f"{value:.3g}")
+                    for metric, error, part in zip(SHOWN, off, share, strict=True)
+                    for key, value in ((metric, error), (f"{metric} relative", part))
+                }
+            )
     return rows
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Markdown: errors relative to the figure, and in brackets those too small for `hexapod compare` to call a change."""
-    lines = ["| control | solver, tolerance | steps | " + " | ".join(name.replace("_", " ") for name in SHOWN) + " |"]
+    """Markdown: errors relative to the figure, and in brackets those too small for `hexapod
+    compare` to call a change.
+    """
+    lines = [
+        "| control | solver, tolerance | steps | "
+        + " | ".join(name.replace("_", " ") for name in SHOWN)
+        + " |"
+    ]
     lines.append("|---" * (3 + len(SHOWN)) + "|")
     for row in rows:
         cells = [_cell(row[name], row[f"{name} relative"], FLOORS[name]) for name in SHOWN]
-        lines.append(f"| {row['control']} | {row['solver']} | {row['steps']} | " + " | ".join(cells) + " |")
+        lines.append(
+            f"| {row['control']} | {row['solver']} | {row['steps']} | " + " | ".join(cells) + " |"
+        )
     return "\n".join(lines)
 
 

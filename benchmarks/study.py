@@ -1,4 +1,5 @@
-"""`python -m benchmarks.study [--page]`: what a study's run costs beside its walk, how two workers scale, bytes and memory per run.
+"""`python -m benchmarks.study [--page]`: what a study's run costs beside its walk, how two workers
+scale, bytes and memory per run.
 
 Writes benchmarks/results/<machine>/study.csv; with --page the table in docs/studies.md too.
 """
@@ -49,35 +50,80 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "studies.md"
 INSTANT = "benchmarks.study:Instant"
 BOTH = ("kinematic", "compliant")
-RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = 20_000, 50_000, 2000, 600, 20, 360, 60, 3
+RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = (
+    20_000,
+    50_000,
+    2000,
+    600,
+    20,
+    360,
+    60,
+    3,
+)
 CORES, MILLION = 100, 1e6  # of the plan
 DEFAULT: dict[str, Any] = {}
 # settings of the solver by name: docs/studies.md says what they cost in accuracy
 SOLVERS: dict[str, dict[str, Any]] = {
-    "": {"solver.method": "ros2", "solver.tolerance": 3e-3}, "_coarse": {"solver.method": "ros2", "solver.tolerance": 1e-2},
+    "": {"solver.method": "ros2", "solver.tolerance": 3e-3},
+    "_coarse": {"solver.method": "ros2", "solver.tolerance": 1e-2},
     "_default": DEFAULT,
-}  # fmt: skip
+}
 SOLVER_NAMES = {"": "ros2 at 3e-3", "_coarse": "ros2 at 1e-2", "_default": "the default solver"}
 # name -> unit, what it is
 MEANINGS = {
-    **{f"rate{key}": ("1/min", f"walks of 10 s, both controls, two processes, {name}: best of {REPEATS}")
-       for key, name in SOLVER_NAMES.items()},
+    **{
+        f"rate{key}": (
+            "1/min",
+            f"walks of 10 s, both controls, two processes, {name}: best of {REPEATS}",
+        )
+        for key, name in SOLVER_NAMES.items()
+    },
     "rate_median": ("1/min", "the median of those of the first row"),
-    "rate_python": ("1/min", f"the same with the Python controller and master (`--engine python`), {SOLVER_NAMES['']}"),
-    **{f"walk_{control}{key}": ("ms", f"of a processor, for a walk of 10 s under {control} control, all in, {name}")
-       for key, name in SOLVER_NAMES.items() for control in BOTH},
+    "rate_python": (
+        "1/min",
+        f"the same with the Python controller and master (`--engine python`), {SOLVER_NAMES['']}",
+    ),
+    **{
+        f"walk_{control}{key}": (
+            "ms",
+            f"of a processor, for a walk of 10 s under {control} control, all in, {name}",
+        )
+        for key, name in SOLVER_NAMES.items()
+        for control in BOTH
+    },
     "scaling": ("1", "two workers' rate over twice one's"),
     "scaling_free": ("1", "two programs without any study over twice one: what the machine gives"),
-    "overhead": ("ms", "of a processor, for a run that takes no time: its scenario made, sent, checked and stored"),
-    "handed_out": ("1/s", "runs that take no time, handed out and stored by one program with two workers"),
-    "overhead_dask": ("ms", "of a processor, for a run that takes no time, through a Dask scheduler with two workers, in chunks"),
+    "overhead": (
+        "ms",
+        "of a processor, for a run that takes no time: its scenario made, sent, checked and stored",
+    ),
+    "handed_out": (
+        "1/s",
+        "runs that take no time, handed out and stored by one program with two workers",
+    ),
+    "overhead_dask": (
+        "ms",
+        "of a processor, for a run that takes no time, through a Dask scheduler with two workers, in chunks",
+    ),
     "task_dask": ("ms", "of a processor, for a task of one such run: client, scheduler and worker"),
-    "finish": ("ms", "of a processor, for each run when all are there: put in order, read, added up, reported"),
+    "finish": (
+        "ms",
+        "of a processor, for each run when all are there: put in order, read, added up, reported",
+    ),
     "bytes": ("B", "a run in results.parquet"),
     "memory": ("B", f"peak memory of the program, for each run from {RUNS} to {LARGE}"),
-}  # fmt: skip
-AIMS = {"rate": "3,000", "rate_coarse": "3,000", "rate_python": "300", "scaling": "0.9", "overhead": "< 5 ms", "overhead_dask": "< 5 ms"}
-SPEEDS = [name for name in MEANINGS if name.startswith(("rate", "walk", "scaling"))]  # the rest is the study's own
+}
+AIMS = {
+    "rate": "3,000",
+    "rate_coarse": "3,000",
+    "rate_python": "300",
+    "scaling": "0.9",
+    "overhead": "< 5 ms",
+    "overhead_dask": "< 5 ms",
+}
+SPEEDS = [
+    name for name in MEANINGS if name.startswith(("rate", "walk", "scaling"))
+]  # the rest is the study's own
 OWN = [name for name in MEANINGS if name not in SPEEDS]
 Figures = dict[str, tuple[float, str, str]]  # by name: value, unit, what it is
 
@@ -91,7 +137,13 @@ class Instant:
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
         """As Engine says."""
         metrics = {name: value * (1.0 + scenario.seed) for name, value in self._metrics.items()}
-        return Summary(control=scenario.control, seed=scenario.seed, status=COMPLETED, upright=True, metrics=metrics)
+        return Summary(
+            control=scenario.control,
+            seed=scenario.seed,
+            status=COMPLETED,
+            upright=True,
+            metrics=metrics,
+        )
 
     def close(self) -> None:
         """Nothing to free."""
@@ -101,15 +153,32 @@ class Timed:
     """A study, run into a folder that is gone afterwards."""
 
     def __init__(
-        self, runs: int, *, controls: tuple[str, ...] = ("kinematic",), settings: Mapping[str, Any] = DEFAULT, report: bool = False,
+        self,
+        runs: int,
+        *,
+        controls: tuple[str, ...] = ("kinematic",),
+        settings: Mapping[str, Any] = DEFAULT,
+        report: bool = False,
         **options: Any,
-    ) -> None:  # fmt: skip
-        table = {"seeds": runs // len(controls), "controls": list(controls), "variation": True, "set": dict(settings)}
+    ) -> None:
+        table = {
+            "seeds": runs // len(controls),
+            "controls": list(controls),
+            "variation": True,
+            "set": dict(settings),
+        }
         self.runs, self._stamps = runs, list[tuple[float, int]]()
         with TemporaryDirectory(prefix="hexapod-bench-") as folder:
             begin = processor_time()
-            run_study(study_from_table(table, where="bench"), Path(folder), options=Options(**options), begun=self._begun)
-            self.processor = processor_time() - begin  # s    of this process and the workers it waited for
+            run_study(
+                study_from_table(table, where="bench"),
+                Path(folder),
+                options=Options(**options),
+                begun=self._begun,
+            )
+            self.processor = (
+                processor_time() - begin
+            )  # s    of this process and the workers it waited for
             self.bytes = (Path(folder) / RESULTS_FILE).stat().st_size / runs
             if report:
                 write_study_report(read_results(Path(folder)), Path(folder))
@@ -121,7 +190,9 @@ class Timed:
 
     @property
     def rate(self) -> float:
-        """Runs per second, from when a tenth of them was there, for workers take a while to begin, until the last tenth."""
+        """Runs per second, from when a tenth of them was there, for workers take a while to
+        begin, until the last tenth.
+        """
         times, counts = np.array(self._stamps).T
         done = np.cumsum(counts)
         first, last = np.searchsorted(done, [0.1 * self.runs, 0.9 * self.runs])
@@ -130,11 +201,18 @@ class Timed:
 
 def processor_time() -> float:
     """s    of this process and of those it has waited for"""
-    return float(sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)))
+    return float(
+        sum(
+            sum(resource.getrusage(who)[:2])
+            for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        )
+    )
 
 
 def measured(fmu: Path, gains: Gains) -> Figures:
-    """All figures. Processor time, of which others on the machine take nothing, and medians of rates that were measured side by side."""
+    """All figures. Processor time, of which others on the machine take nothing, and medians of
+    rates that were measured side by side.
+    """
     common: dict[str, Any] = {"fmu": fmu, "gains": gains}
     found = _own_costs(common) | _walk_costs(common) | _rates(common)
     return {name: (found[name], *MEANINGS[name]) for name in MEANINGS}
@@ -148,10 +226,14 @@ def _own_costs(common: dict[str, Any]) -> dict[str, float]:
         tasks = [through_cluster(runs, common) for runs in (FEW, TASKS)]
     report = [item.reported - item.processor for item in (many, large)]
     return {
-        "overhead": 1e3 * (large.processor - many.processor) / (LARGE - RUNS), "handed_out": large.rate,
-        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (BY_DASK - FEW), "task_dask": 1e3 * (tasks[1] - tasks[0]) / (TASKS - FEW),
-        "finish": 1e3 * (report[1] - report[0]) / (LARGE - RUNS), "bytes": many.bytes, "memory": (most - small) / (LARGE - RUNS),
-    }  # fmt: skip
+        "overhead": 1e3 * (large.processor - many.processor) / (LARGE - RUNS),
+        "handed_out": large.rate,
+        "overhead_dask": 1e3 * (by_dask[1] - by_dask[0]) / (BY_DASK - FEW),
+        "task_dask": 1e3 * (tasks[1] - tasks[0]) / (TASKS - FEW),
+        "finish": 1e3 * (report[1] - report[0]) / (LARGE - RUNS),
+        "bytes": many.bytes,
+        "memory": (most - small) / (LARGE - RUNS),
+    }
 
 
 def _walk_costs(common: dict[str, Any]) -> dict[str, float]:
@@ -159,34 +241,58 @@ def _walk_costs(common: dict[str, Any]) -> dict[str, float]:
     for key, settings in SOLVERS.items():
         for control in BOTH:
             less, more = (
-                Timed(runs, workers=1, controls=(control,), settings=settings, **common).processor for runs in (FEW, FEW + WALKS // 4)
+                Timed(runs, workers=1, controls=(control,), settings=settings, **common).processor
+                for runs in (FEW, FEW + WALKS // 4)
             )
             found[f"walk_{control}{key}"] = 1e3 * (more - less) / (WALKS // 4)
     return found
 
 
 def _rates(common: dict[str, Any]) -> dict[str, float]:
-    """Per minute the best of all, for noise only ever takes away, and their medians; ratios of what ran one after the other, medians."""
-    rates: dict[str, list[float]] = {name: [] for name in (*(f"rate{key}" for key in SOLVERS), "rate_python", "scaling", "scaling_free")}
+    """Per minute the best of all, for noise only ever takes away, and their medians; ratios of
+    what ran one after the other, medians.
+    """
+    rates: dict[str, list[float]] = {
+        name: []
+        for name in (*(f"rate{key}" for key in SOLVERS), "rate_python", "scaling", "scaling_free")
+    }
     for _ in range(REPEATS):
         for key, settings in SOLVERS.items():
-            rates[f"rate{key}"].append(60.0 * Timed(WALKS, controls=BOTH, workers=2, settings=settings, **common).rate)
+            rates[f"rate{key}"].append(
+                60.0 * Timed(WALKS, controls=BOTH, workers=2, settings=settings, **common).rate
+            )
         alone = 60.0 * Timed(WALKS, controls=BOTH, workers=1, settings=SOLVERS[""], **common).rate
         rates["scaling"].append(rates["rate"][-1] / (2.0 * alone))
         rates["scaling_free"].append(free_rate(2, common) / (2.0 * free_rate(1, common)))
         rates["rate_python"].append(
-            60.0 * Timed(PYTHON_WALKS, controls=BOTH, workers=2, engine="python", settings=SOLVERS[""], **common).rate
+            60.0
+            * Timed(
+                PYTHON_WALKS,
+                controls=BOTH,
+                workers=2,
+                engine="python",
+                settings=SOLVERS[""],
+                **common,
+            ).rate
         )
     best = {name: max(values) for name, values in rates.items() if name.startswith("rate")}
-    return {name: statistics.median(values) for name, values in rates.items()} | best | {"rate_median": statistics.median(rates["rate"])}
+    return (
+        {name: statistics.median(values) for name, values in rates.items()}
+        | best
+        | {"rate_median": statistics.median(rates["rate"])}
+    )
 
 
 def free_rate(count: int, common: dict[str, Any]) -> float:
     """Walks per second of so many processes that know nothing of each other or of a study."""
     context = get_context("spawn")
     together = context.Barrier(count)
-    with ProcessPoolExecutor(count, mp_context=context, initializer=_meet_at, initargs=(together,)) as processes:
-        futures = [processes.submit(walk_alone, common["fmu"], common["gains"]) for _ in range(count)]
+    with ProcessPoolExecutor(
+        count, mp_context=context, initializer=_meet_at, initargs=(together,)
+    ) as processes:
+        futures = [
+            processes.submit(walk_alone, common["fmu"], common["gains"]) for _ in range(count)
+        ]
         return sum(future.result() for future in futures)
 
 
@@ -201,7 +307,9 @@ def _meet_at(barrier: Any) -> None:
 def walk_alone(fmu: Path, gains: Gains) -> float:
     """Walks per second of this process."""
     settings = [f"{name}={value}" for name, value in SOLVERS[""].items()]
-    plans = [load_scenario("walk_flat", overrides=[f"control={control}", *settings]) for control in BOTH]
+    plans = [
+        load_scenario("walk_flat", overrides=[f"control={control}", *settings]) for control in BOTH
+    ]
     with Walker(fmu=fmu) as walker:
         for plan in plans:
             walker.summary(plan, gains=gains)
@@ -219,7 +327,9 @@ def _measured_memory(runs: int, common: dict[str, Any]) -> tuple[Timed, float]:
 
 
 def through_cluster(runs: int, common: dict[str, Any]) -> float:
-    """s    of processor for runs that take no time: program, scheduler and workers, from their start to their end"""
+    """s    of processor for runs that take no time: program, scheduler and workers, from their
+    start to their end
+    """
     begin = processor_time()
     with cluster() as address:
         Timed(runs, engine=INSTANT, scheduler=address, **common)
@@ -237,14 +347,19 @@ def cluster() -> Iterator[str]:
     with TemporaryDirectory(prefix="hexapod-dask-") as folder:
         file = Path(folder) / "scheduler.json"
         common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
-        commands = [["dask_scheduler", "--port", "0"], *[["dask_worker", "--nthreads", "1", "--no-nanny"]] * 2]
+        commands = [
+            ["dask_scheduler", "--port", "0"],
+            *[["dask_worker", "--nthreads", "1", "--no-nanny"]] * 2,
+        ]
         processes = [
             subprocess.Popen(
-                [sys.executable, "-m", f"distributed.cli.{name}", *words, *common], cwd=folder, stderr=subprocess.DEVNULL,
+                [sys.executable, "-m", f"distributed.cli.{name}", *words, *common],
+                cwd=folder,
+                stderr=subprocess.DEVNULL,
                 env={**os.environ, "PYTHONPATH": str(ROOT)},
             )
             for name, *words in commands
-        ]  # fmt: skip
+        ]
         try:
             while not (file.exists() and file.read_text().rstrip().endswith("}")):
                 time.sleep(0.1)
@@ -262,9 +377,14 @@ def write(figures: Figures, *, page: bool) -> Path:
     with atomic_text(path) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["name", "value", "unit", "meaning"])
-        writer.writerows([name, f"{value:.4g}", unit, meaning] for name, (value, unit, meaning) in figures.items())
+        writer.writerows(
+            [name, f"{value:.4g}", unit, meaning]
+            for name, (value, unit, meaning) in figures.items()
+        )
     if page:
-        put_in_page({"speed": table(figures, SPEEDS), "own": table(figures, OWN), "plan": plan(figures)})
+        put_in_page(
+            {"speed": table(figures, SPEEDS), "own": table(figures, OWN), "plan": plan(figures)}
+        )
     return path
 
 
@@ -284,25 +404,41 @@ def table(figures: Mapping[str, tuple[float, str, str]], names: Sequence[str]) -
     for name in names:
         value, unit, meaning = figures[name]
         text = f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
-        lines.append(f"| {meaning} | {text}{'' if unit == '1' else f' {unit}'} | {AIMS.get(name, '')} |")
+        lines.append(
+            f"| {meaning} | {text}{'' if unit == '1' else f' {unit}'} | {AIMS.get(name, '')} |"
+        )
     return "\n".join(lines)
 
 
 def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
-    """What a million walks of 10 s, half of them under either control, come to on a hundred such cores."""
+    """What a million walks of 10 s, half of them under either control, come to on a hundred such
+    cores.
+    """
     values = {name: value for name, (value, _, _) in figures.items()}
-    walk, exact = (1e-3 * 0.5 * sum(values[f"walk_{control}{key}"] for control in BOTH) for key in ("", "_default"))  # s
+    walk, exact = (
+        1e-3 * 0.5 * sum(values[f"walk_{control}{key}"] for control in BOTH)
+        for key in ("", "_default")
+    )  # s
     hours = MILLION * walk / 3600.0
     per_second = CORES / walk
     tasks = CORES / conduct.chunk_time(CORES)
     rows = [
-        (f"processor time, {SOLVER_NAMES['']}", f"{hours:.1f} core hours; with the default solver {MILLION * exact / 3600.0:.1f}"),
+        (
+            f"processor time, {SOLVER_NAMES['']}",
+            f"{hours:.1f} core hours; with the default solver {MILLION * exact / 3600.0:.1f}",
+        ),
         (
             f"on {CORES} cores",
             f"{60.0 * hours / CORES:.0f} min at {per_second:.0f} walks per second; {60.0 * MILLION * exact / 3600.0 / CORES:.0f} min",
         ),
-        ("of what one program hands out and stores", f"{100.0 * per_second / values['handed_out']:.0f} %"),
-        ("to put in order, add up and report at the end, on one core", f"{1e-3 * MILLION * values['finish'] / 60.0:.1f} min"),
+        (
+            "of what one program hands out and stores",
+            f"{100.0 * per_second / values['handed_out']:.0f} %",
+        ),
+        (
+            "to put in order, add up and report at the end, on one core",
+            f"{1e-3 * MILLION * values['finish'] / 60.0:.1f} min",
+        ),
         ("results.parquet", f"{values['bytes'] * MILLION / 1e6:.0f} MB"),
         ("memory of the program for its runs", f"{values['memory'] * MILLION / 1e6:.0f} MB"),
         (
@@ -310,7 +446,13 @@ def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
             f"{tasks:.0f} per second, {100.0 * tasks * 1e-3 * values['task_dask']:.0f} % of one core for all that handle them",
         ),
     ]
-    return "\n".join([f"| 10⁶ walks of 10 s, {CORES} such cores | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)])
+    return "\n".join(
+        [
+            f"| 10⁶ walks of 10 s, {CORES} such cores | |",
+            "|---|---|",
+            *(f"| {name} | {value} |" for name, value in rows),
+        ]
+    )
 
 
 def main() -> None:

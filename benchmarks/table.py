@@ -65,7 +65,12 @@ class Parts:
 
 def rows(runs: Sequence[Run], series: Sequence[Series], parts: Parts) -> list[Row]:
     """The whole table."""
-    return [*_evaluation(runs, parts), *_walking(runs, series), *_own_contact(runs, series), *_rest(parts)]
+    return [
+        *_evaluation(runs, parts),
+        *_walking(runs, series),
+        *_own_contact(runs, series),
+        *_rest(parts),
+    ]
 
 
 def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
@@ -73,21 +78,41 @@ def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
         told = parts.derivatives.get(kernel, {})
         plain, full = told.get("plain", math.nan), told.get("multipliers", math.nan)
         yield Row(figure=f"right-hand side, {kernel}", unit="us", ours=plain, goal=goal)
-        yield Row(figure=f"the same with all multipliers, {kernel}: extra", unit="1", ours=full / plain - 1.0, goal=MULTIPLIERS_GOAL)
+        yield Row(
+            figure=f"the same with all multipliers, {kernel}: extra",
+            unit="1",
+            ours=full / plain - 1.0,
+            goal=MULTIPLIERS_GOAL,
+        )
     fastest = min((told["plain"] for told in parts.derivatives.values()), default=math.nan)
-    peers = [("pinocchio", PLANT_LAW), ("mujoco", PLANT_LAW), ("mujoco", MUJOCO_LAW), ("simbody", PLANT_LAW), ("drake", DRAKE_LAW)]
+    peers = [
+        ("pinocchio", PLANT_LAW),
+        ("mujoco", PLANT_LAW),
+        ("mujoco", MUJOCO_LAW),
+        ("simbody", PLANT_LAW),
+        ("drake", DRAKE_LAW),
+    ]
     for engine, law in peers:
         theirs = per_evaluation(runs, engine, law)
         goal = PINOCCHIO_GOAL if engine == "pinocchio" else math.nan
         name = engine if law == PLANT_LAW else f"{engine}, its own contact"
         yield Row(
-            figure="right-hand side against", unit="us", ours=fastest, peer=name, theirs=theirs, ratio=theirs / fastest,
-            goal=goal, judged="ratio", better="more",
-        )  # fmt: skip
+            figure="right-hand side against",
+            unit="us",
+            ours=fastest,
+            peer=name,
+            theirs=theirs,
+            ratio=theirs / fastest,
+            goal=goal,
+            judged="ratio",
+            better="more",
+        )
 
 
 def _walking(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]:
-    """At each error: ours and every peer with all walks within it, then with the median walk within it."""
+    """At each error: ours and every peer with all walks within it, then with the median walk
+    within it.
+    """
     mine = [one for one in series if one.engine == OURS]
     theirs = [one for one in series if one.engine != OURS and one.law != MUJOCO_LAW]
     for target in REALTIME_GOALS:
@@ -101,22 +126,60 @@ def _walking(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]:
 def _ours(chosen: Choice | None, target: float, at: str) -> Iterable[Row]:
     slowest = chosen.spread.worst_realtime_factor if chosen else math.nan
     worst = chosen.spread.worst_error if chosen else math.nan
-    yield Row(figure=f"{at}{_how(chosen)}: real time", unit="x", ours=_factor(chosen), goal=REALTIME_GOALS[target], better="more")
-    yield Row(figure=f"{at}: slowest walk", unit="x", ours=slowest, goal=WORST_GOAL if target == FINE else math.nan, better="more")
+    yield Row(
+        figure=f"{at}{_how(chosen)}: real time",
+        unit="x",
+        ours=_factor(chosen),
+        goal=REALTIME_GOALS[target],
+        better="more",
+    )
+    yield Row(
+        figure=f"{at}: slowest walk",
+        unit="x",
+        ours=slowest,
+        goal=WORST_GOAL if target == FINE else math.nan,
+        better="more",
+    )
     yield Row(figure=f"{at}: worst error", unit="m", ours=worst)
 
 
-def _against(runs: Sequence[Run], peers: Sequence[Series], target: float, at: str, ours: float, *, every_walk: bool) -> Iterable[Row]:
+def _against(
+    runs: Sequence[Run],
+    peers: Sequence[Series],
+    target: float,
+    at: str,
+    ours: float,
+    *,
+    every_walk: bool,
+) -> Iterable[Row]:
     """A row for each peer at its best, and one for the best of them."""
     engines = list(dict.fromkeys(one.engine for one in peers if spreads(runs, one)))
-    found = {engine: best(runs, [one for one in peers if one.engine == engine], target, every_walk=every_walk) for engine in engines}
+    found = {
+        engine: best(
+            runs, [one for one in peers if one.engine == engine], target, every_walk=every_walk
+        )
+        for engine in engines
+    }
     facts: dict[str, Any] = {"figure": f"{at}: against", "unit": "x", "ours": ours}
     for engine, choice in found.items():
         theirs = _factor(choice)
-        yield Row(peer=f"{engine}{_how(choice)}" if choice else f"{engine}: not reached", theirs=theirs, ratio=ours / theirs, **facts)
+        yield Row(
+            peer=f"{engine}{_how(choice)}" if choice else f"{engine}: not reached",
+            theirs=theirs,
+            ratio=ours / theirs,
+            **facts,
+        )
     top = max((_factor(choice) for choice in found.values() if choice), default=math.nan)
     goal = PEERS_GOAL if target == FINE else math.nan
-    yield Row(peer="the best of them", theirs=top, ratio=ours / top, goal=goal, judged="ratio", better="more", **facts)
+    yield Row(
+        peer="the best of them",
+        theirs=top,
+        ratio=ours / top,
+        goal=goal,
+        judged="ratio",
+        better="more",
+        **facts,
+    )
 
 
 def _own_contact(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]:
@@ -127,23 +190,51 @@ def _own_contact(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]
         if one.law != MUJOCO_LAW:
             continue
         for spread in spreads(runs, one):
-            goal = OWN_CONTACT_GOAL if (one.method, spread.setting) == (method, setting) else math.nan
+            goal = (
+                OWN_CONTACT_GOAL if (one.method, spread.setting) == (method, setting) else math.nan
+            )
             peer = f"{one.engine} {one.method} {spread.setting:g}, at {spread.error:.1e} m"
             yield Row(
-                figure=f"every walk within {FINE:g} m: against", unit="x", ours=_factor(chosen), peer=peer, theirs=spread.realtime_factor,
-                ratio=_factor(chosen) / spread.realtime_factor, goal=goal, judged="ratio", better="more",
-            )  # fmt: skip
+                figure=f"every walk within {FINE:g} m: against",
+                unit="x",
+                ours=_factor(chosen),
+                peer=peer,
+                theirs=spread.realtime_factor,
+                ratio=_factor(chosen) / spread.realtime_factor,
+                goal=goal,
+                judged="ratio",
+                better="more",
+            )
 
 
 def _rest(parts: Parts) -> Iterable[Row]:
     for name, cost in parts.steep.items():
-        yield Row(figure=f"cost with {name} over the default's", unit="1", ours=cost, goal=STEEP_GOAL)
+        yield Row(
+            figure=f"cost with {name} over the default's", unit="1", ours=cost, goal=STEEP_GOAL
+        )
     for control, factor in parts.loop.items():
-        yield Row(figure=f"whole co-simulation, {control} control", unit="x", ours=factor, goal=LOOP_GOAL, better="more")
-    yield Row(figure="the master itself, a macro-step", unit="us", ours=parts.master, goal=MASTER_GOAL)
-    yield Row(figure="an instance, its structure", unit="byte", ours=parts.structure, goal=MEMORY_GOAL)
-    yield Row(figure="an instance, by which the process grows", unit="byte", ours=parts.resident, goal=MEMORY_GOAL)
-    yield Row(figure="allocations in all steps of a walk", unit="1", ours=parts.allocations, goal=0.0)
+        yield Row(
+            figure=f"whole co-simulation, {control} control",
+            unit="x",
+            ours=factor,
+            goal=LOOP_GOAL,
+            better="more",
+        )
+    yield Row(
+        figure="the master itself, a macro-step", unit="us", ours=parts.master, goal=MASTER_GOAL
+    )
+    yield Row(
+        figure="an instance, its structure", unit="byte", ours=parts.structure, goal=MEMORY_GOAL
+    )
+    yield Row(
+        figure="an instance, by which the process grows",
+        unit="byte",
+        ours=parts.resident,
+        goal=MEMORY_GOAL,
+    )
+    yield Row(
+        figure="allocations in all steps of a walk", unit="1", ours=parts.allocations, goal=0.0
+    )
     for name, count in parts.instructions.items():
         yield Row(figure=f"instructions of an evaluation, {name}", unit="1", ours=count)
     yield Row(figure="instructions of a macro-step", unit="1", ours=parts.walk_instructions)
@@ -167,10 +258,14 @@ def shown(found: Sequence[Row], *, title: str) -> Table:
     """The table for a terminal."""
     table = Table(title=title)
     columns: tuple[tuple[str, Callable[[Row], str], Any], ...] = (
-        ("figure", lambda row: f"{row.figure} [{row.unit}]".replace("[", "\\["), "left"), ("ours", lambda row: _number(row.ours), "right"),
-        ("peer", lambda row: row.peer, "left"), ("theirs", lambda row: _number(row.theirs), "right"),
-        ("ratio", lambda row: _number(row.ratio), "right"), ("goal", _goal, "right"), ("met", lambda row: MET[row.met], "left"),
-    )  # fmt: skip
+        ("figure", lambda row: f"{row.figure} [{row.unit}]".replace("[", "\\["), "left"),
+        ("ours", lambda row: _number(row.ours), "right"),
+        ("peer", lambda row: row.peer, "left"),
+        ("theirs", lambda row: _number(row.theirs), "right"),
+        ("ratio", lambda row: _number(row.ratio), "right"),
+        ("goal", _goal, "right"),
+        ("met", lambda row: MET[row.met], "left"),
+    )
     for name, _, justify in columns:
         table.add_column(name, justify=justify, no_wrap=name != "figure")
     for row in found:

@@ -1,6 +1,8 @@
-"""What the benchmarks need beside the package: an environment of the peers' wheels and the drivers built against them.
+"""What the benchmarks need beside the package: an environment of the peers' wheels and the drivers
+built against them.
 
-All of it lies in build/bench. A peer that cannot be had here is reported with the reason and otherwise left out.
+All of it lies in build/bench. A peer that cannot be had here is reported with the reason and
+otherwise left out.
 """
 
 from __future__ import annotations
@@ -40,7 +42,9 @@ class Tools:
 
 
 def prepare(*, quick: bool) -> Tools:
-    """Installs the peers' wheels and builds all drivers; what is up to date stays. Raises RuntimeError when our own do not build."""
+    """Installs the peers' wheels and builds all drivers; what is up to date stays. Raises
+    RuntimeError when our own do not build.
+    """
     python = _environment()
     missing = _install(python, ("mujoco",) if quick else None)
     native = BUILD / "native"
@@ -73,7 +77,17 @@ def _install(python: Path, chosen: tuple[str, ...] | None) -> dict[str, str]:
             continue
         stamp = python.parents[1] / f".{line}"
         if not stamp.exists():
-            trouble = _run([str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", line])
+            trouble = _run(
+                [
+                    str(python),
+                    "-m",
+                    "pip",
+                    "install",
+                    "--quiet",
+                    "--disable-pip-version-check",
+                    line,
+                ]
+            )
             if trouble:
                 missing[PACKAGES[name]] = trouble
             else:
@@ -99,8 +113,14 @@ def _build(native: Path, target: str) -> str:
 
 def _run(command: list[str]) -> str:
     """Runs a command; returns "", or the last it said when it failed."""
-    environment = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])}
+    environment = os.environ | {
+        "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    }
     if shutil.which(command[0], path=environment["PATH"]) is None:
         return f"{command[0]} is not installed"
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    return "" if done.returncode == 0 else " / ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
+    return (
+        ""
+        if done.returncode == 0
+        else " / ".join((done.stderr or done.stdout).strip().splitlines()[-LAST_LINES:])
+    )

@@ -1,8 +1,10 @@
-"""The family of walks: who walks how over what, and what the servos are told. `python -m benchmarks.walks` writes the files.
+"""The family of walks: who walks how over what, and what the servos are told. `python -m
+benchmarks.walks` writes the files.
 
-A step size that looks good on one trajectory may be luck, so every figure is judged on all of these: both robots, all gaits, two of
-each, the rest drawn once from a seeded generator. The joint commands are the kinematic controller's, which looks at no measurement, so
-every engine gets the same ones whatever its own error is.
+A step size that looks good on one trajectory may be luck, so every figure is judged on all of
+these: both robots, all gaits, two of each, the rest drawn once from a seeded generator. The joint
+commands are the kinematic controller's, which looks at no measurement, so every engine gets the
+same ones whatever its own error is.
 
 A walk file is raw bytes, so that a driver in any language reads it without a parser:
     hxDefinition | int64 n | double h | n x hxInput (held over [k h, (k + 1) h))
@@ -64,12 +66,20 @@ def family() -> list[Walk]:
 
 
 def stiff(walk: Walk, *, slope: float | None = None, stiffness: float | None = None) -> Walk:
-    """The same walk with a steeper friction law [s/m] or a harder foot [N/m^1.5], named after the change."""
+    """The same walk with a steeper friction law [s/m] or a harder foot [N/m^1.5], named after
+    the change.
+    """
     robot, name = walk.robot, walk.name
     if slope is not None:
-        robot, name = replace(robot, friction=replace(robot.friction, slope=slope)), f"{name}-slope{slope:g}"
+        robot, name = (
+            replace(robot, friction=replace(robot.friction, slope=slope)),
+            f"{name}-slope{slope:g}",
+        )
     if stiffness is not None:
-        robot, name = replace(robot, contact=replace(robot.contact, stiffness=stiffness)), f"{name}-stiff{stiffness:g}"
+        robot, name = (
+            replace(robot, contact=replace(robot.contact, stiffness=stiffness)),
+            f"{name}-stiff{stiffness:g}",
+        )
     return replace(walk, name=name, robot=robot)
 
 
@@ -83,10 +93,17 @@ def _drawn(generator: np.random.Generator, robot_name: str, gait_name: str, k: i
         if _reachable(command, robot, gait):
             break
     stiffness = robot.contact.stiffness * float(np.exp(generator.uniform(*np.log(STIFFNESS))))
-    contact = replace(robot.contact, stiffness=stiffness, restitution=generator.uniform(*RESTITUTION))
+    contact = replace(
+        robot.contact, stiffness=stiffness, restitution=generator.uniform(*RESTITUTION)
+    )
     friction = replace(robot.friction, mu=generator.uniform(*MU))
     name = f"{robot_name}-{gait_name}-{k}"
-    return Walk(name=name, robot=replace(robot, contact=contact, friction=friction), gait=gait, command=command)
+    return Walk(
+        name=name,
+        robot=replace(robot, contact=contact, friction=friction),
+        gait=gait,
+        command=command,
+    )
 
 
 def _reachable(command: BodyCommand, robot: Robot, gait: Gait) -> bool:
@@ -102,7 +119,9 @@ def commands(walk: Walk) -> Iterator[Command]:
     controller, nothing = Controller(walk.robot, period=STEP, gait=walk.gait), Measurement()
     for k in range(walk.steps):
         told = controller.step(k * STEP, walk.command, nothing)
-        yield Command(angle_ref=told.angle_ref, speed_ref=told.speed_ref, torque_ref=told.torque_ref)
+        yield Command(
+            angle_ref=told.angle_ref, speed_ref=told.speed_ref, torque_ref=told.torque_ref
+        )
 
 
 def start(walk: Walk) -> Any:
@@ -113,7 +132,11 @@ def start(walk: Walk) -> Any:
 
 def file_bytes(walk: Walk) -> bytes:
     """The walk as the drivers read it."""
-    parts = [bytes(start(walk)), struct.pack("=qd", walk.steps, STEP), *(bytes(inputs(command)) for command in commands(walk))]
+    parts = [
+        bytes(start(walk)),
+        struct.pack("=qd", walk.steps, STEP),
+        *(bytes(inputs(command)) for command in commands(walk)),
+    ]
     return b"".join(parts)
 
 

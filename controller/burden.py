@@ -34,7 +34,9 @@ class Burden:
     """
 
     def __init__(self, *, most: float, cycle: float, period: float, weight_time: float) -> None:
-        """most [N m] that a servo may be asked for, cycle [s] of the gait, weight_time [s] of the support."""
+        """most [N m] that a servo may be asked for, cycle [s] of the gait, weight_time [s] of
+        the support.
+        """
         self._most, self._fade = most, math.exp(-period / cycle)
         self._follow = 1.0 - math.exp(-period / (QUICK * weight_time))
         self.reset()

@@ -1,7 +1,9 @@
-"""The force laws of compliant control: what the planned load and the measured foot forces ask of the joints.
+"""The force laws of compliant control: what the planned load and the measured foot forces ask of
+the joints.
 
-Support. The servos are told the torques that carry each leg's planned share of weight and acceleration (support.py), scaled by the weight
-that the feet really measure: a payload is carried too.
+Support. The servos are told the torques that carry each leg's planned share of weight and
+acceleration (support.py), scaled by the weight that the feet really measure: a payload is carried
+too.
 
 Tangential. Of its force a foot should give way only to what does no work for the body. What the
 plan asks of it is left alone, and so are the legs' common push and twist beyond that, shared in
@@ -12,8 +14,8 @@ vertical force: the loop's plant is at most 1, whatever leg, pose and servo, and
 feel it. The answer goes with the measured load, so that a foot is not dragged over the ground by it
 while it is being unloaded.
 
-Normal. The virtual suspension answers the force beyond the planned share; its deflection z reaches the joints as the vertical force
-z/C_zz, C = J kp^-1 J^T, and so without a horizontal one.
+Normal. The virtual suspension answers the force beyond the planned share; its deflection z reaches
+the joints as the vertical force z/C_zz, C = J kp^-1 J^T, and so without a horizontal one.
 """
 
 from __future__ import annotations
@@ -36,17 +38,34 @@ from hexapod_cosim.controller.slip_pid import LOAD_FLOOR, squeeze
 from hexapod_cosim.controller.support import Shares, torques
 from hexapod_cosim.controller.touchdown import EARLY, Touchdown
 
-SLIDING = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that slides, or a slope of 29 degrees, has it
+# 1    common tangential over normal force beyond the plan: only a robot that slides, or a slope of
+# 29 degrees, has it
+SLIDING = 0.55
 CALM = 0.5  # 1    gait cycles without it until feet are trusted again
 SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
 SETTLED = 0.5  # 1    of the weight: feet that carry less together have only just met the ground
-OUTRUN = 0.35, 0.45  # 1    share of the time in which paths ask more speed than a servo has: below joints follow, above they do not
+OUTRUN = (
+    0.35,
+    0.45,
+    # 1    share of the time in which paths ask more speed than a servo has: below joints follow,
+    # above they do not
+)
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
 LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the design's margins hold up to it
 SCALES = 0.5, 3.0  # 1    measured over modelled weight that the support believes
 HIGH = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
-REMEMBERED = ("scale", "trust", "_plan", "_at", "_slack", "_sliding", "outrun", "_asked", "_dragged")
+REMEMBERED = (
+    "scale",
+    "trust",
+    "_plan",
+    "_at",
+    "_slack",
+    "_sliding",
+    "outrun",
+    "_asked",
+    "_dragged",
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +74,8 @@ class Plan:
 
     own: Array  # N m    (n, 6, 3) torques for the legs' own weight and motion
     carry: Array  # N m    (n, 6, 3) and for the planned load
-    effect: Array  # (n, 6, 6, 3) of a force on the foot: its shift x y z [m/N], and the bend of the joints [rad/N]
+    # (n, 6, 6, 3) of a force on the foot: its shift x y z [m/N], and the bend of the joints [rad/N]
+    effect: Array
     shares: Shares
     push: Array  # N    (n, 6, 4) planned tangential forces x y 0 0
     feet: Plane  # m    (n, 6) contact points x + i y
@@ -73,26 +93,59 @@ class Plan:
 class Compliance:
     """The laws of all feet.
 
-    Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos [N m]; shift: (6, 3) of the feet
-    that comes of `bend` [m], shift_plane: (6,) the same x + i y; offset: (6,) by which paths are raised for ground met early or late [m];
-    doubted: (6,) sensors not believed; fallback: (6,) legs that walk without feedback, for that or because the robot slides;
-    scale: measured over planned weight; trust: 1, or less while the robot slides, is far too
-    heavy or its joints cannot follow, which `outrun` tells;  burden: how much of the weight servos
-    carry;  landings: how high feet meet the ground.
+    Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos
+    [N m]; shift: (6, 3) of the feet that comes of `bend` [m], shift_plane: (6,) the same x + i y;
+    offset: (6,) by which paths are raised for ground met early or late [m]; doubted: (6,) sensors
+    not believed; fallback: (6,) legs that walk without feedback, for that or because the robot
+    slides; scale: measured over planned weight; trust: 1, or less while the robot slides, is far
+    too heavy or its joints cannot follow, which `outrun` tells;  burden: how much of the weight
+    servos carry;  landings: how high feet meet the ground.
     """
 
-    def __init__(self, gains: Gains, parts: Parts, *, weight: float, cycle: float, kp: float, step_height: float, period: float) -> None:
-        """weight [N] of the robot, cycle [s] and step height [m] of its gait, kp [N m/rad] of its servos."""
-        self._parts, self._softness, self._high, self._period = parts, 1.0 / kp, HIGH * step_height, period
+    def __init__(
+        self,
+        gains: Gains,
+        parts: Parts,
+        *,
+        weight: float,
+        cycle: float,
+        kp: float,
+        step_height: float,
+        period: float,
+    ) -> None:
+        """weight [N] of the robot, cycle [s] and step height [m] of its gait, kp [N m/rad] of
+        its servos.
+        """
+        self._parts, self._softness, self._high, self._period = (
+            parts,
+            1.0 / kp,
+            HIGH * step_height,
+            period,
+        )
         share = weight / TRIPOD_LEGS
         self.law = FootLaw(gains, period=period)
-        self.detector, self.watch, self.touchdown = ContactDetector(weight), SensorWatch(weight, cycle=cycle), Touchdown(period=period)
+        self.detector, self.watch, self.touchdown = (
+            ContactDetector(weight),
+            SensorWatch(weight, cycle=cycle),
+            Touchdown(period=period),
+        )
         self.landings = Landings()
-        self.burden = Burden(most=gains.limits.torque, cycle=cycle, period=period, weight_time=gains.support.weight_time)
-        self._tracking, self._memory = min(period / gains.slip.tracking_time, 1.0), math.exp(-period / gains.slip.load_time)
+        self.burden = Burden(
+            most=gains.limits.torque,
+            cycle=cycle,
+            period=period,
+            weight_time=gains.support.weight_time,
+        )
+        self._tracking, self._memory = (
+            min(period / gains.slip.tracking_time, 1.0),
+            math.exp(-period / gains.slip.load_time),
+        )
         self._follow_load = 1.0 - self._memory
         self._settled = SETTLED * weight
-        self._calm, self._follow_cycle = round(CALM * cycle / period), 1.0 - math.exp(-period / cycle)
+        self._calm, self._follow_cycle = (
+            round(CALM * cycle / period),
+            1.0 - math.exp(-period / cycle),
+        )
         self._follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
         self._largest, self._deepest = gains.slip.limit * share, gains.suspension.limit
         self._most, self._fastest = gains.limits.torque, gains.limits.speed * period
@@ -100,7 +153,11 @@ class Compliance:
         if not parts.suspension:
             self._mixing[2, 2] = 0.0
         self.bend, self.torque, self._step = np.zeros((3, LEGS, 3))
-        self._felt, self._inputs, self._ones = np.zeros((LEGS, 4)), np.zeros((LEGS, 4)), np.ones(LEGS)
+        self._felt, self._inputs, self._ones = (
+            np.zeros((LEGS, 4)),
+            np.zeros((LEGS, 4)),
+            np.ones(LEGS),
+        )
         self._felt_push, self._felt_normal = self._felt.view(np.complex128)[:, 0], self._felt[:, 2]
         self._squeezing = self._inputs.view(np.complex128)[:, 0]
         self._force, self._moved = np.zeros((LEGS, 3, 1)), np.zeros((LEGS, 6, 1))
@@ -109,15 +166,42 @@ class Compliance:
         self._answer = self.law.row.view(np.complex128)[:, 0]
         self.offset, self.grip = np.zeros(LEGS), np.ones(LEGS)
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
-        self._remembering: tuple[Any, ...] = (self.watch, self.touchdown, self.detector, self.landings, self.burden)
-        self._arrays = (self.law.row, self.bend, self.offset, self.doubted, self.grip, self.fallback)
+        self._remembering: tuple[Any, ...] = (
+            self.watch,
+            self.touchdown,
+            self.detector,
+            self.landings,
+            self.burden,
+        )
+        self._arrays = (
+            self.law.row,
+            self.bend,
+            self.offset,
+            self.doubted,
+            self.grip,
+            self.fallback,
+        )
         self.reset()
 
     def reset(self) -> None:
         """All laws at rest."""
-        for law in (self.law, self.detector, self.watch, self.touchdown, self.landings, self.burden):
+        for law in (
+            self.law,
+            self.detector,
+            self.watch,
+            self.touchdown,
+            self.landings,
+            self.burden,
+        ):
             law.reset()
-        for array in (self.bend, self.torque, self._moved, self.offset, self.doubted, self.fallback):
+        for array in (
+            self.bend,
+            self.torque,
+            self._moved,
+            self.offset,
+            self.doubted,
+            self.fallback,
+        ):
             array[...] = 0
         self.outrun, self._asked, self._dragged = False, 0.0, 0
         self.scale, self.trust, self._at, self._slack, self._sliding = 0.0, 1.0, -1, False, 0
@@ -125,7 +209,10 @@ class Compliance:
 
     def save(self) -> dict[str, Any]:
         """What the laws remember, and what is planned."""
-        own, kept = {name: getattr(self, name) for name in REMEMBERED}, [array.copy() for array in self._arrays]
+        own, kept = (
+            {name: getattr(self, name) for name in REMEMBERED},
+            [array.copy() for array in self._arrays],
+        )
         return {"own": own, "arrays": kept, "parts": [part.save() for part in self._remembering]}
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -137,13 +224,22 @@ class Compliance:
             part.restore(remembered)
 
     def plan(
-        self, demand: Demand, shares: Shares, *, feet: Plane, height: Array, rise: Array, swinging: Mask, hurried: Mask | None = None
+        self,
+        demand: Demand,
+        shares: Shares,
+        *,
+        feet: Plane,
+        height: Array,
+        rise: Array,
+        swinging: Mask,
+        hurried: Mask | None = None,
     ) -> None:
         """Lays out the coming steps, rows of all arguments but `swinging`.
 
         Args:
             feet: (n, 6) contact points x + i y in the walking frame [m];
-            height, rise: (n, 6) of the feet's paths over the stance [m, m/s];  swinging: (6,) in the air throughout;
+            height, rise: (n, 6) of the feet's paths over the stance [m, m/s];  swinging: (6,) in
+            the air throughout;
             hurried: (n,) some joint is asked for more speed than its servo has, default never.
         """
         lever, none = demand.lever, np.zeros_like(demand.torque)
@@ -151,25 +247,39 @@ class Compliance:
         still = np.zeros_like(height)
         standing, well_up, supports = shares.activation >= 1.0, height > EARLY, self._parts.support
         self._plan = Plan(
-            own=demand.torque if supports else none, carry=carry,
-            effect=self._softness * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
-            shares=shares, push=np.stack([shares.push.real, shares.push.imag, still, still], axis=-1), feet=feet,
-            weight=shares.normal.sum(axis=1).tolist(), live=(shares.activation > 0.0).astype(np.float64), standing=standing,
+            own=demand.torque if supports else none,
+            carry=carry,
+            effect=self._softness
+            * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
+            shares=shares,
+            push=np.stack([shares.push.real, shares.push.imag, still, still], axis=-1),
+            feet=feet,
+            weight=shares.normal.sum(axis=1).tolist(),
+            live=(shares.activation > 0.0).astype(np.float64),
+            standing=standing,
             sure=list(zip(_bits(standing), _bits(standing | well_up), strict=True)),
-            falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0), height=height, swinging=swinging.copy(),
+            falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0),
+            height=height,
+            swinging=swinging.copy(),
             needed=np.abs(carry).max(axis=(1, 2)).tolist(),
             hurried=[False] * len(rise) if hurried is None else hurried.tolist(),
-        )  # fmt: skip
+        )
         self._at = -1
 
     def step(self, force: Array) -> None:
-        """One planned period on. force: (6, 4) ground on foot in the walking frame [N], the last column 0."""
+        """One planned period on. force: (6, 4) ground on foot in the walking frame [N], the last
+        column 0.
+        """
         self._at += 1
         plan, at, parts = self._plan, self._at, self._parts
         touching = self.detector.step(force[:, 2])
         self.landings.look(touching, plan.height[at], plan.swinging)
         standing, certain = plan.sure[at]
-        if (int.from_bytes(touching.tobytes(), "little") ^ standing) & certain or self.watch.busy or self.touchdown.busy:
+        if (
+            (int.from_bytes(touching.tobytes(), "little") ^ standing) & certain
+            or self.watch.busy
+            or self.touchdown.busy
+        ):
             force = self._wonder(force, touching)
             touching = self.detector.touching
         felt = np.subtract(force, self.scale * plan.push[at], out=self._felt)
@@ -189,7 +299,8 @@ class Compliance:
         self._actuate()
 
     def _mix(self) -> float:
-        """Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze of these, f_n, load.
+        """Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze
+        of these, f_n, load.
 
         Returns sum f_n [N].
         """
@@ -200,11 +311,14 @@ class Compliance:
             self._judge(math.hypot(x, y) * share if total > self._settled else 0.0)
         np.dot(felt, mixing, out=self._inputs)
         if self._parts.slip_pid:
-            self._squeezing[:] = squeeze(self._felt_push, self._felt_normal, self._plan.feet[self._at])
+            self._squeezing[:] = squeeze(
+                self._felt_push, self._felt_normal, self._plan.feet[self._at]
+            )
         return float(total)
 
     def _judge(self, drag: float) -> None:
-        """A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who carries what: kinematic control for it.
+        """A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who
+        carries what: kinematic control for it.
 
         drag: of the feet's common tangential force beyond the plan, the share of the normal one.
         """
@@ -233,9 +347,14 @@ class Compliance:
         if np.dot(law.deflection, law.deflection) > self._deepest**2:
             self._limit_deflections()
         freedom = self.burden.freedom if self._parts.support else 1.0
-        np.multiply(law.answer, freedom * np.minimum(law.load, LARGEST_LOAD)[:, None], out=self._force[:, :2, 0])
+        np.multiply(
+            law.answer,
+            freedom * np.minimum(law.load, LARGEST_LOAD)[:, None],
+            out=self._force[:, :2, 0],
+        )
         np.divide(law.deflection, plan.effect[at, :, 2, 2], out=self._force[:, 2, 0])
-        # a foot in the air forgets, within the time in which a leg gives up its load; and all do what they may not take away
+        # a foot in the air forgets, within the time in which a leg gives up its load; and all do
+        # what they may not take away
         kept = 1.0 - (1.0 - freedom) * self._follow_load
         law.integral *= kept * np.where(plan.swinging > touching, self._memory, 1.0)[:, None]
 
@@ -271,7 +390,9 @@ class Compliance:
         np.maximum(np.minimum(torque, self._most, out=torque), -self._most, out=torque)
 
     def _take_up(self, torque: Array) -> None:
-        """A leg that stands in the plan and not on the ground is given its share back as it loads."""
+        """A leg that stands in the plan and not on the ground is given its share back as it
+        loads.
+        """
         missing = self._plan.standing[self._at] & ~self.detector.touching
         self.grip += self._follow_load * (1.0 - self.grip)
         self.grip[missing] = 0.0
@@ -279,21 +400,31 @@ class Compliance:
         self._slack = bool((self.grip < GRIPPED).any())
 
     def _wonder(self, force: Array, touching: Mask) -> Array:
-        """Feet that touch and should not, or the other way round: ground met early or late, or a sensor that is wrong.
+        """Feet that touch and should not, or the other way round: ground met early or late, or a
+        sensor that is wrong.
 
-        Returns the forces; where a sensor is not believed, those of the plan, and of all feet once a tripod's are not.
+        Returns the forces; where a sensor is not believed, those of the plan, and of all feet once
+        a tripod's are not.
         """
         plan, at, parts, touches = self._plan, self._at, self._parts, touching.tolist()
         standing, height = plan.standing[at].tolist(), plan.height[at]
         expected = self.landings.expected(touching, height, plan.swinging)
         if parts.fallback:
             total = float(force[touching, 2].sum())
-            doubted = self.watch.look(touches, total, standing, (height > self._high + expected).tolist(), time=self._period)
+            doubted = self.watch.look(
+                touches,
+                total,
+                standing,
+                (height > self._high + expected).tolist(),
+                time=self._period,
+            )
             self.doubted[:] = doubted if sum(doubted) < TRIPOD_LEGS else True
             self.fallback[:] = self.doubted | (self.trust < 1.0)
             if self.doubted.any():
                 force = np.where(self.doubted[:, None], self.scale * plan.shares.forces(at), force)
-                touches = np.where(self.doubted, plan.shares.activation[at] > 0.5, touching).tolist()
+                touches = np.where(
+                    self.doubted, plan.shares.activation[at] > 0.5, touching
+                ).tolist()
                 self.detector.touching = np.array(touches)
         if self.trust < 1.0:
             self.touchdown.reset()
@@ -301,7 +432,9 @@ class Compliance:
         elif parts.touchdown:
             self._slack = True
             falling = np.where(self.landings.early(expected, height), plan.falling[at], 0.0)
-            self.offset[:] = self.touchdown.step(touches, falling.tolist(), plan.swinging.tolist(), standing)
+            self.offset[:] = self.touchdown.step(
+                touches, falling.tolist(), plan.swinging.tolist(), standing
+            )
         return force
 
 

@@ -1,4 +1,6 @@
-"""Compliant control around its laws: from the planned steps to what the laws need, and from the sensors to the corrected feet."""
+"""Compliant control around its laws: from the planned steps to what the laws need, and from the
+sensors to the corrected feet.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,16 @@ from hexapod_cosim.models import Robot
 if TYPE_CHECKING:
     from hexapod_cosim.controller.controller import JointCommand, Measurement
 
-REMEMBERED = ("_steered", "_count", "_at", "_moving", "_rotations", "_command", "_climb", "_planned")
+REMEMBERED = (
+    "_steered",
+    "_count",
+    "_at",
+    "_moving",
+    "_rotations",
+    "_command",
+    "_climb",
+    "_planned",
+)
 STEERING_TIME = 0.1  # s    in which a change of the added velocity is led over
 PACK = Struct("12d").pack_into  # numbers into an array: half the time of an assignment
 
@@ -32,15 +43,36 @@ PACK = Struct("12d").pack_into  # numbers into an array: half the time of an ass
 class Compliant:
     """What compliant control adds to the feet, angles and torques of one robot in one gait.
 
-    Attributes: laws: the force laws;  hold: the slow loops;  shift, lift: (6,) corrections of the feet [m], walking frame.
+    Attributes: laws: the force laws;  hold: the slow loops;  shift, lift: (6,) corrections of the
+    feet [m], walking frame.
     """
 
-    def __init__(self, robot: Robot, gait: Gait, gains: Gains, parts: Parts, *, legs: LegSolver, period: float) -> None:
-        self._parts, self._legs, self._per_second, self._leading = parts, legs, 1.0 / period, STEERING_TIME / period
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        gains: Gains,
+        parts: Parts,
+        *,
+        legs: LegSolver,
+        period: float,
+    ) -> None:
+        self._parts, self._legs, self._per_second, self._leading = (
+            parts,
+            legs,
+            1.0 / period,
+            STEERING_TIME / period,
+        )
         self._dynamics = InverseDynamics(robot, legs, period=period)
         self._support = Support(robot, gait, gains.support, rest=self._dynamics.rest())
         self.laws = Compliance(
-            gains, parts, weight=robot.weight, cycle=gait.period, kp=robot.servo.kp, step_height=gait.step_height, period=period
+            gains,
+            parts,
+            weight=robot.weight,
+            cycle=gait.period,
+            kp=robot.servo.kp,
+            step_height=gait.step_height,
+            period=period,
         )
         self.hold = Hold(gains.hold, parts, period=period)
         self.shift: Plane = np.zeros(LEGS, dtype=np.complex128)
@@ -61,9 +93,16 @@ class Compliant:
         self._count, self._at, self._moving = 0, -1, False
 
     def save(self) -> dict[str, Any]:
-        """What it remembers and has planned. Planned arrays are never changed, so they are shared."""
+        """What it remembers and has planned. Planned arrays are never changed, so they are
+        shared.
+        """
         own = {name: getattr(self, name) for name in REMEMBERED}
-        return {"laws": self.laws.save(), "hold": self.hold.save(), "offset": self._offset.copy(), "own": own}
+        return {
+            "laws": self.laws.save(),
+            "hold": self.hold.save(),
+            "offset": self._offset.copy(),
+            "own": own,
+        }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save()."""
@@ -75,11 +114,16 @@ class Compliant:
     def steer(self, v: Plane, yaw_rate: Array, *, moves: bool, afresh: bool) -> tuple[Plane, Array]:
         """Commanded velocities of the coming steps and what the lost way adds to them.
 
-        That is looked at `afresh` when a leg lifts off or touches down, and led over without a jump.
+        That is looked at `afresh` when a leg lifts off or touches down, and led over without a
+        jump.
         """
         if afresh or (not moves and self._steered[1].any()):
             hold = self.hold
-            goal = np.array([hold.velocity, hold.yaw_rate]) if moves else np.zeros(2, dtype=np.complex128)
+            goal = (
+                np.array([hold.velocity, hold.yaw_rate])
+                if moves
+                else np.zeros(2, dtype=np.complex128)
+            )
             self._steered = self._steering(np.zeros(1))[0], goal, 0
         added = self._steering(np.arange(len(v), dtype=np.float64))
         return v + added[:, 0], yaw_rate + added[:, 1].real
@@ -87,7 +131,9 @@ class Compliant:
     def _steering(self, steps: Array) -> Plane:
         """(n, 2) the additions to velocity and yaw rate so many steps ahead."""
         begin, goal, past = self._steered
-        return np.asarray(begin + (goal - begin) * np.minimum((past + steps) / self._leading, 1.0)[:, None])
+        return np.asarray(
+            begin + (goal - begin) * np.minimum((past + steps) / self._leading, 1.0)[:, None]
+        )
 
     def advance(self, steps: int) -> None:
         """So many of the steps planned last are past: the next are planned from there."""
@@ -96,23 +142,41 @@ class Compliant:
 
     def lower(self, feet: Feet, steps: Steps, *, walking: bool) -> Feet:
         """Planned feet, all rows, lowered by what the ground will give way under their loads."""
-        self._activation = self._support.activation(steps.phase, steps.stayed, steps.stays, walking=walking)
+        self._activation = self._support.activation(
+            steps.phase, steps.stayed, steps.stays, walking=walking
+        )
         self._heights = feet.height
         if not self._parts.support:
             return feet
         lowering = self._support.lowering(steps.plane, self._activation)
         self._heights = feet.height - lowering
-        return replace(feet, height=self._heights, rise=feet.rise - self._per_second * rates(lowering, 1.0))
+        return replace(
+            feet, height=self._heights, rise=feet.rise - self._per_second * rates(lowering, 1.0)
+        )
 
-    def plan(self, first: int, steps: Steps, value: Array, pose: Pose, speed: Array, *, shift: Plane, level: bool) -> None:
+    def plan(
+        self,
+        first: int,
+        steps: Steps,
+        value: Array,
+        pose: Pose,
+        speed: Array,
+        *,
+        shift: Plane,
+        level: bool,
+    ) -> None:
         """Lays out planned steps from the row `first` on.
 
         Args:
-            value: (n, 6) commanded vx vy yaw_rate height roll pitch;  pose, speed: the legs, and the joints' speeds [rad/s];
-            shift: (n, 6) of the feet from their paths for rolling [m];  level: height, roll and pitch are all 0.
+            value: (n, 6) commanded vx vy yaw_rate height roll pitch;  pose, speed: the legs, and
+                the joints' speeds [rad/s];
+            shift: (n, 6) of the feet from their paths for rolling [m];  level: height, roll and
+                pitch are all 0.
         """
         rotation = None if level else rotations(value[:, 4], value[:, 5])
-        demand = self._dynamics.demand(pose, speed, Frames(steps.way, cis(steps.turn), value[:, 3:4], rotation))
+        demand = self._dynamics.demand(
+            pose, speed, Frames(steps.way, cis(steps.turn), value[:, 3:4], rotation)
+        )
         rows = slice(first, None)
         feet = steps.plane + shift
         shares = self._support.shares(feet, self._activation, demand).rows(rows)
@@ -126,7 +190,10 @@ class Compliant:
             hurried=np.asarray((np.abs(speed[rows]) >= self._legs.speed_max).any(axis=(1, 2))),
         )
         self._climb = self._legs.speeds(pose.rows(rows), np.zeros(1), np.ones(1))
-        self._rotations, self._command = None if rotation is None else rotation[rows], value[rows].tolist()
+        self._rotations, self._command = (
+            None if rotation is None else rotation[rows],
+            value[rows].tolist(),
+        )
         self._planned = steps.plane[rows], self._heights[rows]
         self._at = -1
 
@@ -143,7 +210,9 @@ class Compliant:
         angle, climb = out.angle_ref, self._climb[at]
         angle += laws.bend
         angle += climb * raised[:, None]
-        np.maximum(np.minimum(angle, self._legs.angle_max, out=angle), self._legs.angle_min, out=angle)
+        np.maximum(
+            np.minimum(angle, self._legs.angle_max, out=angle), self._legs.angle_min, out=angle
+        )
         if laws.touchdown.busy or self._moving:
             self._moving = laws.touchdown.busy
             out.speed_ref += climb * ((laws.offset - before) * self._per_second)[:, None]
@@ -153,7 +222,9 @@ class Compliant:
         np.add(laws.shift[:, 2], raised, out=self.lift)
 
     def _sense(self, measurement: Measurement) -> None:
-        """Foot forces in the walking frame K: rows f_K = f_W R_WT R_TK, the transpose of R_KT R_TW f_W."""
+        """Foot forces in the walking frame K: rows f_K = f_W R_WT R_TK, the transpose of R_KT
+        R_TW f_W.
+        """
         w, x, y, z = self._quaternion = measurement.quaternion.tolist()
         xx, yy, zz = x * x, y * y, z * z
         PACK(
@@ -177,13 +248,22 @@ class Compliant:
         if self._rotations is not None:
             plane, heights = turned(plane, heights, self._rotations[self._at])
         w, x, y, z = self._quaternion
-        leaning = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)), asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        leaning = (
+            atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0)),
+        )
         yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
         planned, planned_heights = (rows[self._at].tolist() for rows in self._planned)
         self.hold.look(
             Sight(
-                plane=(plane - rolled).tolist(), height=(heights + height).tolist(), planned=planned, planned_height=planned_heights,
-                load=self.laws.law.load.tolist(), tilt=(leaning[0] - roll, leaning[1] - pitch), yaw=yaw, velocity=complex(vx, vy),
+                plane=(plane - rolled).tolist(),
+                height=(heights + height).tolist(),
+                planned=planned,
+                planned_height=planned_heights,
+                load=self.laws.law.load.tolist(),
+                tilt=(leaning[0] - roll, leaning[1] - pitch),
+                yaw=yaw,
+                velocity=complex(vx, vy),
                 yaw_rate=yaw_rate,
             )
-        )  # fmt: skip
+        )

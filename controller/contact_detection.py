@@ -1,9 +1,11 @@
 """What the foot force sensors say, and whether they can be believed.
 
-A foot touches down when its force rises above one threshold and lifts off when it falls below a lower one, so that noise on a force near
-either makes no foot flicker. A sensor is not believed any more when it contradicts for too long what must be: a force on a foot in the
-middle of its swing, or none on a foot that is planned to carry its load while the others do not carry the whole weight in its place. It
-is believed again when it has not contradicted anything for one and a half gait cycles.
+A foot touches down when its force rises above one threshold and lifts off when it falls below a
+lower one, so that noise on a force near either makes no foot flicker. A sensor is not believed any
+more when it contradicts for too long what must be: a force on a foot in the middle of its swing, or
+none on a foot that is planned to carry its load while the others do not carry the whole weight in
+its place. It is believed again when it has not contradicted anything for one and a half gait
+cycles.
 """
 
 from __future__ import annotations
@@ -15,10 +17,17 @@ import numpy as np
 
 from hexapod_cosim.controller.kinematics import LEGS, Array, Mask
 
-TOUCH, LIFT = 0.02, 0.005  # 1    of the weight: a foot with more has touched down, with less has lifted off
+TOUCH, LIFT = (
+    0.02,
+    0.005,
+)  # 1    of the weight: a foot with more has touched down, with less has lifted off
 AIRBORNE_TIME = 0.06  # s    a force this long on a foot in mid-swing, ...
-ABSENT_TIME = 0.10  # s    or none this long on one that should carry, is a contradiction; both longer than the sensors' lag
-MISSING = 0.92  # 1    of the weight: less than this from all feet, and some force is not being reported
+# s    or none this long on one that should carry, is a contradiction; both longer than the sensors'
+# lag
+ABSENT_TIME = 0.10
+MISSING = (
+    0.92  # 1    of the weight: less than this from all feet, and some force is not being reported
+)
 MEMORY = 1.5  # 1    gait cycles without contradiction until a sensor is believed again
 
 
@@ -69,20 +78,35 @@ class SensorWatch:
     def restore(self, state: tuple[Any, ...]) -> None:
         """Restores a state returned by save()."""
         self._contradicted, self._left = state
-        self.doubted, self.busy = [left > 0.0 for left in self._left], any(self._left) or any(self._contradicted)
+        self.doubted, self.busy = (
+            [left > 0.0 for left in self._left],
+            any(self._left) or any(self._contradicted),
+        )
 
-    def look(self, touching: Sequence[bool], total: float, standing: Sequence[bool], high: Sequence[bool], *, time: float) -> list[bool]:
+    def look(
+        self,
+        touching: Sequence[bool],
+        total: float,
+        standing: Sequence[bool],
+        high: Sequence[bool],
+        *,
+        time: float,
+    ) -> list[bool]:
         """After another `time` [s]. Returns `doubted`.
 
         Args:
             touching, total: which feet report a force, and the sum of all [N].
-            standing, high: which legs are planned to carry their whole share, and which to be well above the ground.
+            standing, high: which legs are planned to carry their whole share, and which to be well
+            above the ground.
         """
         missing = total < self._weight
         wrong = [
-            (touches and up) or (missing and stands and not touches) for touches, stands, up in zip(touching, standing, high, strict=True)
+            (touches and up) or (missing and stands and not touches)
+            for touches, stands, up in zip(touching, standing, high, strict=True)
         ]
-        contradicted = [past + time if now else 0.0 for past, now in zip(self._contradicted, wrong, strict=True)]
+        contradicted = [
+            past + time if now else 0.0 for past, now in zip(self._contradicted, wrong, strict=True)
+        ]
         limits = [AIRBORNE_TIME if up else ABSENT_TIME for up in high]
         left = [
             self._memory if past > limit else max(rest - time, 0.0)

@@ -1,7 +1,9 @@
-"""The linear part of a foot's laws as one discrete system, stepped for all feet by one product of matrices.
+"""The linear part of a foot's laws as one discrete system, stepped for all feet by one product of
+matrices.
 
-A foot's row holds its inputs and states; the system is the block-diagonal of the slip PID along x and along y, the virtual suspension
-and the smoothing of the load. Attributes are views of the new row, so that what limits and forgets works in place.
+A foot's row holds its inputs and states; the system is the block-diagonal of the slip PID along x
+and along y, the virtual suspension and the smoothing of the load. Attributes are views of the new
+row, so that what limits and forgets works in place.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from hexapod_cosim.controller import slip_pid, suspension
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.kinematics import LEGS, Array
 
-# columns of a row: answers of the PID, its states by direction, those of the suspension, the load, the inputs
+# columns of a row: answers of the PID, its states by direction, those of the suspension, the load,
+# the inputs
 ANSWER, LAST, SMOOTH, SUM, SLOPE = (slice(k, k + 2) for k in (0, 2, 4, 6, 8))
 SUSPENSION, LOAD, INPUTS = slice(10, 12), 12, slice(13, 17)
 PUSH_X, PUSH_Y, EXCESS, SHARE = range(13, 17)
@@ -24,14 +27,19 @@ COLUMNS = 18  # one more, so that columns pair up to complex numbers
 class FootLaw:
     """Six feet. Inputs: tangential force x, y and normal force to give way to [N], load [1].
 
-    Attributes, views: inputs: (6, 4);  answer: (6, 2) of the PID [N];  integral: (6, 2) its [N];  deflection, rate: (6,) of the
-    suspension [m, m/s];  load: (6,) smoothed [1].
+    Attributes, views: inputs: (6, 4);  answer: (6, 2) of the PID [N];  integral: (6, 2) its [N];
+    deflection, rate: (6,) of the suspension [m, m/s];  load: (6,) smoothed [1].
     """
 
     def __init__(self, gains: Gains, *, period: float) -> None:
         self._step = law_matrix(gains, period=period)
         self.row, self._next = np.zeros((2, LEGS, COLUMNS))
-        self.inputs, self.answer, self.integral, self.load = self.row[:, INPUTS], self.row[:, ANSWER], self.row[:, SUM], self.row[:, LOAD]
+        self.inputs, self.answer, self.integral, self.load = (
+            self.row[:, INPUTS],
+            self.row[:, ANSWER],
+            self.row[:, SUM],
+            self.row[:, LOAD],
+        )
         self.deflection, self.rate = self.row[:, SUSPENSION].T
 
     def reset(self) -> None:

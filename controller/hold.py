@@ -1,9 +1,12 @@
-"""Slow loops on what the standing legs say about the torso: its height and tilt over the ground, and the way it has walked.
+"""Slow loops on what the standing legs say about the torso: its height and tilt over the ground,
+and the way it has walked.
 
-Feet that stand are fixed points, so where the encoders see them tells how the torso lies. Against the planned feet they lie higher by
-c + s_x x + s_y y: the torso is c too low, pitched by s_x and rolled by -s_y against the ground. That tilt, and what a gravity-aware sensor
-says, give the ground's own inclination; smoothed it is what the torso is held parallel to, while quick tilts, of a torso on uneven ground
-as well, are those of the sensor. From look to look the way over the ground is -d(e^(i yaw) p) of the feet that stood all the time.
+Feet that stand are fixed points, so where the encoders see them tells how the torso lies. Against
+the planned feet they lie higher by c + s_x x + s_y y: the torso is c too low, pitched by s_x and
+rolled by -s_y against the ground. That tilt, and what a gravity-aware sensor says, give the
+ground's own inclination; smoothed it is what the torso is held parallel to, while quick tilts, of a
+torso on uneven ground as well, are those of the sensor. From look to look the way over the ground
+is -d(e^(i yaw) p) of the feet that stood all the time.
 """
 
 from __future__ import annotations
@@ -39,7 +42,8 @@ class Sight(NamedTuple):
 class Hold:
     """Corrections of posture and way.
 
-    Attributes: lift: (6) of the feet [m]; velocity [m/s], yaw_rate [rad/s]: additions to the commanded ones; way, heading: those lost.
+    Attributes: lift: (6) of the feet [m]; velocity [m/s], yaw_rate [rad/s]: additions to the
+    commanded ones; way, heading: those lost.
     """
 
     def __init__(self, gains: HoldGains, parts: Parts, *, period: float) -> None:
@@ -57,7 +61,11 @@ class Hold:
 
     def save(self) -> dict[str, Any]:
         """Returns the state that restore() takes."""
-        return {name: value for name, value in vars(self).items() if name not in {"every", "_gains", "_parts", "_time"}}
+        return {
+            name: value
+            for name, value in vars(self).items()
+            if name not in {"every", "_gains", "_parts", "_time"}
+        }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state returned by save()."""
@@ -71,7 +79,11 @@ class Hold:
             self._hold_path(seen)
 
     def _hold_posture(self, seen: Sight) -> None:
-        found = fit_plane(seen.planned, [z - p for z, p in zip(seen.height, seen.planned_height, strict=True)], seen.load)
+        found = fit_plane(
+            seen.planned,
+            [z - p for z, p in zip(seen.height, seen.planned_height, strict=True)],
+            seen.load,
+        )
         if found is None:
             return
         low, along, across = found
@@ -79,9 +91,15 @@ class Hold:
         leaning = seen.tilt[0] + across, seen.tilt[1] - along  # of the ground
         ground = self._ground or leaning
         smooth = min(time / gains.ground_time, 1.0)
-        self._ground = ground = (ground[0] + smooth * (leaning[0] - ground[0]), ground[1] + smooth * (leaning[1] - ground[1]))
+        self._ground = ground = (
+            ground[0] + smooth * (leaning[0] - ground[0]),
+            ground[1] + smooth * (leaning[1] - ground[1]),
+        )
         step, most = gains.attitude_rate * time, gains.angle_limit
-        roll, pitch = (_within(c - step * (t - g), most) for c, t, g in zip(self._angles, seen.tilt, ground, strict=True))
+        roll, pitch = (
+            _within(c - step * (t - g), most)
+            for c, t, g in zip(self._angles, seen.tilt, ground, strict=True)
+        )
         self._angles = roll, pitch
         self._height = _within(self._height + gains.height_rate * time * low, gains.height_limit)
         self.lift = [p.real * pitch - p.imag * roll - self._height for p in seen.planned]
@@ -91,9 +109,19 @@ class Hold:
         feet = [turned * p for p in seen.plane]
         if self._before is not None:
             before, loads, yaw = self._before
-            both = [min(a, b) if min(a, b) > LOADED else 0.0 for a, b in zip(loads, seen.load, strict=True)]
-            commanded, total = rect(1.0, yaw + self.heading + 0.5 * seen.yaw_rate * time) * seen.velocity * time, sum(both)
-            walked = -sum(w * (p - q) for w, p, q in zip(both, feet, before, strict=True)) / total if total else commanded
+            both = [
+                min(a, b) if min(a, b) > LOADED else 0.0
+                for a, b in zip(loads, seen.load, strict=True)
+            ]
+            commanded, total = (
+                rect(1.0, yaw + self.heading + 0.5 * seen.yaw_rate * time) * seen.velocity * time,
+                sum(both),
+            )
+            walked = (
+                -sum(w * (p - q) for w, p, q in zip(both, feet, before, strict=True)) / total
+                if total
+                else commanded
+            )
             self.way += commanded - walked
             self.heading += seen.yaw_rate * time - math.remainder(seen.yaw - yaw, math.tau)
         self._before = feet, seen.load, seen.yaw
@@ -107,15 +135,25 @@ def _within(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
-def fit_plane(feet: Sequence[complex], height: Sequence[float], weight: Sequence[float]) -> tuple[float, float, float] | None:
-    """c, s_x, s_y of the weighted least squares height = c + s_x x + s_y y; None when the feet do not span a plane."""
-    loaded = [(w, p.real, p.imag, z) for p, z, w in zip(feet, height, weight, strict=True) if w > LOADED]
+def fit_plane(
+    feet: Sequence[complex], height: Sequence[float], weight: Sequence[float]
+) -> tuple[float, float, float] | None:
+    """c, s_x, s_y of the weighted least squares height = c + s_x x + s_y y; None when the feet
+    do not span a plane.
+    """
+    loaded = [
+        (w, p.real, p.imag, z) for p, z, w in zip(feet, height, weight, strict=True) if w > LOADED
+    ]
     total = sum(w for w, *_ in loaded)
     if len(loaded) < 3 or not total:
         return None
     x0, y0, z0 = (sum(row[0] * row[k] for row in loaded) / total for k in (1, 2, 3))
     about = [(w / total, x - x0, y - y0, z - z0) for w, x, y, z in loaded]
-    xx, yy, xy = sum(w * x * x for w, x, _, _ in about), sum(w * y * y for w, _, y, _ in about), sum(w * x * y for w, x, y, _ in about)
+    xx, yy, xy = (
+        sum(w * x * x for w, x, _, _ in about),
+        sum(w * y * y for w, _, y, _ in about),
+        sum(w * x * y for w, x, y, _ in about),
+    )
     xz, yz = sum(w * x * z for w, x, _, z in about), sum(w * y * z for w, _, y, z in about)
     determinant = xx * yy - xy * xy
     if determinant < DETERMINANT_FLOOR:

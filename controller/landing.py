@@ -38,7 +38,9 @@ class Landings:
         self.met, self.before, self._flew = state
 
     def look(self, touching: Mask, height: Array, swinging: Mask) -> None:
-        """One period on; (6,) each: feet that report a force, paths over their ends [m], swinging legs."""
+        """One period on; (6,) each: feet that report a force, paths over their ends [m],
+        swinging legs.
+        """
         landed = touching & self._flew
         if landed.any():
             self.before = np.where(landed & (self.met < math.inf), self.met, self.before)
@@ -47,7 +49,12 @@ class Landings:
 
     def expected(self, touching: Mask, height: Array, swinging: Mask) -> Array:
         """(6,) m    where each foot meets the ground without any bump; 0 while nothing tells"""
-        return np.asarray(np.maximum(_least_of_others(np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)), self.before))
+        return np.asarray(
+            np.maximum(
+                _least_of_others(np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)),
+                self.before,
+            )
+        )
 
     def early(self, expected: Array, height: Array) -> Mask:
         """(6,) feet that met the ground well above the height expected and have yet to come down to

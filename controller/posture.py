@@ -11,19 +11,34 @@ from hexapod_cosim.controller.kinematics import Array, Feet, Plane
 
 
 def in_torso_frame(feet: Feet, value: Array, rate: Array) -> Feet:
-    """Feet of the walking frame under a torso at (n, 3) height [m], roll, pitch [rad], with their rates per second."""
+    """Feet of the walking frame under a torso at (n, 3) height [m], roll, pitch [rad], with
+    their rates per second.
+    """
     back = rotations(value[:, 1], value[:, 2]).transpose(0, 2, 1)
     plane, height = turned(feet.plane, feet.height - value[:, :1], back)
     velocity, rise = turned(feet.velocity, feet.rise - rate[:, :1], back)
     x, y, z = _spins(value[:, 1], rate[:, 1], rate[:, 2])[..., None]
     # w x p
-    return Feet(plane, height, velocity - (y - 1j * x) * height - 1j * z * plane, rise - (x * plane.imag - y * plane.real))
+    return Feet(
+        plane,
+        height,
+        velocity - (y - 1j * x) * height - 1j * z * plane,
+        rise - (x * plane.imag - y * plane.real),
+    )
 
 
 def rotations(roll: Array, pitch: Array) -> Array:
     """(n, 3, 3) R_KT, roll about x first, then pitch about y; both (n,) [rad]."""
-    cr, sr, cp, sp, zero = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.zeros_like(roll)
-    return np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]]).transpose(2, 0, 1)
+    cr, sr, cp, sp, zero = (
+        np.cos(roll),
+        np.sin(roll),
+        np.cos(pitch),
+        np.sin(pitch),
+        np.zeros_like(roll),
+    )
+    return np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]]).transpose(
+        2, 0, 1
+    )
 
 
 def turned(plane: Plane, z: Array, rotation: Array) -> tuple[Plane, Array]:

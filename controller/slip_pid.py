@@ -1,9 +1,11 @@
-"""The law against slip: one discrete PID per foot and direction, from tangential force to the force the leg's servos are relieved of.
+"""The law against slip: one discrete PID per foot and direction, from tangential force to the force
+the leg's servos are relieved of.
 
-A foot that the ground pushes by f while the leg holds it is being squeezed against its neighbours or dragged. Giving way takes the load
-off the contact, and with it the creep f/(mu f_n k_t). Forces that move the body are left alone: of
-the tangential forces d_i beyond the plan, (n_i/N) (D + i w (p_i - c)) are those of a body that is
-pushed and turned, n_i the normal forces, N their sum, p = x + i y,
+A foot that the ground pushes by f while the leg holds it is being squeezed against its neighbours
+or dragged. Giving way takes the load off the contact, and with it the creep f/(mu f_n k_t). Forces
+that move the body are left alone: of the tangential forces d_i beyond the plan, (n_i/N) (D + i w
+(p_i - c)) are those of a body that is pushed and turned, n_i the normal forces, N their sum, p = x
++ i y,
 
     D = sum d_i      c = sum n_i p_i / N      w = sum Im((p_i - c)^* d_i) / sum (n_i/N) |p_i - c|^2
 
@@ -31,7 +33,9 @@ LEAST_SPREAD = 1e-4  # m2    of the feet about their centre: less takes no momen
 
 
 def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """(n,) e [N] of tangential forces x + i y on feet that carry normal forces [N] at places [m]."""
+    """(n,) e [N] of tangential forces x + i y on feet that carry normal forces [N] at places
+    [m].
+    """
     total = normal.sum()
     if total <= LOAD_FLOOR:
         return push

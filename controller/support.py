@@ -1,14 +1,19 @@
-"""Who carries what: the planned weight and acceleration of the robot, shared out over the standing feet.
+"""Who carries what: the planned weight and acceleration of the robot, shared out over the standing
+feet.
 
-The ground must give the robot the force and the moment that its planned motion demands (inverse_dynamics.py). The feet's shares are
+The ground must give the robot the force and the moment that its planned motion demands
+(inverse_dynamics.py). The feet's shares are
 
     f_n = a (alpha + beta x + gamma y)       sum f_n = F_z     sum p f_n = moment     p = x + i y
-    f_h = (f_n / sum f_n) (F_h + i w (p - c))      c = sum p f_n / sum f_n      w such that sum Im(p^* f_h) = twist
+    f_h = (f_n / sum f_n) (F_h + i w (p - c))      c = sum p f_n / sum f_n      w such that sum
+    Im(p^* f_h) = twist
 
-with the least sum of f_n^2/a that does it, so that no foot squeezes another, a in [0, 1] each leg's activation: 1 while it stands, 0 in
-the air, and in between over the hand-over, which lies half before and half after the moment at which the paths say that one foot lifts
-off and the next has landed. The servos are told the torques -J^T f that balance the shares, so that no leg sags under its load; and as
-the ground gives way by delta = (f_n/K)^(2/3), a foot is lowered by what it will press in more than in the stance.
+with the least sum of f_n^2/a that does it, so that no foot squeezes another, a in [0, 1] each leg's
+activation: 1 while it stands, 0 in the air, and in between over the hand-over, which lies half
+before and half after the moment at which the paths say that one foot lifts off and the next has
+landed. The servos are told the torques -J^T f that balance the shares, so that no leg sags under
+its load; and as the ground gives way by delta = (f_n/K)^(2/3), a foot is lowered by what it will
+press in more than in the stance.
 """
 
 from __future__ import annotations
@@ -55,7 +60,9 @@ class Support:
         """rest: what the robot asks for in its stance, one step."""
         self._gait, self._stiffness, self._still = gait, robot.contact.stiffness, rest
         # hand-overs of a leg never overlap, whatever the gait
-        self._handover = min(gains.handover_time / gait.period, gait.duty, 1.0 - gait.duty)  # cycles
+        self._handover = min(
+            gains.handover_time / gait.period, gait.duty, 1.0 - gait.duty
+        )  # cycles
         self._rest = self.indentation(rest.weight / LEGS)
 
     def indentation(self, load: Array) -> Array:
@@ -63,19 +70,25 @@ class Support:
         return np.asarray(np.cbrt(load / self._stiffness) ** 2)
 
     def lowering(self, feet: Plane, activation: Array) -> Array:
-        """m    (n, 6) how much lower than planned the feet must be for the torso to keep its height over the ground that gives way"""
+        """m    (n, 6) how much lower than planned the feet must be for the torso to keep its
+        height over the ground that gives way
+        """
         return self.indentation(self.normal(feet, activation, self._still)) - self._rest
 
     def activation(self, phase: Array, stayed: Mask, stays: Mask, *, walking: bool) -> Array:
         """(n, 6) in [0, 1] at gait phases (n, 6).
 
-        stayed, stays: (6,) these legs had nowhere to step when they were to lift off last, or will have nowhere to when they are next.
+        stayed, stays: (6,) these legs had nowhere to step when they were to lift off last, or will
+        have nowhere to when they are next.
         """
         if not walking:
             return np.ones_like(phase)
         half = 0.5 * self._handover
         since = (phase + half) % 1.0  # cycles since the activation began to rise
-        rising, falling = _smooth(since / self._handover), _smooth((self._gait.duty + 2.0 * half - since) / self._handover)
+        rising, falling = (
+            _smooth(since / self._handover),
+            _smooth((self._gait.duty + 2.0 * half - since) / self._handover),
+        )
         # a leg that stayed where it was has neither given up its load nor takes it up again
         handing = np.minimum(np.where(stayed, 1.0, rising), np.where(stays, 1.0, falling))
         return np.where(stayed & (phase >= self._gait.duty), 1.0, handing)
@@ -92,13 +105,20 @@ class Support:
         return Shares(activation, normal, part * (demand.push[:, None] + 1j * turn[:, None] * arm))
 
     def normal(self, feet: Plane, activation: Array, demand: Demand) -> Array:
-        """(n, 6) the vertical shares [N], never negative; the demand is of as many steps, or of one that holds for all."""
+        """(n, 6) the vertical shares [N], never negative; the demand is of as many steps, or of
+        one that holds for all.
+        """
         one = np.stack([np.ones(feet.shape), feet.real, feet.imag], axis=-1)  # (n, 6, 3)
         weighted = one * activation[..., None]
         square = weighted.transpose(0, 2, 1) @ one
         ridge = RIDGE * np.trace(square, axis1=1, axis2=2) + LEAST_ARM
-        needed = np.stack([demand.weight, demand.moment.real, demand.moment.imag], axis=-1)[..., None]
-        return np.maximum((weighted @ np.linalg.solve(square + ridge[:, None, None] * np.eye(3), needed))[..., 0], 0.0)
+        needed = np.stack([demand.weight, demand.moment.real, demand.moment.imag], axis=-1)[
+            ..., None
+        ]
+        return np.maximum(
+            (weighted @ np.linalg.solve(square + ridge[:, None, None] * np.eye(3), needed))[..., 0],
+            0.0,
+        )
 
 
 def torques(lever: Array, shares: Shares) -> Array:

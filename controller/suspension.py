@@ -1,6 +1,8 @@
-"""The virtual suspension: m z'' + b z' + k z = f per foot, f the normal force beyond the leg's share, z up towards the torso.
+"""The virtual suspension: m z'' + b z' + k z = f per foot, f the normal force beyond the leg's
+share, z up towards the torso.
 
-The force is held over a period, so the discretisation by the matrix exponential is exact: x = (z, z'), x(k+1) = A x(k) + B f(k).
+The force is held over a period, so the discretisation by the matrix exponential is exact: x = (z,
+z'), x(k+1) = A x(k) + B f(k).
 """
 
 from __future__ import annotations

@@ -1,15 +1,18 @@
 """Where the feet should be: from a body command to foot paths in the walking frame.
 
-The walking frame is the torso frame of a robot at its nominal height and level posture. Its horizontal points are complex numbers
-p = x + i y: it moves over the ground with the velocity v = vx + i vy and the yaw rate w, so a foot that stands moves by -(v + i w p).
-A swinging foot moves from the ground point it left to the ground point where it will be half-way through the next stance under its
-stance position. Both are fixed to the ground, so with a blend s(tau) whose ends have neither speed nor acceleration the foot leaves and
-meets the ground without sliding:
+The walking frame is the torso frame of a robot at its nominal height and level posture. Its
+horizontal points are complex numbers p = x + i y: it moves over the ground with the velocity v = vx
++ i vy and the yaw rate w, so a foot that stands moves by -(v + i w p). A swinging foot moves from
+the ground point it left to the ground point where it will be half-way through the next stance under
+its stance position. Both are fixed to the ground, so with a blend s(tau) whose ends have neither
+speed nor acceleration the foot leaves and meets the ground without sliding:
 
-    ds/dx = 45/32 (1 - y^4)^2,  y = 2 x - 1,  x = (tau - DWELL) / (1 - 2 DWELL)        z = 64 H (tau (1 - tau))^3
+    ds/dx = 45/32 (1 - y^4)^2,  y = 2 x - 1,  x = (tau - DWELL) / (1 - 2 DWELL)        z = 64 H (tau
+    (1 - tau))^3
 
-The blend's flat top keeps the peak speed at 1.41 times the mean; the quintic of least jerk needs 1.88 and a cycloid 2, which the
-joints of small servos do not reach. DWELL keeps the foot from moving sideways while it is still unloading, or already loading.
+The blend's flat top keeps the peak speed at 1.41 times the mean; the quintic of least jerk needs
+1.88 and a cycloid 2, which the joints of small servos do not reach. DWELL keeps the foot from
+moving sideways while it is still unloading, or already loading.
 """
 
 from __future__ import annotations
@@ -45,16 +48,20 @@ class BodyCommand:
 
 
 class CommandRamp:
-    """Turns steps of the command into smooth changes: a cubic from the present value and rate to the new value and rate 0.
+    """Turns steps of the command into smooth changes: a cubic from the present value and rate to
+    the new value and rate 0.
 
-    Attributes: target: where it goes; steps: periods since that was told, which the owner counts on.
+    Attributes: target: where it goes; steps: periods since that was told, which the owner counts
+    on.
     """
 
     def __init__(self, duration: float, *, period: float) -> None:
         self.duration, self.period = duration, period  # s
         self._cubic = np.zeros((4, 6))
         self._end = next(
-            number for number in itertools.count(int(duration / period)) if number * period >= duration
+            number
+            for number in itertools.count(int(duration / period))
+            if number * period >= duration
         )  # steps that a change takes
         self.reset()
 
@@ -83,19 +90,28 @@ class CommandRamp:
         return max(self._end - self.steps, 0)
 
     def aim(self, target: BodyCommand) -> None:
-        """Heads for a command; repeating the present one changes nothing. Raises HexapodError when it is not finite."""
+        """Heads for a command; repeating the present one changes nothing. Raises HexapodError
+        when it is not finite.
+        """
         if target == self.target:
             return
         goal = np.array(astuple(target), dtype=np.float64)
         if not np.isfinite(goal).all():
-            raise HexapodError("impossible body command", got=target, expected="finite numbers", fix="check where the command comes from")
+            raise HexapodError(
+                "impossible body command",
+                got=target,
+                expected="finite numbers",
+                fix="check where the command comes from",
+            )
         (value,), (rate,) = self.ahead(0)
         gap, slope = goal - value, rate * self.duration
         self._cubic[:] = value, slope, 3.0 * gap - 2.0 * slope, slope - 2.0 * gap
         self.target, self._goal, self.steps = target, goal, 0
 
     def ahead(self, count: int) -> tuple[Array, Array]:
-        """(count + 1, 6) each: vx vy yaw_rate height roll pitch now and at the next `count` steps, and their rates per second."""
+        """(count + 1, 6) each: vx vy yaw_rate height roll pitch now and at the next `count`
+        steps, and their rates per second.
+        """
         if self.settled:
             return np.tile(self._goal, (count + 1, 1)), np.zeros((count + 1, 6))
         numbers = np.arange(self.steps, self.steps + count + 1)[:, None]
@@ -108,7 +124,9 @@ class CommandRamp:
 
 @dataclass(frozen=True)
 class Steps:
-    """Feet at successive periods, (n, 6) each, in the walking frame; what is on the ground in its frame, where the walk began."""
+    """Feet at successive periods, (n, 6) each, in the walking frame; what is on the ground in
+    its frame, where the walk began.
+    """
 
     plane: Plane  # m    centres, x + i y
     height: Array  # m    and z
@@ -122,26 +140,35 @@ class Steps:
     pull: Plane  # m    (goal - foot)/(1 - s) on the ground, 0 of standing feet
     way: Plane  # m    (n, 1) of the walking frame over the ground
     turn: Array  # rad    (n, 1)
-    stayed: Mask  # had nowhere to step when they were to lift off last, so they stood through the time of their swing
+    # had nowhere to step when they were to lift off last, so they stood through the time of their
+    # swing
+    stayed: Mask
     stays: Mask  # will have nowhere to when they are next: at home under a body at rest
 
 
 class FootPaths:
-    """The planned feet. Steps depend on the command alone, so many are planned at once and then taken one by one.
+    """The planned feet. Steps depend on the command alone, so many are planned at once and then
+    taken one by one.
 
-    Nothing in a step depends on how many are planned at once: sums over time run from the walk's begin.
+    Nothing in a step depends on how many are planned at once: sums over time run from the walk's
+    begin.
 
-    Attributes: steps: planned, of which number `at` is the present one and `left` are to come;  walking: the gait clock runs.
+    Attributes: steps: planned, of which number `at` is the present one and `left` are to come;
+    walking: the gait clock runs.
     """
 
     def __init__(self, gait: Gait, home: Array, *, period: float) -> None:
         self.gait, self.period = gait, period
         self.home, self.home_height = home[:, 0] + 1j * home[:, 1], home[:, 2].copy()
         self.swing_time = gait.period * (1.0 - gait.duty)
-        self._landing_lead = 0.5 * gait.period * gait.duty + self.swing_time  # s    from lift-off to the middle of the next stance
+        self._landing_lead = (
+            0.5 * gait.period * gait.duty + self.swing_time
+        )  # s    from lift-off to the middle of the next stance
         begin = np.array(gait.offsets) + gait.start_clock()
         self._offsets, self._never = begin - CLOCK_EPSILON, np.zeros(LEGS, dtype=np.bool_)
-        self._late = (begin + CLOCK_EPSILON) % 1.0 >= gait.duty  # the walk begins in the time of their swing
+        self._late = (
+            begin + CLOCK_EPSILON
+        ) % 1.0 >= gait.duty  # the walk begins in the time of their swing
         self.steps: Steps
         self.at, self.walking, self._before = 0, False, 0
         self.reset()
@@ -170,12 +197,27 @@ class FootPaths:
     def _rest(self, plane: Plane, count: int) -> None:
         """Plans `count` more steps of standing still, with the clock rewound."""
         zeros, still = np.zeros((count + 1, LEGS)), np.zeros((count + 1, LEGS), dtype=np.complex128)
-        plane, height, phase = (np.tile(row, (count + 1, 1)) for row in (plane, self.home_height, self._phases(np.zeros(1))[0]))
+        plane, height, phase = (
+            np.tile(row, (count + 1, 1))
+            for row in (plane, self.home_height, self._phases(np.zeros(1))[0])
+        )
         self.walking, self.at, self._before = False, 0, 0
         self.steps = Steps(
-            plane=plane, height=height, plane_velocity=still, rise=zeros, phase=phase, swinging=zeros > 0.0, progress=zeros, blend=zeros,
-            goal=plane, pull=still, way=still[:, :1], turn=zeros[:, :1], stayed=np.broadcast_to(self._late, zeros.shape), stays=zeros > 0.0,
-        )  # fmt: skip
+            plane=plane,
+            height=height,
+            plane_velocity=still,
+            rise=zeros,
+            phase=phase,
+            swinging=zeros > 0.0,
+            progress=zeros,
+            blend=zeros,
+            goal=plane,
+            pull=still,
+            way=still[:, :1],
+            turn=zeros[:, :1],
+            stayed=np.broadcast_to(self._late, zeros.shape),
+            stays=zeros > 0.0,
+        )
 
     def _phases(self, numbers: Array) -> Array:
         """(n, 6) phases so many periods after the walk's begin."""
@@ -183,11 +225,13 @@ class FootPaths:
         return np.asarray(clock - np.floor(clock))
 
     def plan(self, v: Plane, yaw_rate: Array, *, going: bool) -> None:
-        """Plans the steps after the present one, up to the next in which a leg lifts off or touches down.
+        """Plans the steps after the present one, up to the next in which a leg lifts off or touches
+        down.
 
         Args:
             v, yaw_rate: (n + 1,) vx + i vy and yaw rate [m/s, rad/s] now and at the next n steps.
-            going: the body moves or is commanded to; when False, feet step home and the clock then stops.
+            going: the body moves or is commanded to; when False, feet step home and the clock then
+                stops.
         """
         steps, at = self.steps, self.at
         before = self._before + at if self.walking else 0
@@ -208,18 +252,38 @@ class FootPaths:
             if home.all() and not (swinging | lifted).any():
                 self._rest(feet, len(v) - 1)
                 return
-        changed = int((standing[1:] != standing[1]).argmax()) // LEGS  # the first never differs from itself: 0 is none
+        changed = (
+            int((standing[1:] != standing[1]).argmax()) // LEGS
+        )  # the first never differs from itself: 0 is none
         end = 1 + (changed or len(v) - 1)
         stayed = (steps.stayed[at] | due) & ~lifted
-        self.steps = self._walk(v[:end, None], yaw_rate[:end, None], phase[:end], swinging | lifted, lifted, (stayed, stays))
+        self.steps = self._walk(
+            v[:end, None],
+            yaw_rate[:end, None],
+            phase[:end],
+            swinging | lifted,
+            lifted,
+            (stayed, stays),
+        )
         self.walking, self.at, self._before = True, 0, before
 
-    def _walk(self, v: Plane, yaw_rate: Array, phase: Array, swinging: Mask, lifted: Mask, stay: tuple[Mask, Mask]) -> Steps:
-        """The steps in which these legs (6,) are in the air; those that lift off just now will in any case be aimed once."""
+    def _walk(
+        self,
+        v: Plane,
+        yaw_rate: Array,
+        phase: Array,
+        swinging: Mask,
+        lifted: Mask,
+        stay: tuple[Mask, Mask],
+    ) -> Steps:
+        """The steps in which these legs (6,) are in the air; those that lift off just now will
+        in any case be aimed once.
+        """
         now, at, time = self.steps, self.at, self.swing_time
         tau = (phase - self.gait.duty) / (1.0 - self.gait.duty)
         way, turn = self._odometry(v, yaw_rate)
-        # the way to the landing point shrinks as 1 - s: with pull = (goal - foot)/(1 - s), pull' = pull + (goal' - goal)/(1 - s)
+        # the way to the landing point shrinks as 1 - s: with pull = (goal - foot)/(1 - s), pull' =
+        # pull + (goal' - goal)/(1 - s)
         s, slope = blend(tau)
         s = np.where(swinging, s, 0.0)
         free = swinging & (tau < FREEZE)
@@ -230,16 +294,29 @@ class FootPaths:
         pull[1:] = np.diff(goal, axis=0) / np.maximum(1.0 - s[:-1], NEARLY_DONE)
         np.cumsum(pull, axis=0, out=pull)
         ground, back = goal - (1.0 - s) * pull, cis(-turn)
-        plane, carried = back * (ground - way), back * (np.concatenate([ground[:1], ground[:-1]]) - way)
+        plane, carried = (
+            back * (ground - way),
+            back * (np.concatenate([ground[:1], ground[:-1]]) - way),
+        )
         # a foot on the ground: dp/dt = -(v + i w p)
         velocity = slope / time * (back * pull) - (v + 1j * yaw_rate * carried)
         lift, climb = hop(tau, top=self.gait.step_height, down=self.gait.touchdown_speed * time)
         return Steps(
-            plane=plane, height=self.home_height + np.where(swinging, lift, 0.0), plane_velocity=velocity,
-            rise=np.where(swinging, climb / time, 0.0), phase=phase, swinging=np.broadcast_to(swinging, phase.shape),
-            progress=np.where(swinging, tau, 0.0), blend=s, goal=goal, pull=pull, way=way, turn=turn,
-            stayed=np.broadcast_to(stay[0], phase.shape), stays=np.broadcast_to(stay[1], phase.shape),
-        )  # fmt: skip
+            plane=plane,
+            height=self.home_height + np.where(swinging, lift, 0.0),
+            plane_velocity=velocity,
+            rise=np.where(swinging, climb / time, 0.0),
+            phase=phase,
+            swinging=np.broadcast_to(swinging, phase.shape),
+            progress=np.where(swinging, tau, 0.0),
+            blend=s,
+            goal=goal,
+            pull=pull,
+            way=way,
+            turn=turn,
+            stayed=np.broadcast_to(stay[0], phase.shape),
+            stays=np.broadcast_to(stay[1], phase.shape),
+        )
 
     def _odometry(self, v: Plane, yaw_rate: Array) -> tuple[Plane, Array]:
         """(n, 1) each: way and turn of the walking frame since the walk's begin."""
@@ -258,7 +335,9 @@ class FootPaths:
 
 
 def _held(values: Plane, free: Mask, before: Plane) -> Plane:
-    """The ones `before` (6,) in the first row; then the values while they are `free`, which is at once or never; then the last."""
+    """The ones `before` (6,) in the first row; then the values while they are `free`, which is
+    at once or never; then the last.
+    """
     values[0] = before
     last = free[1:].sum(axis=0)
     return np.where(free, values, values[last, np.arange(LEGS)])
@@ -283,11 +362,15 @@ def blend(tau: Array) -> tuple[Array, Array]:
     y = np.minimum(np.maximum((2.0 * tau - 1.0) / (1.0 - 2.0 * DWELL), -1.0), 1.0)
     y4 = y * y * y * y
     flat = 1.0 - y4
-    return 0.5 + y * (45.0 + y4 * (5.0 * y4 - 18.0)) / 64.0, 45.0 / 32.0 * flat * flat / (1.0 - 2.0 * DWELL)
+    return 0.5 + y * (45.0 + y4 * (5.0 * y4 - 18.0)) / 64.0, 45.0 / 32.0 * flat * flat / (
+        1.0 - 2.0 * DWELL
+    )
 
 
 def hop(tau: Array, *, top: float, down: float) -> tuple[Array, Array]:
-    """z and dz/dtau [m]: 64 top (tau (1 - tau))^3 + down tau^3 (1 - tau), down the touch-down speed times the swing's time."""
+    """z and dz/dtau [m]: 64 top (tau (1 - tau))^3 + down tau^3 (1 - tau), down the touch-down
+    speed times the swing's time.
+    """
     arch = tau * (1.0 - tau)
     bow, fall = 64.0 * top * arch * arch, down * tau * tau
     return (bow + fall) * arch, 3.0 * bow * (1.0 - 2.0 * tau) + fall * (3.0 - 4.0 * tau)

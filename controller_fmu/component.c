@@ -2,11 +2,15 @@
 #include "fmi/component.h"
 
 static hxController *controller_of(hxComponent *component) { return (hxController *)component; }
-static const hxController *const_controller(const hxComponent *component) { return (const hxController *)component; }
+static const hxController *const_controller(const hxComponent *component) {
+  return (const hxController *)component;
+}
 
 hxComponent *hx_component_create(void) { return (hxComponent *)hx_controller_create(); }
 
-void hx_component_destroy(hxComponent *component) { hx_controller_destroy(controller_of(component)); }
+void hx_component_destroy(hxComponent *component) {
+  hx_controller_destroy(controller_of(component));
+}
 
 void hx_component_defaults(struct hxVariables *variables) {
   hx_controller_definition_default(&variables->definition);
@@ -21,7 +25,8 @@ hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *va
   return hx_controller_reset(controller_of(component), &variables->definition, t);
 }
 
-hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, const hxInput *rate, double t_end) {
+hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
+                           const hxInput *rate, double t_end) {
   return hx_controller_step(controller_of(component), &variables->input, rate, t_end);
 }
 
@@ -29,13 +34,19 @@ void hx_component_output(hxComponent *component, struct hxVariables *variables) 
   hx_controller_output(controller_of(component), &variables->input, &variables->output);
 }
 
-double hx_component_time(const hxComponent *component) { return hx_controller_time(const_controller(component)); }
+double hx_component_time(const hxComponent *component) {
+  return hx_controller_time(const_controller(component));
+}
 
-const char *hx_component_message(const hxComponent *component) { return hx_controller_message(const_controller(component)); }
+const char *hx_component_message(const hxComponent *component) {
+  return hx_controller_message(const_controller(component));
+}
 
 size_t hx_component_state_size(void) { return hx_controller_state_size(); }
 
-void hx_component_get_state(const hxComponent *component, void *bytes) { hx_controller_get_state(const_controller(component), bytes); }
+void hx_component_get_state(const hxComponent *component, void *bytes) {
+  hx_controller_get_state(const_controller(component), bytes);
+}
 
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
   return hx_controller_set_state(controller_of(component), bytes, hx_controller_state_size());

@@ -1,4 +1,6 @@
-"""The site's settings. `make docs` puts the pages together first (tools/docs) and then calls Sphinx with this file."""
+"""The site's settings. `make docs` puts the pages together first (tools/docs) and then calls
+Sphinx with this file.
+"""
 
 import sys
 from importlib.metadata import version as version_of
@@ -36,7 +38,11 @@ toc_object_entries_show_parents = "hide"
 
 # every reference leads somewhere, but for those to other projects, whose inventories are not here
 nitpicky = True
-nitpick_ignore_regex = [("py:.*", r"(?!hexapod_cosim\.).*"), ("c:identifier", ".*"), ("py:class", r".*\._\w+")]
+nitpick_ignore_regex = [
+    ("py:.*", r"(?!hexapod_cosim\.).*"),
+    ("c:identifier", ".*"),
+    ("py:class", r".*\._\w+"),
+]
 suppress_warnings = ["misc.highlighting_failure"]  # lines of other languages in a block
 
 templates_path = ["_templates"]

@@ -1,8 +1,10 @@
-"""Makes docs/images/report.png, the README's picture, from a comparison's report as a browser shows it.
+"""Makes docs/images/report.png, the README's picture, from a comparison's report as a browser shows
+it.
 
 hexapod compare walk_flat -o out/demo && python docs/figure_report.py out/demo
 
-Needs Playwright for Python (`pip install -e .[test]` brings it) and a Chromium (HEXAPOD_CHROMIUM names one that is not in the path).
+Needs Playwright for Python (`pip install -e .[test]` brings it) and a Chromium (HEXAPOD_CHROMIUM
+names one that is not in the path).
 """
 
 from __future__ import annotations
@@ -18,7 +20,11 @@ from playwright.sync_api import sync_playwright
 
 TIME = 5.3  # s    a tripod stands, the other swings
 SIZE = {"width": 1280, "height": 900}  # px
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a graphics card
+FLAGS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]  # WebGL without a graphics card
 COLOURS = 256  # of the picture's palette
 PATIENCE = 120_000  # ms
 
@@ -26,7 +32,11 @@ PATIENCE = 120_000  # ms
 def main() -> None:
     """Writes the picture."""
     report = Path(sys.argv[1]).resolve() / "report.html"
-    chromium = os.environ.get("HEXAPOD_CHROMIUM") or shutil.which("chromium") or sys.exit("no Chromium: apt-get install chromium")
+    chromium = (
+        os.environ.get("HEXAPOD_CHROMIUM")
+        or shutil.which("chromium")
+        or sys.exit("no Chromium: apt-get install chromium")
+    )
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_page(viewport=SIZE, device_scale_factor=1.25, color_scheme="light")

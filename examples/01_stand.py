@@ -23,7 +23,9 @@ def main() -> None:
     print(f"height changes by {1e6 * sag:.3f} um in 1 s")
     for foot in feet:
         print(f"{foot}: {result[foot][-1]:.3f} N")
-    print(f"sum {sum(result[foot][-1] for foot in feet):.3f} N, weight {robot.total_mass * 9.81:.3f} N")
+    print(
+        f"sum {sum(result[foot][-1] for foot in feet):.3f} N, weight {robot.total_mass * 9.81:.3f} N"
+    )
 
 
 if __name__ == "__main__":

@@ -10,10 +10,14 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 def main() -> None:
     """Walks three gait cycles on smooth rubber and prints the metrics."""
-    scenario = load_scenario("walk_flat", overrides=["duration=3", "friction.mu=0.5", "command.vx=60 mm/s"])
+    scenario = load_scenario(
+        "walk_flat", overrides=["duration=3", "friction.mu=0.5", "command.vx=60 mm/s"]
+    )
     result = simulate(scenario)
     position = result.outcome.recording.vector("torso.position")
-    print(f"{result.outcome.status}: {position[-1, 0] - position[0, 0]:.3f} m in {result.outcome.simulated:g} s")
+    print(
+        f"{result.outcome.status}: {position[-1, 0] - position[0, 0]:.3f} m in {result.outcome.simulated:g} s"
+    )
     for name, value in result.metrics.items():
         print(f"{name:20} {value:10.4g} {METRICS[name][0]}")
 

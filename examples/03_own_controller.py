@@ -41,14 +41,23 @@ def sway() -> Outcome:
         plant.initialise(0.0, scenario.duration)
         signals = Signals(plant)
         recorder = Recorder(signals, schedule.times, schedule.rows)
-        return run(plant, signals, Sway(load_robot("athena").stance), schedule, recorder, h=scenario.macro_step)
+        return run(
+            plant,
+            signals,
+            Sway(load_robot("athena").stance),
+            schedule,
+            recorder,
+            h=scenario.macro_step,
+        )
 
 
 def main() -> None:
     """Prints how far the torso turned."""
     outcome = sway()
     yaw = outcome.recording.column("torso.yaw")
-    print(f"{outcome.status}: the torso turns by {np.degrees(np.ptp(yaw)):.2f} deg at {outcome.realtime_factor:.0f} x real time")
+    print(
+        f"{outcome.status}: the torso turns by {np.degrees(np.ptp(yaw)):.2f} deg at {outcome.realtime_factor:.0f} x real time"
+    )
 
 
 if __name__ == "__main__":

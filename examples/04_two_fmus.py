@@ -1,4 +1,5 @@
-"""Plant and controller, both as FMUs, walk: a co-simulation master of thirty lines on bare fmpy, connected by equal names.
+"""Plant and controller, both as FMUs, walk: a co-simulation master of thirty lines on bare fmpy,
+connected by equal names.
 
 usage: python examples/04_two_fmus.py
 """
@@ -23,10 +24,25 @@ class Instance:
     def __init__(self, path: Path) -> None:
         description, folder = read_model_description(path), extract(path, path.with_suffix(""))
         identifier = description.coSimulation.modelIdentifier
-        self.fmu = FMU2Slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=path.stem)
-        self.reference = {variable.name: variable.valueReference for variable in description.modelVariables}
-        self.inputs = {variable.name for variable in description.modelVariables if variable.causality == "input"}
-        self.outputs = {variable.name for variable in description.modelVariables if variable.causality == "output"}
+        self.fmu = FMU2Slave(
+            guid=description.guid,
+            modelIdentifier=identifier,
+            unzipDirectory=folder,
+            instanceName=path.stem,
+        )
+        self.reference = {
+            variable.name: variable.valueReference for variable in description.modelVariables
+        }
+        self.inputs = {
+            variable.name
+            for variable in description.modelVariables
+            if variable.causality == "input"
+        }
+        self.outputs = {
+            variable.name
+            for variable in description.modelVariables
+            if variable.causality == "output"
+        }
 
     def start(self) -> None:
         """To step mode."""
@@ -46,11 +62,16 @@ class Instance:
 
 def walk(plant: Instance, controller: Instance) -> float:
     """Five seconds straight on; returns the way of the torso [m]."""
-    sensed, commanded = sorted(plant.outputs & controller.inputs), sorted(controller.outputs & plant.inputs)
+    sensed, commanded = (
+        sorted(plant.outputs & controller.inputs),
+        sorted(controller.outputs & plant.inputs),
+    )
     controller.set(["command.vx"], [SPEED])
     for k in range(STEPS):
         controller.set(sensed, plant.get(sensed))
-        plant.set(commanded, controller.get(commanded))  # the controller's outputs are functions of its inputs at once
+        plant.set(
+            commanded, controller.get(commanded)
+        )  # the controller's outputs are functions of its inputs at once
         for instance in (plant, controller):
             instance.fmu.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
     return plant.get(["torso.position[1]"])[0]
@@ -61,10 +82,16 @@ def main() -> None:
     robot = load_robot("athena")
     with TemporaryDirectory() as folder:
         plant = Instance(export_fmu(robot, Path(folder) / "plant.fmu"))
-        controller = Instance(export_controller(make_setup(robot, control="kinematic", period=STEP), Path(folder) / "controller.fmu"))
+        controller = Instance(
+            export_controller(
+                make_setup(robot, control="kinematic", period=STEP), Path(folder) / "controller.fmu"
+            )
+        )
         for instance in (plant, controller):
             instance.start()
-        print(f"{len(plant.outputs & controller.inputs)} measurements, {len(controller.outputs & plant.inputs)} commands")
+        print(
+            f"{len(plant.outputs & controller.inputs)} measurements, {len(controller.outputs & plant.inputs)} commands"
+        )
         print(f"the torso walks {walk(plant, controller):.4f} m in {STEPS * STEP:g} s")
         for instance in (plant, controller):
             instance.fmu.freeInstance()

@@ -9,13 +9,16 @@
 enum { CHUNK = 64 }; /* rows that go to the table at once */
 
 /* get or set: values are those of hx_instance_get */
-typedef hxStatus rowsFunction(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value);
+typedef hxStatus rowsFunction(hxInstance *instance, hxType type, const unsigned reference[],
+                              size_t n, void *value);
 
-static hxStatus check_rows(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
+static hxStatus check_rows(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                           void *value) {
   return hx_instance_check_set(instance, type, reference, n, value);
 }
 
-static hxStatus set_rows(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value) {
+static hxStatus set_rows(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                         void *value) {
   return hx_instance_set(instance, type, reference, n, value);
 }
 
@@ -25,11 +28,14 @@ static size_t rows_of(hxInstance *instance, hxType type, unsigned reference) {
   const hxVariable *variable = hx_variable_find(reference, &causality);
   if (variable && variable->run) return variable->run;
   if (reference == hx_time_reference && type == HX_REAL) return 1;
-  hx_log(instance, HX_LOG_ERROR, "value reference: got %u, expected one of modelDescription.xml; nothing was done", reference);
+  hx_log(instance, HX_LOG_ERROR,
+         "value reference: got %u, expected one of modelDescription.xml; nothing was done",
+         reference);
   return 0;
 }
 
-static hxStatus check_count(hxInstance *instance, hxType type, const unsigned reference[], size_t n, size_t n_values) {
+static hxStatus check_count(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                            size_t n_values) {
   size_t expected = 0;
   for (size_t i = 0; i < n; i++) {
     const size_t rows = rows_of(instance, type, reference[i]);
@@ -37,17 +43,22 @@ static hxStatus check_count(hxInstance *instance, hxType type, const unsigned re
     expected += rows;
   }
   if (n_values == expected) return HX_OK;
-  hx_log(instance, HX_LOG_ERROR, "values: got room for %zu, expected %zu, all elements of the %zu variables; nothing was done", n_values,
-         expected, n);
+  hx_log(
+      instance, HX_LOG_ERROR,
+      "values: got room for %zu, expected %zu, all elements of the %zu variables; nothing was done",
+      n_values, expected, n);
   return HX_INVALID_ARGUMENT;
 }
 
 /* a number out of int's range is out of any variable's */
-static int to_int(int64_t value) { return value > INT_MAX ? INT_MAX : value < INT_MIN ? INT_MIN : (int)value; }
+static int to_int(int64_t value) {
+  return value > INT_MAX ? INT_MAX : value < INT_MIN ? INT_MIN : (int)value;
+}
 
 static void read_ints(hxType type, const void *value, size_t first, size_t n, int number[]) {
   for (size_t i = 0; i < n; i++)
-    number[i] = type == HX_INTEGER ? to_int(((const int64_t *)value)[first + i]) : ((const bool *)value)[first + i];
+    number[i] = type == HX_INTEGER ? to_int(((const int64_t *)value)[first + i])
+                                   : ((const bool *)value)[first + i];
 }
 
 static void write_ints(hxType type, const int number[], void *value, size_t first, size_t n) {
@@ -60,22 +71,24 @@ static void write_ints(hxType type, const int number[], void *value, size_t firs
 }
 
 /* a function for all rows of an array, whose values begin at `first` */
-static hxStatus each_row(hxInstance *instance, rowsFunction *function, hxType type, unsigned reference, size_t rows, void *value,
-                         size_t first) {
+static hxStatus each_row(hxInstance *instance, rowsFunction *function, hxType type,
+                         unsigned reference, size_t rows, void *value, size_t first) {
   unsigned row[CHUNK];
   int number[CHUNK];
   for (size_t done = 0; done < rows; done += CHUNK) {
     const size_t n = rows - done < CHUNK ? rows - done : CHUNK, at = first + done;
     for (size_t i = 0; i < n; i++) row[i] = reference + (unsigned)(done + i);
     if (type != HX_REAL && function != hx_instance_get) read_ints(type, value, at, n, number);
-    const hxStatus status = function(instance, type, row, n, type == HX_REAL ? (void *)((double *)value + at) : number);
+    const hxStatus status =
+        function(instance, type, row, n, type == HX_REAL ? (void *)((double *)value + at) : number);
     if (status != HX_OK) return status;
     if (type != HX_REAL && function == hx_instance_get) write_ints(type, number, value, at, n);
   }
   return HX_OK;
 }
 
-static hxStatus each_array(hxInstance *instance, rowsFunction *function, hxType type, const unsigned reference[], size_t n, void *value) {
+static hxStatus each_array(hxInstance *instance, rowsFunction *function, hxType type,
+                           const unsigned reference[], size_t n, void *value) {
   size_t first = 0;
   for (size_t i = 0; i < n; i++) {
     const size_t rows = rows_of(instance, type, reference[i]);
@@ -90,28 +103,35 @@ static hxStatus each_array(hxInstance *instance, rowsFunction *function, hxType 
   return HX_OK;
 }
 
-hxStatus hx_arrays_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n, void *value, size_t n_values) {
+hxStatus hx_arrays_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                       void *value, size_t n_values) {
   const hxStatus status = check_count(instance, type, reference, n, n_values);
-  return status == HX_OK ? each_array(instance, hx_instance_get, type, reference, n, value) : status;
+  return status == HX_OK ? each_array(instance, hx_instance_get, type, reference, n, value)
+                         : status;
 }
 
 /* all rows of all arrays are looked at before the first is set */
-hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n, const void *value, size_t n_values) {
+hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
+                       const void *value, size_t n_values) {
   hxStatus status = check_count(instance, type, reference, n, n_values);
   for (size_t i = 0; i < n && status == HX_OK; i++)
     if (reference[i] == hx_time_reference) {
-      hx_log(instance, HX_LOG_ERROR, "time: got a value, expected none, as steps move it; nothing was set");
+      hx_log(instance, HX_LOG_ERROR,
+             "time: got a value, expected none, as steps move it; nothing was set");
       status = HX_INVALID_ARGUMENT;
     }
   if (status == HX_OK) status = each_array(instance, check_rows, type, reference, n, (void *)value);
-  return status == HX_OK ? each_array(instance, set_rows, type, reference, n, (void *)value) : status;
+  return status == HX_OK ? each_array(instance, set_rows, type, reference, n, (void *)value)
+                         : status;
 }
 
-/* ---------------------------------------------------------------------------------------------- derivatives */
+/* ----------------------------------------------------------------------------------------------
+ * derivatives */
 
-/* All rows of arrays, one reference each, to be freed; NULL, with a message, when their number is not n_values or there is no memory.
- * Derivatives are taken of all elements at once. */
-static unsigned *spread(hxInstance *instance, const unsigned reference[], size_t n, size_t n_values) {
+/* All rows of arrays, one reference each, to be freed; NULL, with a message, when their number is
+ * not n_values or there is no memory. Derivatives are taken of all elements at once. */
+static unsigned *spread(hxInstance *instance, const unsigned reference[], size_t n,
+                        size_t n_values) {
   if (check_count(instance, HX_REAL, reference, n, n_values) != HX_OK) return NULL;
   unsigned *row = malloc((n_values + 1) * sizeof *row), *next = row;
   if (!row) hx_log(instance, HX_LOG_ERROR, "derivatives: out of memory; free some and try again");
@@ -122,20 +142,24 @@ static unsigned *spread(hxInstance *instance, const unsigned reference[], size_t
   return row;
 }
 
-hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown, const unsigned known[], size_t n_known,
-                               const double change[], size_t n_change, double result[], size_t n_result) {
+hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
+                               const unsigned known[], size_t n_known, const double change[],
+                               size_t n_change, double result[], size_t n_result) {
   unsigned *unknowns = spread(instance, unknown, n_unknown, n_result);
   unsigned *knowns = unknowns ? spread(instance, known, n_known, n_change) : NULL;
-  const hxStatus status =
-      knowns ? hx_instance_directional(instance, unknowns, n_result, knowns, n_change, change, result) : HX_INVALID_ARGUMENT;
+  const hxStatus status = knowns ? hx_instance_directional(instance, unknowns, n_result, knowns,
+                                                           n_change, change, result)
+                                 : HX_INVALID_ARGUMENT;
   free(knowns);
   free(unknowns);
   return status;
 }
 
-hxStatus hx_arrays_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n, double rate[], size_t n_rate) {
+hxStatus hx_arrays_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
+                                    double rate[], size_t n_rate) {
   unsigned *rows = spread(instance, reference, n, n_rate);
-  const hxStatus status = rows ? hx_instance_get_output_rates(instance, rows, n_rate, rate) : HX_INVALID_ARGUMENT;
+  const hxStatus status =
+      rows ? hx_instance_get_output_rates(instance, rows, n_rate, rate) : HX_INVALID_ARGUMENT;
   free(rows);
   return status;
 }

@@ -11,31 +11,38 @@ static const char *mode_name(int mode) {
   return mode == HX_MODE_STEP ? "between steps" : "after termination";
 }
 
-static const char *interface_name(int interface) { return interface == HX_MODEL_EXCHANGE ? "model exchange" : "co-simulation"; }
+static const char *interface_name(int interface) {
+  return interface == HX_MODEL_EXCHANGE ? "model exchange" : "co-simulation";
+}
 
 int hx_call_admit(hxInstance *instance, const hxCall *call) {
   const hxInstanceState *state = &instance->state;
   if (!(call->interfaces & state->interface))
-    hx_log(instance, HX_LOG_ERROR, "%s: got a call of %s, expected one of %s, which was instantiated; nothing was changed", call->name,
-           interface_name(call->interfaces), interface_name(state->interface));
+    hx_log(instance, HX_LOG_ERROR,
+           "%s: got a call of %s, expected one of %s, which was instantiated; nothing was changed",
+           call->name, interface_name(call->interfaces), interface_name(state->interface));
   else if (!(call->modes & state->mode))
-    hx_log(instance, HX_LOG_ERROR, "%s: got a call %s, where the standard does not allow it; nothing was changed", call->name,
-           mode_name(state->mode));
+    hx_log(instance, HX_LOG_ERROR,
+           "%s: got a call %s, where the standard does not allow it; nothing was changed",
+           call->name, mode_name(state->mode));
   else
     return 1;
   return 0;
 }
 
-int hx_call_given(hxInstance *instance, const hxCall *call, size_t n, const void *array, const void *other) {
+int hx_call_given(hxInstance *instance, const hxCall *call, size_t n, const void *array,
+                  const void *other) {
   if (n == 0 || (array && other)) return 1;
-  hx_log(instance, HX_LOG_ERROR, "%s: got NULL, expected an array of %zu; nothing was changed", call->name, n);
+  hx_log(instance, HX_LOG_ERROR, "%s: got NULL, expected an array of %zu; nothing was changed",
+         call->name, n);
   return 0;
 }
 
 int hx_call_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]) {
   for (size_t i = 0; i < n; i++)
     if (order[i] != 1) {
-      hx_log(instance, HX_LOG_ERROR, "%s: got order %d, expected 1; nothing was done", call->name, order[i]);
+      hx_log(instance, HX_LOG_ERROR, "%s: got order %d, expected 1; nothing was done", call->name,
+             order[i]);
       return 0;
     }
   return 1;
@@ -47,13 +54,15 @@ static int find_category(const char *name) {
   return -1;
 }
 
-hxStatus hx_log_choose(hxInstance *instance, const char *call, int on, size_t n, const char *const category[]) {
+hxStatus hx_log_choose(hxInstance *instance, const char *call, int on, size_t n,
+                       const char *const category[]) {
   unsigned chosen = n == 0 ? ~0u : 0;
   for (size_t i = 0; i < n; i++) {
     const int k = find_category(category[i]);
     if (k < 0) {
-      hx_log(instance, HX_LOG_ERROR, "%s: got category '%s', expected one of modelDescription.xml; nothing was changed", call,
-             category[i] ? category[i] : "(NULL)");
+      hx_log(instance, HX_LOG_ERROR,
+             "%s: got category '%s', expected one of modelDescription.xml; nothing was changed",
+             call, category[i] ? category[i] : "(NULL)");
       return HX_INVALID_ARGUMENT;
     }
     chosen |= k == HX_LOG_ALL ? ~0u : 1u << k;

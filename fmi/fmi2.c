@@ -1,4 +1,5 @@
-/* fmi2.c - FMI 2.0, co-simulation and model exchange: every function of the standard, in its order. No physics. */
+/* fmi2.c - FMI 2.0, co-simulation and model exchange: every function of the standard, in its order.
+ * No physics. */
 #include "fmi/instance.h"
 
 #include <math.h>
@@ -14,9 +15,11 @@ typedef struct fmi2Instance {
   fmi2Status step_status; /* of the last fmi2DoStep */
 } fmi2Instance;
 
-_Static_assert(sizeof(fmi2Real) == sizeof(double) && sizeof(fmi2Boolean) == sizeof(int), "values are copied as they are");
+_Static_assert(sizeof(fmi2Real) == sizeof(double) && sizeof(fmi2Boolean) == sizeof(int),
+               "values are copied as they are");
 
-/* ---------------------------------------------------------------------------------------------- legal order */
+/* ----------------------------------------------------------------------------------------------
+ * legal order */
 
 enum {
   EXCHANGING = HX_MODE_EVENT | HX_MODE_CONTINUOUS,
@@ -65,8 +68,9 @@ typedef enum fmi2Call {
   GET_NOMINALS
 } fmi2Call;
 
-/* The standard's tables of allowed calls (sections 3.2.3 and 4.2.4), but for liberties that importers take and that harm nothing: values are
- * read before initialisation, states and their rates in it, and a terminated instance is terminated again. */
+/* The standard's tables of allowed calls (sections 3.2.3 and 4.2.4), but for liberties that
+ * importers take and that harm nothing: values are read before initialisation, states and their
+ * rates in it, and a terminated instance is terminated again. */
 static const hxCall calls[] = {
     [SET_DEBUG_LOGGING] = {"fmi2SetDebugLogging", ANY_MODE, EITHER},
     [SETUP_EXPERIMENT] = {"fmi2SetupExperiment", HX_MODE_INSTANTIATED, EITHER},
@@ -89,15 +93,18 @@ static const hxCall calls[] = {
     [SERIALIZE] = {"fmi2SerializeFMUstate", ANY_MODE, EITHER},
     [DESERIALIZE] = {"fmi2DeSerializeFMUstate", ANY_MODE, EITHER},
     [SET_INPUT_DERIVATIVES] = {"fmi2SetRealInputDerivatives", BEFORE_END, HX_CO_SIMULATION},
-    [GET_OUTPUT_DERIVATIVES] = {"fmi2GetRealOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED, HX_CO_SIMULATION},
+    [GET_OUTPUT_DERIVATIVES] = {"fmi2GetRealOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED,
+                                HX_CO_SIMULATION},
     [DO_STEP] = {"fmi2DoStep", HX_MODE_STEP, HX_CO_SIMULATION},
     [CANCEL_STEP] = {"fmi2CancelStep", HX_MODE_STEP, HX_CO_SIMULATION},
     [GET_STATUS] = {"fmi2GetXXXStatus", ANY_MODE, HX_CO_SIMULATION},
     [DIRECTIONAL_DERIVATIVE] = {"fmi2GetDirectionalDerivative", INITIALIZED, EITHER},
     [ENTER_EVENT_MODE] = {"fmi2EnterEventMode", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
     [NEW_DISCRETE_STATES] = {"fmi2NewDiscreteStates", HX_MODE_EVENT, HX_MODEL_EXCHANGE},
-    [ENTER_CONTINUOUS_TIME_MODE] = {"fmi2EnterContinuousTimeMode", HX_MODE_EVENT, HX_MODEL_EXCHANGE},
-    [COMPLETED_INTEGRATOR_STEP] = {"fmi2CompletedIntegratorStep", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
+    [ENTER_CONTINUOUS_TIME_MODE] = {"fmi2EnterContinuousTimeMode", HX_MODE_EVENT,
+                                    HX_MODEL_EXCHANGE},
+    [COMPLETED_INTEGRATOR_STEP] = {"fmi2CompletedIntegratorStep", HX_MODE_CONTINUOUS,
+                                   HX_MODEL_EXCHANGE},
     [SET_TIME] = {"fmi2SetTime", EXCHANGING, HX_MODEL_EXCHANGE},
     [SET_CONTINUOUS_STATES] = {"fmi2SetContinuousStates", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
     [GET_DERIVATIVES] = {"fmi2GetDerivatives", INITIALIZED, HX_MODEL_EXCHANGE},
@@ -117,11 +124,13 @@ static fmi2Status status_of(hxStatus status) {
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi2Discard : fmi2Error;
 }
 
-static int given(fmi2Instance *instance, fmi2Call call, size_t n, const void *array, const void *other) {
+static int given(fmi2Instance *instance, fmi2Call call, size_t n, const void *array,
+                 const void *other) {
   return hx_call_given(&instance->base, &calls[call], n, array, other);
 }
 
-/* ---------------------------------------------------------------------------------------------- log */
+/* ----------------------------------------------------------------------------------------------
+ * log */
 
 /* the importer's logger reads printf format, and # as a reference to a variable */
 static void log_sink(hxInstance *base, hxLogCategory category, const char *text) {
@@ -134,24 +143,30 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
     *out++ = *text;
   }
   *out = '\0';
-  instance->callbacks.logger(instance->callbacks.componentEnvironment, base->name, status[category], hx_log_category_names[category],
-                             escaped);
+  instance->callbacks.logger(instance->callbacks.componentEnvironment, base->name, status[category],
+                             hx_log_category_names[category], escaped);
 }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[]) {
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
+                               const fmi2String categories[]) {
   fmi2Instance *instance = enter(c, SET_DEBUG_LOGGING);
-  if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories)) return fmi2Error;
-  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn, nCategories, categories));
+  if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
+    return fmi2Error;
+  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
+                                 nCategories, categories));
 }
 
-/* ---------------------------------------------------------------------------------------------- life */
+/* ----------------------------------------------------------------------------------------------
+ * life */
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
-fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String fmuResourceLocation,
-                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn) {
+fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
+                              fmi2String fmuResourceLocation,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+                              fmi2Boolean loggingOn) {
   fmi2Instance *instance = calloc(1, sizeof *instance);
   (void)visible;
   if (!instance) return NULL;
@@ -159,13 +174,16 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   instance->base.sink = log_sink;
   instance->base.logged = loggingOn ? ~0u : HX_LOG_ALWAYS;
   if (instanceName) snprintf(instance->base.name, sizeof instance->base.name, "%s", instanceName);
-  instance->base.state.interface = fmuType == fmi2CoSimulation ? HX_CO_SIMULATION : HX_MODEL_EXCHANGE;
+  instance->base.state.interface =
+      fmuType == fmi2CoSimulation ? HX_CO_SIMULATION : HX_MODEL_EXCHANGE;
   hxStatus status = HX_INVALID_ARGUMENT;
   if (fmuType == fmi2CoSimulation || (fmuType == fmi2ModelExchange && hx_continuous))
     status = hx_instance_open(&instance->base, fmuGUID, fmuResourceLocation);
   else
     hx_log(&instance->base, HX_LOG_ERROR,
-           "fmi2Instantiate: got interface type %d, expected one of the model description's; nothing was instantiated", (int)fmuType);
+           "fmi2Instantiate: got interface type %d, expected one of the model description's; "
+           "nothing was instantiated",
+           (int)fmuType);
   if (status == HX_OK) return instance;
   fmi2FreeInstance(instance);
   return NULL;
@@ -178,12 +196,16 @@ void fmi2FreeInstance(fmi2Component c) {
   free(instance);
 }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
-                               fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
+                               fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
   fmi2Instance *instance = enter(c, SETUP_EXPERIMENT);
   const char *name = calls[SETUP_EXPERIMENT].name;
-  if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined, stopTime) != HX_OK) return fmi2Error;
-  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance) ? fmi2OK : fmi2Warning;
+  if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined,
+                                              stopTime) != HX_OK)
+    return fmi2Error;
+  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance)
+             ? fmi2OK
+             : fmi2Warning;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
@@ -196,8 +218,10 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
   fmi2Instance *instance = enter(c, EXIT_INITIALIZATION_MODE);
   if (!instance || hx_instance_initialize(&instance->base) != HX_OK) return fmi2Error;
-  instance->base.state.mode = instance->base.state.interface == HX_MODEL_EXCHANGE ? HX_MODE_EVENT : HX_MODE_STEP;
-  hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s", hx_instance_time(&instance->base));
+  instance->base.state.mode =
+      instance->base.state.interface == HX_MODEL_EXCHANGE ? HX_MODE_EVENT : HX_MODE_STEP;
+  hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s",
+         hx_instance_time(&instance->base));
   return fmi2OK;
 }
 
@@ -205,7 +229,8 @@ fmi2Status fmi2Terminate(fmi2Component c) {
   fmi2Instance *instance = enter(c, TERMINATE);
   if (!instance) return fmi2Error;
   if (instance->base.state.mode != HX_MODE_TERMINATED)
-    hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s", hx_instance_time(&instance->base));
+    hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s",
+           hx_instance_time(&instance->base));
   instance->base.state.mode = HX_MODE_TERMINATED;
   return fmi2OK;
 }
@@ -218,15 +243,18 @@ fmi2Status fmi2Reset(fmi2Component c) {
   return fmi2OK;
 }
 
-/* ---------------------------------------------------------------------------------------------- values */
+/* ----------------------------------------------------------------------------------------------
+ * values */
 
-static fmi2Status get_values(fmi2Component c, fmi2Call call, hxType type, const fmi2ValueReference vr[], size_t nvr, void *value) {
+static fmi2Status get_values(fmi2Component c, fmi2Call call, hxType type,
+                             const fmi2ValueReference vr[], size_t nvr, void *value) {
   fmi2Instance *instance = enter(c, call);
   if (!instance || !given(instance, call, nvr, vr, value)) return fmi2Error;
   return status_of(hx_instance_get(&instance->base, type, vr, nvr, value));
 }
 
-static fmi2Status set_values(fmi2Component c, fmi2Call call, hxType type, const fmi2ValueReference vr[], size_t nvr, const void *value) {
+static fmi2Status set_values(fmi2Component c, fmi2Call call, hxType type,
+                             const fmi2ValueReference vr[], size_t nvr, const void *value) {
   fmi2Instance *instance = enter(c, call);
   if (!instance || !given(instance, call, nvr, vr, value)) return fmi2Error;
   return hx_instance_set(&instance->base, type, vr, nvr, value) == HX_OK ? fmi2OK : fmi2Error;
@@ -237,46 +265,56 @@ static fmi2Status no_strings(fmi2Component c, fmi2Call call, size_t nvr) {
   fmi2Instance *instance = enter(c, call);
   if (instance && nvr == 0) return fmi2OK;
   if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR, "%s: got %zu variables, expected none, as this FMU has none of type String", calls[call].name,
-           nvr);
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "%s: got %zu variables, expected none, as this FMU has none of type String",
+           calls[call].name, nvr);
   return fmi2Error;
 }
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                       fmi2Real value[]) {
   return get_values(c, GET_REAL, HX_REAL, vr, nvr, value);
 }
 
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          fmi2Integer value[]) {
   return get_values(c, GET_INTEGER, HX_INTEGER, vr, nvr, value);
 }
 
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          fmi2Boolean value[]) {
   return get_values(c, GET_BOOLEAN, HX_BOOLEAN, vr, nvr, value);
 }
 
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                         fmi2String value[]) {
   (void)vr, (void)value;
   return no_strings(c, GET_STRING, nvr);
 }
 
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                       const fmi2Real value[]) {
   return set_values(c, SET_REAL, HX_REAL, vr, nvr, value);
 }
 
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Integer value[]) {
   return set_values(c, SET_INTEGER, HX_INTEGER, vr, nvr, value);
 }
 
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Boolean value[]) {
   return set_values(c, SET_BOOLEAN, HX_BOOLEAN, vr, nvr, value);
 }
 
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]) {
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                         const fmi2String value[]) {
   (void)vr, (void)value;
   return no_strings(c, SET_STRING, nvr);
 }
 
-/* ---------------------------------------------------------------------------------------------- saved states */
+/* ----------------------------------------------------------------------------------------------
+ * saved states */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
   fmi2Instance *instance = enter(c, GET_STATE);
@@ -306,59 +344,73 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
   return fmi2OK;
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
+                                 size_t size) {
   fmi2Instance *instance = enter(c, SERIALIZE);
   if (!instance || !given(instance, SERIALIZE, 1, FMUstate, serializedState)) return fmi2Error;
-  return status_of(hx_instance_serialize(&instance->base, calls[SERIALIZE].name, FMUstate, serializedState, size));
+  return status_of(hx_instance_serialize(&instance->base, calls[SERIALIZE].name, FMUstate,
+                                         serializedState, size));
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate) {
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
+                                   fmi2FMUstate *FMUstate) {
   fmi2Instance *instance = enter(c, DESERIALIZE);
   if (!instance || !given(instance, DESERIALIZE, 1, serializedState, FMUstate)) return fmi2Error;
   return status_of(hx_instance_deserialize(&instance->base, serializedState, size, FMUstate));
 }
 
-/* ---------------------------------------------------------------------------------------------- co-simulation */
+/* ----------------------------------------------------------------------------------------------
+ * co-simulation */
 
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
+                      fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
   fmi2Instance *instance = enter(c, DO_STEP);
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance) return fmi2Error;
-  instance->step_status = status_of(hx_instance_step(&instance->base, currentCommunicationPoint, communicationStepSize));
+  instance->step_status = status_of(
+      hx_instance_step(&instance->base, currentCommunicationPoint, communicationStepSize));
   return instance->step_status;
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
   fmi2Instance *instance = enter(c, CANCEL_STEP);
   if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR, "fmi2CancelStep: got a call, expected none, as steps are finished when fmi2DoStep returns");
+    hx_log(
+        &instance->base, HX_LOG_ERROR,
+        "fmi2CancelStep: got a call, expected none, as steps are finished when fmi2DoStep returns");
   return fmi2Error;
 }
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
-                                       const fmi2Real value[]) {
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
   fmi2Instance *instance = enter(c, SET_INPUT_DERIVATIVES);
-  if (!instance || !given(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) || !given(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
+  if (!instance || !given(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) ||
+      !given(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
     return fmi2Error;
-  if (!hx_call_first_order(&instance->base, &calls[SET_INPUT_DERIVATIVES], nvr, order)) return fmi2Error;
+  if (!hx_call_first_order(&instance->base, &calls[SET_INPUT_DERIVATIVES], nvr, order))
+    return fmi2Error;
   return status_of(hx_instance_set_input_rates(&instance->base, vr, nvr, value));
 }
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[],
-                                        fmi2Real value[]) {
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[]) {
   fmi2Instance *instance = enter(c, GET_OUTPUT_DERIVATIVES);
-  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
+      !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
     return fmi2Error;
-  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order)) return fmi2Error;
+  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
+    return fmi2Error;
   return status_of(hx_instance_get_output_rates(&instance->base, vr, nvr, value));
 }
 
 /* a kind of status that the type asked for does not have */
 static fmi2Status no_status(fmi2Instance *instance, fmi2StatusKind kind) {
   if (!instance) return fmi2Error;
-  hx_log(&instance->base, HX_LOG_DISCARD, "fmi2GetXXXStatus: got kind %d, which has no value of this type here; nothing was returned",
-         (int)kind);
+  hx_log(
+      &instance->base, HX_LOG_DISCARD,
+      "fmi2GetXXXStatus: got kind %d, which has no value of this type here; nothing was returned",
+      (int)kind);
   return fmi2Discard;
 }
 
@@ -394,18 +446,23 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
   return no_status(enter(c, GET_STATUS), s);
 }
 
-/* ---------------------------------------------------------------------------------------------- derivatives */
+/* ----------------------------------------------------------------------------------------------
+ * derivatives */
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
-                                        const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
+                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[],
+                                        size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
   fmi2Instance *instance = enter(c, DIRECTIONAL_DERIVATIVE);
-  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknown, vUnknown_ref, dvUnknown)) return fmi2Error;
+  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknown, vUnknown_ref, dvUnknown))
+    return fmi2Error;
   if (!given(instance, DIRECTIONAL_DERIVATIVE, nKnown, vKnown_ref, dvKnown)) return fmi2Error;
-  return status_of(hx_instance_directional(&instance->base, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
+  return status_of(hx_instance_directional(&instance->base, vUnknown_ref, nUnknown, vKnown_ref,
+                                           nKnown, dvKnown, dvUnknown));
 }
 
-/* ---------------------------------------------------------------------------------------------- model exchange */
+/* ----------------------------------------------------------------------------------------------
+ * model exchange */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
   fmi2Instance *instance = enter(c, ENTER_EVENT_MODE);
@@ -414,7 +471,8 @@ fmi2Status fmi2EnterEventMode(fmi2Component c) {
   return fmi2OK;
 }
 
-/* touch-downs and lift-offs; nothing follows from them at once, and no time event is ever known beforehand */
+/* touch-downs and lift-offs; nothing follows from them at once, and no time event is ever known
+ * beforehand */
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
   fmi2Instance *instance = enter(c, NEW_DISCRETE_STATES);
   int changed;
@@ -431,11 +489,15 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
   return fmi2OK;
 }
 
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint, fmi2Boolean *enterEventMode,
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
+                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
   fmi2Instance *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
   (void)noSetFMUStatePriorToCurrentPoint;
-  if (!instance || !given(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation)) return fmi2Error;
+  if (!instance ||
+      !given(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation))
+    return fmi2Error;
   *enterEventMode = *terminateSimulation = fmi2False;
   return status_of(hx_instance_completed_step(&instance->base));
 }
@@ -454,7 +516,8 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
 /* a getter of doubles, as many as there are */
 typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
 
-static fmi2Status get_array(fmi2Component c, fmi2Call call, Getter *getter, fmi2Real value[], size_t n) {
+static fmi2Status get_array(fmi2Component c, fmi2Call call, Getter *getter, fmi2Real value[],
+                            size_t n) {
   fmi2Instance *instance = enter(c, call);
   if (!instance || !given(instance, call, n, value, value)) return fmi2Error;
   return status_of(getter(&instance->base, value, n));

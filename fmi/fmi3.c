@@ -1,4 +1,5 @@
-/* fmi3.c - FMI 3.0 for model exchange and co-simulation: every function of the standard, in its order. No physics. */
+/* fmi3.c - FMI 3.0 for model exchange and co-simulation: every function of the standard, in its
+ * order. No physics. */
 #include "fmi/instance.h"
 
 #include <stdint.h>
@@ -15,10 +16,13 @@ typedef struct fmi3InstanceData {
   int may_return_early;
 } fmi3InstanceData;
 
-_Static_assert(sizeof(fmi3Float64) == sizeof(double) && sizeof(fmi3ValueReference) == sizeof(unsigned) && sizeof(fmi3Int32) == sizeof(int),
+_Static_assert(sizeof(fmi3Float64) == sizeof(double) &&
+                   sizeof(fmi3ValueReference) == sizeof(unsigned) &&
+                   sizeof(fmi3Int32) == sizeof(int),
                "values are copied as they are");
 
-/* ---------------------------------------------------------------------------------------------- legal order */
+/* ----------------------------------------------------------------------------------------------
+ * legal order */
 
 enum {
   RUNNING = HX_MODE_STEP | HX_MODE_EVENT | HX_MODE_CONTINUOUS,
@@ -67,8 +71,9 @@ typedef enum fmi3Call {
   UNSUPPORTED
 } fmi3Call;
 
-/* The standard's tables of allowed calls (sections 2.3, 3.2 and 4.2), but for the liberties of fmi2.c: values are read before
- * initialisation, states and their rates in it, and a terminated instance is terminated again. */
+/* The standard's tables of allowed calls (sections 2.3, 3.2 and 4.2), but for the liberties of
+ * fmi2.c: values are read before initialisation, states and their rates in it, and a terminated
+ * instance is terminated again. */
 static const hxCall calls[] = {
     [SET_DEBUG_LOGGING] = {"fmi3SetDebugLogging", ANY_MODE, EITHER},
     [ENTER_INITIALIZATION_MODE] = {"fmi3EnterInitializationMode", HX_MODE_INSTANTIATED, EITHER},
@@ -93,8 +98,10 @@ static const hxCall calls[] = {
     [DIRECTIONAL_DERIVATIVE] = {"fmi3GetDirectionalDerivative", INITIALIZED, EITHER},
     [CLOCKS] = {"a function for clocks", ANY_MODE, EITHER},
     [UPDATE_DISCRETE_STATES] = {"fmi3UpdateDiscreteStates", HX_MODE_EVENT, EITHER},
-    [ENTER_CONTINUOUS_TIME_MODE] = {"fmi3EnterContinuousTimeMode", HX_MODE_EVENT, HX_MODEL_EXCHANGE},
-    [COMPLETED_INTEGRATOR_STEP] = {"fmi3CompletedIntegratorStep", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
+    [ENTER_CONTINUOUS_TIME_MODE] = {"fmi3EnterContinuousTimeMode", HX_MODE_EVENT,
+                                    HX_MODEL_EXCHANGE},
+    [COMPLETED_INTEGRATOR_STEP] = {"fmi3CompletedIntegratorStep", HX_MODE_CONTINUOUS,
+                                   HX_MODEL_EXCHANGE},
     [SET_TIME] = {"fmi3SetTime", HX_MODE_EVENT | HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
     [SET_CONTINUOUS_STATES] = {"fmi3SetContinuousStates", HX_MODE_CONTINUOUS, HX_MODEL_EXCHANGE},
     [GET_RATES] = {"fmi3GetContinuousStateDerivatives", INITIALIZED, HX_MODEL_EXCHANGE},
@@ -103,7 +110,8 @@ static const hxCall calls[] = {
     [GET_NOMINALS] = {"fmi3GetNominalsOfContinuousStates", ANY_MODE, HX_MODEL_EXCHANGE},
     [GET_NUMBER] = {"fmi3GetNumberOfXXX", ANY_MODE, HX_MODEL_EXCHANGE},
     [ENTER_STEP_MODE] = {"fmi3EnterStepMode", HX_MODE_EVENT, HX_CO_SIMULATION},
-    [GET_OUTPUT_DERIVATIVES] = {"fmi3GetOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED, HX_CO_SIMULATION},
+    [GET_OUTPUT_DERIVATIVES] = {"fmi3GetOutputDerivatives", HX_MODE_STEP | HX_MODE_TERMINATED,
+                                HX_CO_SIMULATION},
     [DO_STEP] = {"fmi3DoStep", HX_MODE_STEP, HX_CO_SIMULATION},
     [UNSUPPORTED] = {"a function that is not offered", ANY_MODE, EITHER},
 };
@@ -119,14 +127,17 @@ static fmi3Status status_of(hxStatus status) {
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi3Discard : fmi3Error;
 }
 
-static int given(fmi3InstanceData *instance, fmi3Call call, size_t n, const void *array, const void *other) {
+static int given(fmi3InstanceData *instance, fmi3Call call, size_t n, const void *array,
+                 const void *other) {
   return hx_call_given(&instance->base, &calls[call], n, array, other);
 }
 
 /* importers bind every function of the standard, so all are here */
 static fmi3Status not_supported(fmi3Instance c, const char *name) {
   fmi3InstanceData *instance = enter(c, UNSUPPORTED);
-  if (instance) hx_log(&instance->base, HX_LOG_ERROR, "%s: got a call, expected none, as the model description does not offer it", name);
+  if (instance)
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "%s: got a call, expected none, as the model description does not offer it", name);
   return fmi3Error;
 }
 
@@ -134,7 +145,9 @@ static fmi3Status not_supported(fmi3Instance c, const char *name) {
 static fmi3Status no_variables(fmi3Instance c, fmi3Call call, size_t n) {
   fmi3InstanceData *instance = enter(c, call);
   if (instance && n == 0) return fmi3OK;
-  if (instance) hx_log(&instance->base, HX_LOG_ERROR, "%s: got %zu variables, expected none, as this FMU has none", calls[call].name, n);
+  if (instance)
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "%s: got %zu variables, expected none, as this FMU has none", calls[call].name, n);
   return fmi3Error;
 }
 
@@ -142,26 +155,33 @@ static void put(fmi3Boolean *place, int value) {
   if (place) *place = value != 0;
 }
 
-/* ---------------------------------------------------------------------------------------------- log */
+/* ----------------------------------------------------------------------------------------------
+ * log */
 
 static void log_sink(hxInstance *base, hxLogCategory category, const char *text) {
   static const fmi3Status status[] = {fmi3Error, fmi3Discard, fmi3Warning, fmi3OK, fmi3OK};
   const fmi3InstanceData *instance = (const fmi3InstanceData *)base;
-  if (instance->log) instance->log(instance->environment, status[category], hx_log_category_names[category], text);
+  if (instance->log)
+    instance->log(instance->environment, status[category], hx_log_category_names[category], text);
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]) {
+fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
+                               const fmi3String categories[]) {
   fmi3InstanceData *instance = enter(c, SET_DEBUG_LOGGING);
-  if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories)) return fmi3Error;
-  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn, nCategories, categories));
+  if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
+    return fmi3Error;
+  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
+                                 nCategories, categories));
 }
 
-/* ---------------------------------------------------------------------------------------------- life */
+/* ----------------------------------------------------------------------------------------------
+ * life */
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
 /* an instance that can say why it is not to be; NULL when out of memory */
-static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fmi3Boolean loggingOn, fmi3InstanceEnvironment environment,
+static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fmi3Boolean loggingOn,
+                                      fmi3InstanceEnvironment environment,
                                       fmi3LogMessageCallback log) {
   fmi3InstanceData *instance = calloc(1, sizeof *instance);
   if (!instance) return NULL;
@@ -174,7 +194,8 @@ static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fm
   return instance;
 }
 
-static fmi3Instance open_instance(fmi3InstanceData *instance, fmi3String token, fmi3String resources) {
+static fmi3Instance open_instance(fmi3InstanceData *instance, fmi3String token,
+                                  fmi3String resources) {
   if (instance && hx_instance_open(&instance->base, token, resources) == HX_OK) return instance;
   fmi3FreeInstance(instance);
   return NULL;
@@ -182,28 +203,37 @@ static fmi3Instance open_instance(fmi3InstanceData *instance, fmi3String token, 
 
 static fmi3Instance refuse_kind(fmi3InstanceData *instance, const char *kind) {
   if (instance)
-    hx_log(&instance->base, HX_LOG_ERROR, "instantiation: got %s, expected an interface of the model description; nothing was instantiated",
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "instantiation: got %s, expected an interface of the model description; nothing was "
+           "instantiated",
            kind);
   fmi3FreeInstance(instance);
   return NULL;
 }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
-                                          fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
+fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
+                                          fmi3String resourcePath, fmi3Boolean visible,
+                                          fmi3Boolean loggingOn,
+                                          fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage) {
-  fmi3InstanceData *instance = new_instance(HX_MODEL_EXCHANGE, instanceName, loggingOn, instanceEnvironment, logMessage);
+  fmi3InstanceData *instance =
+      new_instance(HX_MODEL_EXCHANGE, instanceName, loggingOn, instanceEnvironment, logMessage);
   (void)visible;
-  return hx_state_count > 0 ? open_instance(instance, instantiationToken, resourcePath) : refuse_kind(instance, "model exchange");
+  return hx_state_count > 0 ? open_instance(instance, instantiationToken, resourcePath)
+                            : refuse_kind(instance, "model exchange");
 }
 
 /* there are no intermediate updates, so none of their variables is looked at */
-fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
-                                         fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
-                                         fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
-                                         size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
-                                         fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
-  fmi3InstanceData *instance = new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
-  (void)visible, (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables, (void)intermediateUpdate;
+fmi3Instance fmi3InstantiateCoSimulation(
+    fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
+    fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
+    fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
+    size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
+    fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
+  fmi3InstanceData *instance =
+      new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
+  (void)visible, (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables,
+      (void)intermediateUpdate;
   if (instance) {
     instance->base.uses_event_mode = eventModeUsed && hx_continuous;
     instance->may_return_early = earlyReturnAllowed;
@@ -211,12 +241,16 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
   return open_instance(instance, instantiationToken, resourcePath);
 }
 
-fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
-                                               fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
-                                               fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
-                                               fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
-  (void)instantiationToken, (void)resourcePath, (void)visible, (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-  return refuse_kind(new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage), "scheduled execution");
+fmi3Instance fmi3InstantiateScheduledExecution(
+    fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
+    fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
+    fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
+    fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
+  (void)instantiationToken, (void)resourcePath, (void)visible, (void)clockUpdate,
+      (void)lockPreemption, (void)unlockPreemption;
+  return refuse_kind(
+      new_instance(HX_CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage),
+      "scheduled execution");
 }
 
 void fmi3FreeInstance(fmi3Instance c) {
@@ -227,21 +261,28 @@ void fmi3FreeInstance(fmi3Instance c) {
 }
 
 /* a tolerance without sense is no reason to stop: it is not used */
-fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined,
+                                       fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
   fmi3InstanceData *instance = enter(c, ENTER_INITIALIZATION_MODE);
   const char *name = calls[ENTER_INITIALIZATION_MODE].name;
-  if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined, stopTime) != HX_OK) return fmi3Error;
+  if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined,
+                                              stopTime) != HX_OK)
+    return fmi3Error;
   instance->base.state.mode = HX_MODE_INITIALIZATION;
-  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance) ? fmi3OK : fmi3Warning;
+  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance)
+             ? fmi3OK
+             : fmi3Warning;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
   fmi3InstanceData *instance = enter(c, EXIT_INITIALIZATION_MODE);
   if (!instance || hx_instance_initialize(&instance->base) != HX_OK) return fmi3Error;
-  const int events = instance->base.uses_event_mode || instance->base.state.interface == HX_MODEL_EXCHANGE;
+  const int events =
+      instance->base.uses_event_mode || instance->base.state.interface == HX_MODEL_EXCHANGE;
   instance->base.state.mode = events ? HX_MODE_EVENT : HX_MODE_STEP;
-  hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s", hx_instance_time(&instance->base));
+  hx_log(&instance->base, HX_LOG_EVENT, "initialized at %.17g s",
+         hx_instance_time(&instance->base));
   return fmi3OK;
 }
 
@@ -250,7 +291,8 @@ fmi3Status fmi3EnterEventMode(fmi3Instance c) {
   if (!instance) return fmi3Error;
   if (instance->base.state.mode == HX_MODE_STEP && !instance->base.uses_event_mode) {
     hx_log(&instance->base, HX_LOG_ERROR,
-           "fmi3EnterEventMode: got a call, expected none, as there are no events or eventModeUsed was false; nothing was changed");
+           "fmi3EnterEventMode: got a call, expected none, as there are no events or eventModeUsed "
+           "was false; nothing was changed");
     return fmi3Error;
   }
   instance->base.state.mode = HX_MODE_EVENT;
@@ -261,7 +303,8 @@ fmi3Status fmi3Terminate(fmi3Instance c) {
   fmi3InstanceData *instance = enter(c, TERMINATE);
   if (!instance) return fmi3Error;
   if (instance->base.state.mode != HX_MODE_TERMINATED)
-    hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s", hx_instance_time(&instance->base));
+    hx_log(&instance->base, HX_LOG_EVENT, "terminated at %.17g s",
+           hx_instance_time(&instance->base));
   instance->base.state.mode = HX_MODE_TERMINATED;
   return fmi3OK;
 }
@@ -273,55 +316,66 @@ fmi3Status fmi3Reset(fmi3Instance c) {
   return fmi3OK;
 }
 
-/* ---------------------------------------------------------------------------------------------- values */
+/* ----------------------------------------------------------------------------------------------
+ * values */
 
-static fmi3Status get_values(fmi3Instance c, fmi3Call call, hxType type, const fmi3ValueReference vr[], size_t nvr, void *value, size_t n) {
+static fmi3Status get_values(fmi3Instance c, fmi3Call call, hxType type,
+                             const fmi3ValueReference vr[], size_t nvr, void *value, size_t n) {
   fmi3InstanceData *instance = enter(c, call);
   if (!instance || !given(instance, call, nvr, vr, value)) return fmi3Error;
   return status_of(hx_arrays_get(&instance->base, type, vr, nvr, value, n));
 }
 
-static fmi3Status set_values(fmi3Instance c, fmi3Call call, hxType type, const fmi3ValueReference vr[], size_t nvr, const void *value,
+static fmi3Status set_values(fmi3Instance c, fmi3Call call, hxType type,
+                             const fmi3ValueReference vr[], size_t nvr, const void *value,
                              size_t n) {
   fmi3InstanceData *instance = enter(c, call);
   if (!instance || !given(instance, call, nvr, vr, value)) return fmi3Error;
   return status_of(hx_arrays_set(&instance->base, type, vr, nvr, value, n));
 }
 
-fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Float64 value[], size_t n) {
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          fmi3Float64 value[], size_t n) {
   return get_values(c, GET_FLOAT64, HX_REAL, vr, nvr, value, n);
 }
 
 /* enumerations come as Int64 */
-fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Int64 value[], size_t n) {
+fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                        fmi3Int64 value[], size_t n) {
   return get_values(c, GET_INT64, HX_INTEGER, vr, nvr, value, n);
 }
 
-fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Boolean value[], size_t n) {
+fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          fmi3Boolean value[], size_t n) {
   return get_values(c, GET_BOOLEAN, HX_BOOLEAN, vr, nvr, value, n);
 }
 
-fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Float64 value[], size_t n) {
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          const fmi3Float64 value[], size_t n) {
   return set_values(c, SET_FLOAT64, HX_REAL, vr, nvr, value, n);
 }
 
-fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Int64 value[], size_t n) {
+fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                        const fmi3Int64 value[], size_t n) {
   return set_values(c, SET_INT64, HX_INTEGER, vr, nvr, value, n);
 }
 
-fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Boolean value[], size_t n) {
+fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          const fmi3Boolean value[], size_t n) {
   return set_values(c, SET_BOOLEAN, HX_BOOLEAN, vr, nvr, value, n);
 }
 
 /* types that no variable has */
-#define NO_VARIABLES_OF(Type)                                                                                                              \
-  fmi3Status fmi3Get##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3##Type value[], size_t n) {                      \
-    (void)vr, (void)value, (void)n;                                                                                                        \
-    return no_variables(c, GET_OTHER, nvr);                                                                                                \
-  }                                                                                                                                        \
-  fmi3Status fmi3Set##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3##Type value[], size_t n) {                \
-    (void)vr, (void)value, (void)n;                                                                                                        \
-    return no_variables(c, SET_OTHER, nvr);                                                                                                \
+#define NO_VARIABLES_OF(Type)                                                                      \
+  fmi3Status fmi3Get##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,              \
+                           fmi3##Type value[], size_t n) {                                         \
+    (void)vr, (void)value, (void)n;                                                                \
+    return no_variables(c, GET_OTHER, nvr);                                                        \
+  }                                                                                                \
+  fmi3Status fmi3Set##Type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,              \
+                           const fmi3##Type value[], size_t n) {                                   \
+    (void)vr, (void)value, (void)n;                                                                \
+    return no_variables(c, SET_OTHER, nvr);                                                        \
   }
 
 NO_VARIABLES_OF(Float32)
@@ -334,18 +388,20 @@ NO_VARIABLES_OF(UInt32)
 NO_VARIABLES_OF(UInt64)
 NO_VARIABLES_OF(String)
 
-fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, size_t size[], fmi3Binary value[], size_t n) {
+fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, size_t size[],
+                         fmi3Binary value[], size_t n) {
   (void)vr, (void)size, (void)value, (void)n;
   return no_variables(c, GET_OTHER, nvr);
 }
 
-fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const size_t size[], const fmi3Binary value[],
-                         size_t n) {
+fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                         const size_t size[], const fmi3Binary value[], size_t n) {
   (void)vr, (void)size, (void)value, (void)n;
   return no_variables(c, SET_OTHER, nvr);
 }
 
-/* ---------------------------------------------------------------------------------------------- dependencies */
+/* ----------------------------------------------------------------------------------------------
+ * dependencies */
 
 /* which element depends on which is not told: providesPerElementDependencies says so */
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
@@ -353,15 +409,19 @@ fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReferenc
   return not_supported(c, "fmi3GetNumberOfVariableDependencies");
 }
 
-fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
-                                       fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
+                                       size_t elementIndicesOfDependent[],
+                                       fmi3ValueReference independents[],
+                                       size_t elementIndicesOfIndependents[],
                                        fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
-  (void)dependent, (void)elementIndicesOfDependent, (void)independents, (void)elementIndicesOfIndependents, (void)dependencyKinds;
+  (void)dependent, (void)elementIndicesOfDependent, (void)independents,
+      (void)elementIndicesOfIndependents, (void)dependencyKinds;
   (void)nDependencies;
   return not_supported(c, "fmi3GetVariableDependencies");
 }
 
-/* ---------------------------------------------------------------------------------------------- saved states */
+/* ----------------------------------------------------------------------------------------------
+ * saved states */
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
   fmi3InstanceData *instance = enter(c, GET_STATE);
@@ -391,69 +451,86 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t
   return fmi3OK;
 }
 
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
+fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[],
+                                 size_t size) {
   fmi3InstanceData *instance = enter(c, SERIALIZE);
   if (!instance || !given(instance, SERIALIZE, 1, state, bytes)) return fmi3Error;
-  return status_of(hx_instance_serialize(&instance->base, calls[SERIALIZE].name, state, bytes, size));
+  return status_of(
+      hx_instance_serialize(&instance->base, calls[SERIALIZE].name, state, bytes, size));
 }
 
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
+fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size,
+                                   fmi3FMUState *state) {
   fmi3InstanceData *instance = enter(c, DESERIALIZE);
   if (!instance || !given(instance, DESERIALIZE, 1, bytes, state)) return fmi3Error;
   return status_of(hx_instance_deserialize(&instance->base, bytes, size, state));
 }
 
-/* ---------------------------------------------------------------------------------------------- derivatives */
+/* ----------------------------------------------------------------------------------------------
+ * derivatives */
 
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t nUnknowns,
-                                        const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+                                        size_t nUnknowns, const fmi3ValueReference knowns[],
+                                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                         fmi3Float64 sensitivity[], size_t nSensitivity) {
   fmi3InstanceData *instance = enter(c, DIRECTIONAL_DERIVATIVE);
-  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknowns, unknowns, sensitivity)) return fmi3Error;
+  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknowns, unknowns, sensitivity))
+    return fmi3Error;
   if (!given(instance, DIRECTIONAL_DERIVATIVE, nKnowns, knowns, seed)) return fmi3Error;
-  return status_of(hx_arrays_directional(&instance->base, unknowns, nUnknowns, knowns, nKnowns, seed, nSeed, sensitivity, nSensitivity));
+  return status_of(hx_arrays_directional(&instance->base, unknowns, nUnknowns, knowns, nKnowns,
+                                         seed, nSeed, sensitivity, nSensitivity));
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t nUnknowns,
-                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
+                                    size_t nUnknowns, const fmi3ValueReference knowns[],
+                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                     fmi3Float64 sensitivity[], size_t nSensitivity) {
-  (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity;
+  (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed,
+      (void)sensitivity, (void)nSensitivity;
   return not_supported(c, "fmi3GetAdjointDerivative");
 }
 
-/* ---------------------------------------------------------------------------------------------- configuration, clocks */
+/* ----------------------------------------------------------------------------------------------
+ * configuration, clocks */
 
 /* no structural parameters */
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) { return not_supported(c, "fmi3EnterConfigurationMode"); }
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) {
+  return not_supported(c, "fmi3EnterConfigurationMode");
+}
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) { return not_supported(c, "fmi3ExitConfigurationMode"); }
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) {
+  return not_supported(c, "fmi3ExitConfigurationMode");
+}
 
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Float64 interval[],
-                                  fmi3IntervalQualifier qualifier[]) {
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                  fmi3Float64 interval[], fmi3IntervalQualifier qualifier[]) {
   (void)vr, (void)interval, (void)qualifier;
   return no_variables(c, CLOCKS, nvr);
 }
 
-fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3UInt64 counter[], fmi3UInt64 resolution[],
+fmi3Status fmi3GetIntervalFraction(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                   fmi3UInt64 counter[], fmi3UInt64 resolution[],
                                    fmi3IntervalQualifier qualifier[]) {
   (void)vr, (void)counter, (void)resolution, (void)qualifier;
   return no_variables(c, CLOCKS, nvr);
 }
 
-fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
+fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clockReference,
+                                      fmi3Float64 activationTime) {
   (void)clockReference, (void)activationTime;
   return not_supported(c, "fmi3ActivateModelPartition");
 }
 
-#define NO_CLOCKS(Name, Type)                                                                                                              \
-  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type value[]) {                                         \
-    (void)vr, (void)value;                                                                                                                 \
-    return no_variables(c, CLOCKS, nvr);                                                                                                   \
+#define NO_CLOCKS(Name, Type)                                                                      \
+  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type value[]) { \
+    (void)vr, (void)value;                                                                         \
+    return no_variables(c, CLOCKS, nvr);                                                           \
   }
-#define NO_CLOCK_FRACTIONS(Name, Type)                                                                                                     \
-  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type counter[], Type resolution[]) {                    \
-    (void)vr, (void)counter, (void)resolution;                                                                                             \
-    return no_variables(c, CLOCKS, nvr);                                                                                                   \
+#define NO_CLOCK_FRACTIONS(Name, Type)                                                             \
+  fmi3Status fmi3##Name(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, Type counter[], \
+                        Type resolution[]) {                                                       \
+    (void)vr, (void)counter, (void)resolution;                                                     \
+    return no_variables(c, CLOCKS, nvr);                                                           \
   }
 
 NO_CLOCKS(GetClock, fmi3Clock)
@@ -465,14 +542,19 @@ NO_CLOCK_FRACTIONS(GetShiftFraction, fmi3UInt64)
 NO_CLOCK_FRACTIONS(SetIntervalFraction, const fmi3UInt64)
 NO_CLOCK_FRACTIONS(SetShiftFraction, const fmi3UInt64)
 
-/* ---------------------------------------------------------------------------------------------- events */
+/* ----------------------------------------------------------------------------------------------
+ * events */
 
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) { return not_supported(c, "fmi3EvaluateDiscreteStates"); }
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
+  return not_supported(c, "fmi3EvaluateDiscreteStates");
+}
 
-/* Model exchange: touch-downs and lift-offs, from which nothing follows at once. Co-simulation: the step that ended here has done it all.
- * No time event is ever known beforehand. */
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesNeedUpdate, fmi3Boolean *terminateSimulation,
-                                    fmi3Boolean *nominalsOfContinuousStatesChanged, fmi3Boolean *valuesOfContinuousStatesChanged,
+/* Model exchange: touch-downs and lift-offs, from which nothing follows at once. Co-simulation: the
+ * step that ended here has done it all. No time event is ever known beforehand. */
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesNeedUpdate,
+                                    fmi3Boolean *terminateSimulation,
+                                    fmi3Boolean *nominalsOfContinuousStatesChanged,
+                                    fmi3Boolean *valuesOfContinuousStatesChanged,
                                     fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
   fmi3InstanceData *instance = enter(c, UPDATE_DISCRETE_STATES);
   int changed = 0;
@@ -488,7 +570,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesN
   return status_of(status);
 }
 
-/* ---------------------------------------------------------------------------------------------- model exchange */
+/* ----------------------------------------------------------------------------------------------
+ * model exchange */
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
   fmi3InstanceData *instance = enter(c, ENTER_CONTINUOUS_TIME_MODE);
@@ -497,7 +580,8 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
   return fmi3OK;
 }
 
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *enterEventMode,
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
   (void)noSetFMUStatePriorToCurrentPoint;
   fmi3InstanceData *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
@@ -521,7 +605,8 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t
 /* a getter of doubles, as many as there are */
 typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
 
-static fmi3Status get_row(fmi3Instance c, fmi3Call call, Getter *getter, fmi3Float64 value[], size_t n) {
+static fmi3Status get_row(fmi3Instance c, fmi3Call call, Getter *getter, fmi3Float64 value[],
+                          size_t n) {
   fmi3InstanceData *instance = enter(c, call);
   if (!instance || !given(instance, call, n, value, value)) return fmi3Error;
   return status_of(getter(&instance->base, value, n));
@@ -554,9 +639,12 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
   return get_number(c, n, hx_continuous ? hx_continuous->indicators : 0);
 }
 
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) { return get_number(c, n, hx_state_count); }
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
+  return get_number(c, n, hx_state_count);
+}
 
-/* ---------------------------------------------------------------------------------------------- co-simulation */
+/* ----------------------------------------------------------------------------------------------
+ * co-simulation */
 
 fmi3Status fmi3EnterStepMode(fmi3Instance c) {
   fmi3InstanceData *instance = enter(c, ENTER_STEP_MODE);
@@ -565,25 +653,31 @@ fmi3Status fmi3EnterStepMode(fmi3Instance c) {
   return fmi3OK;
 }
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Int32 order[], fmi3Float64 value[],
-                                    size_t n) {
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                    const fmi3Int32 order[], fmi3Float64 value[], size_t n) {
   fmi3InstanceData *instance = enter(c, GET_OUTPUT_DERIVATIVES);
-  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
+      !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
     return fmi3Error;
-  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order)) return fmi3Error;
+  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
+    return fmi3Error;
   return status_of(hx_arrays_get_output_rates(&instance->base, vr, nvr, value, n));
 }
 
-/* an importer that allows it gets the step back where discrete variables change; one with event mode is told to enter it */
-fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
-                      fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+/* an importer that allows it gets the step back where discrete variables change; one with event
+ * mode is told to enter it */
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
+                      fmi3Float64 communicationStepSize,
+                      fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
   fmi3InstanceData *instance = enter(c, DO_STEP);
   const double t = currentCommunicationPoint, h = communicationStepSize;
   int event = 0;
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance) return fmi3Error;
-  const hxStatus status = hx_instance_step_to_event(&instance->base, t, h, instance->may_return_early, &event);
+  const hxStatus status =
+      hx_instance_step_to_event(&instance->base, t, h, instance->may_return_early, &event);
   const double reached = hx_instance_time(&instance->base);
   put(eventHandlingNeeded, event && instance->base.uses_event_mode);
   put(terminateSimulation, 0);

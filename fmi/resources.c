@@ -1,8 +1,9 @@
 /* resources.c - start values in the FMU's resources.
  *
- * start_values.txt: the GUID; then, for every input and parameter in the order of their references, a line
- * "reference value name"; then "checksum" and, in 16 hexadecimal digits, hx_checksum over the lines above without their ends,
- * each one's checksum the next one's seed. Reals are hexadecimal (0x1.8p+1), so they are exact and no locale has a say.
+ * start_values.txt: the GUID; then, for every input and parameter in the order of their references,
+ * a line "reference value name"; then "checksum" and, in 16 hexadecimal digits, hx_checksum over
+ * the lines above without their ends, each one's checksum the next one's seed. Reals are
+ * hexadecimal (0x1.8p+1), so they are exact and no locale has a say.
  */
 #include "fmi/instance.h"
 
@@ -20,7 +21,8 @@ enum { LINE_SIZE = 256 };
 
 static const char file_name[] = "start_values.txt";
 
-/* ---------------------------------------------------------------------------------------------- URI to path */
+/* ----------------------------------------------------------------------------------------------
+ * URI to path */
 
 static int is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -64,7 +66,8 @@ static const char *skip_scheme(const char *uri) {
 /* /C:/x, //C:/x, ///C:/x, //localhost/C:/x -> C:/x; ////server/share -> //server/share; in place */
 static void to_windows_path(char *path) {
   static const char this_machine[] = "//localhost/";
-  const size_t host = strncmp(path, this_machine, sizeof this_machine - 1) == 0 ? sizeof this_machine - 2 : 0;
+  const size_t host =
+      strncmp(path, this_machine, sizeof this_machine - 1) == 0 ? sizeof this_machine - 2 : 0;
   const size_t slashes = strspn(path + host, "/");
   const char *name = path + host + slashes;
   const int drive = name[0] && (name[1] == ':' || name[1] == '|');
@@ -74,7 +77,8 @@ static void to_windows_path(char *path) {
 }
 #endif
 
-/* path of start_values.txt below the resources, decoded or as it is given, to be freed; NULL when out of memory */
+/* path of start_values.txt below the resources, decoded or as it is given, to be freed; NULL when
+ * out of memory */
 static char *start_values_path(const char *resources, int decode) {
   const char *after_scheme = skip_scheme(resources);
   char *path = malloc(strlen(resources) + sizeof file_name + 1);
@@ -100,9 +104,11 @@ static FILE *open_file(const char *path) {
 #endif
 }
 
-/* ---------------------------------------------------------------------------------------------- lines */
+/* ----------------------------------------------------------------------------------------------
+ * lines */
 
-/* hexadecimal floating point, at most 15 digits so that the mantissa is exact; returns 1 if all of the text is one */
+/* hexadecimal floating point, at most 15 digits so that the mantissa is exact; returns 1 if all of
+ * the text is one */
 static int parse_real(const char *text, double *value) {
   const int negative = text[0] == '-';
   unsigned long long mantissa = 0;
@@ -121,7 +127,8 @@ static int parse_real(const char *text, double *value) {
   if (digits < 1 || digits > 15 || (*text != 'p' && *text != 'P')) return 0;
   const int minus = text[1] == '-', sign = minus || text[1] == '+';
   int power = 0;
-  for (text += 1 + sign; is_digit(*text) && power < 10000; text++) power = 10 * power + (*text - '0');
+  for (text += 1 + sign; is_digit(*text) && power < 10000; text++)
+    power = 10 * power + (*text - '0');
   if (*text || !is_digit(text[-1])) return 0;
   *value = ldexp((double)mantissa, exponent + (minus ? -power : power)) * (negative ? -1.0 : 1.0);
   return 1;
@@ -130,7 +137,8 @@ static int parse_real(const char *text, double *value) {
 /* at most 9 decimal digits */
 static int parse_count(const char *text, unsigned *value) {
   size_t length = 0;
-  for (*value = 0; is_digit(text[length]) && length < 10; length++) *value = 10 * *value + (unsigned)(text[length] - '0');
+  for (*value = 0; is_digit(text[length]) && length < 10; length++)
+    *value = 10 * *value + (unsigned)(text[length] - '0');
   return length > 0 && length < 10 && !text[length];
 }
 
@@ -150,7 +158,8 @@ typedef struct hxReader {
   char line[LINE_SIZE];
 } hxReader;
 
-/* the next line without its end, or NULL at the end of the file; a line too long comes in pieces and so parses as none */
+/* the next line without its end, or NULL at the end of the file; a line too long comes in pieces
+ * and so parses as none */
 static char *next_line(hxReader *reader) {
   size_t length = 0;
   int c = fgetc(reader->file);
@@ -190,25 +199,31 @@ static void store(struct hxVariables *variables, const hxVariable *variable, dou
 }
 
 /* one line against the row it must be of; returns 0 if it is not */
-static int read_variable(struct hxVariables *variables, const hxVariable *variable, unsigned reference, char *line) {
+static int read_variable(struct hxVariables *variables, const hxVariable *variable,
+                         unsigned reference, char *line) {
   char *part[3];
   unsigned given;
   double value;
-  if (!line || !split(line, part) || !parse_count(part[0], &given) || given != reference || strcmp(part[2], variable->name) != 0) return 0;
+  if (!line || !split(line, part) || !parse_count(part[0], &given) || given != reference ||
+      strcmp(part[2], variable->name) != 0)
+    return 0;
   if (!parse_value(variable, part[1], &value) || !hx_variable_takes(variable, value)) return 0;
   store(variables, variable, value);
   return 1;
 }
 
-/* ---------------------------------------------------------------------------------------------- file */
+/* ----------------------------------------------------------------------------------------------
+ * file */
 
-static hxStatus refuse(hxInstance *instance, const hxReader *reader, const char *got, const char *expected) {
-  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew", file_name, reader->number,
-         got ? got : "the end of the file", expected);
+static hxStatus refuse(hxInstance *instance, const hxReader *reader, const char *got,
+                       const char *expected) {
+  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew",
+         file_name, reader->number, got ? got : "the end of the file", expected);
   return HX_INVALID_ARGUMENT;
 }
 
-static hxStatus read_variables(hxInstance *instance, hxReader *reader, struct hxVariables *variables) {
+static hxStatus read_variables(hxInstance *instance, hxReader *reader,
+                               struct hxVariables *variables) {
   static const hxCausality causalities[] = {HX_INPUT, HX_PARAMETER};
   char shown[LINE_SIZE], expected[LINE_SIZE];
   for (int k = 0; k < 2; k++) {
@@ -218,8 +233,8 @@ static hxStatus read_variables(hxInstance *instance, hxReader *reader, struct hx
       char *text = next_line(reader);
       if (text) strcpy(shown, text);
       if (!read_variable(variables, variable, section->first + i, text)) {
-        snprintf(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s", section->first + i, variable->name, variable->min,
-                 variable->max, variable->unit);
+        snprintf(expected, sizeof expected, "'%u VALUE %s' with a value in [%g, %g] %s",
+                 section->first + i, variable->name, variable->min, variable->max, variable->unit);
         return refuse(instance, reader, text ? shown : NULL, expected);
       }
     }
@@ -231,9 +246,11 @@ static hxStatus read_variables(hxInstance *instance, hxReader *reader, struct hx
 static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
   char expected[LINE_SIZE];
   const char *line = next_line(reader);
-  snprintf(expected, sizeof expected, "checksum %08lx%08lx", (unsigned long)(reader->checksum >> 32),
+  snprintf(expected, sizeof expected, "checksum %08lx%08lx",
+           (unsigned long)(reader->checksum >> 32),
            (unsigned long)(reader->checksum & 0xffffffffu));
-  if (!line || strcmp(line, expected) != 0) return refuse(instance, reader, line, "the checksum of the lines above: they were changed");
+  if (!line || strcmp(line, expected) != 0)
+    return refuse(instance, reader, line, "the checksum of the lines above: they were changed");
   line = next_line(reader);
   return line ? refuse(instance, reader, line, "the end of the file") : HX_OK;
 }
@@ -242,7 +259,9 @@ static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
 static hxStatus check_start(hxInstance *instance, const struct hxVariables *variables) {
   char message[HX_MESSAGE_SIZE];
   const hxStatus status = hx_component_check(variables, message);
-  if (status != HX_OK) hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU anew", file_name, message);
+  if (status != HX_OK)
+    hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU anew", file_name,
+           message);
   return status;
 }
 
@@ -252,7 +271,9 @@ static hxStatus read_file(hxInstance *instance, FILE *file) {
   const char *guid = next_line(&reader);
   if (!guid) return refuse(instance, &reader, NULL, "the FMU's GUID");
   if (strcmp(guid, instance->guid) != 0) {
-    hx_log(instance, HX_LOG_ERROR, "GUID: got '%s', expected '%s', that of the resources; pass the one in modelDescription.xml",
+    hx_log(instance, HX_LOG_ERROR,
+           "GUID: got '%s', expected '%s', that of the resources; pass the one in "
+           "modelDescription.xml",
            instance->guid, guid);
     return HX_INVALID_ARGUMENT;
   }
@@ -265,7 +286,8 @@ static hxStatus read_file(hxInstance *instance, FILE *file) {
   return HX_OK;
 }
 
-/* opens start_values.txt; a folder may be called %41 in a URI that was never encoded: the path as it is given is the second try */
+/* opens start_values.txt; a folder may be called %41 in a URI that was never encoded: the path as
+ * it is given is the second try */
 static hxStatus open_resources(hxInstance *instance, const char *resources, FILE **file) {
   *file = NULL;
   for (int decode = 1; decode >= 0 && !*file; decode--) {

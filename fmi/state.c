@@ -52,26 +52,34 @@ hxStatus hx_instance_keep(hxInstance *instance, void **block) {
 
 /* bytes may be unaligned */
 static uint64_t checksum(const void *bytes) {
-  return hx_checksum(0, (const char *)bytes + sizeof(hxStateHeader), hx_instance_state_size() - sizeof(hxStateHeader));
+  return hx_checksum(0, (const char *)bytes + sizeof(hxStateHeader),
+                     hx_instance_state_size() - sizeof(hxStateHeader));
 }
 
 static hxStatus refuse(hxInstance *instance, const char *what) {
-  hx_log(instance, HX_LOG_ERROR, "saved state: got %s, expected one that this FMU (%s) saved; nothing was changed", what, instance->guid);
+  hx_log(instance, HX_LOG_ERROR,
+         "saved state: got %s, expected one that this FMU (%s) saved; nothing was changed", what,
+         instance->guid);
   return HX_BAD_STATE;
 }
 
 static const char *fault(const hxInstance *instance, const hxStateHeader *header) {
-  if (memcmp(header->magic, state_magic, sizeof state_magic) != 0) return "bytes that are no saved state";
-  if (header->format != STATE_FORMAT || header->size != hx_instance_state_size()) return "one of another version or platform";
-  return memcmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL : "one of another FMU";
+  if (memcmp(header->magic, state_magic, sizeof state_magic) != 0)
+    return "bytes that are no saved state";
+  if (header->format != STATE_FORMAT || header->size != hx_instance_state_size())
+    return "one of another version or platform";
+  return memcmp(header->guid, instance->guid, sizeof header->guid) == 0 ? NULL
+                                                                        : "one of another FMU";
 }
 
-hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *saved, void *bytes, size_t n) {
+hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *saved, void *bytes,
+                               size_t n) {
   hxStateBlock *block = saved;
   const char *what = fault(instance, &block->header);
   if (what) return refuse(instance, what);
   if (n < hx_instance_state_size()) {
-    hx_log(instance, HX_LOG_ERROR, "%s: got room for %zu bytes, expected %zu; nothing was written", call, n, hx_instance_state_size());
+    hx_log(instance, HX_LOG_ERROR, "%s: got room for %zu bytes, expected %zu; nothing was written",
+           call, n, hx_instance_state_size());
     return HX_INVALID_ARGUMENT;
   }
   block->header.checksum = checksum(block);
@@ -82,7 +90,8 @@ hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *sav
 /* bytes may be unaligned: the header is copied out */
 static hxStatus check(hxInstance *instance, const void *bytes, size_t n) {
   hxStateHeader header;
-  if (n != hx_instance_state_size()) return refuse(instance, n < hx_instance_state_size() ? "too few bytes" : "too many bytes");
+  if (n != hx_instance_state_size())
+    return refuse(instance, n < hx_instance_state_size() ? "too few bytes" : "too many bytes");
   memcpy(&header, bytes, sizeof header);
   const char *what = fault(instance, &header);
   if (what) return refuse(instance, what);
@@ -100,11 +109,14 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   const hxStateBlock *block = bytes;
   const char *what = fault(instance, &block->header);
   if (what) return refuse(instance, what);
-  if (block->instance.interface != instance->state.interface) return refuse(instance, "one of the other interface");
-  if (hx_component_set_state(instance->component, block->component) != HX_OK) return refuse(instance, "a damaged component");
+  if (block->instance.interface != instance->state.interface)
+    return refuse(instance, "one of the other interface");
+  if (hx_component_set_state(instance->component, block->component) != HX_OK)
+    return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);
   /* saved by an instance with event mode: here steps follow one another */
-  if (instance->state.interface == HX_CO_SIMULATION && instance->state.mode == HX_MODE_EVENT && !instance->uses_event_mode)
+  if (instance->state.interface == HX_CO_SIMULATION && instance->state.mode == HX_MODE_EVENT &&
+      !instance->uses_event_mode)
     instance->state.mode = HX_MODE_STEP;
   return HX_OK;
 }

@@ -1,4 +1,5 @@
-/* variables.h - the table of variables that generated/variables.c fills in; their structure is in generated/variables.h. */
+/* variables.h - the table of variables that generated/variables.c fills in; their structure is in
+ * generated/variables.h. */
 #ifndef HEXAPOD_FMI_VARIABLES_H
 #define HEXAPOD_FMI_VARIABLES_H
 
@@ -7,9 +8,19 @@
 
 HX_HIDDEN_BEGIN
 
-typedef enum hxType { HX_REAL, HX_INTEGER, HX_BOOLEAN } hxType; /* double, int, int; an enumeration is an HX_INTEGER */
+typedef enum hxType {
+  HX_REAL,
+  HX_INTEGER,
+  HX_BOOLEAN
+} hxType; /* double, int, int; an enumeration is an HX_INTEGER */
 
-typedef enum hxCausality { HX_INPUT, HX_OUTPUT, HX_PARAMETER, HX_LOCAL, HX_CAUSALITIES } hxCausality; /* local: rates of states */
+typedef enum hxCausality {
+  HX_INPUT,
+  HX_OUTPUT,
+  HX_PARAMETER,
+  HX_LOCAL,
+  HX_CAUSALITIES
+} hxCausality; /* local: rates of states */
 
 typedef struct hxVariable {
   const char *name;
@@ -17,7 +28,8 @@ typedef struct hxVariable {
   double min, max;   /* inclusive, finite: what lies outside, infinite or NaN is refused */
   unsigned short offset; /* into struct hxVariables */
   unsigned char type;    /* hxType */
-  unsigned short run;    /* FMI 3: rows of the array that begins here, 1 for a scalar; 0 within an array */
+  unsigned short
+      run;    /* FMI 3: rows of the array that begins here, 1 for a scalar; 0 within an array */
 } hxVariable;
 
 /* The variables of one causality; their value references are first, first + 1, ... */

@@ -1,4 +1,6 @@
-"""The servo of a joint: PD with feed-forward inside the torque-speed line, and dry friction in the gear."""
+"""The servo of a joint: PD with feed-forward inside the torque-speed line, and dry friction in
+the gear.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +11,13 @@ from hexapod_cosim.models.records import Array, Servo
 GEAR_SPEED = 0.05  # rad/s, where the gear's dry friction saturates
 
 
-def servo_torque(servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array) -> Array:
+def servo_torque(
+    servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array
+) -> Array:
     """Motor torque on the child [N m], shapes as the inputs'.
 
-    clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line; in torque mode kp = kd = 0.
+    clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line; in torque mode kp =
+    kd = 0.
     """
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref

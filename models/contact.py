@@ -1,7 +1,8 @@
 """Foot on ground: normal force with restitution (eq. 4) and friction (eq. 5; bristles: eq. 18, 19).
 
-f_n = K delta^1.5 max(0, 1 + d ddelta), with d [s/m] fixed at touch-down from the approach speed there and held to lift-off.
-Most laws are of the form d = chi(e) / v0; chi(e) is what tells them apart.
+f_n = K delta^1.5 max(0, 1 + d ddelta), with d [s/m] fixed at touch-down from the approach speed
+there and held to lift-off. Most laws are of the form d = chi(e) / v0; chi(e) is what tells them
+apart.
 """
 
 from __future__ import annotations
@@ -17,19 +18,25 @@ from hexapod_cosim.models.records import Array, Contact, Friction, Robot
 from hexapod_cosim.models.terrain import ground
 
 BREAK_AWAY = 0.7  # of the presliding: below it a bristle is a spring
-SERIES_BELOW = 1e-2  # where the closed form of _log_rest has lost more digits than its series leaves out
+SERIES_BELOW = (
+    1e-2  # where the closed form of _log_rest has lost more digits than its series leaves out
+)
 SERIES_TERMS = 9
 
 
 def _log_rest(x: float) -> float:
-    """(ln(1 + x) - x) / x^2, without cancellation near 0; -inf as x -> -1 is not reached by its callers' brackets."""
+    """(ln(1 + x) - x) / x^2, without cancellation near 0; -inf as x -> -1 is not reached by its
+    callers' brackets.
+    """
     if abs(x) < SERIES_BELOW:
         return sum((-1.0) ** (n + 1) * x ** (n - 2) / n for n in range(2, 2 + SERIES_TERMS))
     return (math.log1p(x) - x) / (x * x)
 
 
 def _balance(chi: float, e: float) -> float:
-    """[ln(1 + chi) - ln(1 - chi e) - chi (1 + e)] / chi^2: 0 where a law with chi gives back exactly e."""
+    """[ln(1 + chi) - ln(1 - chi e) - chi (1 + e)] / chi^2: 0 where a law with chi gives back
+    exactly e.
+    """
     return _log_rest(chi) - e * e * _log_rest(-chi * e) if chi * e < 1.0 else math.inf
 
 
@@ -41,12 +48,16 @@ def _bisect(function: Callable[[float], float], low: float, high: float) -> floa
 
 
 def exact_restitution_chi(e: float) -> float:
-    """chi of the law that gives back exactly the restitution e in (0, 1]: chi (1 + e) = ln[(1 + chi)/(1 - chi e)]."""
+    """chi of the law that gives back exactly the restitution e in (0, 1]: chi (1 + e) = ln[(1 +
+    chi)/(1 - chi e)].
+    """
     return 0.0 if e >= 1.0 else _bisect(lambda chi: _balance(chi, e), 0.0, 1.0 / e)
 
 
 def achieved_restitution(chi: float) -> float:
-    """The restitution that a law with this chi > 0 really gives back: the same equation solved for e."""
+    """The restitution that a law with this chi > 0 really gives back: the same equation solved
+    for e.
+    """
     return 1.0 if chi <= 0.0 else _bisect(lambda e: _balance(chi, e), 0.0, min(1.0, 1.0 / chi))
 
 
@@ -59,7 +70,9 @@ CHI: dict[str, Callable[[float], float]] = {
 
 
 def contact_damping(contact: Contact, impact_speed: float) -> float:
-    """d [s/m] of a foot that touches down with this approach speed [m/s]; slower ones count as the floor."""
+    """d [s/m] of a foot that touches down with this approach speed [m/s]; slower ones count as
+    the floor.
+    """
     if contact.law == "hertz":
         return 0.0
     if contact.law == "constant_damping":
@@ -68,20 +81,26 @@ def contact_damping(contact: Contact, impact_speed: float) -> float:
 
 
 def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) -> float:
-    """f_n [N] at penetration delta [m] and approach speed ddelta [m/s]; never pulls. Damping nan: not in contact."""
+    """f_n [N] at penetration delta [m] and approach speed ddelta [m/s]; never pulls. Damping
+    nan: not in contact.
+    """
     if math.isnan(damping):
         return 0.0
     return contact.stiffness * float(max(delta, 0.0) ** 1.5) * max(0.0, 1.0 + damping * ddelta)
 
 
 def bristle_yield(share: Array) -> Array:
-    """Y (any shape): how much of the slip along a bristle is sliding, from 0 at break-away to 1 at the presliding, a share of 1; C1."""
+    """Y (any shape): how much of the slip along a bristle is sliding, from 0 at break-away to 1
+    at the presliding, a share of 1; C1.
+    """
     s = np.clip((share - BREAK_AWAY) / (1.0 - BREAK_AWAY), 0.0, 1.0)
     return np.asarray(s * s * (3.0 - 2.0 * s))
 
 
 def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
-    """(..., 3) Y (v_t.u)+ u/|u|, u = b/b_max: what of the slip velocity (..., 3) [m/s] the foot does not get back (eq. 18)."""
+    """(..., 3) Y (v_t.u)+ u/|u|, u = b/b_max: what of the slip velocity (..., 3) [m/s] the foot
+    does not get back (eq. 18).
+    """
     u = bristle / presliding
     share = np.linalg.norm(u, axis=-1, keepdims=True)
     along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
@@ -103,14 +122,22 @@ def sliding_friction(friction: Friction, sliding: float) -> float:
 
 
 def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """(3,) f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau db/dt / b_max (eq. 19).
+    """(3,) f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau
+    db/dt / b_max (eq. 19).
 
     p is the speed of what the foot slides and does not get back: a foot that sticks has static
     friction however it swings.
 
-    The spring leaves the damping a room of 1 - |u| (3 - u.u)/2, so that friction stays in its cone; u is cut to its presliding.
+    The spring leaves the damping a room of 1 - |u| (3 - u.u)/2, so that friction stays in its cone;
+    u is cut to its presliding.
     """
-    u, d = bristle / friction.presliding, 1.5 * friction.bristle_damping / friction.presliding * bristle_rate(friction, slip, bristle)
+    u, d = (
+        bristle / friction.presliding,
+        1.5
+        * friction.bristle_damping
+        / friction.presliding
+        * bristle_rate(friction, slip, bristle),
+    )
     u = u / max(float(np.linalg.norm(u)), 1.0)
     spring = u * (3.0 - u @ u) / 2.0
     room, push = 1.0 - float(np.linalg.norm(spring)), float(np.linalg.norm(d))
@@ -119,8 +146,11 @@ def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array
     return -sliding_friction(friction, sliding) * normal * (spring + damped)
 
 
-def friction_force(friction: Friction, normal: float, slip: Array, bristle: Array | None = None) -> Array:
-    """(3,) f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t| [N], with its limit -mu f_n k_t v_t at rest; the bristles' with that law.
+def friction_force(
+    friction: Friction, normal: float, slip: Array, bristle: Array | None = None
+) -> Array:
+    """(3,) f_t = -mu f_n tanh(k_t |v_t|) v_t/|v_t| [N], with its limit -mu f_n k_t v_t at rest; the
+    bristles' with that law.
 
     bristle: (3,) their deflection b [m], slack unless given.
     """
@@ -150,7 +180,9 @@ def foot_contact(robot: Robot, tibia: Array, centre: Array) -> FootContact:
     distance, normal = ground(robot.terrain, centre)
     point = centre - robot.foot.radius * normal
     velocity = tibia[7:10] + cross(tibia[10:13], point - tibia[0:3])
-    return FootContact(point, velocity, normal, robot.foot.radius - distance, float(-velocity @ normal))
+    return FootContact(
+        point, velocity, normal, robot.foot.radius - distance, float(-velocity @ normal)
+    )
 
 
 def foot_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
@@ -159,7 +191,9 @@ def foot_contacts(robot: Robot, body: Array) -> tuple[FootContact, ...]:
     return tuple(foot_contact(robot, body[JOINTS * (leg + 1)], centres[leg]) for leg in range(LEGS))
 
 
-def foot_force(robot: Robot, foot: FootContact, damping: float, bristle: Array | None = None) -> Array:
+def foot_force(
+    robot: Robot, foot: FootContact, damping: float, bristle: Array | None = None
+) -> Array:
     """(3,) ground on foot [N]: f_n n + f_t; bristle (3,) as in `friction_force`."""
     f_n = normal_force(robot.contact, damping, foot.penetration, foot.approach_speed)
     slip = foot.velocity + foot.approach_speed * foot.normal
@@ -169,4 +203,6 @@ def foot_force(robot: Robot, foot: FootContact, damping: float, bristle: Array |
 def standing_damping(robot: Robot, body: Array) -> Array:
     """(6,) damping of feet put down slowly where they are in the ground, nan where they are not."""
     slow = contact_damping(robot.contact, 0.0)
-    return np.array([slow if foot.penetration > 0.0 else math.nan for foot in foot_contacts(robot, body)])
+    return np.array(
+        [slow if foot.penetration > 0.0 else math.nan for foot in foot_contacts(robot, body)]
+    )

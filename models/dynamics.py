@@ -1,9 +1,11 @@
-"""The paper's equations, dense and plain: the oracle for the C plant, which solves the same system in O(n).
+"""The paper's equations, dense and plain: the oracle for the C plant, which solves the same system
+in O(n).
 
     [ M  D^T ] [ dv     ]   [ g                                    ]
     [ D  0   ] [ lambda ] = [ gamma - 2 alpha dPhi - beta^2 Phi    ]     (eq. 1)
 
-Velocities are stacked body by body, v then w, world axes: 19 x 6 = 114. Each joint has 5 multipliers: 18 x 5 = 90.
+Velocities are stacked body by body, v then w, world axes: 19 x 6 = 114. Each joint has 5
+multipliers: 18 x 5 = 90.
 """
 
 from __future__ import annotations
@@ -35,14 +37,18 @@ MULTIPLIERS = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What the outside does to the robot. Arrays (6, 3) leg-major, (3,) world axes at the torso's centre of mass."""
+    """What the outside does to the robot. Arrays (6, 3) leg-major, (3,) world axes at the
+    torso's centre of mass.
+    """
 
     angle_ref: Array  # rad
     speed_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # rad/s
     torque_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # N m
     push_force: Array = field(default_factory=lambda: np.zeros(3))  # N
     push_torque: Array = field(default_factory=lambda: np.zeros(3))  # N m
-    acceleration_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # rad/s2  kinematic
+    acceleration_ref: Array = field(
+        default_factory=lambda: np.zeros((LEGS, JOINTS))
+    )  # rad/s2  kinematic
     age: float = 0.0  # s  since it was given: a kinematic drive goes on from there (eq. 14)
 
 
@@ -59,7 +65,9 @@ class JointKinematics:
 
 
 def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKinematics:
-    """Eq. 2 and 3 for the joint between two bodies (13,), drift allowed. The lost dots of gamma's first row are restored."""
+    """Eq. 2 and 3 for the joint between two bodies (13,), drift allowed. The lost dots of
+    gamma's first row are restored.
+    """
     (r_i, p_i, v_i, w_i), (r_j, p_j, v_j, w_j) = split(parent), split(child)
     R_i, R_j = rotation_matrix(p_i), rotation_matrix(p_j)
     sP_i, sP_j, s = R_i @ joint.point_i, R_j @ joint.point_j, R_i @ joint.s_i
@@ -70,13 +78,29 @@ def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKin
 
     # D = [-1, skew(s_i^P), 1, -skew(s_j^P);  0, -a^T skew(s), 0, -s^T skew(a);  the same with b]
     one, none = np.eye(3), np.zeros(3)
-    D_i = np.vstack([np.hstack([-one, skew(sP_i)]), np.hstack([none, -a @ skew(s)]), np.hstack([none, -b @ skew(s)])])
-    D_j = np.vstack([np.hstack([one, -skew(sP_j)]), np.hstack([none, -s @ skew(a)]), np.hstack([none, -s @ skew(b)])])
+    D_i = np.vstack(
+        [
+            np.hstack([-one, skew(sP_i)]),
+            np.hstack([none, -a @ skew(s)]),
+            np.hstack([none, -b @ skew(s)]),
+        ]
+    )
+    D_j = np.vstack(
+        [
+            np.hstack([one, -skew(sP_j)]),
+            np.hstack([none, -s @ skew(a)]),
+            np.hstack([none, -s @ skew(b)]),
+        ]
+    )
     dphi = D_i @ np.concatenate([v_i, w_i]) + D_j @ np.concatenate([v_j, w_j])
 
-    # gamma = (-skew(ds_i^P) w_i + skew(ds_j^P) w_j,  -s^T skew(w_j) da - a^T skew(w_i) ds - 2 da.ds,  the same with b)
+    # gamma = (-skew(ds_i^P) w_i + skew(ds_j^P) w_j,  -s^T skew(w_j) da - a^T skew(w_i) ds - 2
+    # da.ds,  the same with b)
     dsP_i, dsP_j, ds = cross(w_i, sP_i), cross(w_j, sP_j), cross(w_i, s)
-    rows = [-s @ skew(w_j) @ dn - n @ skew(w_i) @ ds - 2.0 * dn @ ds for n, dn in ((a, cross(w_j, a)), (b, cross(w_j, b)))]
+    rows = [
+        -s @ skew(w_j) @ dn - n @ skew(w_i) @ ds - 2.0 * dn @ ds
+        for n, dn in ((a, cross(w_j, a)), (b, cross(w_j, b)))
+    ]
     gamma = np.concatenate([-skew(dsP_i) @ w_i + skew(dsP_j) @ w_j, rows])
     return JointKinematics(phi, dphi, D_i, D_j, gamma, s)
 
@@ -98,10 +122,17 @@ def constraints(robot: Robot, body: Array) -> Constraints:
     joints = [joint_kinematics(model, body[model.parent], body[model.child]) for model in models]
     D, G = np.zeros((MULTIPLIERS * len(models), 6 * BODIES)), np.zeros((len(models), 6 * BODIES))
     for k, (model, joint) in enumerate(zip(models, joints, strict=True)):
-        rows, i, j = slice(MULTIPLIERS * k, MULTIPLIERS * (k + 1)), 6 * model.parent, 6 * model.child
+        rows, i, j = (
+            slice(MULTIPLIERS * k, MULTIPLIERS * (k + 1)),
+            6 * model.parent,
+            6 * model.child,
+        )
         D[rows, i : i + 6], D[rows, j : j + 6] = joint.D_i, joint.D_j
         G[k, i + 3 : i + 6], G[k, j + 3 : j + 6] = -joint.s, joint.s
-    stack = [np.concatenate([getattr(joint, name) for joint in joints]) for name in ("phi", "dphi", "gamma")]
+    stack = [
+        np.concatenate([getattr(joint, name) for joint in joints])
+        for name in ("phi", "dphi", "gamma")
+    ]
     return Constraints(phi=stack[0], dphi=stack[1], D=D, gamma=stack[2], G=G)
 
 
@@ -114,11 +145,15 @@ def world_inertias(robot: Robot, body: Array) -> Array:
     """(19, 3, 3) J = R J_B R^T, world axes [kg m2]."""
     local = [robot.torso.inertia, *(link.inertia for leg in robot.legs for link in leg.links)]
     turns = [rotation_matrix(state[3:7]) for state in body]
-    return np.array([R @ inertia_matrix(entries) @ R.T for R, entries in zip(turns, local, strict=True)])
+    return np.array(
+        [R @ inertia_matrix(entries) @ R.T for R, entries in zip(turns, local, strict=True)]
+    )
 
 
 def mass_matrix(robot: Robot, body: Array) -> Array:
-    """(114, 114) M = diag(m 1, J) + J_r G^T G: the geared rotors' inertia acts on the joint speeds."""
+    """(114, 114) M = diag(m 1, J) + J_r G^T G: the geared rotors' inertia acts on the joint
+    speeds.
+    """
     M = np.zeros((6 * BODIES, 6 * BODIES))
     for k, (mass, J) in enumerate(zip(masses(robot), world_inertias(robot, body), strict=True)):
         M[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
@@ -127,10 +162,14 @@ def mass_matrix(robot: Robot, body: Array) -> Array:
     return M + robot.servo.rotor_inertia * G.T @ G
 
 
-def applied_forces(robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None) -> Array:
-    """(19, 6) force and torque on each body at its centre of mass: gravity, gyroscopic, contact, push; no servo.
+def applied_forces(
+    robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
+) -> Array:
+    """(19, 6) force and torque on each body at its centre of mass: gravity, gyroscopic, contact,
+    push; no servo.
 
-    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact; bristle: (6, 3) their deflection [m], slack unless given.
+    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact; bristle: (6, 3)
+    their deflection [m], slack unless given.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
@@ -145,12 +184,16 @@ def applied_forces(robot: Robot, body: Array, command: Command, damping: Array, 
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
-    """(6, 3) motor torque (0 in kinematic mode, where it is a multiplier) and (6, 3) gear torque on the child [N m]."""
+    """(6, 3) motor torque (0 in kinematic mode, where it is a multiplier) and (6, 3) gear torque
+    on the child [N m].
+    """
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     gear = gear_friction(robot.servo, speed)
     if robot.servo.mode == "kinematic":
         return np.zeros_like(gear), gear
-    return servo_torque(robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref), gear
+    return servo_torque(
+        robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref
+    ), gear
 
 
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
@@ -160,9 +203,15 @@ def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
     """
     alpha, beta, age = robot.baumgarte.alpha, robot.baumgarte.beta, command.age
     speed_ref = command.speed_ref + command.acceleration_ref * age
-    angle_ref = command.angle_ref + command.speed_ref * age + 0.5 * command.acceleration_ref * age**2
+    angle_ref = (
+        command.angle_ref + command.speed_ref * age + 0.5 * command.acceleration_ref * age**2
+    )
     error = joint_angles(robot, body) - angle_ref
-    return command.acceleration_ref - 2.0 * alpha * (joint_speeds(robot, body) - speed_ref) - beta**2 * error
+    return (
+        command.acceleration_ref
+        - 2.0 * alpha * (joint_speeds(robot, body) - speed_ref)
+        - beta**2 * error
+    )
 
 
 @dataclass(frozen=True)
@@ -175,27 +224,45 @@ class Accelerations:
     gear_torque: Array  # (6, 3)  gear on child [N m]
 
 
-def accelerations(robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None) -> Accelerations:
-    """Solves eq. 1 for bodies (19, 13), drifted joints allowed; damping (6,) and bristle (6, 3) as in `applied_forces`.
+def accelerations(
+    robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
+) -> Accelerations:
+    """Solves eq. 1 for bodies (19, 13), drifted joints allowed; damping (6,) and bristle (6, 3) as
+    in `applied_forces`.
 
-    In kinematic mode each joint adds the row G dv = drive_acceleration, whose multiplier is minus the motor's torque.
+    In kinematic mode each joint adds the row G dv = drive_acceleration, whose multiplier is minus
+    the motor's torque.
     """
     joints = constraints(robot, body)
     motor, gear = joint_torques(robot, body, command)
-    g = applied_forces(robot, body, command, damping, bristle).ravel() + joints.G.T @ (motor + gear).ravel()
-    c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi - robot.baumgarte.beta**2 * joints.phi
+    g = (
+        applied_forces(robot, body, command, damping, bristle).ravel()
+        + joints.G.T @ (motor + gear).ravel()
+    )
+    c = (
+        joints.gamma
+        - 2.0 * robot.baumgarte.alpha * joints.dphi
+        - robot.baumgarte.beta**2 * joints.phi
+    )
     D = joints.D
     if robot.servo.mode == "kinematic":
-        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive_acceleration(robot, body, command).ravel()])
+        D, c = (
+            np.vstack([D, joints.G]),
+            np.concatenate([c, drive_acceleration(robot, body, command).ravel()]),
+        )
     none = np.zeros((len(c), len(c)))
-    solution = np.linalg.solve(np.block([[mass_matrix(robot, body), D.T], [D, none]]), np.concatenate([g, c]))
+    solution = np.linalg.solve(
+        np.block([[mass_matrix(robot, body), D.T], [D, none]]), np.concatenate([g, c])
+    )
     dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
     motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
     return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)
 
 
 def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:
-    """(18, 3) force and (18, 3) torque of each joint on its child, the torque about the joint's point: -D_j^T lambda moved there."""
+    """(18, 3) force and (18, 3) torque of each joint on its child, the torque about the joint's
+    point: -D_j^T lambda moved there.
+    """
     force, torque = np.zeros((LEGS * JOINTS, 3)), np.zeros((LEGS * JOINTS, 3))
     for k, model in enumerate(joint_models(robot)):
         joint = joint_kinematics(model, body[model.parent], body[model.child])

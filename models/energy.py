@@ -20,7 +20,9 @@ def kinetic_energy(robot: Robot, body: Array) -> float:
 
 
 def potential_energy(robot: Robot, body: Array) -> float:
-    """J, of gravity (0 at the world's origin) and the elastic part of the contacts, 2/5 K delta^2.5."""
+    """J, of gravity (0 at the world's origin) and the elastic part of the contacts, 2/5 K
+    delta^2.5.
+    """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     depth = np.array([max(foot.penetration, 0.0) for foot in foot_contacts(robot, body)])
     return gravity + 0.4 * robot.contact.stiffness * float(np.sum(depth**2.5))
@@ -32,7 +34,9 @@ def centre_of_mass(robot: Robot, body: Array) -> Array:
 
 
 def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
-    """(3,) linear [kg m/s] and (3,) angular momentum about the world's origin [kg m2/s], rotors' spin left out (geared, internal)."""
+    """(3,) linear [kg m/s] and (3,) angular momentum about the world's origin [kg m2/s], rotors'
+    spin left out (geared, internal).
+    """
     linear = masses(robot)[:, None] * body[:, 7:10]
     spin = np.einsum("kij,kj->ki", world_inertias(robot, body), body[:, 10:13])
     return linear.sum(axis=0), (np.cross(body[:, 0:3], linear) + spin).sum(axis=0)

@@ -18,7 +18,15 @@ class HexapodError(Exception):
         where: file and key, or the like.
     """
 
-    def __init__(self, what: str, *, got: Any = None, expected: Any = None, fix: str | None = None, where: str | None = None) -> None:
+    def __init__(
+        self,
+        what: str,
+        *,
+        got: Any = None,
+        expected: Any = None,
+        fix: str | None = None,
+        where: str | None = None,
+    ) -> None:
         super().__init__(what)
         self.what = what
         self.got = got
@@ -38,7 +46,9 @@ class HexapodError(Exception):
         return _rebuild, (type(self), self.what, self.got, self.expected, self.fix, self.where)
 
 
-def _rebuild(kind: type[HexapodError], what: str, got: Any, expected: Any, fix: str | None, where: str | None) -> HexapodError:
+def _rebuild(
+    kind: type[HexapodError], what: str, got: Any, expected: Any, fix: str | None, where: str | None
+) -> HexapodError:
     return kind(what, got=got, expected=expected, fix=fix, where=where)
 
 
@@ -65,10 +75,19 @@ def nearest_name(name: str, valid: Iterable[str]) -> str | None:
 
 
 def unknown_name(
-    kind: str, name: str, valid: Iterable[str], *, where: str | None = None, error: type[HexapodError] = HexapodError
+    kind: str,
+    name: str,
+    valid: Iterable[str],
+    *,
+    where: str | None = None,
+    error: type[HexapodError] = HexapodError,
 ) -> HexapodError:
-    """The error for a name that is not on a closed list: lists the valid ones and proposes the nearest."""
+    """The error for a name that is not on a closed list: lists the valid ones and proposes the
+    nearest.
+    """
     names = list(valid)
     near = nearest_name(name, names)
     fix = f"did you mean {near!r}?" if near else f"choose one of the {len(names)} valid names"
-    return error(f"unknown {kind}", got=name, expected=f"one of {', '.join(names)}", fix=fix, where=where)
+    return error(
+        f"unknown {kind}", got=name, expected=f"one of {', '.join(names)}", fix=fix, where=where
+    )

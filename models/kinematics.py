@@ -1,6 +1,7 @@
 """Where the bodies are: rotations, joint angles to bodies and back. Frames: docs/architecture.md.
 
-Letters: R_WB turns B's components into the world's. World W, torso T, hip H, parent link P, link L, centre of mass c.
+Letters: R_WB turns B's components into the world's. World W, torso T, hip H, parent link P, link L,
+centre of mass c.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ def skew(a: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """(3,) a x b, for single vectors several times as fast as numpy's."""
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()  # Python's own floats are the fastest at single numbers
+    (ax, ay, az), (bx, by, bz) = (
+        a.tolist(),
+        b.tolist(),
+    )  # Python's own floats are the fastest at single numbers
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
@@ -83,7 +87,9 @@ def unit_axis(axis: tuple[float, ...]) -> Array:
 
 @dataclass(frozen=True)
 class JointModel:
-    """Constants of the joint between parent i and child j: vectors fixed in a body, in that body's axes."""
+    """Constants of the joint between parent i and child j: vectors fixed in a body, in that
+    body's axes.
+    """
 
     parent: int  # body number
     child: int
@@ -97,7 +103,9 @@ class JointModel:
 
 
 def axis_normals(axis: Array) -> tuple[Array, Array]:
-    """Two unit normals to a unit axis: a = axis x (the coordinate direction it is least along, the first on ties), b = axis x a."""
+    """Two unit normals to a unit axis: a = axis x (the coordinate direction it is least along,
+    the first on ties), b = axis x a.
+    """
     least = np.eye(3)[int(np.argmin(np.abs(axis)))]
     a = cross(axis, least)
     a = a / np.linalg.norm(a)
@@ -115,12 +123,23 @@ def _joint_model(robot: Robot, leg: int, joint: int) -> JointModel:
     link, axis = data.links[joint], unit_axis(data.links[joint].axis)
     zero = axis_quaternion(np.array([0.0, 0.0, 1.0]), data.hip_yaw if joint == 0 else 0.0)
     above = data.links[joint - 1]
-    from_com = np.subtract(data.hip_position, robot.torso.com) if joint == 0 else np.subtract(above.tip, above.com)
+    from_com = (
+        np.subtract(data.hip_position, robot.torso.com)
+        if joint == 0
+        else np.subtract(above.tip, above.com)
+    )
     a_j, b_j = axis_normals(axis)
     return JointModel(
-        parent=0 if joint == 0 else child - 1, child=child, s_i=rotation_matrix(zero) @ axis, s_j=axis, a_j=a_j, b_j=b_j,
-        point_i=from_com, point_j=-np.array(link.com), zero=zero,
-    )  # fmt: skip
+        parent=0 if joint == 0 else child - 1,
+        child=child,
+        s_i=rotation_matrix(zero) @ axis,
+        s_j=axis,
+        a_j=a_j,
+        b_j=b_j,
+        point_i=from_com,
+        point_j=-np.array(link.com),
+        zero=zero,
+    )
 
 
 def foot_position(leg: Leg, angle: Array) -> Array:
@@ -139,7 +158,13 @@ def foot_positions(robot: Robot, angle: Array) -> Array:
 
 
 def body_states(
-    robot: Robot, position: Array, quaternion: Array, velocity: Array, angular_velocity: Array, angle: Array, speed: Array
+    robot: Robot,
+    position: Array,
+    quaternion: Array,
+    velocity: Array,
+    angular_velocity: Array,
+    angle: Array,
+    speed: Array,
 ) -> Array:
     """All bodies on their joints exactly, from the torso's motion and the joints'.
 
@@ -176,7 +201,9 @@ def split(state: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def joint_angle(joint: JointModel, parent: Array, child: Array) -> float:
-    """Angle [rad] in (-pi, pi] of the twist about the axis, so that small violations of the joint do not enter to first order."""
+    """Angle [rad] in (-pi, pi] of the twist about the axis, so that small violations of the
+    joint do not enter to first order.
+    """
     p_i = quaternion_product(parent[3:7], joint.zero)
     p = quaternion_product(p_i * np.array([1.0, -1.0, -1.0, -1.0]), child[3:7])
     angle = 2.0 * np.arctan2(joint.s_j @ p[1:], p[0])
@@ -191,13 +218,17 @@ def joint_speed(joint: JointModel, parent: Array, child: Array) -> float:
 
 def joint_angles(robot: Robot, body: Array) -> Array:
     """(6, 3) angles [rad] of bodies (19, 13), drifted joints allowed."""
-    angles = [joint_angle(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)]
+    angles = [
+        joint_angle(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)
+    ]
     return np.array(angles).reshape(LEGS, JOINTS)
 
 
 def joint_speeds(robot: Robot, body: Array) -> Array:
     """(6, 3) speeds [rad/s] of bodies (19, 13), drifted joints allowed."""
-    speeds = [joint_speed(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)]
+    speeds = [
+        joint_speed(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)
+    ]
     return np.array(speeds).reshape(LEGS, JOINTS)
 
 
@@ -205,4 +236,9 @@ def foot_centres(robot: Robot, body: Array) -> Array:
     """(6, 3) the feet's centres in the world [m] of bodies (19, 13)."""
     tibias = body[JOINTS::JOINTS]
     arms = [np.array(leg.links[-1].tip) - np.array(leg.links[-1].com) for leg in robot.legs]
-    return np.array([state[0:3] + rotation_matrix(state[3:7]) @ arm for state, arm in zip(tibias, arms, strict=True)])
+    return np.array(
+        [
+            state[0:3] + rotation_matrix(state[3:7]) @ arm
+            for state, arm in zip(tibias, arms, strict=True)
+        ]
+    )

@@ -1,7 +1,9 @@
-"""What a step of the integrator did: works and losses (eq. 22), and what is integrated along the step's path (eq. 23).
+"""What a step of the integrator did: works and losses (eq. 22), and what is integrated along the
+step's path (eq. 23).
 
-A step of h [s] leads from one set of body states (19, 13) to another. The integrator adds up the impulses of its own stage forces;
-everything else here follows from both ends. The fast form is plant_fmu/src/lanes/measure.h.
+A step of h [s] leads from one set of body states (19, 13) to another. The integrator adds up the
+impulses of its own stage forces; everything else here follows from both ends. The fast form is
+plant_fmu/src/lanes/measure.h.
 """
 
 from __future__ import annotations
@@ -14,10 +16,19 @@ import numpy as np
 from hexapod_cosim.models.actuator import servo_torque
 from hexapod_cosim.models.contact import foot_contacts
 from hexapod_cosim.models.dynamics import Command
-from hexapod_cosim.models.kinematics import JOINTS, LEGS, cross, foot_centres, joint_angles, joint_speeds
+from hexapod_cosim.models.kinematics import (
+    JOINTS,
+    LEGS,
+    cross,
+    foot_centres,
+    joint_angles,
+    joint_speeds,
+)
 from hexapod_cosim.models.records import Array, Robot
 
-NODES = np.linspace(0.0, 1.0, 5)  # of a step, at which the laws of feet are evaluated; those of motors at every second one
+NODES = np.linspace(
+    0.0, 1.0, 5
+)  # of a step, at which the laws of feet are evaluated; those of motors at every second one
 FOOT_WEIGHTS = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0  # Simpson's rule
 MOTOR_WEIGHTS = np.array([1.0, 4.0, 1.0]) / 6.0
 LOAD_SHARE = 0.01  # of the robot's weight: a foot that bears more slips under load
@@ -61,36 +72,55 @@ def _wrapped(angle: Array) -> Array:
 
 
 def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
-    """(6, 3) mean velocity [m/s] of the contact points' material along the ground: the way of the feet's centres, and their rolling."""
+    """(6, 3) mean velocity [m/s] of the contact points' material along the ground: the way of
+    the feet's centres, and their rolling.
+    """
     slips = []
-    ends = [(foot_centres(robot, body), foot_contacts(robot, body), body) for body in (before, after)]
+    ends = [
+        (foot_centres(robot, body), foot_contacts(robot, body), body) for body in (before, after)
+    ]
     for leg in range(LEGS):
         way = ends[1][0][leg] - ends[0][0][leg]
         normal = 0.5 * (ends[0][1][leg].normal + ends[1][1][leg].normal)
-        rolling = [cross(body[JOINTS * (leg + 1), 10:13], -robot.foot.radius * feet[leg].normal) for _, feet, body in ends]
+        rolling = [
+            cross(body[JOINTS * (leg + 1), 10:13], -robot.foot.radius * feet[leg].normal)
+            for _, feet, body in ends
+        ]
         slips.append((way - (way @ normal) * normal) / h + 0.5 * (rolling[0] + rolling[1]))
     return np.array(slips)
 
 
-def step_works(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array) -> Works:
-    """Works of a step (eq. 22): impulses times the mean of the speeds at its ends. closed (6,): feet in contact during the step.
+def step_works(
+    robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array
+) -> Works:
+    """Works of a step (eq. 22): impulses times the mean of the speeds at its ends. closed (6,):
+    feet in contact during the step.
 
-    Contact takes the work of the normal force less the growth of its stored energy 2/5 K delta^(5/2).
+    Contact takes the work of the normal force less the growth of its stored energy 2/5 K
+    delta^(5/2).
     """
     speed = 0.5 * (joint_speeds(robot, before) + joint_speeds(robot, after))
     contact = friction = 0.0
-    for leg, (first, last) in enumerate(zip(foot_contacts(robot, before), foot_contacts(robot, after), strict=True)):
+    for leg, (first, last) in enumerate(
+        zip(foot_contacts(robot, before), foot_contacts(robot, after), strict=True)
+    ):
         normal = 0.5 * (first.normal + last.normal)
         depths = np.maximum([first.penetration, last.penetration], 0.0)
         stored = 0.4 * robot.contact.stiffness * depths**2.5 * closed[leg]
-        contact += float(impulses.foot[leg] @ normal) * 0.5 * (first.approach_speed + last.approach_speed) - float(stored[1] - stored[0])
+        contact += float(impulses.foot[leg] @ normal) * 0.5 * (
+            first.approach_speed + last.approach_speed
+        ) - float(stored[1] - stored[0])
         slips = [foot.velocity + foot.approach_speed * foot.normal for foot in (first, last)]
         friction -= float(impulses.foot[leg] @ (0.5 * (slips[0] + slips[1])))
     return Works(impulses.motor * speed, contact, friction, -float(np.sum(impulses.gear * speed)))
 
 
-def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array) -> tuple[Array, Array, Array]:
-    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates per step at both ends (eq. 23)."""
+def cubic(
+    start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array
+) -> tuple[Array, Array, Array]:
+    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates
+    per step at both ends (eq. 23).
+    """
     bend = slope_start + slope_end - 2.0 * rise
     curve = rise - slope_start - bend
     x = x.reshape(-1, *(1 for _ in np.shape(start)))
@@ -98,34 +128,61 @@ def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Ar
     return value, slope_start + x * (2.0 * curve + 3.0 * x * bend), 2.0 * curve + 6.0 * x * bend
 
 
-def measured_step(robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array, damping: Array) -> Measured:
+def measured_step(
+    robot: Robot,
+    before: Array,
+    after: Array,
+    h: float,
+    command: Command,
+    work: Array,
+    damping: Array,
+) -> Measured:
     """What a step did along its path, in position or torque mode.
 
-    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 4 [s/m], nan for feet that are open during the step.
+    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 4 [s/m], nan for feet
+    that are open during the step.
     """
     joints = _joints(robot, before, after, h, command, work)
     return Measured(*joints, *_feet(robot, before, after, h, damping))
 
 
-def _joints(robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array) -> tuple[Array, Array, Array]:
+def _joints(
+    robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array
+) -> tuple[Array, Array, Array]:
     """Positive and negative work and the squared torque's integral, each (6, 3)."""
-    angle, speeds = joint_angles(robot, before), [h * joint_speeds(robot, body) for body in (before, after)]
+    angle, speeds = (
+        joint_angles(robot, before),
+        [h * joint_speeds(robot, body) for body in (before, after)],
+    )
     rise = _wrapped(joint_angles(robot, after) - angle)
     value, rate, _ = cubic(angle, speeds[0], rise, speeds[1], NODES[::2])
     told = (command.angle_ref, command.speed_ref, command.torque_ref)
-    torque = servo_torque(robot.servo, _wrapped(value), rate / h, *(np.broadcast_to(part, value.shape) for part in told))
+    torque = servo_torque(
+        robot.servo,
+        _wrapped(value),
+        rate / h,
+        *(np.broadcast_to(part, value.shape) for part in told),
+    )
     power = torque * rate / h
     positive, negative, squared = (
-        h * np.tensordot(MOTOR_WEIGHTS, part, 1) for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0), torque**2)
+        h * np.tensordot(MOTOR_WEIGHTS, part, 1)
+        for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0), torque**2)
     )
-    rest = work - (positive - negative)  # what the path misses of the step's work goes to the larger part
+    rest = work - (
+        positive - negative
+    )  # what the path misses of the step's work goes to the larger part
     drives = positive > negative
-    positive, negative = positive + np.where(drives, rest, 0.0), negative - np.where(drives, 0.0, rest)
+    positive, negative = (
+        positive + np.where(drives, rest, 0.0),
+        negative - np.where(drives, 0.0, rest),
+    )
     excess = np.minimum(np.minimum(positive, negative), 0.0)
     return positive - excess, negative - excess, squared
 
 
-def _feet(robot: Robot, before: Array, after: Array, h: float, damping: Array) -> tuple[Array, Array, Array, Array]:
+def _feet(
+    robot: Robot, before: Array, after: Array, h: float, damping: Array
+) -> tuple[Array, Array, Array, Array]:
     """Slip under load, impulse, largest normal force and its steepest rise, each (6,)."""
     ends = foot_contacts(robot, before), foot_contacts(robot, after)
     delta = [np.array([foot.penetration for foot in feet]) for feet in ends]
@@ -135,19 +192,30 @@ def _feet(robot: Robot, before: Array, after: Array, h: float, damping: Array) -
     elastic = np.where(closed, robot.contact.stiffness * np.maximum(depth, 0.0) ** 1.5, 0.0)
     factor = 1.0 + d * rate / h
     force = elastic * np.maximum(factor, 0.0)
-    stiffness = np.where(closed & (factor > 0.0), 1.5 * robot.contact.stiffness * np.sqrt(np.maximum(depth, 0.0)) * factor, 0.0)
+    stiffness = np.where(
+        closed & (factor > 0.0),
+        1.5 * robot.contact.stiffness * np.sqrt(np.maximum(depth, 0.0)) * factor,
+        0.0,
+    )
     rises = stiffness * rate / h + np.where(factor > 0.0, elastic * d, 0.0) * second / h**2
-    slips = [np.array([foot.velocity + foot.approach_speed * foot.normal for foot in feet]) for feet in ends]
+    slips = [
+        np.array([foot.velocity + foot.approach_speed * foot.normal for foot in feet])
+        for feet in ends
+    ]
     x = NODES[:, None, None]
     slip = (
-        (1.0 - x * (4.0 - 3.0 * x)) * slips[0] + x * (3.0 * x - 2.0) * slips[1] + 6.0 * x * (1.0 - x) * mean_slip(robot, before, after, h)
+        (1.0 - x * (4.0 - 3.0 * x)) * slips[0]
+        + x * (3.0 * x - 2.0) * slips[1]
+        + 6.0 * x * (1.0 - x) * mean_slip(robot, before, after, h)
     )
     slipped = _under_load(robot, h, force, np.linalg.norm(slip, axis=-1))
     return slipped, h * FOOT_WEIGHTS @ force, force.max(axis=0), np.maximum(rises.max(axis=0), 0.0)
 
 
 def _under_load(robot: Robot, h: float, force: Array, speed: Array) -> Array:
-    """(6,) integral of the slip speed over where the force, linear between nodes, exceeds LOAD_SHARE of the weight."""
+    """(6,) integral of the slip speed over where the force, linear between nodes, exceeds
+    LOAD_SHARE of the weight.
+    """
     mass = robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links)
     above = force - LOAD_SHARE * mass * float(np.linalg.norm(robot.gravity))
     total = np.zeros(LEGS)

@@ -1,8 +1,10 @@
-"""A robot as a MuJoCo model: the same bodies, joints and servos; ground contact as near as MuJoCo's comes.
+"""A robot as a MuJoCo model: the same bodies, joints and servos; ground contact as near as MuJoCo's
+comes.
 
-MuJoCo's contact is a spring and a damper of accelerations, not Hertz's: its stiffness is chosen so that a standing tripod's feet sink in
-as deep as Hertz's law says, its damping so that a free bounce returns the restitution. Friction is Coulomb's, an elliptic cone. What is
-left out: the servos' torque-speed line, the tanh law's creep.
+MuJoCo's contact is a spring and a damper of accelerations, not Hertz's: its stiffness is chosen so
+that a standing tripod's feet sink in as deep as Hertz's law says, its damping so that a free bounce
+returns the restitution. Friction is Coulomb's, an elliptic cone. What is left out: the servos'
+torque-speed line, the tanh law's creep.
 """
 
 from __future__ import annotations
@@ -28,8 +30,14 @@ from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, V
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
 TIME_STEP = 0.001  # s
-IMPEDANCE = 0.9  # 1    of MuJoCo's constraints, its default: the share of a constraint's acceleration it may take
-DRAWN = {"contype": "0", "conaffinity": "0", "group": "1", "mass": "0"}  # geometry that neither touches nor weighs
+# 1    of MuJoCo's constraints, its default: the share of a constraint's acceleration it may take
+IMPEDANCE = 0.9
+DRAWN = {
+    "contype": "0",
+    "conaffinity": "0",
+    "group": "1",
+    "mass": "0",
+}  # geometry that neither touches nor weighs
 UNKNOWNS = 6 + LEGS * JOINTS
 Z = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
@@ -59,16 +67,36 @@ def _assets(root: ET.Element) -> None:
     for name, colour in COLOURS.items():
         ET.SubElement(asset, "material", name=name, rgba=colour)
     ET.SubElement(
-        asset, "texture", name="grid", type="2d", builtin="checker", rgb1="0.83 0.85 0.87", rgb2="0.76 0.78 0.81", width="256", height="256"
+        asset,
+        "texture",
+        name="grid",
+        type="2d",
+        builtin="checker",
+        rgb1="0.83 0.85 0.87",
+        rgb2="0.76 0.78 0.81",
+        width="256",
+        height="256",
     )
-    ET.SubElement(asset, "material", name="ground", texture="grid", texrepeat="5 5", texuniform="true")
+    ET.SubElement(
+        asset, "material", name="ground", texture="grid", texrepeat="5 5", texuniform="true"
+    )
 
 
 def _ground(world: ET.Element, robot: Robot) -> None:
     ET.SubElement(
-        world, "geom", name="ground", type="plane", size=GROUND, material="ground", pos=numbers((0.0, 0.0, robot.terrain.height)),
-        quat=numbers(_ground_quaternion(robot)), friction=_friction(robot), solref=_solref(robot), solimp=_solimp(), priority="1",
-    )  # fmt: skip
+        world,
+        "geom",
+        name="ground",
+        type="plane",
+        size=GROUND,
+        material="ground",
+        pos=numbers((0.0, 0.0, robot.terrain.height)),
+        quat=numbers(_ground_quaternion(robot)),
+        friction=_friction(robot),
+        solref=_solref(robot),
+        solimp=_solimp(),
+        priority="1",
+    )
 
 
 def _friction(robot: Robot) -> str:
@@ -83,7 +111,8 @@ def _solimp() -> str:
 def _solref(robot: Robot) -> str:
     """Time constant t [s] and damping ratio z.
 
-    MuJoCo's force at a depth r is r / ((1 - d) w t^2 z^2), d the impedance, w the mobility; Hertz's depth under f is (f / K)^(2/3).
+    MuJoCo's force at a depth r is r / ((1 - d) w t^2 z^2), d the impedance, w the mobility; Hertz's
+    depth under f is (f / K)^(2/3).
     """
     load = max(robot.weight / 3.0, 1e-6)
     depth = (load / robot.contact.stiffness) ** (2.0 / 3.0)
@@ -94,8 +123,12 @@ def _solref(robot: Robot) -> str:
 
 
 def tibia_mobility(robot: Robot) -> float:
-    """Acceleration of the tibias' centres of mass per force there [1/kg], mean of legs and directions, at angle 0: MuJoCo's invweight."""
-    J = np.stack([_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1)  # (114, 24)
+    """Acceleration of the tibias' centres of mass per force there [1/kg], mean of legs and
+    directions, at angle 0: MuJoCo's invweight.
+    """
+    J = np.stack(
+        [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
+    )  # (114, 24)
     body = body_states(robot, np.zeros(3), UPRIGHT, np.zeros(3), np.zeros(3), ZERO, ZERO)
     M = J.T @ mass_matrix(robot, body) @ J
     tibias = J.reshape(BODIES, 6, UNKNOWNS)[JOINTS::JOINTS, :3].reshape(-1, UNKNOWNS)
@@ -103,8 +136,12 @@ def tibia_mobility(robot: Robot) -> float:
 
 
 def _motion(robot: Robot, speed: Array) -> Array:
-    """(19, 6) velocities and angular velocities of the bodies at angle 0 for the torso's (6,) and the joints' (18,) speeds."""
-    return body_states(robot, np.zeros(3), UPRIGHT, speed[:3], speed[3:6], ZERO, speed[6:].reshape(LEGS, JOINTS))[:, 7:13]
+    """(19, 6) velocities and angular velocities of the bodies at angle 0 for the torso's (6,)
+    and the joints' (18,) speeds.
+    """
+    return body_states(
+        robot, np.zeros(3), UPRIGHT, speed[:3], speed[3:6], ZERO, speed[6:].reshape(LEGS, JOINTS)
+    )[:, 7:13]
 
 
 def _inertial(body: ET.Element, mass: float, com: Vector3, inertia: Iterable[float]) -> None:
@@ -116,7 +153,16 @@ def _torso(world: ET.Element, robot: Robot) -> None:
     ET.SubElement(torso, "freejoint", name="torso")
     _inertial(torso, robot.torso.mass, robot.torso.com, robot.torso.inertia)
     half = numbers(0.5 * size for size in robot.torso.size)
-    ET.SubElement(torso, "geom", DRAWN, name="torso", type="box", size=half, pos=numbers(robot.torso.com), material="body")
+    ET.SubElement(
+        torso,
+        "geom",
+        DRAWN,
+        name="torso",
+        type="box",
+        size=half,
+        pos=numbers(robot.torso.com),
+        material="body",
+    )
     ET.SubElement(torso, "site", name="imu", pos=numbers(robot.torso.com))
     for leg in robot.legs:
         _leg(torso, leg, robot)
@@ -126,22 +172,55 @@ def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
     body, place = torso, leg.hip_position
     quaternion = axis_quaternion(Z, leg.hip_yaw)
     for name, link in zip(JOINT_NAMES, leg.links, strict=True):
-        body = ET.SubElement(body, "body", name=f"{leg.name}_{name}", pos=numbers(place), quat=numbers(quaternion))
+        body = ET.SubElement(
+            body, "body", name=f"{leg.name}_{name}", pos=numbers(place), quat=numbers(quaternion)
+        )
         _inertial(body, link.mass, link.com, link.inertia)
         _hinge(body, f"{leg.name}_{name}", link, robot)
         size = repr(THICKNESS * robot.foot.radius)
-        ET.SubElement(body, "geom", DRAWN, type="capsule", fromto=numbers((0.0, 0.0, 0.0, *link.tip)), size=size, material="limb")
+        ET.SubElement(
+            body,
+            "geom",
+            DRAWN,
+            type="capsule",
+            fromto=numbers((0.0, 0.0, 0.0, *link.tip)),
+            size=size,
+            material="limb",
+        )
         place, quaternion = link.tip, UPRIGHT
     # feet touch the ground alone
-    foot = ET.SubElement(body, "geom", name=f"{leg.name}_foot", type="sphere", size=repr(robot.foot.radius), pos=numbers(place))
-    foot.attrib |= {"mass": "0", "contype": "0", "conaffinity": "1", "condim": "3", "material": "rubber"}
+    foot = ET.SubElement(
+        body,
+        "geom",
+        name=f"{leg.name}_foot",
+        type="sphere",
+        size=repr(robot.foot.radius),
+        pos=numbers(place),
+    )
+    foot.attrib |= {
+        "mass": "0",
+        "contype": "0",
+        "conaffinity": "1",
+        "condim": "3",
+        "material": "rubber",
+    }
     ET.SubElement(body, "site", name=f"{leg.name}_foot", pos=numbers(place))
 
 
 def _hinge(body: ET.Element, name: str, link: Link, robot: Robot) -> None:
     servo = robot.servo
-    joint = ET.SubElement(body, "joint", name=name, type="hinge", axis=numbers(link.axis), range=numbers((link.angle_min, link.angle_max)))
-    joint.attrib |= {"armature": repr(servo.rotor_inertia), "frictionloss": repr(servo.coulomb_friction)}
+    joint = ET.SubElement(
+        body,
+        "joint",
+        name=name,
+        type="hinge",
+        axis=numbers(link.axis),
+        range=numbers((link.angle_min, link.angle_max)),
+    )
+    joint.attrib |= {
+        "armature": repr(servo.rotor_inertia),
+        "frictionloss": repr(servo.coulomb_friction),
+    }
 
 
 def _servos(root: ET.Element, robot: Robot) -> None:
@@ -149,13 +228,17 @@ def _servos(root: ET.Element, robot: Robot) -> None:
     for leg in robot.legs:
         for name, link in zip(JOINT_NAMES, leg.links, strict=True):
             joint = f"{leg.name}_{name}"
-            position = ET.SubElement(actuator, "position", name=joint, joint=joint, kp=repr(servo.kp), kv=repr(servo.kd))
+            position = ET.SubElement(
+                actuator, "position", name=joint, joint=joint, kp=repr(servo.kp), kv=repr(servo.kd)
+            )
             position.set("ctrlrange", numbers((link.angle_min, link.angle_max)))
             position.set("forcerange", numbers((-servo.torque_max, servo.torque_max)))
 
 
 def _stance(root: ET.Element, robot: Robot) -> None:
-    """The standing pose with the lowest feet just on the ground, the torso as steep as it; in a moment the robot settles."""
+    """The standing pose with the lowest feet just on the ground, the torso as steep as it; in a
+    moment the robot settles.
+    """
     tilt = _ground_quaternion(robot)
     heading = robot.terrain.heading if robot.terrain.kind == "slope" else 0.0
     quaternion = quaternion_product(tilt, axis_quaternion(Z, -heading))
@@ -168,8 +251,12 @@ def _stance(root: ET.Element, robot: Robot) -> None:
 
 
 def _ground_quaternion(robot: Robot) -> Array:
-    """(4,) turns z to the ground's normal: a slope rises along its heading, so the normal leans back."""
+    """(4,) turns z to the ground's normal: a slope rises along its heading, so the normal leans
+    back.
+    """
     terrain = robot.terrain
     slope = terrain.kind == "slope"
     turn = axis_quaternion(Z, terrain.heading if slope else 0.0)
-    return quaternion_product(turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), -terrain.incline if slope else 0.0))
+    return quaternion_product(
+        turn, axis_quaternion(np.array([0.0, 1.0, 0.0]), -terrain.incline if slope else 0.0)
+    )

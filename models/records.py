@@ -1,7 +1,8 @@
 """What the robot is: frozen records with units and ranges.
 
-Frames and conventions: docs/architecture.md. Records hold tuples of floats, so a robot is hashable, picklable and comparable;
-`dataclasses.replace` makes a changed one, `check_robot` judges it by the rules that files are judged by.
+Frames and conventions: docs/architecture.md. Records hold tuples of floats, so a robot is hashable,
+picklable and comparable; `dataclasses.replace` makes a changed one, `check_robot` judges it by the
+rules that files are judged by.
 """
 
 from __future__ import annotations
@@ -25,7 +26,14 @@ Vector6 = tuple[float, float, float, float, float, float]
 
 LEG_NAMES = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINT_NAMES = ("coxa", "femur", "tibia")
-CONTACT_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley", "constant_damping", "hertz")
+CONTACT_LAWS = (
+    "exact_restitution",
+    "flores",
+    "lankarani_nikravesh",
+    "hunt_crossley",
+    "constant_damping",
+    "hertz",
+)
 FRICTION_LAWS = ("tanh", "none", "bristle")
 STATIC_LAWS = ("bristle",)  # friction laws that tell static from kinetic friction
 SERVO_MODES = ("position", "torque", "kinematic")
@@ -40,9 +48,13 @@ class Torso:
     """The main body; its frame's origin is the one hip positions are measured from."""
 
     mass: Annotated[float, Number("kg", above=0.0)]
-    size: Annotated[Vector3, Vector("m", 3, above=0.0)]  # box, for drawing and for the default inertia
+    size: Annotated[
+        Vector3, Vector("m", 3, above=0.0)
+    ]  # box, for drawing and for the default inertia
     com: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))]
-    inertia: Annotated[Vector6, Vector("kg m2", 6)]  # about the com: xx yy zz xy xz yz; absent in a file: of the box
+    inertia: Annotated[
+        Vector6, Vector("kg m2", 6)
+    ]  # about the com: xx yy zz xy xz yz; absent in a file: of the box
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +98,9 @@ class Foot:
 @dataclass(frozen=True, kw_only=True)
 class Contact:
     law: Annotated[str, Choice(CONTACT_LAWS)]
-    stiffness: Annotated[float, Number("N/m^1.5", above=0.0)]  # absent in a file: Hertz, sphere on rigid ground
+    stiffness: Annotated[
+        float, Number("N/m^1.5", above=0.0)
+    ]  # absent in a file: Hertz, sphere on rigid ground
     restitution: Annotated[float, Number("1", at_least=0.0, at_most=1.0)]
     damping_factor: Annotated[float, Number("s/m", at_least=0.0)]  # c of the constant law
     impact_speed_floor: Annotated[float, Number("m/s", above=0.0)]
@@ -99,10 +113,16 @@ class Friction:
     # of a foot that sticks, bristle law; 0 or absent: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
     slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5, tanh law
-    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # b_max of eq. 18, bristle law; absent in a file: Mindlin
-    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]  # tau of eq. 19, bristle law
+    presliding: Annotated[
+        float, Number("m", at_least=1e-7, at_most=1.0)
+    ]  # b_max of eq. 18, bristle law; absent in a file: Mindlin
+    bristle_damping: Annotated[
+        float, Number("s", at_least=0.0, at_most=10.0, default=0.005)
+    ]  # tau of eq. 19, bristle law
     # v_s of eq. 19, bristle law
-    stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = 0.005
+    stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
+        0.005
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,10 +1,12 @@
-"""Robots from files: `load_robot("athena")` gives a checked `Robot`. The records themselves stand in records.py.
+"""Robots from files: `load_robot("athena")` gives a checked `Robot`. The records themselves stand
+in records.py.
 
-A robot file shares link data between the legs in [links.coxa], [links.femur], [links.tibia]; any leg may override any of
-those keys in [legs.LF.femur] and so on, so legs need not be equal. Three figures may be left out and are then computed:
-torso.inertia (the homogeneous box of torso.size), contact.stiffness (Hertz, from the foot's radius and material) and friction.presliding
-(Mindlin, from the same and the weight). A URDF is a robot file too, and a robot file may name one, [urdf] file = "my.urdf", with what
-is put over it (urdf/).
+A robot file shares link data between the legs in [links.coxa], [links.femur], [links.tibia]; any
+leg may override any of those keys in [legs.LF.femur] and so on, so legs need not be equal. Three
+figures may be left out and are then computed: torso.inertia (the homogeneous box of torso.size),
+contact.stiffness (Hertz, from the foot's radius and material) and friction.presliding (Mindlin,
+from the same and the weight). A URDF is a robot file too, and a robot file may name one, [urdf]
+file = "my.urdf", with what is put over it (urdf/).
 """
 
 from __future__ import annotations
@@ -43,16 +45,48 @@ from hexapod_cosim.models.records import (
     Vector3,
     Vector6,
 )
-from hexapod_cosim.models.schema import Number, Vector, expect_table, read_given, refuse_unknown_keys, require
+from hexapod_cosim.models.schema import (
+    Number,
+    Vector,
+    expect_table,
+    read_given,
+    refuse_unknown_keys,
+    require,
+)
 from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
 
 __all__ = [
-    "CONTACT_LAWS", "FRICTION_LAWS", "GAITS", "JOINT_NAMES", "LEG_NAMES", "METHODS", "PROJECTIONS", "SERVO_MODES", "TERRAINS",
-    "Array", "Baumgarte", "Contact", "Foot", "Friction", "Gait", "Leg", "Link", "Robot", "Servo", "Solver", "Terrain", "Torso",
-    "box_inertia", "check_robot", "hertz_stiffness", "list_robots", "load_robot",
-    "mindlin_presliding", "robot_from_table",
-]  # fmt: skip
+    "CONTACT_LAWS",
+    "FRICTION_LAWS",
+    "GAITS",
+    "JOINT_NAMES",
+    "LEG_NAMES",
+    "METHODS",
+    "PROJECTIONS",
+    "SERVO_MODES",
+    "TERRAINS",
+    "Array",
+    "Baumgarte",
+    "Contact",
+    "Foot",
+    "Friction",
+    "Gait",
+    "Leg",
+    "Link",
+    "Robot",
+    "Servo",
+    "Solver",
+    "Terrain",
+    "Torso",
+    "box_inertia",
+    "check_robot",
+    "hertz_stiffness",
+    "list_robots",
+    "load_robot",
+    "mindlin_presliding",
+    "robot_from_table",
+]
 
 LEAST_PRESLIDING = 1e-6  # m  where there is no load or no friction to take it from
 STANCE = Number("rad", at_least=-math.pi, at_most=math.pi)
@@ -73,10 +107,16 @@ def load_robot(path_or_name: str | Path) -> Robot:
         alone = _robot_from_text(text, str(path))
     except OSError as error:
         fix = "give the path of a robot file, or one of: " + ", ".join(list_robots())
-        raise RobotError("cannot read the robot file", got=error.strerror, fix=fix, where=str(path)) from error
+        raise RobotError(
+            "cannot read the robot file", got=error.strerror, fix=fix, where=str(path)
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise RobotError(
-            "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
+            "not a TOML file",
+            got=str(error),
+            expected="TOML 1.0 in UTF-8",
+            fix="correct that line",
+            where=str(path),
         ) from error
     if alone is None:
         return _robot_from_urdf(side_table(tomllib.loads(text), path.parent, str(path)), str(path))
@@ -85,7 +125,9 @@ def load_robot(path_or_name: str | Path) -> Robot:
 
 @lru_cache(maxsize=64)
 def _robot_from_text(text: str, where: str) -> Robot | None:
-    """The robot of a file's text, read once; None if it names a URDF, which may change without it."""
+    """The robot of a file's text, read once; None if it names a URDF, which may change without
+    it.
+    """
     table = tomllib.loads(text)
     return None if "urdf" in table else robot_from_table(table, where=where)
 
@@ -108,9 +150,15 @@ def _robot_path(path_or_name: str | Path) -> Path:
 
 
 def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
-    """A checked robot from the nested tables of a robot file; `where` names the file in messages. Raises RobotError."""
+    """A checked robot from the nested tables of a robot file; `where` names the file in
+    messages. Raises RobotError.
+    """
     refuse_unknown_keys(table, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
-    sections = {name: _read_section(table, name, f"{where}: {name}") for name in SECTIONS if name != "friction"}
+    sections = {
+        name: _read_section(table, name, f"{where}: {name}")
+        for name in SECTIONS
+        if name != "friction"
+    }
     gravity, legs = _read_gravity(table, f"{where}: gravity"), _read_legs(table, where)
     mass = sections["torso"].mass + sum(link.mass for leg in legs for link in leg.links)
     standing = mass * math.hypot(*gravity) / 3.0  # N  a foot of a tripod
@@ -118,7 +166,9 @@ def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
         name=_read_text(table.get("name"), f"{where}: name"),
         gravity=gravity,
         legs=legs,
-        friction=_read_friction(table, f"{where}: friction", sections["foot"], sections["contact"], standing),
+        friction=_read_friction(
+            table, f"{where}: friction", sections["foot"], sections["contact"], standing
+        ),
         source={
             key: _read_text(text, f"{where}: source.{key}")
             for key, text in expect_table(table.get("source", {}), f"{where}: source").items()
@@ -131,7 +181,9 @@ def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
 
 def _read_text(value: Any, where: str) -> str:
     if not isinstance(value, str) or not value:
-        raise RobotError("wrong type", got=value, expected="a text", fix="give it in quotes", where=where)
+        raise RobotError(
+            "wrong type", got=value, expected="a text", fix="give it in quotes", where=where
+        )
     return value
 
 
@@ -142,14 +194,20 @@ def _read_gravity(table: Mapping[str, Any], where: str) -> Vector3:
 
 def _section(table: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:
     if name not in table:
-        raise RobotError("missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where)
+        raise RobotError(
+            "missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where
+        )
     return expect_table(table[name], where)
 
 
-def _read_friction(table: Mapping[str, Any], where: str, foot: Foot, contact: Contact, load: float) -> Friction:
+def _read_friction(
+    table: Mapping[str, Any], where: str, foot: Foot, contact: Contact, load: float
+) -> Friction:
     given = read_given(Friction, _section(table, "friction", where), where)
     if "presliding" not in given and "mu" in given:
-        given["presliding"] = mindlin_presliding(foot, contact.stiffness, max(given["mu"], given.get("mu_static", 0.0)), load)
+        given["presliding"] = mindlin_presliding(
+            foot, contact.stiffness, max(given["mu"], given.get("mu_static", 0.0)), load
+        )
     return Friction(**require(Friction, given, where))
 
 
@@ -159,7 +217,9 @@ def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     if record is Torso and {"mass", "size"} <= given.keys():
         given.setdefault("inertia", box_inertia(given["mass"], given["size"]))
     if record is Contact and "stiffness" not in given:
-        given["stiffness"] = hertz_stiffness(_read_section(table, "foot", where.replace("contact", "foot")))
+        given["stiffness"] = hertz_stiffness(
+            _read_section(table, "foot", where.replace("contact", "foot"))
+        )
     if record is Servo and {"torque_max", "speed_max"} <= given.keys():
         constant = ideal_motor_constant(given["torque_max"], given["speed_max"])
         given.setdefault("motor_constant", constant)
@@ -171,7 +231,9 @@ def _read_legs(table: Mapping[str, Any], where: str) -> tuple[Leg, ...]:
     legs = expect_table(table.get("legs", {}), f"{where}: legs")
     refuse_unknown_keys(shared, list(JOINT_NAMES), f"{where}: links")
     refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")
-    common = {joint: _read_link(shared.get(joint, {}), f"{where}: links.{joint}") for joint in JOINT_NAMES}
+    common = {
+        joint: _read_link(shared.get(joint, {}), f"{where}: links.{joint}") for joint in JOINT_NAMES
+    }
     return tuple(_read_leg(name, legs, common, f"{where}: legs.{name}") for name in LEG_NAMES)
 
 
@@ -182,9 +244,16 @@ def _read_link(table: Any, where: str) -> dict[str, Any]:
     return given
 
 
-def _read_leg(name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str, Any]], where: str) -> Leg:
+def _read_leg(
+    name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str, Any]], where: str
+) -> Leg:
     if name not in legs:
-        raise RobotError("missing leg", expected="legs " + " ".join(LEG_NAMES), fix=f"add [legs.{name}]", where=where)
+        raise RobotError(
+            "missing leg",
+            expected="legs " + " ".join(LEG_NAMES),
+            fix=f"add [legs.{name}]",
+            where=where,
+        )
     table = expect_table(legs[name], where)
     refuse_unknown_keys(table, ["hip_position", "hip_yaw", *JOINT_NAMES], where)
     placed = {key: value for key, value in table.items() if key not in JOINT_NAMES}
@@ -192,7 +261,12 @@ def _read_leg(name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str,
     for joint in JOINT_NAMES:
         values = common[joint] | _read_link(table.get(joint, {}), f"{where}.{joint}")
         if "stance" not in values:
-            raise RobotError("missing key", expected="a value in rad", fix="add `stance = ...`", where=f"{where}.{joint}.stance")
+            raise RobotError(
+                "missing key",
+                expected="a value in rad",
+                fix="add `stance = ...`",
+                where=f"{where}.{joint}.stance",
+            )
         stance.append(values.pop("stance"))
         links.append(Link(**require(Link, values, f"{where}.{joint}")))
     given = read_given(Leg, placed, where) | {"stance": tuple(stance)}
@@ -202,7 +276,14 @@ def _read_leg(name: str, legs: Mapping[str, Any], common: Mapping[str, dict[str,
 def box_inertia(mass: float, size: Vector3) -> Vector6:
     """Inertia of a homogeneous box about its centre [kg m2]: xx yy zz xy xz yz."""
     x2, y2, z2 = (edge * edge for edge in size)
-    return (mass / 12.0 * (y2 + z2), mass / 12.0 * (x2 + z2), mass / 12.0 * (x2 + y2), 0.0, 0.0, 0.0)
+    return (
+        mass / 12.0 * (y2 + z2),
+        mass / 12.0 * (x2 + z2),
+        mass / 12.0 * (x2 + y2),
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
 def ideal_motor_constant(torque_max: float, speed_max: float) -> float:
@@ -218,7 +299,8 @@ def hertz_stiffness(foot: Foot) -> float:
 
 
 def mindlin_presliding(foot: Foot, stiffness: float, mu: float, load: float) -> float:
-    """Tangential displacement at which the foot's sphere pressed on by a load f_n [N] slides (Mindlin 1949) [m].
+    """Tangential displacement at which the foot's sphere pressed on by a load f_n [N] slides
+    (Mindlin 1949) [m].
 
     3 mu f_n (2 - nu)/(16 G a), a = sqrt(R delta) the radius of the contact, delta = (f_n/K)^(2/3).
     """

@@ -1,4 +1,5 @@
-"""Typed records read from TOML tables: what a field may hold stands in its annotation, and is checked in one place.
+"""Typed records read from TOML tables: what a field may hold stands in its annotation, and is
+checked in one place.
 
 mass: Annotated[float, Number("kg", above=0.0)]
 """
@@ -33,13 +34,29 @@ class Number:
         return f"{text} [{self.unit}]"
 
     def holds(self, value: float) -> bool:
-        return math.isfinite(value) and self.above < value < self.below and self.at_least <= value <= self.at_most
+        return (
+            math.isfinite(value)
+            and self.above < value < self.below
+            and self.at_least <= value <= self.at_most
+        )
 
     def read(self, value: Any, where: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise RobotError("wrong type", got=value, expected=self.range_text(), fix="give a number", where=where)
+            raise RobotError(
+                "wrong type",
+                got=value,
+                expected=self.range_text(),
+                fix="give a number",
+                where=where,
+            )
         if not self.holds(value):
-            raise RobotError("value not allowed", got=value, expected=self.range_text(), fix="correct the value and its unit", where=where)
+            raise RobotError(
+                "value not allowed",
+                got=value,
+                expected=self.range_text(),
+                fix="correct the value and its unit",
+                where=where,
+            )
         return float(value)
 
 
@@ -55,9 +72,21 @@ class Vector:
     def read(self, value: Any, where: str) -> tuple[float, ...]:
         expected = f"{self.size} numbers [{self.unit}]"
         if not isinstance(value, list | tuple):
-            raise RobotError("wrong type", got=value, expected=expected, fix="give a list of numbers", where=where)
+            raise RobotError(
+                "wrong type",
+                got=value,
+                expected=expected,
+                fix="give a list of numbers",
+                where=where,
+            )
         if len(value) != self.size:
-            raise RobotError("wrong length", got=value, expected=expected, fix=f"give exactly {self.size} entries", where=where)
+            raise RobotError(
+                "wrong length",
+                got=value,
+                expected=expected,
+                fix=f"give exactly {self.size} entries",
+                where=where,
+            )
         entry = Number(self.unit, above=self.above)
         return tuple(entry.read(item, f"{where}[{k}]") for k, item in enumerate(value))
 
@@ -71,7 +100,13 @@ class Choice:
 
     def read(self, value: Any, where: str) -> str:
         if not isinstance(value, str):
-            raise RobotError("wrong type", got=value, expected=f"one of {', '.join(self.names)}", fix="give a name in quotes", where=where)
+            raise RobotError(
+                "wrong type",
+                got=value,
+                expected=f"one of {', '.join(self.names)}",
+                fix="give a name in quotes",
+                where=where,
+            )
         if value not in self.names:
             raise unknown_name("name", value, self.names, where=where, error=RobotError)
         return value
@@ -88,13 +123,24 @@ def specs(record: type[Any]) -> dict[str, Spec]:
 @cache
 def _specs(record: Any) -> dict[str, Spec]:
     hints = get_type_hints(record, include_extras=True)
-    return {name: spec for name, hint in hints.items() for spec in getattr(hint, "__metadata__", ()) if isinstance(spec, Spec)}
+    return {
+        name: spec
+        for name, hint in hints.items()
+        for spec in getattr(hint, "__metadata__", ())
+        if isinstance(spec, Spec)
+    }
 
 
 def expect_table(value: Any, where: str) -> Mapping[str, Any]:
     """The value, if it is a TOML table."""
     if not isinstance(value, Mapping):
-        raise RobotError("wrong type", got=value, expected="a table", fix="write it as [section] with keys below", where=where)
+        raise RobotError(
+            "wrong type",
+            got=value,
+            expected="a table",
+            fix="write it as [section] with keys below",
+            where=where,
+        )
     return value
 
 
@@ -105,11 +151,19 @@ def refuse_unknown_keys(table: Mapping[str, Any], valid: list[str], where: str) 
             raise unknown_name("key", key, valid, where=where, error=RobotError)
 
 
-def read_given(record: type[Any], table: Mapping[str, Any], where: str, *, extra: tuple[str, ...] = ()) -> dict[str, Any]:
-    """The record's fields that the table gives, each checked; `extra` names keys that belong to someone else."""
+def read_given(
+    record: type[Any], table: Mapping[str, Any], where: str, *, extra: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """The record's fields that the table gives, each checked; `extra` names keys that belong to
+    someone else.
+    """
     fields = specs(record)
     refuse_unknown_keys(table, [*fields, *extra], where)
-    return {key: fields[key].read(value, f"{where}.{key}") for key, value in table.items() if key in fields}
+    return {
+        key: fields[key].read(value, f"{where}.{key}")
+        for key, value in table.items()
+        if key in fields
+    }
 
 
 def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -118,8 +172,14 @@ def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str
     values |= given
     for key, spec in specs(record).items():
         if key not in values:
-            expected = f"one of {', '.join(spec.names)}" if isinstance(spec, Choice) else f"a value in {spec.unit}"
-            raise RobotError("missing key", expected=expected, fix=f"add `{key} = ...`", where=f"{where}.{key}")
+            expected = (
+                f"one of {', '.join(spec.names)}"
+                if isinstance(spec, Choice)
+                else f"a value in {spec.unit}"
+            )
+            raise RobotError(
+                "missing key", expected=expected, fix=f"add `{key} = ...`", where=f"{where}.{key}"
+            )
     return values
 
 

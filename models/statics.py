@@ -1,8 +1,9 @@
 """How the robot stands: the pose in which nothing accelerates.
 
-Tanh friction holds nothing at rest, so on level ground the feet spread until no tangential force is left. On a slope no such
-pose exists; the robot stands while it creeps, and friction at the creep's velocity carries what pulls it downhill. Under the
-bristle law it stands still there: what it has given way downhill, as one body, carries it instead.
+Tanh friction holds nothing at rest, so on level ground the feet spread until no tangential force is
+left. On a slope no such pose exists; the robot stands while it creeps, and friction at the creep's
+velocity carries what pulls it downhill. Under the bristle law it stands still there: what it has
+given way downhill, as one body, carries it instead.
 
 Where gravity pulls along the ground more than friction can hold, the robot slides. Then the pose is
 the one in which all bodies accelerate alike: the pose of rest under gravity less that acceleration.
@@ -43,7 +44,9 @@ UNKNOWNS = TORSO + LEGS * JOINTS
 
 @dataclass(frozen=True)
 class Standing:
-    """A pose of rest, or of sliding as one body; torso above the world's origin, heading along x."""
+    """A pose of rest, or of sliding as one body; torso above the world's origin, heading along
+    x.
+    """
 
     position: Array  # (3,) m  torso's centre of mass
     quaternion: Array  # (4,)
@@ -51,7 +54,8 @@ class Standing:
     velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground and under the bristle law
     foot_force: Array  # (6, 3) N  ground on foot
     bristle: Array  # (6, 3) m  what the feet have given way, 0 but on a slope under the bristle law
-    slide: Array  # (3,) m/s2  acceleration of the whole robot along the ground, 0 where friction holds it
+    # (3,) m/s2  acceleration of the whole robot along the ground, 0 where friction holds it
+    slide: Array
 
 
 def sliding(gravity: Array, normal: Array, mu: float, mu_static: float = 0.0) -> Array:
@@ -81,17 +85,23 @@ def _slide(robot: Robot) -> Array:
 
 
 def _standing_part(robot: Robot) -> Robot:
-    """The robot with one and the same of all that does not matter to how it stands: how motion is integrated, how it walks, and on level
-    ground how strong its friction is, since it has nothing to hold.
+    """The robot with one and the same of all that does not matter to how it stands: how motion is
+    integrated, how it walks, and on level ground how strong its friction is, since it has nothing
+    to hold.
     """
-    friction, calm = robot.friction, Solver(method="rosw3", step=0.0, tolerance=1e-4, step_max=1.0, projection="none")
+    friction, calm = (
+        robot.friction,
+        Solver(method="rosw3", step=0.0, tolerance=1e-4, step_max=1.0, projection="none"),
+    )
     gravity, normal = np.array(robot.gravity), ground_normal(robot.terrain)
     press = -float(gravity @ normal)
     level = float(np.linalg.norm(gravity + press * normal)) <= LEVEL * press
     if level and (friction.law != "bristle" or max(friction.mu, friction.mu_static) == 0.0):
         friction = replace(friction, law="tanh", mu=1.0, mu_static=0.0)
     still = Gait(name="tripod", period=1.0, duty=0.5, stride=0.0, step_height=1.0)
-    return replace(robot, solver=calm, gait=still, friction=friction, baumgarte=Baumgarte(alpha=0.0, beta=0.0))
+    return replace(
+        robot, solver=calm, gait=still, friction=friction, baumgarte=Baumgarte(alpha=0.0, beta=0.0)
+    )
 
 
 def _held(robot: Robot, slide: Array) -> Robot:
@@ -99,23 +109,31 @@ def _held(robot: Robot, slide: Array) -> Robot:
 
     There gravity is less, and any friction above its own holds it.
     """
-    mu = 1.0 if robot.friction.law == "none" or robot.friction.mu == 0.0 else 2.0 * robot.friction.mu
+    mu = (
+        1.0 if robot.friction.law == "none" or robot.friction.mu == 0.0 else 2.0 * robot.friction.mu
+    )
     x, y, z = (np.array(robot.gravity) - slide).tolist()
-    return replace(robot, gravity=(x, y, z), friction=replace(robot.friction, law="tanh", mu=mu, mu_static=0.0))
+    return replace(
+        robot, gravity=(x, y, z), friction=replace(robot.friction, law="tanh", mu=mu, mu_static=0.0)
+    )
 
 
 def settled(robot: Robot) -> tuple[Array, Array, Array]:
-    """Torso position (3,), quaternion (4,) and joint angles (6, 3) at rest on the ground, servos holding the stance. Raises RobotError."""
+    """Torso position (3,), quaternion (4,) and joint angles (6, 3) at rest on the ground, servos
+    holding the stance. Raises RobotError.
+    """
     pose = standing(robot)
     return pose.position, pose.quaternion, pose.angle
 
 
 def standing(robot: Robot) -> Standing:
-    """Equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has given way) and joint angles.
+    """Equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has
+    given way) and joint angles.
 
-    Servos in position or torque mode hold the stance by their PD law (a torque servo alone would not stand); kinematic ones exactly.
-    Looked up when it was asked for before: the interface and every picture of a robot need it, and it is most of an export's time. Its
-    arrays are read-only. Raises RobotError when there is no such pose: servos too weak or soft.
+    Servos in position or torque mode hold the stance by their PD law (a torque servo alone would
+    not stand); kinematic ones exactly. Looked up when it was asked for before: the interface and
+    every picture of a robot need it, and it is most of an export's time. Its arrays are read-only.
+    Raises RobotError when there is no such pose: servos too weak or soft.
     """
     return _found(_standing_part(robot))
 
@@ -128,7 +146,11 @@ def _found(given: Robot) -> Standing:
     loads = _loads(robot, x)
     for _ in range(ITERATIONS):
         if np.max(np.abs(_residual(robot, loads))) < RESIDUAL:
-            pose = _standing(robot, x) if not slide.any() else _sliding(given, _standing(robot, x), slide)
+            pose = (
+                _standing(robot, x)
+                if not slide.any()
+                else _sliding(given, _standing(robot, x), slide)
+            )
             for array in vars(pose).values():
                 array.flags.writeable = False
             return pose
@@ -139,11 +161,19 @@ def _found(given: Robot) -> Standing:
 def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
     got = f"forces out of balance by {np.max(np.abs(residual)):.3g}"
     fix = "raise servo.kp or servo.torque_max, or change the stance"
-    return RobotError("the robot does not stand", got=got, expected=f"a pose in balance to {RESIDUAL} N", fix=fix, where=robot.name)
+    return RobotError(
+        "the robot does not stand",
+        got=got,
+        expected=f"a pose in balance to {RESIDUAL} N",
+        fix=fix,
+        where=robot.name,
+    )
 
 
 def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:
-    """One damped step: halved until the residual falls, since feet lose the ground (and all slope) when a step is too long."""
+    """One damped step: halved until the residual falls, since feet lose the ground (and all
+    slope) when a step is too long.
+    """
     residual = _residual(robot, loads)
     try:
         step = np.linalg.solve(_jacobian(robot, x, loads), -residual)
@@ -157,7 +187,9 @@ def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:
 
 
 def _jacobian(robot: Robot, x: Array, loads: Array) -> Array:
-    """(24, 24) of the residual by differences. A leg's loads do not depend on other legs' angles: all legs' are moved at once."""
+    """(24, 24) of the residual by differences. A leg's loads do not depend on other legs'
+    angles: all legs' are moved at once.
+    """
 
     def change(direction: Array) -> Array:
         return (_loads(robot, x + DIFFERENCE * direction) - loads) / DIFFERENCE
@@ -165,17 +197,24 @@ def _jacobian(robot: Robot, x: Array, loads: Array) -> Array:
     jacobian = np.zeros((UNKNOWNS, UNKNOWNS))
     for column, unit in enumerate(np.eye(UNKNOWNS)[:TORSO]):
         changed = change(unit)
-        jacobian[:, column] = np.concatenate([changed[:, :TORSO].sum(axis=0), changed[:, TORSO:].ravel()])
+        jacobian[:, column] = np.concatenate(
+            [changed[:, :TORSO].sum(axis=0), changed[:, TORSO:].ravel()]
+        )
     for joint, unit in enumerate(np.eye(JOINTS)):
         changed = change(np.concatenate([np.zeros(TORSO), np.tile(unit, LEGS)]))
         for leg in range(LEGS):
             begin = TORSO + JOINTS * leg
-            jacobian[:TORSO, begin + joint], jacobian[begin : begin + JOINTS, begin + joint] = changed[leg, :TORSO], changed[leg, TORSO:]
+            jacobian[:TORSO, begin + joint], jacobian[begin : begin + JOINTS, begin + joint] = (
+                changed[leg, :TORSO],
+                changed[leg, TORSO:],
+            )
     return jacobian
 
 
 def _start(robot: Robot) -> Array:
-    """Unknowns z, roll, pitch, creep (vx, vy, yaw rate), angles: the stance, along the ground, its feet as deep as they carry."""
+    """Unknowns z, roll, pitch, creep (vx, vy, yaw rate), angles: the stance, along the ground,
+    its feet as deep as they carry.
+    """
     x = np.zeros(UNKNOWNS)
     normal = ground_normal(robot.terrain)
     x[1], x[2] = -np.arcsin(normal[1]), np.arctan2(normal[0], normal[2])
@@ -188,7 +227,10 @@ def _start(robot: Robot) -> Array:
 
 
 def _attitude(x: Array) -> Array:
-    roll, pitch = axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1]), axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2])
+    roll, pitch = (
+        axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1]),
+        axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2]),
+    )
     return quaternion_product(pitch, roll)
 
 
@@ -203,15 +245,22 @@ def _bodies(robot: Robot, x: Array) -> Array:
     angle = x[6:].reshape(LEGS, JOINTS)
     turning = x[5] * ground_normal(robot.terrain)
     position = np.array([0.0, 0.0, x[0]])
-    return body_states(robot, position, _attitude(x), _velocity(robot, x), turning, angle, np.zeros((LEGS, JOINTS)))
+    return body_states(
+        robot, position, _attitude(x), _velocity(robot, x), turning, angle, np.zeros((LEGS, JOINTS))
+    )
 
 
 def _bristles(robot: Robot, body: Array) -> Array:
-    """(6, 3) m. What the feet have given way: the creep of these bodies, read as so many preslidings for each m/s; 0 with other laws."""
+    """(6, 3) m. What the feet have given way: the creep of these bodies, read as so many
+    preslidings for each m/s; 0 with other laws.
+    """
     if robot.friction.law != "bristle":
         return np.zeros((LEGS, 3))
     return np.array(
-        [robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal) for foot in foot_contacts(robot, body)]
+        [
+            robot.friction.presliding * (foot.velocity + foot.approach_speed * foot.normal)
+            for foot in foot_contacts(robot, body)
+        ]
     )
 
 
@@ -224,17 +273,23 @@ def _foot_forces(robot: Robot, body: Array) -> Array:
 
 
 def _residual(robot: Robot, loads: Array) -> Array:
-    """(24,) force and moment on the robot at the torso, and the torque left over at each joint (kinematic: rad off the stance)."""
+    """(24,) force and moment on the robot at the torso, and the torque left over at each joint
+    (kinematic: rad off the stance).
+    """
     weight = robot.torso.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0])
     return np.concatenate([weight + loads[:, :TORSO].sum(axis=0), loads[:, TORSO:].ravel()])
 
 
 def _loads(robot: Robot, x: Array) -> Array:
-    """(6, 9) each leg's force and moment on the torso at its centre of mass, world axes, and what is left over at its joints."""
+    """(6, 9) each leg's force and moment on the torso at its centre of mass, world axes, and
+    what is left over at its joints.
+    """
     body = _bodies(robot, x)
     force = masses(robot)[:, None] * np.array(robot.gravity)
     moment = np.zeros_like(force)
-    for leg, (foot, push) in enumerate(zip(foot_contacts(robot, body), _foot_forces(robot, body), strict=True)):
+    for leg, (foot, push) in enumerate(
+        zip(foot_contacts(robot, body), _foot_forces(robot, body), strict=True)
+    ):
         tibia = JOINTS * (leg + 1)
         force[tibia] += push
         moment[tibia] += cross(foot.point - body[tibia, 0:3], push)
@@ -249,8 +304,8 @@ def _loads(robot: Robot, x: Array) -> Array:
 
 
 def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> tuple[Array, Array]:
-    """Adds each link's force and moment to that above it, leaf to root, in place; returns (6, 6) what the legs do to the torso, and (18,)
-    torques about the joint axes.
+    """Adds each link's force and moment to that above it, leaf to root, in place; returns (6, 6)
+    what the legs do to the torso, and (18,) torques about the joint axes.
     """
     on_torso, torque = np.zeros((LEGS, TORSO)), np.zeros(LEGS * JOINTS)
     for k, joint in reversed(list(enumerate(joint_models(robot)))):
@@ -272,10 +327,24 @@ def _standing(robot: Robot, x: Array) -> Standing:
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
     body = _bodies(robot, x)
     creep = np.zeros(3) if robot.friction.law == "bristle" else _velocity(robot, x)
-    return Standing(position, _attitude(x), angle, creep, _foot_forces(robot, body), _bristles(robot, body), np.zeros(3))
+    return Standing(
+        position,
+        _attitude(x),
+        angle,
+        creep,
+        _foot_forces(robot, body),
+        _bristles(robot, body),
+        np.zeros(3),
+    )
 
 
 def _sliding(robot: Robot, pose: Standing, slide: Array) -> Standing:
-    """The pose of a robot that slides: without creep, its bristles stretched to the full downhill."""
-    way = robot.friction.presliding * slide / np.linalg.norm(slide) if robot.friction.law == "bristle" else np.zeros(3)
+    """The pose of a robot that slides: without creep, its bristles stretched to the full
+    downhill.
+    """
+    way = (
+        robot.friction.presliding * slide / np.linalg.norm(slide)
+        if robot.friction.law == "bristle"
+        else np.zeros(3)
+    )
     return replace(pose, velocity=np.zeros(3), bristle=np.tile(way, (LEGS, 1)), slide=slide)

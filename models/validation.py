@@ -1,6 +1,8 @@
-"""Is this robot physically possible? Rules that need more than one number; single values are judged by their annotations.
+"""Is this robot physically possible? Rules that need more than one number; single values are judged
+by their annotations.
 
-A robot whose inertias no solid body can have simulates wrongly or not at all, so it is refused on load.
+A robot whose inertias no solid body can have simulates wrongly or not at all, so it is refused on
+load.
 """
 
 from __future__ import annotations
@@ -11,35 +13,65 @@ import numpy as np
 
 from hexapod_cosim.models.errors import RobotError
 from hexapod_cosim.models.kinematics import foot_positions, inertia_matrix
-from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, STATIC_LAWS, Array, Friction, Leg, Link, Robot
+from hexapod_cosim.models.records import (
+    JOINT_NAMES,
+    LEG_NAMES,
+    STATIC_LAWS,
+    Array,
+    Friction,
+    Leg,
+    Link,
+    Robot,
+)
 from hexapod_cosim.models.schema import Vector, check_record
 
-# an inertia printed with four figures may miss the triangle inequality by rounding: a thin rod meets it with equality
+# an inertia printed with four figures may miss the triangle inequality by rounding: a thin rod
+# meets it with equality
 INERTIA_ROUNDING = 1e-3
-# matter lies within a link's extent, but a short bracket may carry a servo longer than itself; real links stay below 0.8
+# matter lies within a link's extent, but a short bracket may carry a servo longer than itself; real
+# links stay below 0.8
 GYRATION_PER_EXTENT = 2.0
 # the box holds all matter: twice its half diagonal is already generous
 GYRATION_PER_DIAGONAL = 1.0
-# largest distance of a stance foot from the plane through all six: a leg's sag under load is of this size
+# largest distance of a stance foot from the plane through all six: a leg's sag under load is of
+# this size
 STANCE_PLANE_TOLERANCE = 0.01
 AXIS_TOLERANCE = 1e-6
-SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain")  # what changes without another body
+SETTINGS = (
+    "contact",
+    "friction",
+    "servo",
+    "baumgarte",
+    "solver",
+    "terrain",
+)  # what changes without another body
 DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
 
 
 def check_robot(robot: Robot, *, where: str | None = None) -> None:
-    """Raises RobotError on the first rule that the robot breaks; `where` names its file in the message."""
+    """Raises RobotError on the first rule that the robot breaks; `where` names its file in the
+    message.
+    """
     at = f"{where or robot.name}: "
     Vector("m/s2", 3).read(robot.gravity, at + "gravity")
     for name in ("torso", "foot", "gait"):
         check_record(getattr(robot, name), at + name)
     check_settings(robot, where=where)
-    check_inertia(robot.torso.mass, robot.torso.inertia, GYRATION_PER_DIAGONAL * math.hypot(*robot.torso.size), at + "torso")
+    check_inertia(
+        robot.torso.mass,
+        robot.torso.inertia,
+        GYRATION_PER_DIAGONAL * math.hypot(*robot.torso.size),
+        at + "torso",
+    )
     _check_com(robot.torso.com, math.hypot(*robot.torso.size), at + "torso")
     if tuple(leg.name for leg in robot.legs) != LEG_NAMES:
         expected = "legs " + " ".join(LEG_NAMES)
         raise RobotError(
-            "wrong legs", got=[leg.name for leg in robot.legs], expected=expected, fix="give these six in this order", where=at + "legs"
+            "wrong legs",
+            got=[leg.name for leg in robot.legs],
+            expected=expected,
+            fix="give these six in this order",
+            where=at + "legs",
         )
     for leg in robot.legs:
         _check_leg(leg, f"{at}legs.{leg.name}")
@@ -55,19 +87,39 @@ def check_settings(robot: Robot, *, where: str | None = None) -> None:
 
 
 def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where: str) -> None:
-    """Positive definite, triangle inequality of the principal moments, radius of gyration at most `extent` [m]."""
+    """Positive definite, triangle inequality of the principal moments, radius of gyration at
+    most `extent` [m].
+    """
     moments = np.linalg.eigvalsh(inertia_matrix(inertia))
     shown = [float(f"{moment:.4g}") for moment in moments]
     fix = "check units (kg m2), the reference point (centre of mass) and the signs of the products"
     if moments[0] <= 0.0:
-        raise RobotError("inertia not positive definite", got=shown, expected="principal moments > 0", fix=fix, where=where + ".inertia")
+        raise RobotError(
+            "inertia not positive definite",
+            got=shown,
+            expected="principal moments > 0",
+            fix=fix,
+            where=where + ".inertia",
+        )
     if moments[0] + moments[1] < (1.0 - INERTIA_ROUNDING) * moments[2]:
         expected = "principal moments of which no one exceeds the sum of the others"
-        raise RobotError("inertia of no possible body", got=shown, expected=expected, fix=fix, where=where + ".inertia")
+        raise RobotError(
+            "inertia of no possible body",
+            got=shown,
+            expected=expected,
+            fix=fix,
+            where=where + ".inertia",
+        )
     radius = math.sqrt(float(moments.sum()) / (2.0 * mass))
     if radius > extent:
         expected = f"a radius of gyration of at most {extent:.3g} m for matter of this extent"
-        raise RobotError("inertia too large for the mass", got=f"{radius:.3g} m", expected=expected, fix=fix, where=where + ".inertia")
+        raise RobotError(
+            "inertia too large for the mass",
+            got=f"{radius:.3g} m",
+            expected=expected,
+            fix=fix,
+            where=where + ".inertia",
+        )
 
 
 def _check_leg(leg: Leg, where: str) -> None:
@@ -90,16 +142,30 @@ def _check_link(link: Link, where: str) -> None:
     extent = math.hypot(*link.tip)
     if extent <= 0.0:
         raise RobotError(
-            "link without extent", got=link.tip, expected="a tip away from the joint", fix="give a length", where=where + ".length"
+            "link without extent",
+            got=link.tip,
+            expected="a tip away from the joint",
+            fix="give a length",
+            where=where + ".length",
         )
     check_inertia(link.mass, link.inertia, GYRATION_PER_EXTENT * extent, where)
     _check_com(link.com, GYRATION_PER_EXTENT * extent, where)
     if abs(math.hypot(*link.axis) - 1.0) > AXIS_TOLERANCE:
-        raise RobotError("axis not of unit length", got=link.axis, expected="a unit vector", fix="normalise it", where=where + ".axis")
+        raise RobotError(
+            "axis not of unit length",
+            got=link.axis,
+            expected="a unit vector",
+            fix="normalise it",
+            where=where + ".axis",
+        )
     if link.angle_min >= link.angle_max:
         got = [link.angle_min, link.angle_max]
         raise RobotError(
-            "limits not ordered", got=got, expected="angle_min < angle_max", fix="swap or correct them (rad)", where=where + ".angle_min"
+            "limits not ordered",
+            got=got,
+            expected="angle_min < angle_max",
+            fix="swap or correct them (rad)",
+            where=where + ".angle_min",
         )
 
 
@@ -119,11 +185,19 @@ def _check_laws(robot: Robot, at: str) -> None:
     if contact.law in DISSIPATIVE_LAWS and contact.restitution <= 0.0:
         fix = "give a positive value, or choose the hertz or constant_damping law"
         raise RobotError(
-            "no finite damping for this law", got=contact.restitution, expected="restitution > 0", fix=fix, where=at + "contact.restitution"
+            "no finite damping for this law",
+            got=contact.restitution,
+            expected="restitution > 0",
+            fix=fix,
+            where=at + "contact.restitution",
         )
     if solver.method == "rk4" and solver.step <= 0.0:
         raise RobotError(
-            "rk4 has no error control", got=solver.step, expected="a fixed step > 0 s", fix="set solver.step", where=at + "solver.step"
+            "rk4 has no error control",
+            got=solver.step,
+            expected="a fixed step > 0 s",
+            fix="set solver.step",
+            where=at + "solver.step",
         )
     if servo.torque_continuous > servo.torque_max:
         expected = f"at most torque_max = {servo.torque_max:g} N m"

@@ -4,7 +4,9 @@
 #include <string.h>
 
 static hxPlant *plant_of(hxComponent *component) { return (hxPlant *)component; }
-static const hxPlant *const_plant(const hxComponent *component) { return (const hxPlant *)component; }
+static const hxPlant *const_plant(const hxComponent *component) {
+  return (const hxPlant *)component;
+}
 
 hxComponent *hx_component_create(void) { return (hxComponent *)hx_plant_create(); }
 
@@ -23,7 +25,8 @@ hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *va
   return hx_plant_reset(plant_of(component), &variables->definition, t);
 }
 
-hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables, const hxInput *rate, double t_end) {
+hxStatus hx_component_step(hxComponent *component, const struct hxVariables *variables,
+                           const hxInput *rate, double t_end) {
   return hx_plant_step_ramp(plant_of(component), &variables->input, rate, t_end);
 }
 
@@ -31,19 +34,26 @@ void hx_component_output(hxComponent *component, struct hxVariables *variables) 
   hx_plant_output(plant_of(component), &variables->input, &variables->output);
 }
 
-double hx_component_time(const hxComponent *component) { return hx_plant_time(const_plant(component)); }
+double hx_component_time(const hxComponent *component) {
+  return hx_plant_time(const_plant(component));
+}
 
-const char *hx_component_message(const hxComponent *component) { return hx_plant_message(const_plant(component)); }
+const char *hx_component_message(const hxComponent *component) {
+  return hx_plant_message(const_plant(component));
+}
 
 size_t hx_component_state_size(void) { return hx_plant_state_size(); }
 
-void hx_component_get_state(const hxComponent *component, void *bytes) { hx_plant_get_state(const_plant(component), bytes); }
+void hx_component_get_state(const hxComponent *component, void *bytes) {
+  hx_plant_get_state(const_plant(component), bytes);
+}
 
 hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
   return hx_plant_set_state(plant_of(component), bytes, hx_plant_state_size());
 }
 
-/* ---------------------------------------------------------------------------------------------- model exchange */
+/* ----------------------------------------------------------------------------------------------
+ * model exchange */
 
 static void get_state(const hxComponent *component, struct hxVariables *variables) {
   hx_plant_get_coordinates(const_plant(component), &variables->state);
@@ -62,11 +72,14 @@ static void completed(hxComponent *component, const struct hxVariables *variable
   hx_plant_completed_step(plant_of(component), &variables->input);
 }
 
-static hxStatus step(hxComponent *component, const struct hxVariables *variables, double t_end, int stop, int *event) {
+static hxStatus step(hxComponent *component, const struct hxVariables *variables, double t_end,
+                     int stop, int *event) {
   return hx_plant_step_to_event(plant_of(component), &variables->input, t_end, stop, event);
 }
 
-static void indicate(const hxComponent *component, double indicator[]) { hx_plant_indicators(const_plant(component), indicator); }
+static void indicate(const hxComponent *component, double indicator[]) {
+  hx_plant_indicators(const_plant(component), indicator);
+}
 
 /* slack bristles are the only states that an event sets */
 static int update(hxComponent *component, struct hxVariables *variables) {
@@ -77,15 +90,16 @@ static int update(hxComponent *component, struct hxVariables *variables) {
   return 1;
 }
 
-static hxStatus tangent(hxComponent *component, const struct hxVariables *variables, const struct hxVariables *change,
-                        struct hxVariables *result) {
-  const hxStatus status =
-      hx_plant_tangent(plant_of(component), &variables->input, &change->input, &change->state, &result->rate, &result->output);
+static hxStatus tangent(hxComponent *component, const struct hxVariables *variables,
+                        const struct hxVariables *change, struct hxVariables *result) {
+  const hxStatus status = hx_plant_tangent(plant_of(component), &variables->input, &change->input,
+                                           &change->state, &result->rate, &result->output);
   memcpy(result->indicator, result->output.foot.penetration, sizeof result->indicator);
   return status;
 }
 
-static void integrals(hxComponent *component, const struct hxVariables *variables, struct hxVariables *result) {
+static void integrals(hxComponent *component, const struct hxVariables *variables,
+                      struct hxVariables *result) {
   hx_plant_integral_rates(plant_of(component), &variables->input, &result->output);
 }
 

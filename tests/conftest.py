@@ -1,4 +1,6 @@
-"""The built plant: one incremental CMake build a session, in build/test, with the probe of internal functions; the command."""
+"""The built plant: one incremental CMake build a session, in build/test, with the probe of
+internal functions; the command.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +21,34 @@ from hexapod_cosim.cosim.cli import main
 
 # what takes longest begins, so that no process is left with it in the end
 LONGEST = (
-    "test_docs", "test_long_walk", "test_walking", "test_endurance", "test_cli", "test_controller_design", "test_howto", "test_batch",
-    "test_readme", "test_control_benchmark", "test_examples", "test_laws_impact", "test_platforms", "test_robot_package",
-    "test_cli_endings", "test_study_cluster", "test_study_store", "test_study_workers", "test_random_robots",
-)  # fmt: skip
+    "test_docs",
+    "test_long_walk",
+    "test_walking",
+    "test_endurance",
+    "test_cli",
+    "test_controller_design",
+    "test_howto",
+    "test_batch",
+    "test_readme",
+    "test_control_benchmark",
+    "test_examples",
+    "test_laws_impact",
+    "test_platforms",
+    "test_robot_package",
+    "test_cli_endings",
+    "test_study_cluster",
+    "test_study_store",
+    "test_study_workers",
+    "test_random_robots",
+)
 # what builds the same binaries for other platforms stays together
 TOGETHER = dict.fromkeys(("test_platforms", "test_platform_walks", "test_cross_build"), "platforms")
 
 
 class Files(LoadScopeScheduling):  # type: ignore[misc]
-    """A file's tests, with their fixtures, stay in one process. (Groups by marks do nothing under pytest 9.2 with xdist 3.8.)"""
+    """A file's tests, with their fixtures, stay in one process. (Groups by marks do nothing
+    under pytest 9.2 with xdist 3.8.)
+    """
 
     def _split_scope(self, nodeid: str) -> str:
         stem = Path(nodeid.partition("::")[0]).stem
@@ -43,12 +63,18 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Files:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Order for several processes; in one everything is as it was."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        items.sort(key=lambda item: LONGEST.index(item.path.stem) if item.path.stem in LONGEST else len(LONGEST))
+        items.sort(
+            key=lambda item: (
+                LONGEST.index(item.path.stem) if item.path.stem in LONGEST else len(LONGEST)
+            )
+        )
 
 
 @pytest.fixture(scope="session")
 def plant_build() -> Path:
-    """build/test, up to date; also installed to build/plant, from where the exporter packs. Of several processes one builds."""
+    """build/test, up to date; also installed to build/plant, from where the exporter packs. Of
+    several processes one builds.
+    """
     try:
         return built()
     except BuildError as error:
@@ -102,7 +128,9 @@ def core(plant_build: Path) -> ctypes.CDLL:
 @pytest.fixture(scope="session")
 def controller_core(plant_build: Path) -> ctypes.CDLL:
     """controller.h as a shared library."""
-    return ctypes.CDLL(str(shared_library(plant_build, "controller_fmu", "libhexapod_controller_c")))
+    return ctypes.CDLL(
+        str(shared_library(plant_build, "controller_fmu", "libhexapod_controller_c"))
+    )
 
 
 @pytest.fixture

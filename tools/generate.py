@@ -1,4 +1,5 @@
-"""Writes plant_fmu/generated/ and controller_fmu/generated/ from their interface.toml, models/athena.toml and pyproject.toml's version.
+"""Writes plant_fmu/generated/ and controller_fmu/generated/ from their interface.toml,
+models/athena.toml and pyproject.toml's version.
 
 usage: python tools/generate.py [--check]
 
@@ -18,7 +19,10 @@ from hexapod_cosim.cosim.export.documentation import render_html
 from hexapod_cosim.cosim.export.export import start_values
 from hexapod_cosim.cosim.export.extras import PICTURES
 from hexapod_cosim.cosim.interface.arrays import arrays
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup, load_controller_interface
+from hexapod_cosim.cosim.interface.controller_interface import (
+    ControllerSetup,
+    load_controller_interface,
+)
 from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Variable, load_interface
 from hexapod_cosim.cosim.interface.model_description import render_fmi2
 from hexapod_cosim.cosim.interface.terminals import render_terminals
@@ -32,8 +36,12 @@ TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"
 
 def main() -> int:
     """Writes or checks; returns the exit code."""
-    parser = argparse.ArgumentParser(description="Generates plant_fmu/generated/ and controller_fmu/generated/.")
-    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a file is stale")
+    parser = argparse.ArgumentParser(
+        description="Generates plant_fmu/generated/ and controller_fmu/generated/."
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing; exit with 1 if a file is stale"
+    )
     check = parser.parse_args().check
     stale = stale_files()
     for path, text in stale.items():
@@ -46,14 +54,20 @@ def main() -> int:
 
 def stale_files() -> dict[Path, str]:
     """Path and text of the generated files that are missing or differ from what they should be."""
-    return {path: text for path, text in render_all().items() if not path.is_file() or path.read_text(encoding="utf-8") != text}
+    return {
+        path: text
+        for path, text in render_all().items()
+        if not path.is_file() or path.read_text(encoding="utf-8") != text
+    }
 
 
 def render_all() -> dict[Path, str]:
     """Every generated file's path and text."""
     robot = load_robot(DEFAULT_ROBOT)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
-    return render_component(load_interface(robot)) | render_component(load_controller_interface(setup))
+    return render_component(load_interface(robot)) | render_component(
+        load_controller_interface(setup)
+    )
 
 
 def render_component(interface: Interface) -> dict[Path, str]:
@@ -64,7 +78,9 @@ def render_component(interface: Interface) -> dict[Path, str]:
         folder / "variables.c": render_variables(interface, description.guid),
         folder / "defaults.c": render_defaults(interface),
         folder / "modelDescription.xml": description.xml,
-        folder / "index.html": render_html(interface, description.xml, picture=PICTURES[2], reference=interface.component is PLANT),
+        folder / "index.html": render_html(
+            interface, description.xml, picture=PICTURES[2], reference=interface.component is PLANT
+        ),
         folder / "terminalsAndIcons.xml": render_terminals(list(interface.by_name)),
         folder / "start_values.txt": start_values(interface, description.guid),
     }
@@ -73,31 +89,56 @@ def render_component(interface: Interface) -> dict[Path, str]:
 def render_structure(component: Component) -> str:
     """What the variables are fields of, as C."""
     kind = component.structure
-    lines = [_head("variables.h - what the FMU's variables are fields of."), "#ifndef HEXAPOD_GENERATED_VARIABLES_H"]
+    lines = [
+        _head("variables.h - what the FMU's variables are fields of."),
+        "#ifndef HEXAPOD_GENERATED_VARIABLES_H",
+    ]
     lines += ["#define HEXAPOD_GENERATED_VARIABLES_H", "", f'#include "{component.header}"', ""]
     if kind:
         lines += [f"typedef hx{kind}Input hxInput; /* what the FMI layer calls it */", ""]
-    lines += ["struct hxVariables {", f"  hx{kind}Definition definition; /* parameters */", "  hxInput input;", f"  hx{kind}Output output;"]
+    lines += [
+        "struct hxVariables {",
+        f"  hx{kind}Definition definition; /* parameters */",
+        "  hxInput input;",
+        f"  hx{kind}Output output;",
+    ]
     if component is PLANT:
-        lines += ["  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */"]
+        lines += [
+            "  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */"
+        ]
         lines += ["  double indicator[HX_LEGS]; /* events are its changes of sign */"]
     return "\n".join([*lines, "};", "", "#endif", ""])
 
 
 def render_variables(interface: Interface, guid: str) -> str:
     """The table of variables as C."""
-    lines = [_head("variables.c - every variable of the FMU: where it is and what it may be."), "#include <float.h>", ""]
+    lines = [
+        _head("variables.c - every variable of the FMU: where it is and what it may be."),
+        "#include <float.h>",
+        "",
+    ]
     lines += ['#include "fmi/variables.h"', ""]
     runs = {array.reference: len(array.elements) for array in arrays(interface)}
     for causality in CAUSALITIES:
-        if rows := [_row(variable, runs.get(variable.reference, 0)) for variable in interface.of_causality(causality)]:
+        if rows := [
+            _row(variable, runs.get(variable.reference, 0))
+            for variable in interface.of_causality(causality)
+        ]:
             lines += [f"static const hxVariable {causality}s[] = {{", *rows, "};", ""]
     lines += ["const hxSection hx_sections[HX_CAUSALITIES] = {"]
     for causality in CAUSALITIES:
         first, any_there = interface.first_reference[causality], interface.of_causality(causality)
-        row = f"{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s" if any_there else f"{first}, 0, 0"
+        row = (
+            f"{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s"
+            if any_there
+            else f"{first}, 0, 0"
+        )
         lines += [f"    [HX_{causality.upper()}] = {{{row}}},"]
-    lines += ["};", "", f"const unsigned hx_time_reference = {interface.first_reference['independent']};"]
+    lines += [
+        "};",
+        "",
+        f"const unsigned hx_time_reference = {interface.first_reference['independent']};",
+    ]
     lines += ["", "const char *const hx_log_category_names[] = {"]
     lines += [f'    "{name}",' for name in interface.log_categories]
     lines += ["};", "", *_states(interface)]
@@ -110,11 +151,20 @@ def _states(interface: Interface) -> list[str]:
     if not interface.states:
         return ["const hxStateRow *const hx_states = 0;", "const size_t hx_state_count = 0;", ""]
     rows = [
-        f"    {{{interface.variable(state.name).reference}, {interface.variable(state.name).nominal!r}}}," for state in interface.states
+        f"    {{{interface.variable(state.name).reference}, {interface.variable(state.name).nominal!r}}},"
+        for state in interface.states
     ]
-    lines = ["static const hxStateRow states[] = {", *rows, "};", "const hxStateRow *const hx_states = states;"]
+    lines = [
+        "static const hxStateRow states[] = {",
+        *rows,
+        "};",
+        "const hxStateRow *const hx_states = states;",
+    ]
     lines += ["const size_t hx_state_count = sizeof states / sizeof states[0];", ""]
-    lines += ['_Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");', ""]
+    lines += [
+        '_Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");',
+        "",
+    ]
     return lines
 
 
@@ -151,17 +201,38 @@ def render_defaults(interface: Interface) -> str:
     lines += ["const char *hx_version(void) {", f'  return "{interface.version}";', "}", ""]
     for member in ("definition", "input"):
         structure = f"hx{component.structure}{member.capitalize()}"
-        lines += [f"static const hxRange {member}_ranges[] = {{", *_ranges(interface, member, structure), "};", ""]
-        lines += [f"size_t hx_{component.prefix}{member}_ranges(const hxRange **range) {{", f"  *range = {member}_ranges;"]
+        lines += [
+            f"static const hxRange {member}_ranges[] = {{",
+            *_ranges(interface, member, structure),
+            "};",
+            "",
+        ]
+        lines += [
+            f"size_t hx_{component.prefix}{member}_ranges(const hxRange **range) {{",
+            f"  *range = {member}_ranges;",
+        ]
         lines += [f"  return sizeof {member}_ranges / sizeof {member}_ranges[0];", "}", ""]
     return "\n".join(lines)
 
 
 def _default(interface: Interface, member: str) -> Iterable[str]:
     """A structure's default values, and the function that hands them out."""
-    structure, function = f"hx{interface.component.structure}{member.capitalize()}", f"hx_{interface.component.prefix}{member}_default"
-    yield from (f"static const {structure} default_{member} = {{", *_initialisers(interface, member), "};", "")
-    yield from (f"void {function}({structure} *{member}) {{", f"  *{member} = default_{member};", "}", "")
+    structure, function = (
+        f"hx{interface.component.structure}{member.capitalize()}",
+        f"hx_{interface.component.prefix}{member}_default",
+    )
+    yield from (
+        f"static const {structure} default_{member} = {{",
+        *_initialisers(interface, member),
+        "};",
+        "",
+    )
+    yield from (
+        f"void {function}({structure} *{member}) {{",
+        f"  *{member} = default_{member};",
+        "}",
+        "",
+    )
 
 
 def _ranges(interface: Interface, member: str, structure: str) -> Iterable[str]:

@@ -1,9 +1,11 @@
-"""Writes what of the default robot's FMU is drawn or simulated rather than rendered: pictures and reference results.
+"""Writes what of the default robot's FMU is drawn or simulated rather than rendered: pictures and
+reference results.
 
 usage: python tools/generate_extras.py [--check]
 
-They go to plant_fmu/generated/, from where CMake packs them. Another library or compiler may change last digits, so --check, which
-writes nothing and exits with 1 if anything is stale, compares numbers and pixels. Needs the installed plant.
+They go to plant_fmu/generated/, from where CMake packs them. Another library or compiler may change
+last digits, so --check, which writes nothing and exits with 1 if anything is stale, compares
+numbers and pixels. Needs the installed plant.
 """
 
 from __future__ import annotations
@@ -30,10 +32,18 @@ GREY_LEVELS = 2.0  # mean difference between pictures that are the same to the e
 
 def main() -> int:
     """Writes or checks; returns the exit code."""
-    parser = argparse.ArgumentParser(description="Generates the pictures and reference results in plant_fmu/generated/.")
-    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a file is stale")
+    parser = argparse.ArgumentParser(
+        description="Generates the pictures and reference results in plant_fmu/generated/."
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing; exit with 1 if a file is stale"
+    )
     check = parser.parse_args().check
-    stale = {path: data for path, data in render_all().items() if not (path.is_file() and same(path.name, path.read_bytes(), data))}
+    stale = {
+        path: data
+        for path, data in render_all().items()
+        if not (path.is_file() and same(path.name, path.read_bytes(), data))
+    }
     for path, data in stale.items():
         print(f"{path}: {'stale; run tools/generate_extras.py' if check else 'written'}")
         if not check:
@@ -49,7 +59,9 @@ def render_all() -> dict[Path, bytes]:
     with TemporaryDirectory() as folder:
         reference = reference_members(interface, export_fmu(robot, Path(folder) / "athena.fmu"))
     files = {GENERATED / Path(name).name: data for name, data in pictures(interface).items()}
-    return files | {GENERATED / "reference" / Path(name).name: data for name, data in reference.items()}
+    return files | {
+        GENERATED / "reference" / Path(name).name: data for name, data in reference.items()
+    }
 
 
 def same(name: str, old: bytes, new: bytes) -> bool:
@@ -61,14 +73,20 @@ def same(name: str, old: bytes, new: bytes) -> bool:
 
 def same_picture(old: bytes, new: bytes) -> bool:
     """Whether two PNGs look the same."""
-    first, second = (np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"), dtype=float) for data in (old, new))
+    first, second = (
+        np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"), dtype=float) for data in (old, new)
+    )
     return first.shape == second.shape and float(np.abs(first - second).mean()) < GREY_LEVELS
 
 
 def same_results(old: bytes, new: bytes) -> bool:
-    """Whether two CSVs have the same columns, and numbers that differ by solver rounding at most."""
+    """Whether two CSVs have the same columns, and numbers that differ by solver rounding at
+    most.
+    """
     first, second = read_csv(old), read_csv(new)
-    return list(first) == list(second) and all(np.allclose(first[name], second[name], rtol=TOLERANCE, atol=TOLERANCE) for name in first)
+    return list(first) == list(second) and all(
+        np.allclose(first[name], second[name], rtol=TOLERANCE, atol=TOLERANCE) for name in first
+    )
 
 
 if __name__ == "__main__":

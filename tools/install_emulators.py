@@ -1,4 +1,6 @@
-"""Installs what `make test-platforms` runs foreign binaries with, from Debian's or Ubuntu's packages: Wine, qemu-user, an Arm C library."""
+"""Installs what `make test-platforms` runs foreign binaries with, from Debian's or Ubuntu's
+packages: Wine, qemu-user, an Arm C library.
+"""
 
 from __future__ import annotations
 
@@ -17,16 +19,30 @@ PACKAGES = {  # by what shows that a package is there
 
 def main() -> int:
     """Installs what is missing; returns the exit code."""
-    packages = [name for need, names in PACKAGES.items() if shutil.which(need) is None and not Path(need).exists() for name in names]
+    packages = [
+        name
+        for need, names in PACKAGES.items()
+        if shutil.which(need) is None and not Path(need).exists()
+        for name in names
+    ]
     if not packages:
         return 0
     command = ["apt-get", "install", "--yes", "--no-install-recommends", *packages]
     if shutil.which("apt-get") is None or os.geteuid() != 0:
-        expected = "apt-get and the rights of root" if shutil.which("apt-get") is None else "the rights of root"
-        print(f"missing: {', '.join(packages)}; to install them this needs {expected}. As root: {' '.join(command)}", file=sys.stderr)
+        expected = (
+            "apt-get and the rights of root"
+            if shutil.which("apt-get") is None
+            else "the rights of root"
+        )
+        print(
+            f"missing: {', '.join(packages)}; to install them this needs {expected}. As root: {' '.join(command)}",
+            file=sys.stderr,
+        )
         return 1
     subprocess.run(["apt-get", "update", "--quiet"], check=False)
-    return subprocess.run(command, check=False, env=os.environ | {"DEBIAN_FRONTEND": "noninteractive"}).returncode
+    return subprocess.run(
+        command, check=False, env=os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+    ).returncode
 
 
 if __name__ == "__main__":

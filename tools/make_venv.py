@@ -1,4 +1,5 @@
-"""Makes a virtual environment with pip, also where the system's Python comes without it (Debian keeps it in python3-venv).
+"""Makes a virtual environment with pip, also where the system's Python comes without it (Debian
+keeps it in python3-venv).
 
 usage: python3 tools/make_venv.py FOLDER
 
@@ -21,7 +22,9 @@ from pathlib import Path
 
 OLDEST = (3, 11)
 INDEX = os.environ.get("PIP_INDEX_URL", "https://pypi.org/simple").rstrip("/")
-WHEEL = re.compile(r'href="([^"#]*pip-([0-9.]+)-py3-none-any\.whl)#sha256=([0-9a-f]{64})"')  # address, release, checksum
+WHEEL = re.compile(
+    r'href="([^"#]*pip-([0-9.]+)-py3-none-any\.whl)#sha256=([0-9a-f]{64})"'
+)  # address, release, checksum
 
 
 def main() -> int:
@@ -31,7 +34,10 @@ def main() -> int:
         return 2
     if sys.version_info[:2] < OLDEST:
         found, needed = (".".join(map(str, version)) for version in (sys.version_info[:2], OLDEST))
-        print(f"Python too old: got {found}, expected {needed} or later; run make with PYTHON=/path/to/python3", file=sys.stderr)
+        print(
+            f"Python too old: got {found}, expected {needed} or later; run make with PYTHON=/path/to/python3",
+            file=sys.stderr,
+        )
         return 1
     folder = Path(sys.argv[1])
     if not has_pip(folder):
@@ -42,11 +48,19 @@ def main() -> int:
 def has_pip(folder: Path) -> bool:
     """Whether the environment's Python runs and has pip."""
     python = folder / "bin" / "python"
-    return python.exists() and subprocess.run([python, "-m", "pip", "--version"], capture_output=True, check=False).returncode == 0
+    return (
+        python.exists()
+        and subprocess.run(
+            [python, "-m", "pip", "--version"], capture_output=True, check=False
+        ).returncode
+        == 0
+    )
 
 
 def make(folder: Path) -> None:
-    """An environment with pip: the system's own copy, or else the newest one of the package index."""
+    """An environment with pip: the system's own copy, or else the newest one of the package
+    index.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     try:
         venv.create(folder, with_pip=True, symlinks=True)
@@ -59,7 +73,10 @@ def install_pip(folder: Path) -> None:
     """pip from the index, installed by itself: its wheel runs as it is."""
     with tempfile.TemporaryDirectory() as temporary:
         wheel = download_pip(Path(temporary))
-        subprocess.run([folder / "bin" / "python", wheel / "pip", "install", "--quiet", "--no-index", wheel], check=True)
+        subprocess.run(
+            [folder / "bin" / "python", wheel / "pip", "install", "--quiet", "--no-index", wheel],
+            check=True,
+        )
 
 
 def download_pip(folder: Path) -> Path:
@@ -67,7 +84,9 @@ def download_pip(folder: Path) -> Path:
     page = f"{INDEX}/pip/"
     with urllib.request.urlopen(page) as answer:
         links = WHEEL.findall(answer.read().decode("utf-8"))
-    link, release, checksum = max(links, key=lambda found: [int(part) for part in found[1].split(".")])
+    link, release, checksum = max(
+        links, key=lambda found: [int(part) for part in found[1].split(".")]
+    )
     with urllib.request.urlopen(urllib.parse.urljoin(page, link)) as answer:
         content = answer.read()
     if hashlib.sha256(content).hexdigest() != checksum:

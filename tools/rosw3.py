@@ -1,9 +1,11 @@
-"""Makes the coefficients of the method rosw3 (plant_fmu/src/method.c): those nearest to ROS34PW2's that keep order 3 with A_i formed anew.
+"""Makes the coefficients of the method rosw3 (plant_fmu/src/method.c): those nearest to ROS34PW2's
+that keep order 3 with A_i formed anew.
 
-ROS34PW2 (Rang and Angermann, BIT 45, 2005) is a W-method: order 3 with one inexact Jacobian A for all its stages. Here every stage has
-its own (its masses and joints are where the stage is), which asks for one condition more, sum b_i c_i gamma_i = 0; ROS34PW2 misses it by
-0.0025.
-Kept: gamma, the last stage's a = (0, 0, 1) and stiff accuracy (b = last row of a + g + gamma), so that it stays A- and L-stable.
+ROS34PW2 (Rang and Angermann, BIT 45, 2005) is a W-method: order 3 with one inexact Jacobian A for
+all its stages. Here every stage has its own (its masses and joints are where the stage is), which
+asks for one condition more, sum b_i c_i gamma_i = 0; ROS34PW2 misses it by 0.0025.
+Kept: gamma, the last stage's a = (0, 0, 1) and stiff accuracy (b = last row of a + g + gamma), so
+that it stays A- and L-stable.
 """
 
 from __future__ import annotations
@@ -41,7 +43,14 @@ def conditions(x: Array) -> Array:
     full, c = g + GAMMA * np.eye(4), a.sum(axis=1)
     rows = full.sum(axis=1)
     two = [b.sum() - 1.0, b @ c - 1.0 / 2.0, b @ rows]
-    three = [b @ c**2 - 1.0 / 3.0, b @ a @ c - 1.0 / 6.0, b @ a @ rows, b @ full @ c, b @ full @ rows, (b * c) @ rows]
+    three = [
+        b @ c**2 - 1.0 / 3.0,
+        b @ a @ c - 1.0 / 6.0,
+        b @ a @ rows,
+        b @ full @ c,
+        b @ full @ rows,
+        (b * c) @ rows,
+    ]
     return np.array([*two, *three])
 
 
@@ -49,13 +58,21 @@ def embedded_weights(x: Array) -> Array:
     """The weights nearest to ROS34PW2's embedded ones that have order 2 with any A."""
     a, g, _ = method(x)
     rows = np.vstack([np.ones(4), a.sum(axis=1), (g + GAMMA * np.eye(4)).sum(axis=1)])
-    return EMBEDDED + rows.T @ np.linalg.solve(rows @ rows.T, np.array([1.0, 0.5, 0.0]) - rows @ EMBEDDED)
+    return EMBEDDED + rows.T @ np.linalg.solve(
+        rows @ rows.T, np.array([1.0, 0.5, 0.0]) - rows @ EMBEDDED
+    )
 
 
 def main() -> None:
     solution = least_squares(conditions, START, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     a, g, b = method(solution.x)
-    for name, value in (("a", a), ("g", g), ("c", a.sum(axis=1)), ("b", b), ("e", b - embedded_weights(solution.x))):
+    for name, value in (
+        ("a", a),
+        ("g", g),
+        ("c", a.sum(axis=1)),
+        ("b", b),
+        ("e", b - embedded_weights(solution.x)),
+    ):
         print(name, [[float(entry) for entry in row] for row in np.atleast_2d(value)])
     print("largest condition left:", float(np.max(np.abs(conditions(solution.x)))))
 

@@ -1,4 +1,5 @@
-"""`make study-demo`: a study of 500 runs killed twice and completed; the same uninterrupted, and on a Dask cluster: the same bytes.
+"""`make study-demo`: a study of 500 runs killed twice and completed; the same uninterrupted, and on
+a Dask cluster: the same bytes.
 
 usage: python -m tools.study_demo FOLDER
 """
@@ -60,12 +61,28 @@ def main() -> int:
 
 def command(folder: Path, name: str, *more: str) -> list[str]:
     """A study into a part of the folder."""
-    return [sys.executable, "-m", "hexapod_cosim.cosim.cli", "study", str(folder / "study.toml"), "-o", str(folder / name), *more]
+    return [
+        sys.executable,
+        "-m",
+        "hexapod_cosim.cosim.cli",
+        "study",
+        str(folder / "study.toml"),
+        "-o",
+        str(folder / name),
+        *more,
+    ]
 
 
 def kill_at(folder: Path, least: int) -> None:
-    """Runs until so many runs are stored, then kills the program and its workers, who get no chance to do anything."""
-    process = subprocess.Popen(command(folder, "killed"), start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    """Runs until so many runs are stored, then kills the program and its workers, who get no
+    chance to do anything.
+    """
+    process = subprocess.Popen(
+        command(folder, "killed"),
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     while stored(folder) < least and process.poll() is None:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
@@ -75,15 +92,23 @@ def kill_at(folder: Path, least: int) -> None:
 
 def stored(folder: Path) -> int:
     """Runs in the parts of the study that is killed."""
-    return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / "killed" / "runs").glob("*.parquet"))
+    return sum(
+        pq.ParquetFile(path).metadata.num_rows
+        for path in (folder / "killed" / "runs").glob("*.parquet")
+    )
 
 
 def finish(folder: Path, name: str, *more: str) -> None:
     """Runs a study to its end and says how long it took."""
     begin = time.monotonic()
-    done = subprocess.run(command(folder, name, "--json", *more), check=True, stdout=subprocess.PIPE)
+    done = subprocess.run(
+        command(folder, name, "--json", *more), check=True, stdout=subprocess.PIPE
+    )
     summary = json.loads(done.stdout)
-    print(f"{name}: {summary['runs']} runs, walked {summary['walked']}, in {time.monotonic() - begin:.0f} s", flush=True)
+    print(
+        f"{name}: {summary['runs']} runs, walked {summary['walked']}, in {time.monotonic() - begin:.0f} s",
+        flush=True,
+    )
 
 
 @contextmanager
@@ -91,7 +116,10 @@ def cluster(folder: Path) -> Iterator[str]:
     """A Dask scheduler and two worker processes on loopback; the scheduler's address."""
     file = (folder / "scheduler.json").resolve()
     common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
-    starts = (["dask_scheduler", "--port", "0"], ["dask_worker", "--nworkers", "2", "--nthreads", "1"])
+    starts = (
+        ["dask_scheduler", "--port", "0"],
+        ["dask_worker", "--nworkers", "2", "--nthreads", "1"],
+    )
     processes = [
         subprocess.Popen(
             [sys.executable, "-m", f"distributed.cli.{name}", *words, *common],

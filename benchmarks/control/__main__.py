@@ -1,4 +1,6 @@
-"""`python -m benchmarks.control [--quick] [--only SECTION] [--tuning]`: walks the cases, prints the tables, writes them to docs and CSV."""
+"""`python -m benchmarks.control [--quick] [--only SECTION] [--tuning]`: walks the cases, prints
+the tables, writes them to docs and CSV.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,16 @@ from rich.console import Console
 from rich.progress import Progress
 
 from benchmarks import BUILD, ROOT
-from benchmarks.control.cases import DATA, ablation, grid, model_errors, robustness, seeds, sticking, tuning
+from benchmarks.control.cases import (
+    DATA,
+    ablation,
+    grid,
+    model_errors,
+    robustness,
+    seeds,
+    sticking,
+    tuning,
+)
 from benchmarks.control.measure import Measured, Section, measure
 from benchmarks.control.tables import changes_table, put_into, refused, robustness_table, write_csv
 from hexapod_cosim.models import HexapodError
@@ -24,7 +35,10 @@ QUICK_CASES = 8  # every n-th case of a section, from the last on: all parts, fo
 def sections() -> list[Section]:
     """Every table of the page."""
     judged = seeds("judged")
-    grids = [Section(name=f"grid {robot}", cases=grid(robot), seeds=judged) for robot in DATA["judged"]["robots"]]
+    grids = [
+        Section(name=f"grid {robot}", cases=grid(robot), seeds=judged)
+        for robot in DATA["judged"]["robots"]
+    ]
     return [
         Section(name="ablation", cases=ablation(), seeds=judged), *grids,
         Section(name="sticking", cases=sticking(), seeds=judged),
@@ -35,34 +49,61 @@ def sections() -> list[Section]:
 
 def tuning_sections() -> list[Section]:
     """What gains may be tuned on."""
-    return [Section(name=f"tuning {robot}", cases=tuning(robot), seeds=seeds("tuning")) for robot in DATA["tuning"]["robots"]]
+    return [
+        Section(name=f"tuning {robot}", cases=tuning(robot), seeds=seeds("tuning"))
+        for robot in DATA["tuning"]["robots"]
+    ]
 
 
 def quick(chosen: Sequence[Section]) -> list[Section]:
     """A few cases and seeds of each."""
     return [
-        Section(name=one.name, cases=list(one.cases)[:: -QUICK_CASES][::-1], seeds=one.seeds[:QUICK_SEEDS]) for one in chosen
-    ]  # fmt: skip
+        Section(
+            name=one.name,
+            cases=list(one.cases)[::-QUICK_CASES][::-1],
+            seeds=one.seeds[:QUICK_SEEDS],
+        )
+        for one in chosen
+    ]
 
 
 def tables(measured: Measured) -> dict[str, str]:
     """Markdown by section."""
-    return {name: (robustness_table if name == "robustness" else changes_table)(cases) for name, cases in measured.items()}
+    return {
+        name: (robustness_table if name == "robustness" else changes_table)(cases)
+        for name, cases in measured.items()
+    }
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """All tables, in some five minutes on two processors; --quick in a minute, into build/bench instead of docs and results."""
+    """All tables, in some five minutes on two processors; --quick in a minute, into build/bench
+    instead of docs and results.
+    """
     parser = argparse.ArgumentParser(prog="python -m benchmarks.control", description=main.__doc__)
-    parser.add_argument("--quick", action="store_true", help="few cases and seeds, short walks; docs and results stay as they are")
-    parser.add_argument("--only", metavar="SECTION", help="one table: " + ", ".join(one.name for one in sections()))
-    parser.add_argument("--tuning", action="store_true", help="the cases that gains may be tuned on; docs and results stay as they are")
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="few cases and seeds, short walks; docs and results stay as they are",
+    )
+    parser.add_argument(
+        "--only", metavar="SECTION", help="one table: " + ", ".join(one.name for one in sections())
+    )
+    parser.add_argument(
+        "--tuning",
+        action="store_true",
+        help="the cases that gains may be tuned on; docs and results stay as they are",
+    )
     given = parser.parse_args(arguments)
     offered = tuning_sections() if given.tuning else sections()
     chosen = [one for one in offered if given.only in {None, one.name}]
     if not chosen:
-        parser.error(f"no section {given.only!r}: choose one of " + ", ".join(one.name for one in offered))
+        parser.error(
+            f"no section {given.only!r}: choose one of " + ", ".join(one.name for one in offered)
+        )
     try:
-        measured = walked(quick(chosen) if given.quick else chosen, QUICK_CYCLES if given.quick else None)
+        measured = walked(
+            quick(chosen) if given.quick else chosen, QUICK_CYCLES if given.quick else None
+        )
         expect_walks(measured)
         kept = write(measured, page=None if given.quick or given.tuning else PAGE)
     except HexapodError as error:
@@ -78,14 +119,23 @@ def expect_walks(measured: Measured) -> None:
     for name, cases in measured.items():
         if all(map(refused, cases.values())):
             reason = next(run.reason for case in cases.values() for run in case.first)
-            raise HexapodError("no case of this table could be walked", got=reason, fix="mend that first; nothing was written", where=name)
+            raise HexapodError(
+                "no case of this table could be walked",
+                got=reason,
+                fix="mend that first; nothing was written",
+                where=name,
+            )
 
 
 def walked(chosen: Sequence[Section], cycles: float | None) -> Measured:
     """Measures with a progress bar on stderr."""
     with Progress(console=Console(stderr=True)) as bar:
         task = bar.add_task("runs", total=None)
-        return measure(chosen, cycles=cycles, tell=lambda done, total: bar.update(task, completed=done, total=total))
+        return measure(
+            chosen,
+            cycles=cycles,
+            tell=lambda done, total: bar.update(task, completed=done, total=total),
+        )
 
 
 def write(measured: Measured, *, page: Path | None) -> Path:

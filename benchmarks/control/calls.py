@@ -1,4 +1,6 @@
-"""What a call of the controller takes, within a co-simulation: `python -m benchmarks.control.calls`."""
+"""What a call of the controller takes, within a co-simulation: `python -m
+benchmarks.control.calls`.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,14 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller import BodyCommand, Controller, Gains, JointCommand, Measurement, make_gait
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Controller,
+    Gains,
+    JointCommand,
+    Measurement,
+    make_gait,
+)
 from hexapod_cosim.cosim.design.design import design_for
 from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.master.fmu import Fmu
@@ -39,16 +48,27 @@ class Timed:
 
 
 def call_times(fmu: Path, gains: Gains | None) -> NDArray[np.float64]:
-    """us    (steps,) of every call in a walk, the least of some walks: what else the machine does only adds to it"""
+    """us    (steps,) of every call in a walk, the least of some walks: what else the machine
+    does only adds to it
+    """
     scenario = load_scenario(SCENARIO)
     robot, schedule = load_robot(scenario.robot), make_schedule(scenario)
     walks = []
     for _ in range(REPEATS):
-        controller = Timed(Controller(robot, period=scenario.macro_step, gait=make_gait(robot), gains=gains))
+        controller = Timed(
+            Controller(robot, period=scenario.macro_step, gait=make_gait(robot), gains=gains)
+        )
         with Fmu(fmu) as plant:
             plant.initialise(0.0, scenario.duration)
             signals = Signals(plant)
-            run(plant, signals, controller, schedule, Recorder(signals, schedule.times, schedule.rows), h=scenario.macro_step)
+            run(
+                plant,
+                signals,
+                controller,
+                schedule,
+                Recorder(signals, schedule.times, schedule.rows),
+                h=scenario.macro_step,
+            )
         walks.append(controller.times)
     return np.asarray(1e6 * np.min(walks, axis=0))
 
@@ -58,9 +78,14 @@ def main() -> None:
     robot = load_robot(load_scenario(SCENARIO).robot)
     with TemporaryDirectory(prefix="hexapod-bench-") as folder:
         fmu = export_fmu(robot, Path(folder) / "robot.fmu")
-        for control, gains in (("kinematic", None), ("compliant", design_for(robot, load_scenario(SCENARIO).macro_step))):
+        for control, gains in (
+            ("kinematic", None),
+            ("compliant", design_for(robot, load_scenario(SCENARIO).macro_step)),
+        ):
             times = call_times(fmu, gains)
-            shown = ", ".join(f"{name} {np.percentile(times, share):.0f}" for name, share in SHARES.items())
+            shown = ", ".join(
+                f"{name} {np.percentile(times, share):.0f}" for name, share in SHARES.items()
+            )
             print(f"{control}: mean {times.mean():.0f} us, {shown}")
 
 

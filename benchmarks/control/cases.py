@@ -1,4 +1,6 @@
-"""The cases of scenarios.toml as settings over a scenario: one factor at a time around the judged walk, and the plane of gait and speed."""
+"""The cases of scenarios.toml as settings over a scenario: one factor at a time around the
+judged walk, and the plane of gait and speed.
+"""
 
 from __future__ import annotations
 
@@ -14,23 +16,34 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import load_robot
 
-DATA: dict[str, Any] = tomllib.loads((Path(__file__).parent / "scenarios.toml").read_text(encoding="utf-8"))
+DATA: dict[str, Any] = tomllib.loads(
+    (Path(__file__).parent / "scenarios.toml").read_text(encoding="utf-8")
+)
 PARTS = tuple(item.name for item in fields(Parts))
 SWITCH = "compliance."  # what begins so says nothing to kinematic control
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A walk to be walked under both controls: what is set over the scenario (as with --set), and under which name it is shown."""
+    """A walk to be walked under both controls: what is set over the scenario (as with --set),
+    and under which name it is shown.
+    """
 
     name: str
     scenario: str
     settings: tuple[str, ...]
 
     def plan(self, control: str, seed: int) -> Scenario:
-        """The scenario of a seed. Raises ScenarioError for a setting that this version does not know."""
-        kept = [text for text in self.settings if control == "compliant" or not text.startswith(SWITCH)]
-        scenario = load_scenario(self.scenario, overrides=[*kept, f"control={control}", f"seed={seed}", "outputs.plots=false"])
+        """The scenario of a seed. Raises ScenarioError for a setting that this version does not
+        know.
+        """
+        kept = [
+            text for text in self.settings if control == "compliant" or not text.startswith(SWITCH)
+        ]
+        scenario = load_scenario(
+            self.scenario,
+            overrides=[*kept, f"control={control}", f"seed={seed}", "outputs.plots=false"],
+        )
         return replace(scenario, variation=STANDARD)
 
 
@@ -49,20 +62,27 @@ def judged_walk(name: str = "judged", *settings: str) -> Case:
 def ablation() -> list[Case]:
     """No part, each part alone, all but each part, all parts."""
     off = {part: f"{SWITCH}{part}=false" for part in PARTS}
-    alone = [judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part)) for part in PARTS]
+    alone = [
+        judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part))
+        for part in PARTS
+    ]
     without = [judged_walk(f"all but {part}", text) for part, text in off.items()]
     return [judged_walk("no part", *off.values()), *alone, *without, judged_walk("all parts")]
 
 
 def sticking() -> list[Case]:
-    """The judged walk on ground that holds a foot still, with all parts and with the tangential PID alone."""
+    """The judged walk on ground that holds a foot still, with all parts and with the tangential
+    PID alone.
+    """
     law = DATA["judged"]["sticking"]
     alone = next(case for case in ablation() if case.name == "slip_pid alone")
     return [judged_walk("all parts", *law), judged_walk(alone.name, *law, *alone.settings)]
 
 
 def model_errors() -> list[Case]:
-    """The judged walk on plants that are not the controller's model: with all parts, and without the slip PID."""
+    """The judged walk on plants that are not the controller's model: with all parts, and without
+    the slip PID.
+    """
     entries = [entry for entry in DATA["robustness"]["cases"] if entry.get("model_error")]
     off = f"{SWITCH}slip_pid=false"
     return [
@@ -78,29 +98,55 @@ def robustness() -> list[Case]:
 
 
 def grid(robot: str) -> list[Case]:
-    """Of the judged set: every gait at every speed, then friction and payload around the judged walk."""
+    """Of the judged set: every gait at every speed, then friction and payload around the judged
+    walk.
+    """
     table, own = DATA["judged"], load_robot(robot)
-    frictions = [_walk(table, f"mu {mu:g}", robot, [f"friction.mu={mu}"]) for mu in table["mu"] if mu != own.friction.mu]
-    payloads = [_walk(table, f"payload {load:g} kg", robot, _payload(robot, load)) for load in table["payload"] if load]
+    frictions = [
+        _walk(table, f"mu {mu:g}", robot, [f"friction.mu={mu}"])
+        for mu in table["mu"]
+        if mu != own.friction.mu
+    ]
+    payloads = [
+        _walk(table, f"payload {load:g} kg", robot, _payload(robot, load))
+        for load in table["payload"]
+        if load
+    ]
     return [*_plane(table, robot, []), *frictions, *payloads]
 
 
 def tuning(robot: str) -> list[Case]:
-    """Of the tuning set: the same, where every case differs from every judged one in speed, friction, payload and timing at once."""
+    """Of the tuning set: the same, where every case differs from every judged one in speed,
+    friction, payload and timing at once.
+    """
     table = DATA["tuning"]
     (mu, *frictions), (load, *payloads) = table["mu"], table["payload"]
     gait, speed = next(iter(table["gaits"])), f"command.vx={table['vx'][0]}"
-    first = [f"gait.name={gait}", *table["gaits"][gait], speed, f"friction.mu={mu}", *_payload(robot, load)]
+    first = [
+        f"gait.name={gait}",
+        *table["gaits"][gait],
+        speed,
+        f"friction.mu={mu}",
+        *_payload(robot, load),
+    ]
     others = {f"mu {value:g}": [f"friction.mu={value}"] for value in frictions}
     others |= {f"payload {value:g} kg": _payload(robot, value) for value in payloads}
     others |= {f"period {value:g} s": [f"gait.period={value}"] for value in table["period"]}
     plane = _plane(table, robot, [f"friction.mu={mu}", *_payload(robot, load)])
-    return [*plane, *(_walk(table, name, robot, [*first, *changes]) for name, changes in others.items())]
+    return [
+        *plane,
+        *(_walk(table, name, robot, [*first, *changes]) for name, changes in others.items()),
+    ]
 
 
 def _plane(table: dict[str, Any], robot: str, rest: Sequence[str]) -> list[Case]:
     return [
-        _walk(table, f"{gait}, {vx:g} m/s", robot, [f"gait.name={gait}", *timing, f"command.vx={vx}", *rest])
+        _walk(
+            table,
+            f"{gait}, {vx:g} m/s",
+            robot,
+            [f"gait.name={gait}", *timing, f"command.vx={vx}", *rest],
+        )
         for gait, timing in table["gaits"].items()
         for vx in table["vx"]
     ]

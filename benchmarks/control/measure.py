@@ -1,4 +1,6 @@
-"""Cases walked under both controls, over seeds, in one batch: what several cases have in common is walked once."""
+"""Cases walked under both controls, over seeds, in one batch: what several cases have in common
+is walked once.
+"""
 
 from __future__ import annotations
 
@@ -30,26 +32,54 @@ class Section:
 Measured = Mapping[str, Mapping[str, Comparison]]  # by section, then case
 
 
-def measure(sections: Sequence[Section], *, cycles: float | None = None, workers: int | None = None, tell: Tell | None = None) -> Measured:
+def measure(
+    sections: Sequence[Section],
+    *,
+    cycles: float | None = None,
+    workers: int | None = None,
+    tell: Tell | None = None,
+) -> Measured:
     """Walks all cases of all sections. `cycles` of the gait replace the scenarios' own duration."""
-    places = [(section, case, control) for section in sections for case in section.cases for control in CONTROLS]
+    places = [
+        (section, case, control)
+        for section in sections
+        for case in section.cases
+        for control in CONTROLS
+    ]
     plans: dict[str, Scenario] = {}
-    wanted = [[_place(plans, case, control, seed, cycles) for seed in section.seeds] for section, case, control in places]
+    wanted = [
+        [_place(plans, case, control, seed, cycles) for seed in section.seeds]
+        for section, case, control in places
+    ]
     runs = dict(zip(plans, _walk(list(plans.values()), workers, tell), strict=True))
     found: dict[str, dict[str, Comparison]] = {section.name: {} for section in sections}
     walked = [[run if isinstance(run, Summary) else runs[run] for run in row] for row in wanted]
-    for (section, case, _), first, second in zip(places[::2], walked[::2], walked[1::2], strict=True):
+    for (section, case, _), first, second in zip(
+        places[::2], walked[::2], walked[1::2], strict=True
+    ):
         found[section.name][case.name] = compare_runs(first, second)
     return found
 
 
-def _place(plans: dict[str, Scenario], case: Case, control: str, seed: int, cycles: float | None) -> str | Summary:
-    """Where the run of a case will stand among the plans; a case that this version does not know is refused at once."""
+def _place(
+    plans: dict[str, Scenario], case: Case, control: str, seed: int, cycles: float | None
+) -> str | Summary:
+    """Where the run of a case will stand among the plans; a case that this version does not know
+    is refused at once.
+    """
     try:
         plan = case.plan(control, seed)
     except ScenarioError as error:
-        return Summary(control=control, seed=seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES)
-    plan = plan if cycles is None else replace(plan, duration=plan.macro_step * round(cycles * _period(plan) / plan.macro_step))
+        return Summary(
+            control=control, seed=seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES
+        )
+    plan = (
+        plan
+        if cycles is None
+        else replace(
+            plan, duration=plan.macro_step * round(cycles * _period(plan) / plan.macro_step)
+        )
+    )
     key = to_toml(plan.to_table())
     plans.setdefault(key, plan)
     return key

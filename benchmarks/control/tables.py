@@ -16,40 +16,76 @@ from hexapod_cosim.models import HexapodError
 
 # metric -> heading of its column
 COLUMNS = {
-    "slip_per_metre": "slip", "foot_error_stance": "feet, stance", "peak_force": "peak force", "loading_rate": "loading rate",
-    "path_error": "path error", "yaw_drift": "yaw drift", "height_rms": "height", "roll_rms": "roll", "pitch_rms": "pitch",
-    "cost_of_transport": "cost", "electrical_cost": "electrical cost", "servo_load_max": "hottest servo",
-}  # fmt: skip
+    "slip_per_metre": "slip",
+    "foot_error_stance": "feet, stance",
+    "peak_force": "peak force",
+    "loading_rate": "loading rate",
+    "path_error": "path error",
+    "yaw_drift": "yaw drift",
+    "height_rms": "height",
+    "roll_rms": "roll",
+    "pitch_rms": "pitch",
+    "cost_of_transport": "cost",
+    "electrical_cost": "electrical cost",
+    "servo_load_max": "hottest servo",
+}
 # metric -> heading, and what the figure is multiplied by for people
 PLAIN = {
-    "slip_per_metre": ("slip [mm/m]", 1e3), "height_rms": ("height [mm]", 1e3), "roll_rms": ("roll [mrad]", 1e3),
-    "pitch_rms": ("pitch [mrad]", 1e3), "path_error": ("path error [mm/m]", 1e3), "peak_force": ("peak force [BW]", 1.0),
-}  # fmt: skip
+    "slip_per_metre": ("slip [mm/m]", 1e3),
+    "height_rms": ("height [mm]", 1e3),
+    "roll_rms": ("roll [mrad]", 1e3),
+    "pitch_rms": ("pitch [mrad]", 1e3),
+    "path_error": ("path error [mm/m]", 1e3),
+    "peak_force": ("peak force [BW]", 1.0),
+}
 BEGIN, END = "<!-- control:{} -->", "<!-- /control:{} -->"
-LEGEND = (
-    "Changes from kinematic to compliant, means over {} seeds; ± half a 95 % interval where it shows; ≈ not sure, or too small to measure."
-)
+LEGEND = "Changes from kinematic to compliant, means over {} seeds; ± half a 95 % interval where it shows; ≈ not sure, or too small to measure."
 
 Cases = Mapping[str, Comparison]  # by name
 
 
 def changes_table(cases: Cases) -> str:
-    """A row per case: how many runs walked to the end under either control, and the change of every metric."""
-    rows = [[name, _walked(item), *(cell(key, item.changes[key]) for key in COLUMNS)] for name, item in cases.items() if not refused(item)]
-    return "\n\n".join(filter(None, [_markdown(["case", "walked", *COLUMNS.values()], rows), _legend(cases), _left_out(cases)]))
+    """A row per case: how many runs walked to the end under either control, and the change of
+    every metric.
+    """
+    rows = [
+        [name, _walked(item), *(cell(key, item.changes[key]) for key in COLUMNS)]
+        for name, item in cases.items()
+        if not refused(item)
+    ]
+    return "\n\n".join(
+        filter(
+            None,
+            [
+                _markdown(["case", "walked", *COLUMNS.values()], rows),
+                _legend(cases),
+                _left_out(cases),
+            ],
+        )
+    )
 
 
 def robustness_table(cases: Cases) -> str:
-    """A row per case: how many runs walked to the end, a few figures under either control, and how long compliance was given up."""
+    """A row per case: how many runs walked to the end, a few figures under either control, and
+    how long compliance was given up.
+    """
     headings = ["case", "walked", *(text for text, _ in PLAIN.values()), "fallback"]
-    rows = [[name, _walked(item), *_plain(item), _fallback(item)] for name, item in cases.items() if not refused(item)]
+    rows = [
+        [name, _walked(item), *_plain(item), _fallback(item)]
+        for name, item in cases.items()
+        if not refused(item)
+    ]
     note = "Kinematic → compliant, means over {} seeds. Fallback: share of the time in which a leg walked without feedback."
-    return "\n\n".join(filter(None, [_markdown(headings, rows), _legend(cases, note), _left_out(cases)]))
+    return "\n\n".join(
+        filter(None, [_markdown(headings, rows), _legend(cases, note), _left_out(cases)])
+    )
 
 
 def refused(comparison: Comparison) -> bool:
     """Whether a control could not begin at all."""
-    return any(all(run.status == REFUSED for run in runs) for runs in (comparison.first, comparison.second))
+    return any(
+        all(run.status == REFUSED for run in runs) for runs in (comparison.first, comparison.second)
+    )
 
 
 def cell(name: str, change: Change) -> str:
@@ -71,7 +107,12 @@ def _walked(comparison: Comparison) -> str:
 
 def _plain(comparison: Comparison) -> list[str]:
     changes = [(comparison.changes[name], scale) for name, (_, scale) in PLAIN.items()]
-    return [f"{_figure(scale * change.before)} → {_figure(scale * change.after)}" if change.pairs else "-" for change, scale in changes]
+    return [
+        f"{_figure(scale * change.before)} → {_figure(scale * change.after)}"
+        if change.pairs
+        else "-"
+        for change, scale in changes
+    ]
 
 
 def _figure(value: float) -> str:
@@ -89,17 +130,25 @@ def _legend(cases: Cases, text: str = LEGEND) -> str:
 
 def _left_out(cases: Cases) -> str:
     """What could not be walked, and why."""
-    lost = {name: next(run.reason for run in (*item.first, *item.second) if run.reason) for name, item in cases.items() if refused(item)}
+    lost = {
+        name: next(run.reason for run in (*item.first, *item.second) if run.reason)
+        for name, item in cases.items()
+        if refused(item)
+    }
     return "\n".join(f"- Left out: {name}. {reason}" for name, reason in lost.items())
 
 
 def _markdown(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join("| " + " | ".join(text.replace("|", "/") for text in line) + " |" for line in lines)
+    return "\n".join(
+        "| " + " | ".join(text.replace("|", "/") for text in line) + " |" for line in lines
+    )
 
 
 def put_into(page: Path, tables: Mapping[str, str]) -> None:
-    """Replaces what stands between the markers of each table; the rest of the page stays. Raises HexapodError for a missing marker."""
+    """Replaces what stands between the markers of each table; the rest of the page stays. Raises
+    HexapodError for a missing marker.
+    """
     text = page.read_text(encoding="utf-8")
     for name, table in tables.items():
         begin, end = BEGIN.format(name), END.format(name)
@@ -107,7 +156,12 @@ def put_into(page: Path, tables: Mapping[str, str]) -> None:
         _, closed, tail = rest.partition(end)
         if not found or not closed:
             missing = end if found else begin
-            raise HexapodError("the page has no place for a table", expected=f"a line {missing}", fix="add it", where=str(page))
+            raise HexapodError(
+                "the page has no place for a table",
+                expected=f"a line {missing}",
+                fix="add it",
+                where=str(page),
+            )
         text = f"{head}{begin}\n\n{table}\n\n{end}{tail}"
     write_text(page, text)
 
@@ -125,9 +179,17 @@ def _records(case: str, comparison: Comparison) -> Iterable[dict[str, Any]]:
     first, second = comparison.labels
     walked = {f"walked_{label}": number for label, number in comparison.walked.items()}
     for name, change in comparison.changes.items():
-        if METRICS[name][1] is not None:  # what the machine's load decides is no figure of the control
+        if (
+            METRICS[name][1] is not None
+        ):  # what the machine's load decides is no figure of the control
             means = {first: change.before, second: change.after}
-            yield {"case": case, "seeds": len(comparison.seeds)} | walked | {"metric": name} | means | change.as_table()
+            yield (
+                {"case": case, "seeds": len(comparison.seeds)}
+                | walked
+                | {"metric": name}
+                | means
+                | change.as_table()
+            )
 
 
 def _rounded(value: Any) -> Any:

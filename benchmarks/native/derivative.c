@@ -1,8 +1,11 @@
-/* derivative.c - microseconds of one evaluation of the right-hand side, by kernel: `derivative WALK REPEATS [KERNEL MULTIPLIERS]`
+/* derivative.c - microseconds of one evaluation of the right-hand side, by kernel: `derivative WALK
+ * REPEATS [KERNEL MULTIPLIERS]`
  *
- * Evaluated are the states of a walk, one after the other, so that neither the branch predictor nor the cache knows the answer. Prints a
- * JSON line, for each kernel that runs here {"plain": us, "multipliers": us}: the least of the repeats' means, since noise only ever adds.
- * With a kernel and 0 or 1 named, that is evaluated ROUNDS times at every state and nothing is printed: for counting instructions.
+ * Evaluated are the states of a walk, one after the other, so that neither the branch predictor nor
+ * the cache knows the answer. Prints a JSON line, for each kernel that runs here {"plain": us,
+ * "multipliers": us}: the least of the repeats' means, since noise only ever adds. With a kernel
+ * and 0 or 1 named, that is evaluated ROUNDS times at every state and nothing is printed: for
+ * counting instructions.
  */
 #include <string.h>
 
@@ -34,12 +37,14 @@ static int visit(const Walk *walk, Visited *visited) {
 }
 
 /* us of one evaluation; the results are summed so that none can be left out */
-__attribute__((noinline)) static double measure(const hxKernel *kernel, const Visited *visited, int multipliers, double *sum) {
+__attribute__((noinline)) static double measure(const hxKernel *kernel, const Visited *visited,
+                                                int multipliers, double *sum) {
   hxMotion rate;
   const double begin = seconds_now();
   for (int round = 0; round < ROUNDS; ++round) {
     for (int k = 0; k < visited->count; ++k) {
-      kernel->derivative(&visited->model, &visited->state[k], &visited->command[k], multipliers, &rate);
+      kernel->derivative(&visited->model, &visited->state[k], &visited->command[k], multipliers,
+                         &rate);
       *sum += rate.y[HX_V];
     }
   }

@@ -1,8 +1,10 @@
-/* driver.h - what all drivers share: the walk file, the clock, the command line and the JSON line they print
+/* driver.h - what all drivers share: the walk file, the clock, the command line and the JSON line
+ * they print
  *
  *     driver WALK METHOD STEP REPEATS PATH_OUT
  *
- * Timed is the loop over the macro-steps alone: hand over the commands, integrate, read the torso's position.
+ * Timed is the loop over the macro-steps alone: hand over the commands, integrate, read the torso's
+ * position.
  */
 #ifndef BENCH_DRIVER_H
 #define BENCH_DRIVER_H
@@ -24,11 +26,13 @@ typedef struct {
 /* One engine. Functions return 0 when they succeed; self is whatever the driver keeps. */
 typedef struct {
   int (*prepare)(void *self, const Walk *walk, const char *method, double step);
-  int (*start)(void *self);                                            /* the initial state at t = 0 */
+  int (*start)(void *self); /* the initial state at t = 0 */
   int (*advance)(void *self, const hxInput *input, double t_end);
-  void (*torso)(void *self, double position[3]);                       /* m  centre of mass */
-  double (*evaluations)(void *self);                                   /* of the right-hand side since start */
-  void (*evaluate)(void *self, const hxInput *input, int count); /* the right-hand side here, count times; NULL: not to be had alone */
+  void (*torso)(void *self, double position[3]); /* m  centre of mass */
+  double (*evaluations)(void *self); /* of the right-hand side since start */
+  void (*evaluate)(
+      void *self, const hxInput *input,
+      int count); /* the right-hand side here, count times; NULL: not to be had alone */
 } Driver;
 
 enum { STATES = 100, EVALUATIONS_A_STATE = 10 };
@@ -41,11 +45,13 @@ static inline double seconds_now(void) {
 
 static inline int walk_read(const char *path, Walk *walk) {
   FILE *file = fopen(path, "rb");
-  int good = file && fread(&walk->definition, sizeof walk->definition, 1, file) == 1 && fread(&walk->n, sizeof walk->n, 1, file) == 1 &&
+  int good = file && fread(&walk->definition, sizeof walk->definition, 1, file) == 1 &&
+             fread(&walk->n, sizeof walk->n, 1, file) == 1 &&
              fread(&walk->h, sizeof walk->h, 1, file) == 1 && walk->n > 0 && walk->n < 10000000;
   if (good) {
     walk->input = (hxInput *)malloc((size_t)walk->n * sizeof *walk->input);
-    good = walk->input && fread(walk->input, sizeof *walk->input, (size_t)walk->n, file) == (size_t)walk->n;
+    good = walk->input &&
+           fread(walk->input, sizeof *walk->input, (size_t)walk->n, file) == (size_t)walk->n;
   }
   if (file) fclose(file);
   if (!good) fprintf(stderr, "%s: no walk file of this hexapod.h; write it anew\n", path);
@@ -53,7 +59,8 @@ static inline int walk_read(const char *path, Walk *walk) {
 }
 
 /* Walks once; path: (n + 1) x 3. Returns 0, or 1 when the engine gave up. */
-static inline int walk_once(const Driver *driver, void *self, const Walk *walk, double *path, double *seconds) {
+static inline int walk_once(const Driver *driver, void *self, const Walk *walk, double *path,
+                            double *seconds) {
   if (driver->start(self)) return 1;
   const double begin = seconds_now();
   driver->torso(self, path);
@@ -65,7 +72,8 @@ static inline int walk_once(const Driver *driver, void *self, const Walk *walk, 
   return 0;
 }
 
-/* Mean time of an evaluation over a walk's first states, in microseconds; negative when there is none to be had. */
+/* Mean time of an evaluation over a walk's first states, in microseconds; negative when there is
+ * none to be had. */
 static inline double evaluation_time(const Driver *driver, void *self, const Walk *walk) {
   double seconds = 0.0;
   if (!driver->evaluate || driver->start(self)) return -1.0;
@@ -87,7 +95,8 @@ static inline int path_write(const char *name, const double *path, int64_t n) {
   return good ? 0 : 1;
 }
 
-static inline int driver_run(const Driver *driver, void *self, const Walk *walk, int repeats, double *path) {
+static inline int driver_run(const Driver *driver, void *self, const Walk *walk, int repeats,
+                             double *path) {
   double evaluations = 0.0;
   printf("{\"seconds\": [");
   for (int r = 0; r < repeats; ++r) {

@@ -1,20 +1,22 @@
-// idle_fmu.cpp - an FMU's binary that computes nothing: what a run of it takes is the master's own time
+// idle_fmu.cpp - an FMU's binary that computes nothing: what a run of it takes is the master's own
+// time
 #include <cstddef>
 
 extern "C" {
 #include "fmi2Functions.h"
 
-#define OK(name, ...)                                                                                                                      \
+#define OK(name, ...)                                                                              \
   fmi2Status name(__VA_ARGS__) { return fmi2OK; }
-#define VARIABLES(type)                                                                                                                    \
-  OK(fmi2Get##type, fmi2Component, const fmi2ValueReference[], size_t, fmi2##type[])                                                       \
+#define VARIABLES(type)                                                                            \
+  OK(fmi2Get##type, fmi2Component, const fmi2ValueReference[], size_t, fmi2##type[])               \
   OK(fmi2Set##type, fmi2Component, const fmi2ValueReference[], size_t, const fmi2##type[])
 
 static char instance;
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
-fmi2Component fmi2Instantiate(fmi2String, fmi2Type, fmi2String, fmi2String, const fmi2CallbackFunctions *, fmi2Boolean, fmi2Boolean) {
+fmi2Component fmi2Instantiate(fmi2String, fmi2Type, fmi2String, fmi2String,
+                              const fmi2CallbackFunctions *, fmi2Boolean, fmi2Boolean) {
   return &instance;
 }
 void fmi2FreeInstance(fmi2Component) {}
@@ -34,10 +36,12 @@ OK(fmi2FreeFMUstate, fmi2Component, fmi2FMUstate *)
 OK(fmi2SerializedFMUstateSize, fmi2Component, fmi2FMUstate, size_t *)
 OK(fmi2SerializeFMUstate, fmi2Component, fmi2FMUstate, fmi2Byte[], size_t)
 OK(fmi2DeSerializeFMUstate, fmi2Component, const fmi2Byte[], size_t, fmi2FMUstate *)
-OK(fmi2GetDirectionalDerivative, fmi2Component, const fmi2ValueReference[], size_t, const fmi2ValueReference[], size_t, const fmi2Real[],
-   fmi2Real[])
-OK(fmi2SetRealInputDerivatives, fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[], const fmi2Real[])
-OK(fmi2GetRealOutputDerivatives, fmi2Component, const fmi2ValueReference[], size_t, const fmi2Integer[], fmi2Real[])
+OK(fmi2GetDirectionalDerivative, fmi2Component, const fmi2ValueReference[], size_t,
+   const fmi2ValueReference[], size_t, const fmi2Real[], fmi2Real[])
+OK(fmi2SetRealInputDerivatives, fmi2Component, const fmi2ValueReference[], size_t,
+   const fmi2Integer[], const fmi2Real[])
+OK(fmi2GetRealOutputDerivatives, fmi2Component, const fmi2ValueReference[], size_t,
+   const fmi2Integer[], fmi2Real[])
 OK(fmi2DoStep, fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
 OK(fmi2CancelStep, fmi2Component)
 OK(fmi2GetStatus, fmi2Component, const fmi2StatusKind, fmi2Status *)

@@ -1,7 +1,9 @@
-/* instances.c - many plants in one process, stepped in turn: `instances WALK TOLERANCE COUNT` prints a JSON line
+/* instances.c - many plants in one process, stepped in turn: `instances WALK TOLERANCE COUNT`
+ * prints a JSON line
  *
- * {"microseconds_per_step": of one plant's macro-step, "bytes_per_instance": its structure, "resident_per_instance": by which the process
- * grew, null where the system does not tell, "allocations": in all steps together}. All plants walk the same walk: what grows is the memory
+ * {"microseconds_per_step": of one plant's macro-step, "bytes_per_instance": its structure,
+ * "resident_per_instance": by which the process grew, null where the system does not tell,
+ * "allocations": in all steps together}. All plants walk the same walk: what grows is the memory
  * they touch.
  */
 #include <unistd.h>
@@ -20,7 +22,9 @@ void *__wrap_realloc(void *block, size_t size);
 
 void *__wrap_malloc(size_t size) { return ++allocations, __real_malloc(size); }
 void *__wrap_calloc(size_t count, size_t size) { return ++allocations, __real_calloc(count, size); }
-void *__wrap_realloc(void *block, size_t size) { return ++allocations, __real_realloc(block, size); }
+void *__wrap_realloc(void *block, size_t size) {
+  return ++allocations, __real_realloc(block, size);
+}
 
 /* bytes of the process in memory; 0 where there is no /proc */
 static double resident(void) {
@@ -64,7 +68,8 @@ int main(int argc, char **argv) {
   for (int64_t k = 0; k < walk.n; ++k)
     if (step_all(plant, count, &walk, k)) return 1;
   const double seconds = seconds_now() - begin;
-  printf("{\"microseconds_per_step\": %.6f, \"bytes_per_instance\": %zu, \"allocations\": %ld, \"resident_per_instance\": ",
+  printf("{\"microseconds_per_step\": %.6f, \"bytes_per_instance\": %zu, \"allocations\": %ld, "
+         "\"resident_per_instance\": ",
          1e6 * seconds / ((double)walk.n * count), sizeof(hxPlant), allocations - before_steps);
   if (before > 0.0)
     printf("%.0f}\n", (resident() - before) / count);

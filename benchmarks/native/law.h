@@ -1,6 +1,8 @@
-/* law.h - the plant's laws for the peers, written from docs/equations.md and not from its sources: servo, contact, friction
+/* law.h - the plant's laws for the peers, written from docs/equations.md and not from its sources:
+ * servo, contact, friction
  *
- * Exact restitution, tanh friction, flat ground, servo in position mode; law_compile refuses anything else.
+ * Exact restitution, tanh friction, flat ground, servo in position mode; law_compile refuses
+ * anything else.
  */
 #ifndef BENCH_LAW_H
 #define BENCH_LAW_H
@@ -36,41 +38,54 @@ static inline double law_chi(double e) {
 }
 
 static inline int law_compile(Law *law, const hxDefinition *d) {
-  if (d->contact.law != HX_CONTACT_EXACT_RESTITUTION || d->friction.law != HX_FRICTION_TANH || d->terrain.kind != HX_TERRAIN_FLAT ||
-      d->servo.mode != HX_SERVO_POSITION) {
-    fprintf(stderr, "the peers know exact restitution, tanh friction, flat ground and position servos only\n");
+  if (d->contact.law != HX_CONTACT_EXACT_RESTITUTION || d->friction.law != HX_FRICTION_TANH ||
+      d->terrain.kind != HX_TERRAIN_FLAT || d->servo.mode != HX_SERVO_POSITION) {
+    fprintf(
+        stderr,
+        "the peers know exact restitution, tanh friction, flat ground and position servos only\n");
     return 1;
   }
-  law->stiffness = d->contact.stiffness, law->chi = law_chi(d->contact.restitution), law->floor = d->contact.impact_speed_floor;
+  law->stiffness = d->contact.stiffness, law->chi = law_chi(d->contact.restitution),
+  law->floor = d->contact.impact_speed_floor;
   law->mu = d->friction.mu, law->slope = d->friction.slope;
   law->ground = d->terrain.height, law->radius = d->foot_radius;
-  law->kp = d->servo.kp, law->kd = d->servo.kd, law->torque_max = d->servo.torque_max, law->speed_max = d->servo.speed_max;
+  law->kp = d->servo.kp, law->kd = d->servo.kd, law->torque_max = d->servo.torque_max,
+  law->speed_max = d->servo.speed_max;
   law->gear = d->servo.coulomb_friction;
   return 0;
 }
 
-static inline double law_within(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
+static inline double law_within(double x, double low, double high) {
+  return x < low ? low : x > high ? high : x;
+}
 
 /* N m  motor within its torque-speed line, and the gear's dry friction */
-static inline double law_servo(const Law *law, double angle, double speed, double angle_ref, double speed_ref, double torque_ref) {
+static inline double law_servo(const Law *law, double angle, double speed, double angle_ref,
+                               double speed_ref, double torque_ref) {
   const double wanted = law->kp * (angle_ref - angle) + law->kd * (speed_ref - speed) + torque_ref;
   const double load = speed / law->speed_max;
-  const double high = law->torque_max * law_within(1.0 - load, 0.0, 1.0), low = -law->torque_max * law_within(1.0 + load, 0.0, 1.0);
+  const double high = law->torque_max * law_within(1.0 - load, 0.0, 1.0),
+               low = -law->torque_max * law_within(1.0 + load, 0.0, 1.0);
   return law_within(wanted, low, high) - law->gear * tanh(speed / 0.05);
 }
 
-static inline double law_damping(const Law *law, double impact_speed) { return law->chi / fmax(impact_speed, law->floor); }
+static inline double law_damping(const Law *law, double impact_speed) {
+  return law->chi / fmax(impact_speed, law->floor);
+}
 
-/* Ground on foot [N], world axes: centre of the sphere and velocity of its lowest point. A foot that goes through the ground for the first
- * time within a step feels it at once, at its present speed: the peers do not stop at touch-downs. */
-static inline double law_foot(const Law *law, const LawFoot *foot, const double centre[3], const double velocity[3], double force[3]) {
+/* Ground on foot [N], world axes: centre of the sphere and velocity of its lowest point. A foot
+ * that goes through the ground for the first time within a step feels it at once, at its present
+ * speed: the peers do not stop at touch-downs. */
+static inline double law_foot(const Law *law, const LawFoot *foot, const double centre[3],
+                              const double velocity[3], double force[3]) {
   const double depth = law->radius - (centre[2] - law->ground), approach = -velocity[2];
   force[0] = force[1] = force[2] = 0.0;
   if (depth <= 0.0) return depth;
   const double damping = foot->closed ? foot->damping : law_damping(law, approach);
   const double normal = law->stiffness * depth * sqrt(depth) * fmax(1.0 + damping * approach, 0.0);
   const double slip = hypot(velocity[0], velocity[1]);
-  const double drag = law->mu * normal * (law->slope * slip < 1e-8 ? law->slope : tanh(law->slope * slip) / slip);
+  const double drag =
+      law->mu * normal * (law->slope * slip < 1e-8 ? law->slope : tanh(law->slope * slip) / slip);
   force[0] = -drag * velocity[0], force[1] = -drag * velocity[1], force[2] = normal;
   return depth;
 }

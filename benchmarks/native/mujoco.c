@@ -1,9 +1,10 @@
 /* mujoco.c - MuJoCo under the drivers' command line
  *
- * METHOD: "own-" or "law-", then an integrator of MuJoCo: implicitfast, RK4, Euler, implicit. STEP: its time step.
- * own: MuJoCo's contact, friction and servos as its users have them: a sphere on a plane, elliptic cone, default solref and solimp (about
- *      this foot's depth at rest), position actuators with force limits, dry friction of the gears as frictionloss.
- * law: the plant's laws (law.h) as a passive force, MuJoCo's contacts and constraints off.
+ * METHOD: "own-" or "law-", then an integrator of MuJoCo: implicitfast, RK4, Euler, implicit. STEP:
+ * its time step. own: MuJoCo's contact, friction and servos as its users have them: a sphere on a
+ * plane, elliptic cone, default solref and solimp (about this foot's depth at rest), position
+ * actuators with force limits, dry friction of the gears as frictionloss. law: the plant's laws
+ * (law.h) as a passive force, MuJoCo's contacts and constraints off.
  */
 #include <mujoco/mujoco.h>
 #include <string.h>
@@ -27,35 +28,42 @@ typedef struct {
 
 static MuJoCo *present; /* the callback has no argument of its own */
 
-/* ---- model ----------------------------------------------------------------------------------------------------------- */
+/* ---- model
+ * -----------------------------------------------------------------------------------------------------------
+ */
 
 typedef struct {
   char text[XML_SIZE];
   size_t size;
 } Xml;
 
-#define ADD(xml, ...) ((xml)->size += (size_t)snprintf((xml)->text + (xml)->size, XML_SIZE - (xml)->size, __VA_ARGS__))
+#define ADD(xml, ...)                                                                              \
+  ((xml)->size += (size_t)snprintf((xml)->text + (xml)->size, XML_SIZE - (xml)->size, __VA_ARGS__))
 
 static void add_inertial(Xml *xml, double mass, const double com[3], const double J[6]) {
-  ADD(xml, "<inertial mass='%.17g' pos='%.17g %.17g %.17g' fullinertia='%.17g %.17g %.17g %.17g %.17g %.17g'/>\n", mass, com[0], com[1],
-      com[2], J[0], J[1], J[2], J[3], J[4], J[5]);
+  ADD(xml,
+      "<inertial mass='%.17g' pos='%.17g %.17g %.17g' fullinertia='%.17g %.17g %.17g %.17g %.17g "
+      "%.17g'/>\n",
+      mass, com[0], com[1], com[2], J[0], J[1], J[2], J[3], J[4], J[5]);
 }
 
 static void add_foot(Xml *xml, const hxDefinition *d, const hxLink *tibia) {
-  ADD(xml, "<geom type='sphere' size='%.17g' pos='%.17g %.17g %.17g' friction='%.17g' condim='3'/>\n", d->foot_radius, tibia->length,
-      tibia->offset_y, tibia->offset_z, d->friction.mu);
+  ADD(xml,
+      "<geom type='sphere' size='%.17g' pos='%.17g %.17g %.17g' friction='%.17g' condim='3'/>\n",
+      d->foot_radius, tibia->length, tibia->offset_y, tibia->offset_z, d->friction.mu);
 }
 
 static void add_leg(Xml *xml, const hxDefinition *d, int i) {
   const hxLeg *leg = &d->leg[i];
-  ADD(xml, "<body pos='%.17g %.17g %.17g' quat='%.17g 0 0 %.17g'>\n", leg->hip_position[0], leg->hip_position[1], leg->hip_position[2],
-      cos(0.5 * leg->hip_yaw), sin(0.5 * leg->hip_yaw));
+  ADD(xml, "<body pos='%.17g %.17g %.17g' quat='%.17g 0 0 %.17g'>\n", leg->hip_position[0],
+      leg->hip_position[1], leg->hip_position[2], cos(0.5 * leg->hip_yaw), sin(0.5 * leg->hip_yaw));
   for (int j = 0; j < HX_JOINTS; ++j) {
     const hxLink *link = &leg->link[j];
-    ADD(xml, "<joint name='%d' axis='%.17g %.17g %.17g' armature='%.17g'/>\n", HX_JOINTS * i + j, link->axis[0], link->axis[1],
-        link->axis[2], d->servo.rotor_inertia);
+    ADD(xml, "<joint name='%d' axis='%.17g %.17g %.17g' armature='%.17g'/>\n", HX_JOINTS * i + j,
+        link->axis[0], link->axis[1], link->axis[2], d->servo.rotor_inertia);
     add_inertial(xml, link->mass, link->com, link->inertia);
-    if (j + 1 < HX_JOINTS) ADD(xml, "<body pos='%.17g %.17g %.17g'>\n", link->length, link->offset_y, link->offset_z);
+    if (j + 1 < HX_JOINTS)
+      ADD(xml, "<body pos='%.17g %.17g %.17g'>\n", link->length, link->offset_y, link->offset_z);
   }
   add_foot(xml, d, &leg->link[HX_JOINTS - 1]);
   ADD(xml, "</body></body></body>\n");
@@ -64,18 +72,26 @@ static void add_leg(Xml *xml, const hxDefinition *d, int i) {
 static void add_servos(Xml *xml, const hxDefinition *d) {
   ADD(xml, "<actuator>\n");
   for (int k = 0; k < HX_LEGS * HX_JOINTS; ++k)
-    ADD(xml, "<position joint='%d' kp='%.17g' kv='%.17g' forcelimited='true' forcerange='%.17g %.17g'/>\n", k, d->servo.kp, d->servo.kd,
-        -d->servo.torque_max, d->servo.torque_max);
+    ADD(xml,
+        "<position joint='%d' kp='%.17g' kv='%.17g' forcelimited='true' forcerange='%.17g "
+        "%.17g'/>\n",
+        k, d->servo.kp, d->servo.kd, -d->servo.torque_max, d->servo.torque_max);
   ADD(xml, "</actuator>\n");
 }
 
-static void write_model(Xml *xml, const hxDefinition *d, int own, const char *integrator, double step) {
+static void write_model(Xml *xml, const hxDefinition *d, int own, const char *integrator,
+                        double step) {
   xml->size = 0;
-  ADD(xml, "<mujoco><compiler angle='radian'/>\n<option timestep='%.17g' integrator='%s' cone='elliptic' gravity='%.17g %.17g %.17g'>",
+  ADD(xml,
+      "<mujoco><compiler angle='radian'/>\n<option timestep='%.17g' integrator='%s' "
+      "cone='elliptic' gravity='%.17g %.17g %.17g'>",
       step, integrator, d->gravity[0], d->gravity[1], d->gravity[2]);
   if (!own) ADD(xml, "<flag contact='disable' constraint='disable'/>");
-  ADD(xml, "</option>\n<default><joint frictionloss='%.17g'/></default>\n<worldbody>\n", own ? d->servo.coulomb_friction : 0.0);
-  ADD(xml, "<geom type='plane' size='0 0 1' pos='0 0 %.17g' friction='%.17g' condim='3'/>\n<body>\n<freejoint align='false'/>\n",
+  ADD(xml, "</option>\n<default><joint frictionloss='%.17g'/></default>\n<worldbody>\n",
+      own ? d->servo.coulomb_friction : 0.0);
+  ADD(xml,
+      "<geom type='plane' size='0 0 1' pos='0 0 %.17g' friction='%.17g' "
+      "condim='3'/>\n<body>\n<freejoint align='false'/>\n",
       d->terrain.height, d->friction.mu);
   add_inertial(xml, d->torso.mass, d->torso.com, d->torso.inertia);
   for (int i = 0; i < HX_LEGS; ++i) add_leg(xml, d, i);
@@ -95,11 +111,13 @@ static mjModel *load(const Xml *xml) {
   return model;
 }
 
-/* ---- the plant's law as a passive force ------------------------------------------------------------------------------ */
+/* ---- the plant's law as a passive force
+ * ------------------------------------------------------------------------------ */
 
 static void cross(const mjtNum *a, const mjtNum *b, mjtNum *c) { mju_cross(c, a, b); }
 
-/* J^T f of a force at a point of leg i: the torso's six entries (rotation in its own axes) and the leg's three hinges */
+/* J^T f of a force at a point of leg i: the torso's six entries (rotation in its own axes) and the
+ * leg's three hinges */
 static void push(const mjModel *m, mjData *d, int i, const mjtNum point[3], const mjtNum force[3]) {
   mjtNum arm[3], torque[3], local[3];
   mju_sub3(arm, point, d->xpos + 3);
@@ -128,8 +146,11 @@ static void feel_ground(const mjModel *m, mjData *d, MuJoCo *self, int i) {
   mju_sub3(arm, point, d->subtree_com + 3 * m->body_rootid[body]);
   cross(d->cvel + 6 * body, arm, velocity);
   mju_addTo3(velocity, d->cvel + 6 * body + 3);
-  if (self->fresh) law_switch(&self->law, &self->foot[i], self->law.radius - (centre[2] - self->law.ground), -velocity[2]);
-  if (law_foot(&self->law, &self->foot[i], centre, velocity, force) > 0.0) push(m, d, i, point, force);
+  if (self->fresh)
+    law_switch(&self->law, &self->foot[i], self->law.radius - (centre[2] - self->law.ground),
+               -velocity[2]);
+  if (law_foot(&self->law, &self->foot[i], centre, velocity, force) > 0.0)
+    push(m, d, i, point, force);
 }
 
 static void drive(mjData *d, const MuJoCo *self, int i) {
@@ -137,7 +158,8 @@ static void drive(mjData *d, const MuJoCo *self, int i) {
   for (int j = 0; j < HX_JOINTS; ++j) {
     const int k = HX_JOINTS * i + j;
     d->qfrc_passive[6 + k] +=
-        law_servo(&self->law, d->qpos[7 + k], d->qvel[6 + k], input->angle_ref[i][j], input->speed_ref[i][j], input->torque_ref[i][j]);
+        law_servo(&self->law, d->qpos[7 + k], d->qvel[6 + k], input->angle_ref[i][j],
+                  input->speed_ref[i][j], input->torque_ref[i][j]);
   }
 }
 
@@ -150,7 +172,9 @@ static void apply_law(const mjModel *m, mjData *d) {
   self->fresh = 0;
 }
 
-/* ---- driver ---------------------------------------------------------------------------------------------------------- */
+/* ---- driver
+ * ----------------------------------------------------------------------------------------------------------
+ */
 
 static int prepare(void *self, const Walk *walk, const char *method, double step) {
   static Xml xml;
@@ -178,7 +202,8 @@ static void set_pose(const hxDefinition *definition, mjData *d) {
   mju_rotVecQuat(offset, definition->torso.com, quaternion);
   mju_sub3(d->qpos, definition->initial.position, offset);
   mju_copy4(d->qpos + 3, quaternion);
-  for (int i = 0; i < HX_LEGS; ++i) mju_copy3(d->qpos + 7 + HX_JOINTS * i, definition->initial.angle[i]);
+  for (int i = 0; i < HX_LEGS; ++i)
+    mju_copy3(d->qpos + 7 + HX_JOINTS * i, definition->initial.angle[i]);
 }
 
 /* walks start at rest: the velocities stay zero */
@@ -195,10 +220,13 @@ static int start(void *self) {
 }
 
 static void set_servos(MuJoCo *mujoco, const hxInput *input) {
-  const double lead = mujoco->definition->servo.kd / mujoco->definition->servo.kp; /* s  puts kd speed_ref into the position */
+  const double lead = mujoco->definition->servo.kd /
+                      mujoco->definition->servo.kp; /* s  puts kd speed_ref into the position */
   if (!mujoco->own) return;
   for (int i = 0; i < HX_LEGS; ++i)
-    for (int j = 0; j < HX_JOINTS; ++j) mujoco->data->ctrl[HX_JOINTS * i + j] = input->angle_ref[i][j] + lead * input->speed_ref[i][j];
+    for (int j = 0; j < HX_JOINTS; ++j)
+      mujoco->data->ctrl[HX_JOINTS * i + j] =
+          input->angle_ref[i][j] + lead * input->speed_ref[i][j];
 }
 
 static int advance(void *self, const hxInput *input, double t_end) {
@@ -212,7 +240,8 @@ static int advance(void *self, const hxInput *input, double t_end) {
     mj_step(mujoco->model, mujoco->data);
     mujoco->evaluations += stages;
   }
-  return mujoco->data->warning[mjWARN_BADQACC].number > 0 || mujoco->data->warning[mjWARN_BADQPOS].number > 0;
+  return mujoco->data->warning[mjWARN_BADQACC].number > 0 ||
+         mujoco->data->warning[mjWARN_BADQPOS].number > 0;
 }
 
 static void torso(void *self, double position[3]) {

@@ -1,6 +1,8 @@
-// pinocchio.cpp - Pinocchio's articulated-body algorithm with the plant's laws (law.h) under the drivers' command line
+// pinocchio.cpp - Pinocchio's articulated-body algorithm with the plant's laws (law.h) under the
+// drivers' command line
 //
-// METHOD: rk4, semi-implicit. STEP: step size. An evaluation is kinematics, servos, six contacts and ABA with external forces.
+// METHOD: rk4, semi-implicit. STEP: step size. An evaluation is kinematics, servos, six contacts
+// and ABA with external forces.
 #include <cstring>
 #include <memory>
 #include <string>
@@ -52,12 +54,15 @@ pinocchio::Inertia inertia(double mass, const double *com, const double *J) {
 }
 
 // The cheap joint of an axis of the frame, turned round where it points back; else the general one.
-pinocchio::JointIndex add_joint(Engine &engine, pinocchio::JointIndex parent, const pinocchio::SE3 &placement, const Vector3d &axis,
-                                double *sign, const std::string &name) {
+pinocchio::JointIndex add_joint(Engine &engine, pinocchio::JointIndex parent,
+                                const pinocchio::SE3 &placement, const Vector3d &axis, double *sign,
+                                const std::string &name) {
   int k = 0;
   axis.cwiseAbs().maxCoeff(&k);
   *sign = 1.0;
-  if (axis.cwiseAbs()[k] < axis.norm()) return engine.model.addJoint(parent, pinocchio::JointModelRevoluteUnaligned(axis), placement, name);
+  if (axis.cwiseAbs()[k] < axis.norm())
+    return engine.model.addJoint(parent, pinocchio::JointModelRevoluteUnaligned(axis), placement,
+                                 name);
   *sign = axis[k] < 0.0 ? -1.0 : 1.0;
   if (k == 0) return engine.model.addJoint(parent, pinocchio::JointModelRX(), placement, name);
   if (k == 1) return engine.model.addJoint(parent, pinocchio::JointModelRY(), placement, name);
@@ -66,21 +71,27 @@ pinocchio::JointIndex add_joint(Engine &engine, pinocchio::JointIndex parent, co
 
 void add_leg(Engine &engine, pinocchio::JointIndex torso, int i) {
   const hxLeg &leg = engine.definition->leg[i];
-  pinocchio::SE3 placement(Eigen::AngleAxisd(leg.hip_yaw, Vector3d::UnitZ()).toRotationMatrix(), vector(leg.hip_position));
+  pinocchio::SE3 placement(Eigen::AngleAxisd(leg.hip_yaw, Vector3d::UnitZ()).toRotationMatrix(),
+                           vector(leg.hip_position));
   pinocchio::JointIndex parent = torso;
   for (int j = 0; j < HX_JOINTS; ++j) {
     const hxLink &link = leg.link[j];
     const std::string name = std::to_string(HX_JOINTS * i + j);
-    parent = engine.joint[i][j] = add_joint(engine, parent, placement, vector(link.axis), &engine.sign[i][j], name);
-    engine.model.appendBodyToJoint(parent, inertia(link.mass, link.com, link.inertia), pinocchio::SE3::Identity());
-    placement = pinocchio::SE3(Matrix3d::Identity(), Vector3d(link.length, link.offset_y, link.offset_z));
+    parent = engine.joint[i][j] =
+        add_joint(engine, parent, placement, vector(link.axis), &engine.sign[i][j], name);
+    engine.model.appendBodyToJoint(parent, inertia(link.mass, link.com, link.inertia),
+                                   pinocchio::SE3::Identity());
+    placement =
+        pinocchio::SE3(Matrix3d::Identity(), Vector3d(link.length, link.offset_y, link.offset_z));
   }
 }
 
 void build(Engine &engine) {
   const hxDefinition &d = *engine.definition;
-  const auto torso = engine.model.addJoint(0, pinocchio::JointModelFreeFlyer(), pinocchio::SE3::Identity(), "torso");
-  engine.model.appendBodyToJoint(torso, inertia(d.torso.mass, d.torso.com, d.torso.inertia), pinocchio::SE3::Identity());
+  const auto torso = engine.model.addJoint(0, pinocchio::JointModelFreeFlyer(),
+                                           pinocchio::SE3::Identity(), "torso");
+  engine.model.appendBodyToJoint(torso, inertia(d.torso.mass, d.torso.com, d.torso.inertia),
+                                 pinocchio::SE3::Identity());
   for (int i = 0; i < HX_LEGS; ++i) add_leg(engine, torso, i);
   engine.model.gravity.linear(vector(d.gravity));
   engine.model.armature.tail(HX_LEGS * HX_JOINTS).setConstant(d.servo.rotor_inertia);
@@ -88,7 +99,8 @@ void build(Engine &engine) {
   engine.external.assign(static_cast<std::size_t>(engine.model.njoints), pinocchio::Force::Zero());
 }
 
-// Centre [m] and velocity of the lowest point of a foot, and the arm of that point from the tibia's joint, world axes.
+// Centre [m] and velocity of the lowest point of a foot, and the arm of that point from the tibia's
+// joint, world axes.
 void foot_motion(const Engine &engine, int i, Vector3d &centre, Vector3d &arm, Vector3d &velocity) {
   const hxLink &tibia = engine.definition->leg[i].link[HX_JOINTS - 1];
   const auto joint = engine.joint[i][HX_JOINTS - 1];
@@ -97,7 +109,8 @@ void foot_motion(const Engine &engine, int i, Vector3d &centre, Vector3d &arm, V
   centre = placement.translation() + arm;
   arm[2] -= engine.law.radius;
   const pinocchio::Motion &local = engine.data->v[joint];
-  velocity = placement.rotation() * local.linear() + (placement.rotation() * local.angular()).cross(arm);
+  velocity =
+      placement.rotation() * local.linear() + (placement.rotation() * local.angular()).cross(arm);
 }
 
 void feel_ground(Engine &engine, int i) {
@@ -107,7 +120,8 @@ void feel_ground(Engine &engine, int i) {
   const double depth = engine.law.radius - (centre[2] - engine.law.ground);
   if (engine.fresh) law_switch(&engine.law, &engine.foot[i], depth, -velocity[2]);
   engine.external[joint].setZero();
-  if (law_foot(&engine.law, &engine.foot[i], centre.data(), velocity.data(), force.data()) <= 0.0) return;
+  if (law_foot(&engine.law, &engine.foot[i], centre.data(), velocity.data(), force.data()) <= 0.0)
+    return;
   const Matrix3d &R = engine.data->oMi[joint].rotation();
   engine.external[joint].linear() = R.transpose() * force;
   engine.external[joint].angular() = R.transpose() * arm.cross(force);
@@ -119,8 +133,9 @@ Vector24 servo_torques(const Engine &engine, const State &state, const hxInput &
     for (int j = 0; j < HX_JOINTS; ++j) {
       const int k = HX_JOINTS * i + j;
       const double sign = engine.sign[i][j];
-      torque[6 + k] = sign * law_servo(&engine.law, sign * state.q[7 + k], sign * state.v[6 + k], input.angle_ref[i][j],
-                                       input.speed_ref[i][j], input.torque_ref[i][j]);
+      torque[6 + k] =
+          sign * law_servo(&engine.law, sign * state.q[7 + k], sign * state.v[6 + k],
+                           input.angle_ref[i][j], input.speed_ref[i][j], input.torque_ref[i][j]);
     }
   return torque;
 }
@@ -131,7 +146,8 @@ Vector24 acceleration(Engine &engine, const State &state, const hxInput &input) 
   for (int i = 0; i < HX_LEGS; ++i) feel_ground(engine, i);
   engine.fresh = false;
   engine.evaluations += 1.0;
-  return pinocchio::aba(engine.model, *engine.data, state.q, state.v, servo_torques(engine, state, input), engine.external);
+  return pinocchio::aba(engine.model, *engine.data, state.q, state.v,
+                        servo_torques(engine, state, input), engine.external);
 }
 
 // dq/dt
@@ -197,7 +213,8 @@ int start(void *self) {
   engine.state.v.setZero();
   for (int i = 0; i < HX_LEGS; ++i) {
     engine.foot[i] = LawFoot{};
-    for (int j = 0; j < HX_JOINTS; ++j) engine.state.q[7 + HX_JOINTS * i + j] = engine.sign[i][j] * d.initial.angle[i][j];
+    for (int j = 0; j < HX_JOINTS; ++j)
+      engine.state.q[7 + HX_JOINTS * i + j] = engine.sign[i][j] * d.initial.angle[i][j];
   }
   engine.time = engine.evaluations = 0.0;
   return 0;
@@ -222,7 +239,8 @@ int advance(void *self, const hxInput *input, double t_end) {
 void torso(void *self, double position[3]) {
   const Engine &engine = *static_cast<Engine *>(self);
   const Vector25 &q = engine.state.q;
-  const Vector3d r = q.head<3>() + Quaterniond(q[6], q[3], q[4], q[5]) * vector(engine.definition->torso.com);
+  const Vector3d r =
+      q.head<3>() + Quaterniond(q[6], q[3], q[4], q[5]) * vector(engine.definition->torso.com);
   std::memcpy(position, r.data(), sizeof(double) * 3);
 }
 

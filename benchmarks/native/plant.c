@@ -1,6 +1,7 @@
 /* plant.c - this plant under the drivers' command line
  *
- * METHOD: a method's name, error control with the tolerance STEP; with "-fixed" appended, steps of STEP seconds.
+ * METHOD: a method's name, error control with the tolerance STEP; with "-fixed" appended, steps of
+ * STEP seconds.
  */
 #include <string.h>
 
@@ -16,9 +17,11 @@ static const struct {
   const char *name;
   int method, fixed;
 } methods[] = {
-    {"rosw3", HX_METHOD_ROSW3, 0},     {"rosw3-fixed", HX_METHOD_ROSW3, 1}, {"ros2", HX_METHOD_ROS2, 0},
-    {"ros2-fixed", HX_METHOD_ROS2, 1}, {"dp54", HX_METHOD_DP54, 0},         {"dp54-fixed", HX_METHOD_DP54, 1},
-    {"bs32", HX_METHOD_BS32, 0},       {"bs32-fixed", HX_METHOD_BS32, 1},   {"rk4-fixed", HX_METHOD_RK4, 1},
+    {"rosw3", HX_METHOD_ROSW3, 0},   {"rosw3-fixed", HX_METHOD_ROSW3, 1},
+    {"ros2", HX_METHOD_ROS2, 0},     {"ros2-fixed", HX_METHOD_ROS2, 1},
+    {"dp54", HX_METHOD_DP54, 0},     {"dp54-fixed", HX_METHOD_DP54, 1},
+    {"bs32", HX_METHOD_BS32, 0},     {"bs32-fixed", HX_METHOD_BS32, 1},
+    {"rk4-fixed", HX_METHOD_RK4, 1},
 };
 
 static int prepare(void *self, const Walk *walk, const char *method, double step) {

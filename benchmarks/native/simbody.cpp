@@ -1,15 +1,19 @@
 // simbody.cpp - a walk in Simbody with the plant's laws (law.h), under the drivers' command line
 //
-// METHOD: CPodesBDF, RungeKuttaMerson, RungeKutta3, SemiExplicitEuler2, STEP: accuracy; SemiExplicitEuler, STEP: step size.
-// An evaluation is realize(Acceleration): kinematics, servos, contacts, rotors and the articulated bodies.
+// METHOD: CPodesBDF, RungeKuttaMerson, RungeKutta3, SemiExplicitEuler2, STEP: accuracy;
+// SemiExplicitEuler, STEP: step size. An evaluation is realize(Acceleration): kinematics, servos,
+// contacts, rotors and the articulated bodies.
 //
-// The tree is Simbody's: a Free mobiliser for the torso, a Pin for every joint, link frames at their joints. The law is one Force::Custom;
-// touch-downs are located by a TriggeredEventHandler, which samples the impact speed there. A command's end stops a one-step method (a
-// PeriodicEventHandler); the multistep one runs over it under its error control, since a restart at order 1 every 5 ms made it 4 x slower.
+// The tree is Simbody's: a Free mobiliser for the torso, a Pin for every joint, link frames at
+// their joints. The law is one Force::Custom; touch-downs are located by a TriggeredEventHandler,
+// which samples the impact speed there. A command's end stops a one-step method (a
+// PeriodicEventHandler); the multistep one runs over it under its error control, since a restart at
+// order 1 every 5 ms made it 4 x slower.
 //
-// Simbody has no reflected inertia, and here the rotors outweigh the links. A rotor body behind a Constraint::CoordinateCoupler would
-// double the bodies and add 18 constraints; an inertia added to the links would be another robot. So the rotors act as what they are,
-// mobility forces -J_r qdd, with qdd solved beforehand from Simbody's own operators (see Rotors).
+// Simbody has no reflected inertia, and here the rotors outweigh the links. A rotor body behind a
+// Constraint::CoordinateCoupler would double the bodies and add 18 constraints; an inertia added to
+// the links would be another robot. So the rotors act as what they are, mobility forces -J_r qdd,
+// with qdd solved beforehand from Simbody's own operators (see Rotors).
 #include <Simbody.h>
 
 #include <algorithm>
@@ -31,7 +35,8 @@ namespace {
 constexpr int base = 6; // the torso's mobilities, the first ones
 constexpr int timed_evaluations = 2000;
 
-// ---------------------------------------------------------------------------------------------- robot
+// ----------------------------------------------------------------------------------------------
+// robot
 
 Inertia inertia_of(const double J[6]) { return Inertia(J[0], J[1], J[2], J[3], J[4], J[5]); }
 
@@ -84,7 +89,8 @@ private:
       const Rotation axis(UnitVec3(Vec3::getAs(link.axis)), ZAxis);
       axes[leg][joint] = axis.z().asVec3();
       const Body::Rigid body(mass_properties(link.mass, Vec3::getAs(link.com), link.inertia));
-      pins[leg][joint] = MobilizedBody::Pin(parent, Transform(zero * axis, place), body, Transform(axis));
+      pins[leg][joint] =
+          MobilizedBody::Pin(parent, Transform(zero * axis, place), body, Transform(axis));
       parent = pins[leg][joint];
       place = tip_of(link);
     }
@@ -92,9 +98,11 @@ private:
   }
 };
 
-// ---------------------------------------------------------------------------------------------- law
+// ----------------------------------------------------------------------------------------------
+// law
 
-// All a run needs; its discrete state, the command's number and the feet, is changed by the event handlers.
+// All a run needs; its discrete state, the command's number and the feet, is changed by the event
+// handlers.
 struct Setup {
   const Robot &robot;
   const Walk &walk;
@@ -104,16 +112,20 @@ struct Setup {
   LawFoot foot[HX_LEGS] = {};
 
   Setup(const Robot &r, const Walk &w, bool restart) : robot(r), walk(w), restarts(restart) {
-    if (law_compile(&law, &w.definition)) throw std::runtime_error("walk: another law than the peers'");
+    if (law_compile(&law, &w.definition))
+      throw std::runtime_error("walk: another law than the peers'");
   }
 
   const hxInput &input(double time) const { return walk.input[restarts ? command : number(time)]; }
 
   // of the command that begins at a time or is in force there
-  std::int64_t number(double time) const { return std::min(static_cast<std::int64_t>(std::floor(time / walk.h + 1e-9)), walk.n - 1); }
+  std::int64_t number(double time) const {
+    return std::min(static_cast<std::int64_t>(std::floor(time / walk.h + 1e-9)), walk.n - 1);
+  }
 
   double depth(const State &state, int leg) const {
-    return law.radius - (robot.tibia(leg).findStationLocationInGround(state, robot.foot[leg])[2] - law.ground);
+    return law.radius -
+           (robot.tibia(leg).findStationLocationInGround(state, robot.foot[leg])[2] - law.ground);
   }
 
   // m from the tibia's origin, world axes, and m/s: the foot's lowest point
@@ -145,21 +157,27 @@ struct Setup {
   }
 };
 
-// Adds the rotors' inertia to Simbody's equations, as the mobility forces -J_r qdd of (M + J_r) udot = f - bias. M comes from Simbody's
-// composite body inertias: joint k moves all beyond it with C_k s_k, of which an inboard joint sees the torque about its own axis.
+// Adds the rotors' inertia to Simbody's equations, as the mobility forces -J_r qdd of (M + J_r)
+// udot = f - bias. M comes from Simbody's composite body inertias: joint k moves all beyond it with
+// C_k s_k, of which an inboard joint sees the torque about its own axis.
 class Rotors {
 public:
-  Rotors(const Robot &r, double inertia) : robot(r), J(inertia), still(Vector(base + HX_LEGS * HX_JOINTS, 0.0)) {}
+  Rotors(const Robot &r, double inertia)
+      : robot(r), J(inertia), still(Vector(base + HX_LEGS * HX_JOINTS, 0.0)) {}
 
-  void add_forces(const State &state, const Vector_<SpatialVec> &body_forces, Vector &mobility_forces) {
+  void add_forces(const State &state, const Vector_<SpatialVec> &body_forces,
+                  Vector &mobility_forces) {
     if (J == 0.0) return;
-    robot.matter.calcResidualForceIgnoringConstraints(state, mobility_forces, body_forces, still, residual);
+    robot.matter.calcResidualForceIgnoringConstraints(state, mobility_forces, body_forces, still,
+                                                      residual);
     const double *minus_force = residual.getContiguousScalarData();
     robot.matter.realizeCompositeBodyInertias(state);
-    torso = robot.matter.getCompositeBodyInertia(state, robot.torso.getMobilizedBodyIndex()).toSpatialMat();
+    torso = robot.matter.getCompositeBodyInertia(state, robot.torso.getMobilizedBodyIndex())
+                .toSpatialMat();
     torso_force = -SpatialVec(Vec3::getAs(minus_force), Vec3::getAs(minus_force + 3));
     for (int leg = 0; leg < HX_LEGS; ++leg) {
-      for (int joint = 0; joint < HX_JOINTS; ++joint) leg_force[leg][joint] = -minus_force[robot.mobility(leg, joint)];
+      for (int joint = 0; joint < HX_JOINTS; ++joint)
+        leg_force[leg][joint] = -minus_force[robot.mobility(leg, joint)];
       find_leg(state, leg);
     }
     solve(mobility_forces);
@@ -183,8 +201,12 @@ private:
       const Transform &X = link.getBodyTransform(state);
       place[k] = X.p();
       axis[k] = X.R() * robot.axis(leg, k);
-      const SpatialVec f = robot.matter.getCompositeBodyInertia(state, link.getMobilizedBodyIndex()) * SpatialVec(axis[k], Vec3(0));
-      for (int j = 0; j <= k; ++j) leg_block[leg](j, k) = leg_block[leg](k, j) = dot(axis[j], f[0] + (place[k] - place[j]) % f[1]);
+      const SpatialVec f =
+          robot.matter.getCompositeBodyInertia(state, link.getMobilizedBodyIndex()) *
+          SpatialVec(axis[k], Vec3(0));
+      for (int j = 0; j <= k; ++j)
+        leg_block[leg](j, k) = leg_block[leg](k, j) =
+            dot(axis[j], f[0] + (place[k] - place[j]) % f[1]);
       leg_block[leg](k, k) += J;
       between[leg][k] = SpatialVec(f[0] + (place[k] - centre) % f[1], f[1]);
     }
@@ -217,18 +239,22 @@ private:
     const SpatialVec udot = torso_acceleration();
     for (int leg = 0; leg < HX_LEGS; ++leg) {
       Vec3 force;
-      for (int joint = 0; joint < HX_JOINTS; ++joint) force[joint] = leg_force[leg][joint] - ~between[leg][joint] * udot;
+      for (int joint = 0; joint < HX_JOINTS; ++joint)
+        force[joint] = leg_force[leg][joint] - ~between[leg][joint] * udot;
       const Vec3 qdd = inverse[leg] * force;
-      for (int joint = 0; joint < HX_JOINTS; ++joint) mobility_forces[robot.mobility(leg, joint)] -= J * qdd[joint];
+      for (int joint = 0; joint < HX_JOINTS; ++joint)
+        mobility_forces[robot.mobility(leg, joint)] -= J * qdd[joint];
     }
   }
 };
 
 class PlantLaw : public Force::Custom::Implementation {
 public:
-  explicit PlantLaw(const Setup &s) : setup(s), d(s.walk.definition), robot(s.robot), rotors(s.robot, d.servo.rotor_inertia) {}
+  explicit PlantLaw(const Setup &s)
+      : setup(s), d(s.walk.definition), robot(s.robot), rotors(s.robot, d.servo.rotor_inertia) {}
 
-  void calcForce(const State &state, Vector_<SpatialVec> &body_forces, Vector_<Vec3> &, Vector &mobility_forces) const override {
+  void calcForce(const State &state, Vector_<SpatialVec> &body_forces, Vector_<Vec3> &,
+                 Vector &mobility_forces) const override {
     const hxInput &input = setup.input(state.getTime());
     add_gravity_and_push(state, input, body_forces);
     add_servos(state, input, mobility_forces);
@@ -245,30 +271,36 @@ private:
   const Robot &robot;
   mutable Rotors rotors;
 
-  void add_gravity_and_push(const State &state, const hxInput &in, Vector_<SpatialVec> &body_forces) const {
+  void add_gravity_and_push(const State &state, const hxInput &in,
+                            Vector_<SpatialVec> &body_forces) const {
     const Vec3 g = Vec3::getAs(d.gravity);
     for (MobilizedBodyIndex b(1); b < robot.matter.getNumBodies(); ++b) {
       const MobilizedBody &body = robot.matter.getMobilizedBody(b);
       const MassProperties &m = body.getBodyMassProperties(state);
       const Vec3 weight = m.getMass() * g;
-      body_forces[b] += SpatialVec((body.getBodyRotation(state) * m.getMassCenter()) % weight, weight);
+      body_forces[b] +=
+          SpatialVec((body.getBodyRotation(state) * m.getMassCenter()) % weight, weight);
     }
-    body_forces[robot.torso.getMobilizedBodyIndex()] += SpatialVec(Vec3::getAs(in.push_torque), Vec3::getAs(in.push_force));
+    body_forces[robot.torso.getMobilizedBodyIndex()] +=
+        SpatialVec(Vec3::getAs(in.push_torque), Vec3::getAs(in.push_force));
   }
 
   void add_servos(const State &state, const hxInput &in, Vector &mobility_forces) const {
-    const double *q = state.getQ().getContiguousScalarData(), *u = state.getU().getContiguousScalarData();
+    const double *q = state.getQ().getContiguousScalarData(),
+                 *u = state.getU().getContiguousScalarData();
     for (int leg = 0; leg < HX_LEGS; ++leg)
       for (int joint = 0; joint < HX_JOINTS; ++joint) {
         const int i = robot.mobility(leg, joint);
-        mobility_forces[i] += law_servo(&setup.law, q[robot.coordinate(leg, joint)], u[i], in.angle_ref[leg][joint],
-                                        in.speed_ref[leg][joint], in.torque_ref[leg][joint]);
+        mobility_forces[i] +=
+            law_servo(&setup.law, q[robot.coordinate(leg, joint)], u[i], in.angle_ref[leg][joint],
+                      in.speed_ref[leg][joint], in.torque_ref[leg][joint]);
       }
   }
 
   void add_contact(const State &state, int leg, Vector_<SpatialVec> &body_forces) const {
     const MobilizedBody &tibia = robot.tibia(leg);
-    const Vec3 arm = setup.lowest(state, leg), centre = tibia.getBodyOriginLocation(state) + arm + Vec3(0, 0, setup.law.radius);
+    const Vec3 arm = setup.lowest(state, leg),
+               centre = tibia.getBodyOriginLocation(state) + arm + Vec3(0, 0, setup.law.radius);
     const Vec3 velocity = setup.velocity(state, leg, arm);
     Vec3 force;
     law_foot(&setup.law, &setup.foot[leg], &centre[0], &velocity[0], &force[0]);
@@ -276,7 +308,8 @@ private:
   }
 };
 
-// ---------------------------------------------------------------------------------------------- events
+// ----------------------------------------------------------------------------------------------
+// events
 
 class TouchDown : public TriggeredEventHandler {
 public:
@@ -311,7 +344,8 @@ private:
   Setup &setup;
 };
 
-// ---------------------------------------------------------------------------------------------- run
+// ----------------------------------------------------------------------------------------------
+// run
 
 struct Method {
   const char *name;
@@ -319,9 +353,13 @@ struct Method {
   std::unique_ptr<Integrator> (*make)(const System &system, double step);
 };
 
-template <class T> std::unique_ptr<Integrator> error_controlled(const System &system, double) { return std::make_unique<T>(system); }
+template <class T> std::unique_ptr<Integrator> error_controlled(const System &system, double) {
+  return std::make_unique<T>(system);
+}
 
-template <class T> std::unique_ptr<Integrator> fixed(const System &system, double step) { return std::make_unique<T>(system, step); }
+template <class T> std::unique_ptr<Integrator> fixed(const System &system, double step) {
+  return std::make_unique<T>(system, step);
+}
 
 const Method methods[] = {
     {"CPodesBDF", false, true, error_controlled<CPodesIntegrator>},
@@ -343,8 +381,10 @@ const Method &method_of(const std::string &name) {
 State initial_state(const Robot &robot, const hxDefinition &d) {
   State state = robot.system.getDefaultState();
   const auto &at = d.initial;
-  robot.torso.setQToFitTransform(state, Transform(Rotation(Quaternion(Vec4::getAs(at.quaternion))), Vec3::getAs(at.position)));
-  robot.torso.setUToFitVelocity(state, SpatialVec(Vec3::getAs(at.angular_velocity), Vec3::getAs(at.velocity)));
+  robot.torso.setQToFitTransform(
+      state, Transform(Rotation(Quaternion(Vec4::getAs(at.quaternion))), Vec3::getAs(at.position)));
+  robot.torso.setUToFitVelocity(
+      state, SpatialVec(Vec3::getAs(at.angular_velocity), Vec3::getAs(at.velocity)));
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       state.updQ()[robot.coordinate(leg, joint)] = at.angle[leg][joint];
@@ -405,7 +445,8 @@ void run(char **argv) {
   const int repeats = std::stoi(argv[4]);
   Robot robot(walk.definition);
   Setup setup(robot, walk, !method.multistep);
-  Force::Custom law(robot.forces, new PlantLaw(setup)); // the system owns it, as it does the handlers
+  Force::Custom law(robot.forces,
+                    new PlantLaw(setup)); // the system owns it, as it does the handlers
   for (int leg = 0; leg < HX_LEGS; ++leg) robot.system.addEventHandler(new TouchDown(setup, leg));
   if (setup.restarts) robot.system.addEventHandler(new NextCommand(setup));
   robot.system.realizeTopology();
@@ -418,7 +459,8 @@ void run(char **argv) {
   }
   const double each = microseconds_per_evaluation(setup, first);
   if (path_write(argv[5], last.path.data(), walk.n)) throw std::runtime_error("no path written");
-  std::printf("{\"seconds\": [%s], \"evaluations\": %d, \"microseconds_per_evaluation\": %.6f}\n", seconds.c_str(), last.evaluations, each);
+  std::printf("{\"seconds\": [%s], \"evaluations\": %d, \"microseconds_per_evaluation\": %.6f}\n",
+              seconds.c_str(), last.evaluations, each);
 }
 
 } // namespace

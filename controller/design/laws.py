@@ -1,4 +1,6 @@
-"""The two laws as python-control systems, as they run: discrete, with the delays of sensors and computing."""
+"""The two laws as python-control systems, as they run: discrete, with the delays of sensors and
+computing.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def sampled_slip_law(gains: SlipGains, *, period: float) -> control.StateSpace:
     s = control.tf("s")
     smooth = control.sample_system(1.0 / (gains.filter_time * s + 1.0), period, method="bilinear")
     integral = control.sample_system(1.0 / s, period, method="bilinear")
-    derivative = control.sample_system(s / (gains.derivative_time * s + 1.0), period, method="bilinear")
+    derivative = control.sample_system(
+        s / (gains.derivative_time * s + 1.0), period, method="bilinear"
+    )
     return control.ss(smooth * (gains.kp + gains.ki * integral + gains.kd * derivative))
 
 
@@ -42,14 +46,20 @@ def slip_response(gains: SlipGains, omega: Array, *, period: float) -> Response:
 
 
 def sampled_suspension(gains: SuspensionGains, *, period: float) -> control.StateSpace:
-    """The suspension as it runs, force to deflection: x+ = A x + B f and the new z is used at once."""
+    """The suspension as it runs, force to deflection: x+ = A x + B f and the new z is used at
+    once.
+    """
     a, b = discretise(gains, period=period)
     return control.ss(a, b.reshape(2, 1), a[:1], b[:1].reshape(1, 1), period)
 
 
 def delay_steps(needs: Requirements, *, period: float) -> int:
-    """Periods that pass between a force and the command that answers it; parts of one count whole."""
-    return math.ceil(needs.delay_periods - ROUNDING) + math.ceil(needs.force_delay / period - ROUNDING)
+    """Periods that pass between a force and the command that answers it; parts of one count
+    whole.
+    """
+    return math.ceil(needs.delay_periods - ROUNDING) + math.ceil(
+        needs.force_delay / period - ROUNDING
+    )
 
 
 def delay_response(steps: int, omega: Array, *, period: float) -> Response:
@@ -77,7 +87,9 @@ class Laws:
     @cached_property
     def systems(self) -> tuple[control.StateSpace, control.StateSpace]:
         """The PID and the suspension as they run, without the delay."""
-        return sampled_slip_law(self.slip, period=self.period), sampled_suspension(self.suspension, period=self.period)
+        return sampled_slip_law(self.slip, period=self.period), sampled_suspension(
+            self.suspension, period=self.period
+        )
 
     def responses(self, omega: Array) -> tuple[Response, Response]:
         """Of the PID and of the suspension (frequencies,)."""

@@ -1,7 +1,9 @@
-"""Loops of many feet that share one law: the law times an eigenvalue of the plant, at every frequency (generalised Nyquist).
+"""Loops of many feet that share one law: the law times an eigenvalue of the plant, at every
+frequency (generalised Nyquist).
 
-All feet and directions have the same law l(z), so det(1 + l P) = product of (1 + l lambda_i) over the eigenvalues of the plant's
-response P: every eigenlocus is a loop of one input and one output, and has margins.
+All feet and directions have the same law l(z), so det(1 + l P) = product of (1 + l lambda_i) over
+the eigenvalues of the plant's response P: every eigenlocus is a loop of one input and one output,
+and has margins.
 """
 
 from __future__ import annotations
@@ -17,7 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze_matrix
+from hexapod_cosim.controller.design.standing import (
+    StandingPlant,
+    answers,
+    axes_of,
+    relieved,
+    squeeze_matrix,
+)
 from hexapod_cosim.controller.kinematics import Array
 from hexapod_cosim.models import Robot
 
@@ -33,7 +41,9 @@ def frequencies(period: float, count: int, *, slowest: float = SLOWEST) -> Array
 
 
 def response(system: control.StateSpace, omega: Array) -> Response:
-    """C (z I - A)^-1 B + D at z = e^(i omega h), all frequencies at once: (frequencies, outputs, inputs)."""
+    """C (z I - A)^-1 B + D at z = e^(i omega h), all frequencies at once: (frequencies, outputs,
+    inputs).
+    """
     z = np.exp(1j * omega * system.dt)[:, None, None]
     states = system.nstates
     right = np.broadcast_to(system.B.astype(np.complex128), (len(omega), *system.B.shape))
@@ -41,7 +51,8 @@ def response(system: control.StateSpace, omega: Array) -> Response:
 
 
 def eigenloci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Response, Response]:
-    """Of a standing plant, as loops of negative feedback: tangential (2 n - 3, frequencies) and vertical (n, frequencies) [N/m].
+    """Of a standing plant, as loops of negative feedback: tangential (2 n - 3, frequencies) and
+    vertical (n, frequencies) [N/m].
 
     The common push and twist of all feet are no squeeze and have no locus.
     """
@@ -52,11 +63,15 @@ def eigenloci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Respons
     left, size, _ = np.linalg.svd(fight)
     basis = left[:, size > RANK]
     tangential = basis.T @ fight @ answer[:, flat][:, :, flat] * np.repeat(loads, 2) @ basis
-    return tracked(np.linalg.eigvals(-tangential)), tracked(np.linalg.eigvals(-answer[:, up][:, :, up] * vertical))
+    return tracked(np.linalg.eigvals(-tangential)), tracked(
+        np.linalg.eigvals(-answer[:, up][:, :, up] * vertical)
+    )
 
 
 def tracked(values: NDArray[Any]) -> Response:
-    """Eigenvalues (frequencies, n) as continuous loci (n, frequencies): each goes on with the nearest."""
+    """Eigenvalues (frequencies, n) as continuous loci (n, frequencies): each goes on with the
+    nearest.
+    """
     loci = values.astype(np.complex128)
     for before, here in pairwise(loci):
         here[:] = here[linear_sum_assignment(np.abs(before[:, None] - here))[1]]
@@ -76,11 +91,17 @@ class Loci:
         places = np.arange(len(self.omega))
         between = np.linspace(0.0, places[-1], times * len(self.omega))
         values = np.array([np.interp(between, places, locus) for locus in self.values])
-        return Loci(omega=np.exp(np.interp(between, places, np.log(self.omega))), names=self.names, values=values)
+        return Loci(
+            omega=np.exp(np.interp(between, places, np.log(self.omega))),
+            names=self.names,
+            values=values,
+        )
 
 
 def all_loci(robot: Robot, plants: Plants, omega: Array) -> tuple[Loci, Loci]:
-    """Tangential and vertical eigenloci of all plants, without the laws: the plants' own change slowly with the frequency."""
+    """Tangential and vertical eigenloci of all plants, without the laws: the plants' own change
+    slowly with the frequency.
+    """
     found = {name: eigenloci(robot, plant, omega) for name, plant in plants.items()}
     tangential, vertical = (
         Loci(
@@ -103,11 +124,15 @@ class LoopMargins:
 
 
 def critical_size(loops: Response) -> Array:
-    """1    (n,) largest size of each loop (n, frequencies) where it crosses the negative real axis, by linear interpolation; 0: nowhere"""
+    """1    (n,) largest size of each loop (n, frequencies) where it crosses the negative real
+    axis, by linear interpolation; 0: nowhere
+    """
     before, after = loops[:, :-1], loops[:, 1:]
     crossed = (before.imag * after.imag < 0.0) & (before.real < 0.0) & (after.real < 0.0)
     part = before.imag / np.where(crossed, before.imag - after.imag, 1.0)
-    return np.asarray(np.where(crossed, -before.real - part * (after.real - before.real), 0.0).max(axis=1))
+    return np.asarray(
+        np.where(crossed, -before.real - part * (after.real - before.real), 0.0).max(axis=1)
+    )
 
 
 def quick_margins(loop: Response, omega: Array) -> LoopMargins:
@@ -115,12 +140,17 @@ def quick_margins(loop: Response, omega: Array) -> LoopMargins:
     size, gap, critical = np.abs(loop), np.abs(np.angle(-loop)), float(critical_size(loop[None])[0])
     unity = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) < 0.0)
     part = np.log(size[unity]) / (np.log(size[unity]) - np.log(size[unity + 1]))
-    phase, at = gap[unity] + part * (gap[unity + 1] - gap[unity]), omega[unity] * (omega[unity + 1] / omega[unity]) ** part
+    phase, at = (
+        gap[unity] + part * (gap[unity + 1] - gap[unity]),
+        omega[unity] * (omega[unity + 1] / omega[unity]) ** part,
+    )
     lag = np.mod(np.angle(loop[unity]) + math.pi, 2.0 * math.pi)
     return LoopMargins(
-        gain=-20.0 * math.log10(critical) if critical else math.inf, phase=math.degrees(phase.min(initial=math.inf)),
-        delay=float((lag / at).min(initial=math.inf)), crossover=float(at.max(initial=0.0)),
-    )  # fmt: skip
+        gain=-20.0 * math.log10(critical) if critical else math.inf,
+        phase=math.degrees(phase.min(initial=math.inf)),
+        delay=float((lag / at).min(initial=math.inf)),
+        crossover=float(at.max(initial=0.0)),
+    )
 
 
 def loop_margins(loop: Response, omega: Array) -> LoopMargins:
@@ -130,6 +160,8 @@ def loop_margins(loop: Response, omega: Array) -> LoopMargins:
     more = [g for g in gains if g > 1.0]  # the gain that may come on top
     delays = np.radians(np.mod(phases, 360.0)) / crossings
     return LoopMargins(
-        gain=20.0 * math.log10(min(more)) if more else math.inf, phase=float(np.abs(phases).min(initial=math.inf)),
-        delay=float(delays.min(initial=math.inf)), crossover=float(crossings.max(initial=0.0)),
-    )  # fmt: skip
+        gain=20.0 * math.log10(min(more)) if more else math.inf,
+        phase=float(np.abs(phases).min(initial=math.inf)),
+        delay=float(delays.min(initial=math.inf)),
+        crossover=float(crossings.max(initial=0.0)),
+    )

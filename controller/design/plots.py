@@ -1,4 +1,6 @@
-"""Figures of a design: Bode and Nyquist diagrams of all eigenloci, answers to disturbances, margins over delay and load."""
+"""Figures of a design: Bode and Nyquist diagrams of all eigenloci, answers to disturbances,
+margins over delay and load.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,15 @@ import numpy as np
 
 from hexapod_cosim.controller.design.closed import closed_loop, disturbed, splay
 from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps
-from hexapod_cosim.controller.design.loci import Loci, Plants, Response, all_loci, critical_size, frequencies, quick_margins
+from hexapod_cosim.controller.design.loci import (
+    Loci,
+    Plants,
+    Response,
+    all_loci,
+    critical_size,
+    frequencies,
+    quick_margins,
+)
 from hexapod_cosim.controller.design.standing import StandingPlant, answers, relieved, weight_share
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.controller.gains import Gains, GainsError
@@ -33,13 +43,22 @@ NAMES = ("bode", "nyquist", "step", "margins")
 def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Path) -> list[Path]:
     """Writes `bode`, `nyquist`, `step` and `margins` as SVG and PNG; returns the paths.
 
-    robot, plants: what the gains were designed for. Raises GainsError when they are another robot's, or the figures cannot be written.
+    robot, plants: what the gains were designed for. Raises GainsError when they are another
+    robot's, or the figures cannot be written.
     """
     if robot.hash != gains.robot_hash:
         fix = "pass the robot they were designed for"
-        raise GainsError("not the robot of these gains", got=robot.hash[:12], expected=gains.robot_hash[:12], fix=fix)
+        raise GainsError(
+            "not the robot of these gains",
+            got=robot.hash[:12],
+            expected=gains.robot_hash[:12],
+            fix=fix,
+        )
     laws = Laws(
-        slip=gains.slip, suspension=gains.suspension, period=gains.period, delays=delay_steps(gains.requirements, period=gains.period)
+        slip=gains.slip,
+        suspension=gains.suspension,
+        period=gains.period,
+        delays=delay_steps(gains.requirements, period=gains.period),
     )
     loci = all_loci(robot, plants, frequencies(gains.period, DRAWN))
     loops = [one.values * law for one, law in zip(loci, laws.responses(loci[0].omega), strict=True)]
@@ -49,12 +68,23 @@ def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Pat
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with rc_context(SETTINGS):
-            figures = (_bode(loops, loci[0].omega, gains), _nyquist(loops, loci[0].omega, gains), _step(robot, plants, laws, gains),
-                       _margins(robot, plants, loci, loops, gains))  # fmt: skip
-            return [path for name, figure in zip(NAMES, figures, strict=True) for path in _save(figure, folder, name)]
+            figures = (
+                _bode(loops, loci[0].omega, gains),
+                _nyquist(loops, loci[0].omega, gains),
+                _step(robot, plants, laws, gains),
+                _margins(robot, plants, loci, loops, gains),
+            )
+            return [
+                path
+                for name, figure in zip(NAMES, figures, strict=True)
+                for path in _save(figure, folder, name)
+            ]
     except OSError as error:
         raise GainsError(
-            "cannot write the design's figures", got=error.strerror, fix="choose a writable folder", where=str(folder)
+            "cannot write the design's figures",
+            got=error.strerror,
+            fix="choose a writable folder",
+            where=str(folder),
         ) from error
 
 
@@ -63,7 +93,9 @@ def _figure(rows: int, columns: int, gains: Gains, **options: Any) -> tuple[Any,
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     figure = Figure(figsize=(WIDTH, 0.3 + 2.1 * rows))
-    figure.suptitle(f"{gains.robot}, controller period {1e3 * gains.period:g} ms", fontsize="medium")
+    figure.suptitle(
+        f"{gains.robot}, controller period {1e3 * gains.period:g} ms", fontsize="medium"
+    )
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
@@ -75,7 +107,11 @@ def _save(figure: Any, folder: Path, name: str) -> list[Path]:
 
 def _legend_below(figure: Any, *of: Any) -> None:
     """One legend for all axes, of what is drawn in some of them."""
-    found = {label: line for axes in of for line, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    found = {
+        label: line
+        for axes in of
+        for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
     figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=len(found))
 
 
@@ -92,15 +128,35 @@ def _bode(loops: list[Response], omega: Array, gains: Gains) -> Any:
     figure, grid = _figure(2, 2, gains, sharex=True)
     needs = gains.requirements
     for (size, angle), all_of, title in zip(grid.T, loops, TITLES, strict=True):
-        _each(all_of, lambda loop, axes=size, **style: axes.semilogx(omega, 20.0 * np.log10(np.abs(loop)), **style))
-        _each(all_of, lambda loop, axes=angle, **style: axes.semilogx(omega, _degrees(loop), **style))
+        _each(
+            all_of,
+            lambda loop, axes=size, **style: axes.semilogx(
+                omega, 20.0 * np.log10(np.abs(loop)), **style
+            ),
+        )
+        _each(
+            all_of, lambda loop, axes=angle, **style: axes.semilogx(omega, _degrees(loop), **style)
+        )
         size.axhline(0.0, color="k", lw=0.6)
-        size.axhline(-needs.gain_margin, color=COLOURS["asked"], ls="--", lw=1.0, label=f"gain margin asked: {needs.gain_margin:g} dB")
+        size.axhline(
+            -needs.gain_margin,
+            color=COLOURS["asked"],
+            ls="--",
+            lw=1.0,
+            label=f"gain margin asked: {needs.gain_margin:g} dB",
+        )
         angle.axhline(-180.0, color="k", lw=0.6)
         label = f"phase margin asked: {needs.phase_margin:g} deg"
-        angle.axhline(needs.phase_margin - 180.0, color=COLOURS["asked"], ls="--", lw=1.0, label=label)
+        angle.axhline(
+            needs.phase_margin - 180.0, color=COLOURS["asked"], ls="--", lw=1.0, label=label
+        )
         size.set(title=f"loops of the {title}", ylabel="gain [dB]", ylim=DECIBELS)
-        angle.set(xlabel="frequency [rad/s]", ylabel="phase [deg]", ylim=(-540.0, 180.0), yticks=range(-540, 181, 90))
+        angle.set(
+            xlabel="frequency [rad/s]",
+            ylabel="phase [deg]",
+            ylim=(-540.0, 180.0),
+            yticks=range(-540, 181, 90),
+        )
     _legend_below(figure, *grid[:, 0])
     return figure
 
@@ -118,26 +174,51 @@ def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
         _each(all_of, lambda loop, axes=axes, **style: axes.plot(loop.real, loop.imag, **style))
         axes.plot(np.cos(turn), np.sin(turn), color="k", lw=0.5)
         arc = np.pi + np.linspace(-edge, edge, 60)
-        axes.plot(np.cos(arc), np.sin(arc), color=COLOURS["asked"], lw=2.0, label="margins asked: not through here")
-        axes.plot([-1.0, -(10.0 ** (-needs.gain_margin / 20.0))], [0.0, 0.0], color=COLOURS["asked"], lw=2.0)
+        axes.plot(
+            np.cos(arc),
+            np.sin(arc),
+            color=COLOURS["asked"],
+            lw=2.0,
+            label="margins asked: not through here",
+        )
+        axes.plot(
+            [-1.0, -(10.0 ** (-needs.gain_margin / 20.0))],
+            [0.0, 0.0],
+            color=COLOURS["asked"],
+            lw=2.0,
+        )
         axes.plot([-1.0], [0.0], "k+", ms=10)
-        axes.set(title=f"loops of the {title}", xlabel="real part [1]", ylabel="imaginary part [1]", aspect="equal")
+        axes.set(
+            title=f"loops of the {title}",
+            xlabel="real part [1]",
+            ylabel="imaginary part [1]",
+            aspect="equal",
+        )
         axes.set(xlim=(-1.6, 1.6), ylim=(-1.6, 1.6), xticks=range(-1, 2), yticks=range(-1, 2))
     _legend_below(figure, grid[0, 0])
     return figure
 
 
 def _nominal(robot: Robot, plants: Plants) -> StandingPlant:
-    """Of the plants on most legs, where these can work against each other in all ways, the one nearest to a third of the weight a leg."""
+    """Of the plants on most legs, where these can work against each other in all ways, the one
+    nearest to a third of the weight a leg.
+    """
     most = max(plant.standing.sum() for plant in plants.values())
-    return min((plant for plant in plants.values() if plant.standing.sum() == most), key=lambda p: abs(p.load(robot).mean() - 1.0))
+    return min(
+        (plant for plant in plants.values() if plant.standing.sum() == most),
+        key=lambda p: abs(p.load(robot).mean() - 1.0),
+    )
 
 
 def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     figure, (row,) = _figure(1, 3, gains)
     plant = _nominal(robot, plants)
     with_laws, without = closed_loop(robot, plant, laws), relieved(robot, plant)
-    squeezed, bump, share = splay(robot, plant), np.zeros(3 * int(plant.standing.sum())), weight_share(robot)
+    squeezed, bump, share = (
+        splay(robot, plant),
+        np.zeros(3 * int(plant.standing.sum())),
+        weight_share(robot),
+    )
     bump[2] = -BUMP * answers(robot, plant)[1][0]
     for system, label, colour, dashes in (
         (without, "without the laws", COLOURS["without"], "--"),
@@ -149,7 +230,9 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
         row[1].step(time, forces[2] / share, where="post", color=colour, ls=dashes, label=label)
     late = laws.systems[1] * delay(laws.delays, period=laws.period)
     deflection = np.asarray(control.forced_response(late, time, forces[2][None]).outputs)
-    row[2].step(time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension")
+    row[2].step(
+        time, 1e3 * deflection.reshape(-1), where="post", color=COLOURS["worst"], label="suspension"
+    )
     row[0].set(title="a squeeze of 1", ylabel="squeezing force left [1]")
     row[1].set(title=f"a foot on a bump of {1e3 * BUMP:g} mm", ylabel="excess load [weight / 3]")
     row[2].set(title="the same bump", ylabel="suspension's deflection [mm]")
@@ -160,18 +243,38 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
     return figure
 
 
-def _margins(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[Response], gains: Gains) -> Any:
+def _margins(
+    robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[Response], gains: Gains
+) -> Any:
     """Least margins of all loops, further delay or one load chosen."""
     figure, grid = _figure(2, 2, gains, sharey="row", sharex="col")
-    needs, load = gains.requirements, {name: round(float(plant.load(robot).mean()), 2) for name, plant in plants.items()}
-    delays, loads, omega = np.linspace(0.0, MOST_DELAY, DELAYS), sorted(set(load.values())), loci[0].omega
+    needs, load = (
+        gains.requirements,
+        {name: round(float(plant.load(robot).mean()), 2) for name, plant in plants.items()},
+    )
+    delays, loads, omega = (
+        np.linspace(0.0, MOST_DELAY, DELAYS),
+        sorted(set(load.values())),
+        loci[0].omega,
+    )
     for all_of, one, (title, (colour, marker)) in zip(loops, loci, LAWS.items(), strict=True):
-        late = [_least(all_of * delay_response(1, omega, period=float(more)), omega) for more in delays]
-        borne = [_least(all_of[[load[name] == value for name in one.names]], omega) for value in loads]
+        late = [
+            _least(all_of * delay_response(1, omega, period=float(more)), omega) for more in delays
+        ]
+        borne = [
+            _least(all_of[[load[name] == value for name in one.names]], omega) for value in loads
+        ]
         for column, x, found in ((0, 1e3 * delays, late), (1, loads, borne)):
             for axes, values in zip(grid[:, column], np.array(found).T, strict=True):
-                axes.plot(x, values, color=colour, marker=marker, ms=3, lw=1.0, clip_on=False, label=title)
-    for axes, asked, label in zip(grid, (needs.gain_margin, needs.phase_margin), ("gain margin [dB]", "phase margin [deg]"), strict=True):
+                axes.plot(
+                    x, values, color=colour, marker=marker, ms=3, lw=1.0, clip_on=False, label=title
+                )
+    for axes, asked, label in zip(
+        grid,
+        (needs.gain_margin, needs.phase_margin),
+        ("gain margin [dB]", "phase margin [deg]"),
+        strict=True,
+    ):
         axes[0].set(ylabel=label)
         for one_of in axes:
             one_of.axhline(asked, color=COLOURS["asked"], ls="--", lw=1.0, label="asked for")
@@ -184,7 +287,12 @@ def _margins(robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[
 
 
 def _least(loops: Response, omega: Array) -> tuple[float, float]:
-    """Least gain [dB] and phase [deg] margins of loops; where none has a crossing the scale's end. Negative: unstable."""
-    critical, phase = float(critical_size(loops).max()), min(quick_margins(loop, omega).phase for loop in loops)
+    """Least gain [dB] and phase [deg] margins of loops; where none has a crossing the scale's
+    end. Negative: unstable.
+    """
+    critical, phase = (
+        float(critical_size(loops).max()),
+        min(quick_margins(loop, omega).phase for loop in loops),
+    )
     gain = -20.0 * np.log10(critical) if critical else np.inf
     return min(float(gain), SCALES[0]), float(np.copysign(min(phase, SCALES[1]), gain))

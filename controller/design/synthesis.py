@@ -1,7 +1,8 @@
 """Gains by requirement, with python-control.
 
-The tangential PID gets the most integral action that keeps the margins of every eigenlocus of every plant; the suspension the deflection,
-frequency and damping asked for, or a lower frequency where the margins demand it.
+The tangential PID gets the most integral action that keeps the margins of every eigenlocus of every
+plant; the suspension the deflection, frequency and damping asked for, or a lower frequency where
+the margins demand it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.design.laws import Laws, delay_response, delay_steps, sampled_suspension, slip_response
+from hexapod_cosim.controller.design.laws import (
+    Laws,
+    delay_response,
+    delay_steps,
+    sampled_suspension,
+    slip_response,
+)
 from hexapod_cosim.controller.design.loci import (
     SLOWEST,
     Loci,
@@ -55,7 +62,12 @@ SAME = 1e-9  # relative, of periods
 
 
 def design_gains(
-    robot: Robot, period: float, *, plants: Plants, requirements: Requirements | None = None, left_out: Sequence[str] = ()
+    robot: Robot,
+    period: float,
+    *,
+    plants: Plants,
+    requirements: Requirements | None = None,
+    left_out: Sequence[str] = (),
 ) -> Gains:
     """Gains of a robot for a controller period [s] from its standing plants, by name.
 
@@ -74,13 +86,28 @@ def design_gains(
     judge, late = Judge(robot, plants, period=period), delay_steps(needs, period=period)
     laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
     laws, reached = _backed_off(judge, tangential, laws, needs)
-    margins, shortfalls = verify(robot, plants, judge, vertical, laws, needs, slip=reached, binding=binding)
+    margins, shortfalls = verify(
+        robot, plants, judge, vertical, laws, needs, slip=reached, binding=binding
+    )
     return Gains(
-        robot=robot.name, robot_hash=robot.hash, period=period, requirements=needs, slip=laws.slip, suspension=suspension, margins=margins,
-        caveats=(*(f"the design leaves out {text}" for text in (*left_out, *too_heavy)), *shortfalls),
-        support=_taken(SupportGains, needs), hold=_taken(HoldGains, needs),
-        limits=LimitGains(speed=needs.speed_share * robot.servo.speed_max, torque=needs.torque_share * robot.servo.torque_max),
-    )  # fmt: skip
+        robot=robot.name,
+        robot_hash=robot.hash,
+        period=period,
+        requirements=needs,
+        slip=laws.slip,
+        suspension=suspension,
+        margins=margins,
+        caveats=(
+            *(f"the design leaves out {text}" for text in (*left_out, *too_heavy)),
+            *shortfalls,
+        ),
+        support=_taken(SupportGains, needs),
+        hold=_taken(HoldGains, needs),
+        limits=LimitGains(
+            speed=needs.speed_share * robot.servo.speed_max,
+            torque=needs.torque_share * robot.servo.torque_max,
+        ),
+    )
 
 
 def _taken(kind: type[Any], needs: Requirements) -> Any:
@@ -90,23 +117,44 @@ def _taken(kind: type[Any], needs: Requirements) -> Any:
 
 def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) -> None:
     if not 0.0 < period < math.inf:
-        raise GainsError("impossible controller period", got=period, expected="a number > 0", fix="give it in seconds")
+        raise GainsError(
+            "impossible controller period",
+            got=period,
+            expected="a number > 0",
+            fix="give it in seconds",
+        )
     if robot.servo.mode != "position" or robot.servo.kp <= 0.0:
         raise GainsError(
-            "compliant control shifts the servos' targets", got=f"servo mode {robot.servo.mode}, kp {robot.servo.kp}",
-            expected="servo mode position with kp > 0", fix="use position servos, or kinematic control",
-        )  # fmt: skip
+            "compliant control shifts the servos' targets",
+            got=f"servo mode {robot.servo.mode}, kp {robot.servo.kp}",
+            expected="servo mode position with kp > 0",
+            fix="use position servos, or kinematic control",
+        )
     for entry in fields(needs):
         value, strict = getattr(needs, entry.name), entry.name in POSITIVE["requirements"]
         if not 0.0 <= value < math.inf or (strict and not value):
             expected = f"a number >{'' if strict else '='} 0"
-            raise GainsError("impossible requirement", got=value, expected=expected, fix="correct it", where=entry.name)
+            raise GainsError(
+                "impossible requirement",
+                got=value,
+                expected=expected,
+                fix="correct it",
+                where=entry.name,
+            )
     for name, plant in plants.items():
         if not math.isclose(plant.system.dt, period, rel_tol=SAME):
-            raise GainsError("a plant sampled otherwise", got=plant.system.dt, expected=f"{period} s", fix="sample it anew", where=name)
+            raise GainsError(
+                "a plant sampled otherwise",
+                got=plant.system.dt,
+                expected=f"{period} s",
+                fix="sample it anew",
+                where=name,
+            )
 
 
-def _backed_off(judge: Judge, loci: Loci, laws: Laws, needs: Requirements) -> tuple[Laws, LoopMargins]:
+def _backed_off(
+    judge: Judge, loci: Loci, laws: Laws, needs: Requirements
+) -> tuple[Laws, LoopMargins]:
     """Laws whose tangential loops keep their margins by python-control's judgement; and these.
 
     The search's frequencies may step over a resonance: then the gain gives way.
@@ -116,7 +164,10 @@ def _backed_off(judge: Judge, loci: Loci, laws: Laws, needs: Requirements) -> tu
         if found.phase >= needs.phase_margin and found.gain >= needs.gain_margin:
             return laws, found
         slip = laws.slip
-        laws = replace(laws, slip=replace(slip, kp=BACK_OFF * slip.kp, ki=BACK_OFF * slip.ki, kd=BACK_OFF * slip.kd))
+        laws = replace(
+            laws,
+            slip=replace(slip, kp=BACK_OFF * slip.kp, ki=BACK_OFF * slip.ki, kd=BACK_OFF * slip.kd),
+        )
     return laws, judge.worst(loci, 0, laws)
 
 
@@ -126,7 +177,11 @@ def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, 
     And texts that say in which they do not. Raises GainsError when they carry it in none.
     """
     most = needs.torque_share * robot.servo.torque_max
-    torque = {_legs(plant): support_torque(robot, {name: plant}) for name, plant in plants.items() if nominal(robot, plant)}
+    torque = {
+        _legs(plant): support_torque(robot, {name: plant})
+        for name, plant in plants.items()
+        if nominal(robot, plant)
+    }
     able = {name: plant for name, plant in plants.items() if torque.get(_legs(plant), 0.0) <= most}
     if not any(nominal(robot, plant) for plant in able.values()):
         fix = "stronger servos, less weight, or feet closer to the hips"
@@ -134,7 +189,13 @@ def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, 
             f"{min(torque.values()):.3g} N m",
             f"at most {most:.3g} N m, torque_share x servo.torque_max, of a servo in some stance",
         )
-        raise GainsError("the servos do not carry the robot", got=got, expected=expected, fix=fix, where=f"robot {robot.name}")
+        raise GainsError(
+            "the servos do not carry the robot",
+            got=got,
+            expected=expected,
+            fix=fix,
+            where=f"robot {robot.name}",
+        )
     expected = f"at most {most:.3g} N m, torque_share x servo.torque_max"
     return able, tuple(
         f"{legs}: the servos do not carry the robot (got {value:.3g} N m, expected {expected})"
@@ -144,59 +205,95 @@ def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, 
 
 
 def _legs(plant: StandingPlant) -> str:
-    return "standing on " + " ".join(leg for leg, stands in zip(LEG_NAMES, plant.standing, strict=True) if stands)
+    return "standing on " + " ".join(
+        leg for leg, stands in zip(LEG_NAMES, plant.standing, strict=True) if stands
+    )
 
 
-def design_slip(loci: Loci, needs: Requirements, *, period: float, time: float = 1.0) -> tuple[SlipGains, str]:
+def design_slip(
+    loci: Loci, needs: Requirements, *, period: float, time: float = 1.0
+) -> tuple[SlipGains, str]:
     """Among shapes kp/ki, kd/ki the one with the largest ki at which every locus keeps its margins.
 
     And what stopped that ki. time: of the robot's size (size.py), which the shapes go with.
     """
     late = delay_response(delay_steps(needs, period=period), loci.omega, period=period)
-    best, binding = slip_gains(0.0, 0.0, 0.0, needs, period=period), "no integral action is possible"
+    best, binding = (
+        slip_gains(0.0, 0.0, 0.0, needs, period=period),
+        "no integral action is possible",
+    )
     leads, curvatures = [time * lead for lead in LEADS], [time * time * bend for bend in CURVATURES]
     for lead, curvature in itertools.product(leads, curvatures):
         shape = slip_gains(1.0, lead, curvature, needs, period=period)
         loops = loci.values * slip_response(shape, loci.omega, period=period) * late
         most, stopped = _largest_gain(loops, needs, loci)
         if SAFETY * most > best.ki:
-            best, binding = slip_gains(SAFETY * most, lead, curvature, needs, period=period), stopped
+            best, binding = (
+                slip_gains(SAFETY * most, lead, curvature, needs, period=period),
+                stopped,
+            )
     return best, binding
 
 
-def slip_gains(ki: float, lead: float, curvature: float, needs: Requirements, *, period: float) -> SlipGains:
+def slip_gains(
+    ki: float, lead: float, curvature: float, needs: Requirements, *, period: float
+) -> SlipGains:
     """Gains of a shape; the derivative and the anti-windup go with period and filter."""
     return SlipGains(
-        kp=ki * lead, ki=ki, kd=ki * curvature, derivative_time=DERIVATIVE_PERIODS * period, filter_time=needs.filter_time,
-        load_time=needs.load_time, tracking_time=2.0 * max(needs.filter_time, period), limit=needs.slip_limit,
-    )  # fmt: skip
+        kp=ki * lead,
+        ki=ki,
+        kd=ki * curvature,
+        derivative_time=DERIVATIVE_PERIODS * period,
+        filter_time=needs.filter_time,
+        load_time=needs.load_time,
+        tracking_time=2.0 * max(needs.filter_time, period),
+        limit=needs.slip_limit,
+    )
 
 
 def _largest_gain(loops: Response, needs: Requirements, loci: Loci) -> tuple[float, str]:
-    """Scale of unit-gain loops at which the worst just keeps its margins, and which margin of which plant that is.
+    """Scale of unit-gain loops at which the worst just keeps its margins, and which margin of which
+    plant that is.
 
-    Out of the sector of the phase margin beyond gain 1 at all frequencies: more than the margin at the crossings asks for.
+    Out of the sector of the phase margin beyond gain 1 at all frequencies: more than the margin at
+    the crossings asks for.
     """
     inside = np.abs(np.angle(-loops)) < math.radians(needs.phase_margin + SPARE)
-    near, critical = np.where(inside, np.abs(loops), TINY).max(axis=1), np.maximum(critical_size(loops), TINY)
-    allowed = {"phase_margin": 1.0 / near, "gain_margin": 10.0 ** (-needs.gain_margin / 20.0) / critical}
+    near, critical = (
+        np.where(inside, np.abs(loops), TINY).max(axis=1),
+        np.maximum(critical_size(loops), TINY),
+    )
+    allowed = {
+        "phase_margin": 1.0 / near,
+        "gain_margin": 10.0 ** (-needs.gain_margin / 20.0) / critical,
+    }
     name = min(allowed, key=lambda margin: float(allowed[margin].min()))
     worst = int(allowed[name].argmin())
     return float(allowed[name][worst]), f"{name} ({loci.names[worst]})"
 
 
-def design_suspension(robot: Robot, loci: Loci, needs: Requirements, *, period: float) -> SuspensionGains:
-    """k from the deflection under a third of the weight, m from the frequency, b from the damping ratio.
+def design_suspension(
+    robot: Robot, loci: Loci, needs: Requirements, *, period: float
+) -> SuspensionGains:
+    """k from the deflection under a third of the weight, m from the frequency, b from the damping
+    ratio.
 
-    A stiff leg on a soft suspension asks for more margin than the wanted frequency leaves: then the frequency gives way.
+    A stiff leg on a soft suspension asks for more margin than the wanted frequency leaves: then the
+    frequency gives way.
     """
-    stiffness, late = weight_share(robot) / needs.deflection, delay_response(delay_steps(needs, period=period), loci.omega, period=period)
+    stiffness, late = (
+        weight_share(robot) / needs.deflection,
+        delay_response(delay_steps(needs, period=period), loci.omega, period=period),
+    )
     gains = suspension_gains(stiffness, needs.frequency, needs)
     for step in range(FREQUENCY_STEPS):
         gains = suspension_gains(stiffness, needs.frequency * FREQUENCY_FACTOR**step, needs)
         law = response(sampled_suspension(gains, period=period), loci.omega)[:, 0, 0] * late
         found = [quick_margins(locus * law, loci.omega) for locus in loci.values]
-        if min(m.gain for m in found) > needs.gain_margin / SAFETY and min(m.phase for m in found) > needs.phase_margin / SAFETY:
+        if (
+            min(m.gain for m in found) > needs.gain_margin / SAFETY
+            and min(m.phase for m in found) > needs.phase_margin / SAFETY
+        ):
             break
     return gains
 
@@ -205,5 +302,8 @@ def suspension_gains(stiffness: float, frequency: float, needs: Requirements) ->
     """A mass on that spring with the natural frequency [Hz] and the damping ratio asked for."""
     mass = stiffness / (2.0 * math.pi * frequency) ** 2
     return SuspensionGains(
-        mass=mass, damping=2.0 * needs.damping_ratio * math.sqrt(stiffness * mass), stiffness=stiffness, limit=needs.deflection_limit
+        mass=mass,
+        damping=2.0 * needs.damping_ratio * math.sqrt(stiffness * mass),
+        stiffness=stiffness,
+        limit=needs.deflection_limit,
     )

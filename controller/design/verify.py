@@ -1,4 +1,6 @@
-"""What a design reached, in discrete time, by python-control; and whether it is what was asked for."""
+"""What a design reached, in discrete time, by python-control; and whether it is what was asked
+for.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,15 @@ CRITERIA = ("gain", "phase", "delay")
 
 
 def verify(
-    robot: Robot, plants: Plants, judge: Judge, vertical: Loci, laws: Laws, needs: Requirements, *, slip: LoopMargins, binding: str
+    robot: Robot,
+    plants: Plants,
+    judge: Judge,
+    vertical: Loci,
+    laws: Laws,
+    needs: Requirements,
+    *,
+    slip: LoopMargins,
+    binding: str,
 ) -> tuple[Margins, tuple[str, ...]]:
     """Margins of the worst loops and the stability of all feet together.
 
@@ -42,10 +52,17 @@ def verify(
     """
     suspension = judge.worst(vertical, 1, laws)
     margins = Margins(
-        slip_crossover=slip.crossover, slip_phase_margin=slip.phase, slip_gain_margin=slip.gain, slip_delay_margin=slip.delay,
-        slip_rejection=steady_slip(robot, plants, laws), suspension_phase_margin=suspension.phase, suspension_gain_margin=suspension.gain,
-        support_torque=support_torque(robot, plants), spectral_radius=_slowest(robot, plants, laws), binding=binding,
-    )  # fmt: skip
+        slip_crossover=slip.crossover,
+        slip_phase_margin=slip.phase,
+        slip_gain_margin=slip.gain,
+        slip_delay_margin=slip.delay,
+        slip_rejection=steady_slip(robot, plants, laws),
+        suspension_phase_margin=suspension.phase,
+        suspension_gain_margin=suspension.gain,
+        support_torque=support_torque(robot, plants),
+        spectral_radius=_slowest(robot, plants, laws),
+        binding=binding,
+    )
     for what, reached, asked in (
         ("phase_margin of the tangential loop", slip.phase, needs.phase_margin),
         ("gain_margin of the tangential loop", slip.gain, needs.gain_margin),
@@ -64,8 +81,18 @@ def _shortfalls(robot: Robot, margins: Margins, needs: Requirements) -> Iterator
     """
     usual = requirements_for(robot)
     for name, reached, asked, met in (
-        ("bandwidth", margins.slip_crossover, needs.bandwidth, margins.slip_crossover >= needs.bandwidth),
-        ("slip_rejection", margins.slip_rejection, needs.slip_rejection, margins.slip_rejection <= needs.slip_rejection),
+        (
+            "bandwidth",
+            margins.slip_crossover,
+            needs.bandwidth,
+            margins.slip_crossover >= needs.bandwidth,
+        ),
+        (
+            "slip_rejection",
+            margins.slip_rejection,
+            needs.slip_rejection,
+            margins.slip_rejection <= needs.slip_rejection,
+        ),
     ):
         least = "at least" if name == "bandwidth" else "at most"
         if not met and asked != getattr(usual, name):
@@ -77,7 +104,9 @@ def _shortfalls(robot: Robot, margins: Margins, needs: Requirements) -> Iterator
 
 def support_torque(robot: Robot, plants: Plants) -> float:
     """N m    largest feed-forward torque of a servo in the stances near the nominal load"""
-    return max(float(np.abs(plant.torque).max()) for plant in plants.values() if nominal(robot, plant))
+    return max(
+        float(np.abs(plant.torque).max()) for plant in plants.values() if nominal(robot, plant)
+    )
 
 
 def nominal(robot: Robot, plant: StandingPlant) -> bool:
@@ -91,14 +120,25 @@ def _slowest(robot: Robot, plants: Plants, laws: Laws) -> float:
     for name, plant in plants.items():
         radius = spectral_radius(closed_loop(robot, plant, laws), feet=int(plant.standing.sum()))
         if not radius < 1.0:
-            raise _missed(robot, f"stability ({name})", got=f"spectral radius {radius:.6f}", expected="less than 1")
+            raise _missed(
+                robot,
+                f"stability ({name})",
+                got=f"spectral radius {radius:.6f}",
+                expected="less than 1",
+            )
         worst = max(worst, radius)
     return worst
 
 
 def _missed(robot: Robot, what: str, *, got: object, expected: str) -> GainsError:
     fix = "shorten the period or the delays, allow less deflection, or ask for less margin"
-    return GainsError(f"the design misses its {what}", got=got, expected=expected, fix=fix, where=f"robot {robot.name}")
+    return GainsError(
+        f"the design misses its {what}",
+        got=got,
+        expected=expected,
+        fix=fix,
+        where=f"robot {robot.name}",
+    )
 
 
 class Judge:
@@ -112,8 +152,14 @@ class Judge:
         """Of the tangential (which = 0) or the vertical (1) loops; loci: those of the search."""
         law, fine = laws.responses(loci.omega)[which], laws.responses(self._omega)[which]
         found = [quick_margins(locus * law, loci.omega) for locus in loci.values]
-        judged = [self._margins(loci.names[_least(found, criterion)], which, fine, criterion) for criterion in CRITERIA]
-        least = {criterion: min(getattr(margins, criterion) for margins in judged) for criterion in CRITERIA}
+        judged = [
+            self._margins(loci.names[_least(found, criterion)], which, fine, criterion)
+            for criterion in CRITERIA
+        ]
+        least = {
+            criterion: min(getattr(margins, criterion) for margins in judged)
+            for criterion in CRITERIA
+        }
         return LoopMargins(**least, crossover=max(margins.crossover for margins in judged))
 
     def _margins(self, name: str, which: int, law: Response, criterion: str) -> LoopMargins:
@@ -127,7 +173,9 @@ def _least(found: Sequence[LoopMargins], criterion: str) -> int:
 
 
 def steady_slip(robot: Robot, plants: Plants, laws: Laws) -> float:
-    """Steady slip with the tangential law over that without it, worst of the squeezes that feet near their nominal load can have."""
+    """Steady slip with the tangential law over that without it, worst of the squeezes that feet
+    near their nominal load can have.
+    """
     omega = np.array([STEADY / size_of(robot).time])
     law = laws.responses(omega)[0]
     worst = 0.0

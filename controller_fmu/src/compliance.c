@@ -2,24 +2,35 @@
 
 #include <string.h>
 
-static const double load_floor = 1e-6;                       /* N  below it no foot carries anything */
-static const double sliding_drag = 0.55; /* 1  common tangential over normal force beyond the plan: only a robot that slides has it */
+static const double load_floor = 1e-6; /* N  below it no foot carries anything */
+static const double sliding_drag = 0.55; /* 1  common tangential over normal force beyond the plan:
+                                            only a robot that slides has it */
 static const double calm_cycles = 0.5; /* 1  gait cycles without it until feet are trusted again */
 static const double sliding_time = 0.04; /* s  longer than a foot skids when it touches down */
-static const double settled_share = 0.5; /* 1  of the weight: feet that carry less together have only just met the ground */
-static const double joints_follow = 0.35, joints_do_not = 0.45; /* 1  share of the time in which paths ask more speed than a servo has */
+static const double settled_share =
+    0.5; /* 1  of the weight: feet that carry less together have only just met the ground */
+static const double
+    joints_follow = 0.35,
+    joints_do_not = 0.45; /* 1  share of the time in which paths ask more speed than a servo has */
 static const double gripped = 0.99; /* 1  of its share: a leg with more carries it */
-static const double largest_load = 2.0; /* 1  in thirds of the weight: the design's margins hold up to it */
-static const double least_scale = 0.5, largest_scale = 3.0; /* 1  measured over modelled weight that the support believes */
-static const double high_share = 0.25; /* 1  of the step height: a foot planned higher is certainly in the air */
+static const double largest_load =
+    2.0; /* 1  in thirds of the weight: the design's margins hold up to it */
+static const double least_scale = 0.5,
+                    largest_scale =
+                        3.0; /* 1  measured over modelled weight that the support believes */
+static const double high_share =
+    0.25; /* 1  of the step height: a foot planned higher is certainly in the air */
 
-enum { HX_TRIPOD_LEGS = 3 }; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
+enum {
+  HX_TRIPOD_LEGS = 3
+}; /* legs that share the weight in the hardest gait: loads are counted in weight / 3 */
 
 static double total_weight(const hxControllerDefinition *d) {
   double mass = d->torso.mass;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) mass += d->leg[leg].link[joint].mass;
-  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] + d->gravity[2] * d->gravity[2]);
+  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] +
+                     d->gravity[2] * d->gravity[2]);
 }
 
 void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianceModel *model) {
@@ -56,12 +67,13 @@ void hx_compliance_reset(hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->grip[leg] = 1.0;
 }
 
-void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand, const double height[HX_LEGS], const double rise[HX_LEGS],
-                        hxPlan *plan) {
+void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
+                        const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan) {
   const double supports = model->parts.support ? 1.0 : 0.0;
   plan->weight = plan->needed = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double f[3] = {plan->shares.push[leg].x, plan->shares.push[leg].y, plan->shares.normal[leg]};
+    const double f[3] = {plan->shares.push[leg].x, plan->shares.push[leg].y,
+                         plan->shares.normal[leg]};
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const double *lever = demand->lever[leg][joint];
       for (int i = 0; i < 3; ++i) plan->lever[leg][joint][i] = lever[i];
@@ -77,7 +89,8 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand, 
   }
 }
 
-/* ---------------------------------------------------------------------------------------------- sensors */
+/* ----------------------------------------------------------------------------------------------
+ * sensors */
 
 /* Feet whose sensors are not believed feel what is planned; all do once a tripod's are not. */
 static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
@@ -91,8 +104,8 @@ static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompl
 }
 
 /* met: height at which feet meet the ground without any bump [m] */
-static void doubt(const hxComplianceModel *model, const hxPlan *plan, const double met[HX_LEGS], double force[HX_LEGS][3],
-                  hxCompliance *laws) {
+static void doubt(const hxComplianceModel *model, const hxPlan *plan, const double met[HX_LEGS],
+                  double force[HX_LEGS][3], hxCompliance *laws) {
   hxExpected expected;
   double total = 0.0;
   int doubted = 0;
@@ -110,20 +123,24 @@ static void doubt(const hxComplianceModel *model, const hxPlan *plan, const doub
   if (doubted) replace_forces(plan, force, laws);
 }
 
-static void meet_ground(const hxComplianceModel *model, const hxPlan *plan, const double met[HX_LEGS], hxCompliance *laws) {
+static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
+                        const double met[HX_LEGS], hxCompliance *laws) {
   hxMeeting meeting[HX_LEGS];
   int early[HX_LEGS];
   laws->slack = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double falling = early[leg] ? plan->falling[leg] : 0.0;
-    meeting[leg] = (hxMeeting){laws->touching[leg], falling, plan->swinging[leg], plan->standing[leg]};
+    meeting[leg] =
+        (hxMeeting){laws->touching[leg], falling, plan->swinging[leg], plan->standing[leg]};
   }
   hx_touchdown_step(model->period, meeting, &laws->touchdown);
 }
 
-/* Feet that touch and should not, or the other way round: ground met early or late, or a sensor that is wrong. */
-static void wonder(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
+/* Feet that touch and should not, or the other way round: ground met early or late, or a sensor
+ * that is wrong. */
+static void wonder(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3],
+                   hxCompliance *laws) {
   double met[HX_LEGS];
   hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
   if (model->parts.fallback) doubt(model, plan, met, force, laws);
@@ -136,15 +153,19 @@ static void wonder(const hxComplianceModel *model, const hxPlan *plan, double fo
 static int surprised(const hxPlan *plan, const hxCompliance *laws) {
   int found = hx_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    found |= laws->touching[leg] != plan->standing[leg] && (plan->standing[leg] || plan->well_up[leg]);
+    found |=
+        laws->touching[leg] != plan->standing[leg] && (plan->standing[leg] || plan->well_up[leg]);
   return found;
 }
 
-/* ---------------------------------------------------------------------------------------------- laws */
+/* ----------------------------------------------------------------------------------------------
+ * laws */
 
-/* A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who carries what: kinematic control for it.
- * drag: of the feet's common tangential force beyond the plan, the share of the normal one. */
-static void judge(const hxComplianceModel *model, const hxPlan *plan, double drag, hxCompliance *laws) {
+/* A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who carries
+ * what: kinematic control for it. drag: of the feet's common tangential force beyond the plan, the
+ * share of the normal one. */
+static void judge(const hxComplianceModel *model, const hxPlan *plan, double drag,
+                  hxCompliance *laws) {
   laws->asked += model->follow_cycle * ((double)plan->hurried - laws->asked);
   laws->outrun = laws->asked > (laws->outrun ? joints_follow : joints_do_not);
   laws->dragged = drag > sliding_drag ? laws->dragged + 1 : 0;
@@ -159,10 +180,10 @@ static void judge(const hxComplianceModel *model, const hxPlan *plan, double dra
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze of these, f_n, load.
- * Returns sum f_n [N]. */
-static double mix(const hxComplianceModel *model, const hxPlan *plan, const double force[HX_LEGS][3], hxFootInput input[HX_LEGS],
-                  hxCompliance *laws) {
+/* Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze of these,
+ * f_n, load. Returns sum f_n [N]. */
+static double mix(const hxComplianceModel *model, const hxPlan *plan,
+                  const double force[HX_LEGS][3], hxFootInput input[HX_LEGS], hxCompliance *laws) {
   hxPlane felt[HX_LEGS], common = {0.0, 0.0};
   double normal[HX_LEGS], total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -174,7 +195,8 @@ static double mix(const hxComplianceModel *model, const hxPlan *plan, const doub
     total += normal[leg];
   }
   const double share = total > load_floor ? 1.0 / total : 0.0;
-  if (model->parts.fallback) judge(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0, laws);
+  if (model->parts.fallback)
+    judge(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0, laws);
   hx_slip_squeeze(normal, plan->feet, felt);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     input[leg].push = model->parts.slip_pid ? felt[leg] : hx_plane(0.0, 0.0);
@@ -185,8 +207,10 @@ static double mix(const hxComplianceModel *model, const hxPlan *plan, const doub
 }
 
 /* measured over planned weight, and what the suspensions are to give way to */
-static void weigh(const hxComplianceModel *model, const hxPlan *plan, double total, hxFootInput input[HX_LEGS], hxCompliance *laws) {
-  const double ratio = total / fmax(plan->weight, load_floor), scale = hx_clamp(ratio, least_scale, largest_scale);
+static void weigh(const hxComplianceModel *model, const hxPlan *plan, double total,
+                  hxFootInput input[HX_LEGS], hxCompliance *laws) {
+  const double ratio = total / fmax(plan->weight, load_floor),
+               scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
   if (!doubted) {
@@ -205,7 +229,8 @@ static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
     const hxPlane wanted = law->answer;
-    law->answer = hx_scaled(wanted, model->largest / fmax(hypot(wanted.x, wanted.y), model->largest));
+    law->answer =
+        hx_scaled(wanted, model->largest / fmax(hypot(wanted.x, wanted.y), model->largest));
     law->x.integral += model->tracking * (law->answer.x - wanted.x);
     law->y.integral += model->tracking * (law->answer.y - wanted.y);
   }
@@ -221,9 +246,11 @@ static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws
 }
 
 /* The laws one period on, limited, and the forces that come of them. */
-static void answer_forces(const hxComplianceModel *model, const hxPlan *plan, const hxFootInput input[HX_LEGS], double answer[HX_LEGS][3],
+static void answer_forces(const hxComplianceModel *model, const hxPlan *plan,
+                          const hxFootInput input[HX_LEGS], double answer[HX_LEGS][3],
                           hxCompliance *laws) {
-  const double freedom = model->parts.support ? laws->burden.freedom : 1.0, kept = 1.0 - (1.0 - freedom) * model->follow_load;
+  const double freedom = model->parts.support ? laws->burden.freedom : 1.0,
+               kept = 1.0 - (1.0 - freedom) * model->follow_load;
   double answers = 0.0, deflections = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hx_foot_law_step(&model->law, &input[leg], &laws->law[leg]);
@@ -236,12 +263,14 @@ static void answer_forces(const hxComplianceModel *model, const hxPlan *plan, co
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
     const double (*lever)[3] = plan->lever[leg];
-    const double vertical = lever[0][2] * lever[0][2] + lever[1][2] * lever[1][2] + lever[2][2] * lever[2][2];
+    const double vertical =
+        lever[0][2] * lever[0][2] + lever[1][2] * lever[1][2] + lever[2][2] * lever[2][2];
     const hxPlane given = hx_scaled(law->answer, freedom * fmin(law->load, largest_load));
     answer[leg][0] = given.x;
     answer[leg][1] = given.y;
     answer[leg][2] = law->deflection / (model->softness * vertical); /* z/C_zz, C = J kp^-1 J^T */
-    /* a foot in the air forgets, within the time in which a leg gives up its load; and all do what they may not take away */
+    /* a foot in the air forgets, within the time in which a leg gives up its load; and all do what
+     * they may not take away */
     const double left = plan->swinging[leg] && !laws->touching[leg] ? kept * model->memory : kept;
     law->x.integral *= left;
     law->y.integral *= left;
@@ -260,7 +289,8 @@ static void take_up(const hxComplianceModel *model, const hxPlan *plan, hxCompli
 }
 
 /* one joint's bend towards the wanted one, and torque, within what commands never exceed */
-static void limit_joint(const hxComplianceModel *model, double wanted, double *bend, double *torque) {
+static void limit_joint(const hxComplianceModel *model, double wanted, double *bend,
+                        double *torque) {
   if (!model->parts.limits) {
     *bend = wanted;
     return;
@@ -270,10 +300,12 @@ static void limit_joint(const hxComplianceModel *model, double wanted, double *b
 }
 
 /* bend = J^T f/kp, limited in rate; torque = own + strength x scale x carry, limited */
-static void actuate(const hxComplianceModel *model, const hxPlan *plan, const double answer[HX_LEGS][3], hxCompliance *laws) {
+static void actuate(const hxComplianceModel *model, const hxPlan *plan,
+                    const double answer[HX_LEGS][3], hxCompliance *laws) {
   const double strength = model->parts.limits ? laws->burden.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    for (int joint = 0; joint < HX_JOINTS; ++joint) laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
   if (laws->slack) take_up(model, plan, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double *f = answer[leg];
@@ -289,7 +321,8 @@ static void actuate(const hxComplianceModel *model, const hxPlan *plan, const do
   }
 }
 
-void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
+void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
+                        double force[HX_LEGS][3], hxCompliance *laws) {
   hxFootInput input[HX_LEGS];
   double normal[HX_LEGS], answer[HX_LEGS][3];
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];

@@ -1,4 +1,5 @@
-/* compliant.h - compliant control around its laws: from the sensors to the corrected feet. Python: controller/compliant.py. */
+/* compliant.h - compliant control around its laws: from the sensors to the corrected feet. Python:
+ * controller/compliant.py. */
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
@@ -43,17 +44,22 @@ typedef struct hxStance {
   const double *height;              /* m  (6) and what they are lowered to */
 } hxStance;
 
-void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS], hxCompliantModel *model);
+void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS],
+                          hxCompliantModel *model);
 void hx_compliant_reset(hxCompliant *compliant);
 
-/* Before new steps are planned, `steps` after the last: looks at what the lost way asks for when a leg lifts off or touches down. */
-void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh, hxCompliant *compliant);
+/* Before new steps are planned, `steps` after the last: looks at what the lost way asks for when a
+ * leg lifts off or touches down. */
+void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh,
+                        hxCompliant *compliant);
 
 /* The addition so many steps after the first planned one. */
-hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant, int64_t steps);
+hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
+                              int64_t steps);
 
 /* The joint commands of this step, corrected in place. */
-void hx_compliant_step(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS], const hxStance *stance, const hxControllerInput *input,
+void hx_compliant_step(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS],
+                       const hxStance *stance, const hxControllerInput *input,
                        hxCompliant *compliant, hxControllerOutput *output);
 
 HX_HIDDEN_END

@@ -1,4 +1,5 @@
-/* contact_detection.h - what the foot force sensors say, and whether they can be believed. Python: controller/contact_detection.py. */
+/* contact_detection.h - what the foot force sensors say, and whether they can be believed. Python:
+ * controller/contact_detection.py. */
 #ifndef HX_CONTACT_DETECTION_H
 #define HX_CONTACT_DETECTION_H
 
@@ -34,7 +35,8 @@ void hx_watch_compile(double weight, double cycle, double period, hxWatchModel *
 int hx_watch_busy(const hxWatch *watch);
 
 /* After another period: touching and the sum of all forces [N] are what is reported. */
-void hx_watch_look(const hxWatchModel *model, const int touching[HX_LEGS], double total, const hxExpected *expected, hxWatch *watch);
+void hx_watch_look(const hxWatchModel *model, const int touching[HX_LEGS], double total,
+                   const hxExpected *expected, hxWatch *watch);
 
 HX_HIDDEN_END
 

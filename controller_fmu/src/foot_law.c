@@ -8,8 +8,8 @@ void hx_foot_law_compile(const hxControllerDefinition *definition, hxFootLawMode
                            .kd = gains->slip.kd,
                            .filter = gains->slip.filter_time,
                            .derivative = gains->slip.derivative_time};
-  hx_suspension_discretise(gains->suspension.mass, gains->suspension.damping, gains->suspension.stiffness, definition->period,
-                           &model->suspension);
+  hx_suspension_discretise(gains->suspension.mass, gains->suspension.damping,
+                           gains->suspension.stiffness, definition->period, &model->suspension);
   model->keep = exp(-definition->period / gains->slip.load_time);
 }
 

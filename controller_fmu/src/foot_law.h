@@ -1,5 +1,5 @@
-/* foot_law.h - the linear part of a foot's laws: the slip PID along x and along y, the virtual suspension and the smoothing of the load.
- * Python: controller/foot_law.py. */
+/* foot_law.h - the linear part of a foot's laws: the slip PID along x and along y, the virtual
+ * suspension and the smoothing of the load. Python: controller/foot_law.py. */
 #ifndef HX_FOOT_LAW_H
 #define HX_FOOT_LAW_H
 

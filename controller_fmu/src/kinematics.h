@@ -1,4 +1,5 @@
-/* kinematics.h - closed-form kinematics of three-joint legs, torso frame. Python: controller/kinematics.py. */
+/* kinematics.h - closed-form kinematics of three-joint legs, torso frame. Python:
+ * controller/kinematics.py. */
 #ifndef HX_LEG_KINEMATICS_H
 #define HX_LEG_KINEMATICS_H
 
@@ -47,17 +48,20 @@ double hx_leg_rolling(const hxLegModel *model, const double angle[HX_JOINTS]);
 void hx_leg_pose(const hxLegModel *model, hxPlane plane, double height, hxPose *pose);
 
 /* rad/s  joint speeds of a foot that moves so, torso frame [m/s] */
-void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise, double speed[HX_JOINTS]);
+void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise,
+                   double speed[HX_JOINTS]);
 
-/* Angles within the joints' limits and speeds that servos reach. Returns whether the foot misses its target. */
-int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise, double angle[HX_JOINTS],
-                 double speed[HX_JOINTS]);
+/* Angles within the joints' limits and speeds that servos reach. Returns whether the foot misses
+ * its target. */
+int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise,
+                 double angle[HX_JOINTS], double speed[HX_JOINTS]);
 
 /* rad/s2  that lead the joints to the angles of a neighbouring step, `ahead` [s] of this one (< 0:
  * that led from there); none without a neighbour. A joint that its limits hold, of angle or of
  * speed, has none, and none has more than turns its speed round in that time. */
-void hx_leg_accelerations(const hxLegModel *model, const hxPose *neighbour, double ahead, const double angle[HX_JOINTS],
-                          const double speed[HX_JOINTS], double acceleration[HX_JOINTS]);
+void hx_leg_accelerations(const hxLegModel *model, const hxPose *neighbour, double ahead,
+                          const double angle[HX_JOINTS], const double speed[HX_JOINTS],
+                          double acceleration[HX_JOINTS]);
 
 HX_HIDDEN_END
 

@@ -1,5 +1,5 @@
-/* posture.h - height, roll and pitch of the torso over its feet: from the walking frame K to the torso frame T.
- * Python: controller/posture.py. */
+/* posture.h - height, roll and pitch of the torso over its feet: from the walking frame K to the
+ * torso frame T. Python: controller/posture.py. */
 #ifndef HX_POSTURE_H
 #define HX_POSTURE_H
 
@@ -26,7 +26,8 @@ void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane, double *z);
 
 /* A foot of the walking frame, its place and velocity, seen in the torso frame, in place. */
 void hx_posture_see_place(const hxPosture *posture, hxPlane *plane, double *height);
-void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height, hxPlane *velocity, double *rise);
+void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height, hxPlane *velocity,
+                    double *rise);
 
 HX_HIDDEN_END
 

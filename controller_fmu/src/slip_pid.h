@@ -1,4 +1,5 @@
-/* slip_pid.h - the law against slip: one discrete PID per foot and direction. Python: controller/slip_pid.py. */
+/* slip_pid.h - the law against slip: one discrete PID per foot and direction. Python:
+ * controller/slip_pid.py. */
 #ifndef HX_SLIP_PID_H
 #define HX_SLIP_PID_H
 
@@ -22,9 +23,11 @@ typedef struct hxSlipState {
   double slope;     /* N   filtered derivative */
 } hxSlipState;
 
-/* Tangential forces d on feet that carry normal forces [N] at these places [m], less what pushes and turns the body as one, shared by load:
- * e = d - (n / sum n) (D + i w (p - c)), with neither a sum nor a moment about the vertical. */
-void hx_slip_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
+/* Tangential forces d on feet that carry normal forces [N] at these places [m], less what pushes
+ * and turns the body as one, shared by load: e = d - (n / sum n) (D + i w (p - c)), with neither a
+ * sum nor a moment about the vertical. */
+void hx_slip_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
+                     hxPlane push[HX_LEGS]);
 
 /* One period on under a force [N]; returns the answer [N]. */
 double hx_slip_pid_step(const hxSlipPid *pid, double force, hxSlipState *state);

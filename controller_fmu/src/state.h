@@ -1,4 +1,5 @@
-/* state.h - what a controller is made of: constants compiled from the definition, and the state that moves. No pointers anywhere. */
+/* state.h - what a controller is made of: constants compiled from the definition, and the state
+ * that moves. No pointers anywhere. */
 #ifndef HX_CONTROLLER_STATE_H
 #define HX_CONTROLLER_STATE_H
 
@@ -18,7 +19,8 @@ typedef struct hxControllerModel {
 
 /* One planned step: what depends on the command alone. */
 typedef struct hxRow {
-  double value[HX_COMMANDS], rate[HX_COMMANDS];  /* vx vy yaw_rate height roll pitch, and per second */
+  double value[HX_COMMANDS],
+      rate[HX_COMMANDS];  /* vx vy yaw_rate height roll pitch, and per second */
   hxPosture posture;
   hxSteps steps;
   double activation[HX_LEGS];  /* 1 */
@@ -45,7 +47,8 @@ typedef struct hxControllerState {
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
-/* The next tick, done for show: it is the same when time goes on under the same input. Not part of the state. */
+/* The next tick, done for show: it is the same when time goes on under the same input. Not part of
+ * the state. */
 typedef struct hxAhead {
   int known;
   hxControllerInput input;

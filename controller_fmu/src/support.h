@@ -1,5 +1,5 @@
-/* support.h - who carries what: the planned weight and acceleration of the robot, shared out over the standing feet.
- * Python: controller/support.py. */
+/* support.h - who carries what: the planned weight and acceleration of the robot, shared out over
+ * the standing feet. Python: controller/support.py. */
 #ifndef HX_SUPPORT_H
 #define HX_SUPPORT_H
 
@@ -23,15 +23,19 @@ typedef struct hxShares {
   hxPlane push[HX_LEGS];       /* N */
 } hxShares;
 
-void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest, hxSupportModel *model);
+void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest,
+                        hxSupportModel *model);
 
 /* 1 while the leg stands, 0 in the air, in between over the hand-over.
- * stayed, stays: it had nowhere to step when it was to lift off last, or will have nowhere to when it is next. */
-double hx_support_activation(const hxSupportModel *model, double phase, int stayed, int stays, int walking);
+ * stayed, stays: it had nowhere to step when it was to lift off last, or will have nowhere to when
+ * it is next. */
+double hx_support_activation(const hxSupportModel *model, double phase, int stayed, int stays,
+                             int walking);
 
-/* m  how much lower than planned the feet must be for the torso to keep its height over the ground that gives way */
-void hx_support_lowering(const hxSupportModel *model, const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
-                         double lowering[HX_LEGS]);
+/* m  how much lower than planned the feet must be for the torso to keep its height over the ground
+ * that gives way */
+void hx_support_lowering(const hxSupportModel *model, const hxPlane feet[HX_LEGS],
+                         const double activation[HX_LEGS], double lowering[HX_LEGS]);
 
 /* Shares of feet in the walking frame; activations are given. */
 void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxShares *shares);

@@ -7,19 +7,20 @@
 
 HX_HIDDEN_BEGIN
 
-extern const double hx_early; /* m  a foot that meets the ground with more of its way down to go has met it early */
+extern const double
+    hx_early; /* m  a foot that meets the ground with more of its way down to go has met it early */
 
 typedef struct hxTouchdown {
-  double offset[HX_LEGS];  /* m  by which paths are raised */
-  double late[HX_LEGS];    /* s  for how long the ground has been missed */
+  double offset[HX_LEGS]; /* m  by which paths are raised */
+  double late[HX_LEGS]; /* s  for how long the ground has been missed */
 } hxTouchdown;
 
 /* What is planned and felt of a foot. */
 typedef struct hxMeeting {
-  int touching;    /* it reports a force */
-  double falling;  /* m  how far its path, well above its end, comes down in this period */
-  int swinging;    /* planned in the air */
-  int loaded;      /* planned to carry its whole share */
+  int touching; /* it reports a force */
+  double falling; /* m  how far its path, well above its end, comes down in this period */
+  int swinging; /* planned in the air */
+  int loaded; /* planned to carry its whole share */
 } hxMeeting;
 
 /* Whether there is something to look after. */

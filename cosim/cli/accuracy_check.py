@@ -1,4 +1,6 @@
-"""--check-accuracy of `hexapod simulate` and `compare`: walks once more, twice, and says what that changes."""
+"""--check-accuracy of `hexapod simulate` and `compare`: walks once more, twice, and says what
+that changes.
+"""
 
 from __future__ import annotations
 
@@ -27,11 +29,19 @@ CheckAccuracy = Annotated[
 
 
 def check_accuracy(
-    plans: Sequence[Scenario], runs: Sequence[Summary], folder: Path, *, fmu: Path | None, used: Gains | None, given: Gains | None
+    plans: Sequence[Scenario],
+    runs: Sequence[Summary],
+    folder: Path,
+    *,
+    fmu: Path | None,
+    used: Gains | None,
+    given: Gains | None,
 ) -> Accuracy:
-    """Of the runs that these plans came to, all of one control, whose results are in a folder already.
+    """Of the runs that these plans came to, all of one control, whose results are in a folder
+    already.
 
-    used: the gains of the runs. given: those that the user gave, which half the macro-step keeps; else it has gains of its own.
+    used: the gains of the runs. given: those that the user gave, which half the macro-step keeps;
+    else it has gains of its own.
     """
     fine, half = [finer(plan) for plan in plans], [halved(plan) for plan in plans]
     try:
@@ -39,7 +49,9 @@ def check_accuracy(
             references = list(_run(fine, fmu=fmu, gains=used, tell=tell, done=0))
             halves = list(_run(half, fmu=fmu, gains=given, tell=tell, done=len(fine)))
     except KeyboardInterrupt:
-        warn(f"the results in {folder} are whole, their accuracy was not checked; `hexapod report {folder}` draws their figures")
+        warn(
+            f"the results in {folder} are whole, their accuracy was not checked; `hexapod report {folder}` draws their figures"
+        )
         raise
     found = judge_accuracy(plans[0], runs, references, halves)
     for text in found.notes:
@@ -47,7 +59,9 @@ def check_accuracy(
     return found
 
 
-def _run(plans: Sequence[Scenario], *, fmu: Path | None, gains: Gains | None, tell: Count, done: int) -> Iterator[Summary]:
+def _run(
+    plans: Sequence[Scenario], *, fmu: Path | None, gains: Gains | None, tell: Count, done: int
+) -> Iterator[Summary]:
     with closing(run_batch(plans, fmu=fmu, gains=gains)) as batch:
         tell(done)
         for count, summary in enumerate(batch, start=done + 1):
@@ -56,9 +70,13 @@ def _run(plans: Sequence[Scenario], *, fmu: Path | None, gains: Gains | None, te
 
 
 def show_accuracy(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> None:
-    """Prints what the errors in the main table are, whose rows are given, and what half the macro-step changes, by control."""
+    """Prints what the errors in the main table are, whose rows are given, and what half the
+    macro-step changes, by control.
+    """
     if not accuracies:
         return
     show_text(about_accuracy(accuracies))
-    texts = [[row["name"], row["unit"], *row["values"]] for row in effect_rows(rows, accuracies, metrics)]
+    texts = [
+        [row["name"], row["unit"], *row["values"]] for row in effect_rows(rows, accuracies, metrics)
+    ]
     show_table(["metric", "unit", *accuracies], texts, right=range(2, 2 + len(accuracies)))

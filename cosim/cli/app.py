@@ -6,11 +6,23 @@ from typing import Annotated
 
 import typer
 
-from hexapod_cosim.cosim.cli import compare_command, fmu_commands, listing, run_commands, study_command
+from hexapod_cosim.cosim.cli import (
+    compare_command,
+    fmu_commands,
+    listing,
+    run_commands,
+    study_command,
+)
 from hexapod_cosim.cosim.cli.failures import EPILOG
 from hexapod_cosim.cosim.common.plant_files import package_version
 
-app = typer.Typer(name="hexapod", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False, epilog=EPILOG)
+app = typer.Typer(
+    name="hexapod",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    epilog=EPILOG,
+)
 app.command("export")(fmu_commands.export)
 app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
 app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
@@ -29,7 +41,14 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
-    version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and stop.")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show where an unexpected error arose.")] = False,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Print the version and stop."
+        ),
+    ] = False,
+    debug: Annotated[
+        bool, typer.Option("--debug", help="Show where an unexpected error arose.")
+    ] = False,
 ) -> None:
     """A walking hexapod as an FMU, its compliant control, and their co-simulation."""

@@ -27,7 +27,14 @@ from hexapod_cosim.cosim.cli.running import (
     show_rows,
     titled,
 )
-from hexapod_cosim.cosim.cli.terminal import Json, counting_bar, show_files, show_json, show_text, warn
+from hexapod_cosim.cosim.cli.terminal import (
+    Json,
+    counting_bar,
+    show_files,
+    show_json,
+    show_text,
+    warn,
+)
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.interrupts import held_interrupts
@@ -35,10 +42,24 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, about, comparison_rows, write_report
 from hexapod_cosim.cosim.results.accuracy import Accuracy, halved
-from hexapod_cosim.cosim.results.comparison import SEEDS, SEEDS_PARTIAL, Comparison, compare_runs, write_seeds
+from hexapod_cosim.cosim.results.comparison import (
+    SEEDS,
+    SEEDS_PARTIAL,
+    Comparison,
+    compare_runs,
+    write_seeds,
+)
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import ACCURACY, METRICS_FILE, SCENARIO, Folder, read_scenario, results_folder, stored
+from hexapod_cosim.cosim.results.results import (
+    ACCURACY,
+    METRICS_FILE,
+    SCENARIO,
+    Folder,
+    read_scenario,
+    results_folder,
+    stored,
+)
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.run import chosen_gains
@@ -53,21 +74,34 @@ EPILOG = (
 )
 MAX_SEEDS = 10_000
 Seeds = Annotated[
-    int, typer.Option("--seeds", metavar="N", help="Runs of each control, which small variations tell apart; 1: the plain walk alone.")
+    int,
+    typer.Option(
+        "--seeds",
+        metavar="N",
+        help="Runs of each control, which small variations tell apart; 1: the plain walk alone.",
+    ),
 ]
 
 
 def compare(
-    scenario: Name = "walk_flat", seeds: Seeds = 10, settings: Settings = None, output: FolderName = None,
-    fmu: FmuFile = None, gains: GainsFile = None, accuracy: CheckAccuracy = False, json: Json = False,
-) -> int:  # fmt: skip
+    scenario: Name = "walk_flat",
+    seeds: Seeds = 10,
+    settings: Settings = None,
+    output: FolderName = None,
+    fmu: FmuFile = None,
+    gains: GainsFile = None,
+    accuracy: CheckAccuracy = False,
+    json: Json = False,
+) -> int:
     """Run a walk under kinematic and under compliant control; report."""
     plan = _plan(scenario, settings or [], seeds)
     if accuracy:
         halved(plan)  # refused before anything is run
     given = given_gains(gains)
     ready = chosen_gains(replace(plan, control="compliant"), given)
-    command = command_line("compare", scenario, seeds=seeds, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy)
+    command = command_line(
+        "compare", scenario, seeds=seeds, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy
+    )
     with results_folder(output or default_folder(scenario)) as folder:
         results, files = _first_seed(plan, folder, command, fmu=fmu, gains=ready)
         comparison = _all_seeds(plan, results, seeds, folder.path, fmu=fmu, gains=ready)
@@ -80,7 +114,13 @@ def compare(
             runs = {control: stored(result) for control, result in results.items()}
             scenario_text = read_scenario(folder.path)
             files += write_report(
-                runs, folder.path, tell=warn, comparison=comparison, scenario=scenario_text, command=command, accuracies=checked
+                runs,
+                folder.path,
+                tell=warn,
+                comparison=comparison,
+                scenario=scenario_text,
+                command=command,
+                accuracies=checked,
             )
     if json:
         show_json({**_table(comparison, checked), "report": str(folder.path / REPORT)})
@@ -97,7 +137,13 @@ def compare(
 def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
     """The scenario; what runs of several seeds differ by is the standard, where it does not say."""
     if not 1 <= seeds <= MAX_SEEDS:
-        raise ScenarioError("not a number of runs", got=seeds, expected=f"1 to {MAX_SEEDS}", fix="write --seeds 10", where="--seeds")
+        raise ScenarioError(
+            "not a number of runs",
+            got=seeds,
+            expected=f"1 to {MAX_SEEDS}",
+            fix="write --seeds 10",
+            where="--seeds",
+        )
     plan = titled(load_scenario(scenario, overrides=settings), settings)
     return replace(plan, variation=STANDARD) if seeds > 1 and plan.variation is None else plan
 
@@ -110,19 +156,34 @@ def _first_seed(
     files: list[Path] = []
     for control in CONTROLS:
         with results_folder(folder.path / control) as part:
-            results[control], written = run_into(replace(plan, control=control), [folder, part], command, fmu=fmu, gains=gains)
+            results[control], written = run_into(
+                replace(plan, control=control), [folder, part], command, fmu=fmu, gains=gains
+            )
         files += written
     return results, files
 
 
 def _all_seeds(
-    plan: Scenario, results: Mapping[str, Result], seeds: int, folder: Path, *, fmu: Path | None, gains: Gains | None
+    plan: Scenario,
+    results: Mapping[str, Result],
+    seeds: int,
+    folder: Path,
+    *,
+    fmu: Path | None,
+    gains: Gains | None,
 ) -> Comparison:
     """Runs the other seeds too; an interrupt keeps what came to its end, under another name."""
-    scenarios = [replace(plan, control=control, seed=seed) for seed in range(plan.seed + 1, plan.seed + seeds) for control in CONTROLS]
+    scenarios = [
+        replace(plan, control=control, seed=seed)
+        for seed in range(plan.seed + 1, plan.seed + seeds)
+        for control in CONTROLS
+    ]
     done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
     try:
-        with counting_bar("seeds", 2 * seeds) as tell, closing(run_batch(scenarios, fmu=fmu, gains=gains)) as runs:
+        with (
+            counting_bar("seeds", 2 * seeds) as tell,
+            closing(run_batch(scenarios, fmu=fmu, gains=gains)) as runs,
+        ):
             tell(len(done))
             for run in runs:
                 done.append(run)
@@ -133,14 +194,22 @@ def _all_seeds(
             warn(f"the runs that came to their end are in {folder / SEEDS_PARTIAL}")
         raise
     write_seeds(folder / SEEDS, done)
-    comparison = compare_runs(*([run for run in done if run.control == control] for control in CONTROLS))
+    comparison = compare_runs(
+        *([run for run in done if run.control == control] for control in CONTROLS)
+    )
     for text in comparison.losses:
         warn(text)
     return comparison
 
 
 def _accuracies(
-    plan: Scenario, comparison: Comparison, folder: Path, *, fmu: Path | None, used: Gains | None, given: Gains | None
+    plan: Scenario,
+    comparison: Comparison,
+    folder: Path,
+    *,
+    fmu: Path | None,
+    used: Gains | None,
+    given: Gains | None,
 ) -> dict[str, Accuracy]:
     """By control, of the means over the seeds that are compared."""
     found = {}
@@ -152,14 +221,23 @@ def _accuracies(
 
 def _table(comparison: Comparison, checked: Mapping[str, Accuracy]) -> dict[str, Any]:
     """The content of metrics.json."""
-    accuracy = {ACCURACY: {control: item.as_table() for control, item in checked.items()}} if checked else {}
+    accuracy = (
+        {ACCURACY: {control: item.as_table() for control, item in checked.items()}}
+        if checked
+        else {}
+    )
     return comparison.as_table() | accuracy
 
 
 def _store(plan: Scenario, comparison: Comparison, folder: Path, command: str) -> list[Path]:
     """Writes all but the figures and the report."""
-    text = to_toml({key: value for key, value in plan.to_table().items() if key != "control"})  # both were run
+    text = to_toml(
+        {key: value for key, value in plan.to_table().items() if key != "control"}
+    )  # both were run
     write_text(folder / SCENARIO, text)
     write_json(folder / METRICS_FILE, _table(comparison, {}))
-    write_json(folder / RUN_FILE, {"kind": "compare", "status": COMPLETED, "title": plan.title, "command": command})
+    write_json(
+        folder / RUN_FILE,
+        {"kind": "compare", "status": COMPLETED, "title": plan.title, "command": command},
+    )
     return [folder / SEEDS, folder / SCENARIO, folder / METRICS_FILE, folder / RUN_FILE]

@@ -1,4 +1,6 @@
-"""What a shell offers for a half-typed word: names, and keys of --set with what they mean. Reads names only, loads no robot."""
+"""What a shell offers for a half-typed word: names, and keys of --set with what they mean. Reads
+names only, loads no robot.
+"""
 
 from __future__ import annotations
 
@@ -52,6 +54,8 @@ def _meaning(column: Column) -> str:
 scenario = _offering(_scenarios)
 setting = _offering(_settings)
 robot = _offering(lambda: ((name, "") for name in list_robots()))
-gait = _offering(lambda: ((name, f"duty factor {pattern.duty:.3g}") for name, pattern in PATTERNS.items()))
+gait = _offering(
+    lambda: ((name, f"duty factor {pattern.duty:.3g}") for name, pattern in PATTERNS.items())
+)
 control = _offering(lambda: ((name, "") for name in CONTROLS))
 requirement = _offering(lambda: ((f"{item.name}=", "") for item in fields(Requirements)))

@@ -1,4 +1,5 @@
-"""How a command ends: its exit code, a paragraph on stderr where it failed and, with --json, the same as an object on stdout.
+"""How a command ends: its exit code, a paragraph on stderr where it failed and, with --json, the
+same as an object on stdout.
 
 Imports nothing slow: `main` needs it before it can hear Ctrl-C.
 """
@@ -21,14 +22,17 @@ EXIT_CODES = {
     FELL: "the robot fell; results are complete and written",
     INTERRUPT: "interrupted",
 }
-EPILOG = "Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + "."
+EPILOG = (
+    "Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + "."
+)
 OF_ERRORS = ("what", "got", "expected", "fix", "where")  # attributes of a HexapodError
 
 
 def tell_failure(text: str, code: int, *, error: BaseException | None = None, as_json: bool) -> int:
     """Says on stderr why a command failed, with `as_json` also on stdout; returns the exit code.
 
-    error: whose attributes go into the object; `found`, where it has one, is what the command has to say besides.
+    error: whose attributes go into the object; `found`, where it has one, is what the command has
+    to say besides.
     """
     print(fitted(f"hexapod: {text}", sys.stderr), file=sys.stderr)
     if as_json:
@@ -37,9 +41,16 @@ def tell_failure(text: str, code: int, *, error: BaseException | None = None, as
 
 
 def error_object(text: str, code: int, error: BaseException | None = None) -> dict[str, Any]:
-    """What --json prints of a failure: the whole message, its parts (null where there is none) and the exit code."""
+    """What --json prints of a failure: the whole message, its parts (null where there is none)
+    and the exit code.
+    """
     found = _plain(getattr(error, "found", {}))
-    return {**found, "error": text, **{name: _plain(getattr(error, name, None)) for name in OF_ERRORS}, "exit_code": code}
+    return {
+        **found,
+        "error": text,
+        **{name: _plain(getattr(error, name, None)) for name in OF_ERRORS},
+        "exit_code": code,
+    }
 
 
 def _plain(value: Any) -> Any:

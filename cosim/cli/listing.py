@@ -21,13 +21,23 @@ Rows = list[dict[str, Any]]
 def robots() -> Rows:
     """The robots that come with the package; mass in kg."""
     loaded = [load_robot(name) for name in list_robots()]
-    return [{"name": robot.name, "mass": round(robot.total_mass, 6), "about": robot.source.get("robot", "")} for robot in loaded]
+    return [
+        {
+            "name": robot.name,
+            "mass": round(robot.total_mass, 6),
+            "about": robot.source.get("robot", ""),
+        }
+        for robot in loaded
+    ]
 
 
 def scenarios() -> Rows:
     """The scenarios that come with the package."""
     return [
-        {"name": name, "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))}
+        {
+            "name": name,
+            "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")),
+        }
         for name, path in list_scenarios().items()
     ]
 
@@ -35,14 +45,20 @@ def scenarios() -> Rows:
 def studies() -> Rows:
     """The studies that come with the package."""
     return [
-        {"name": name, "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", ""))}
+        {
+            "name": name,
+            "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")),
+        }
         for name, path in list_studies().items()
     ]
 
 
 def gaits() -> Rows:
     """The gaits with their natural duty factor and the phase of each leg."""
-    return [{"name": name, "duty": gait.duty, **dict(zip(LEG_NAMES, gait.offsets, strict=True))} for name, gait in PATTERNS.items()]
+    return [
+        {"name": name, "duty": gait.duty, **dict(zip(LEG_NAMES, gait.offsets, strict=True))}
+        for name, gait in PATTERNS.items()
+    ]
 
 
 def terrains() -> Rows:
@@ -58,7 +74,9 @@ def laws() -> Rows:
 
 def _choices(enumeration: str) -> Rows:
     interface = load_interface(load_robot(list_robots()[0]))
-    return [{"name": name, "about": text} for name, text in interface.enumerations[enumeration].items]
+    return [
+        {"name": name, "about": text} for name, text in interface.enumerations[enumeration].items
+    ]
 
 
 LISTS: dict[str, Callable[[], Rows]] = {

@@ -47,34 +47,61 @@ from hexapod_cosim.cosim.run.run import chosen_gains
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
-EPILOG = f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
+EPILOG = (
+    f"Exit code {FELL} when the robot fell: what was recorded and measured is written all the same."
+)
 Control = Annotated[
     str | None,
-    typer.Option("--control", metavar="|".join(CONTROLS), help="Overrides the scenario's control.", autocompletion=completion.control),
+    typer.Option(
+        "--control",
+        metavar="|".join(CONTROLS),
+        help="Overrides the scenario's control.",
+        autocompletion=completion.control,
+    ),
 ]
 
 
 def simulate(
-    scenario: Name = "walk_flat", control: Control = None, settings: Settings = None, output: FolderName = None,
-    fmu: FmuFile = None, gains: GainsFile = None, accuracy: CheckAccuracy = False, json: Json = False,
-) -> int:  # fmt: skip
+    scenario: Name = "walk_flat",
+    control: Control = None,
+    settings: Settings = None,
+    output: FolderName = None,
+    fmu: FmuFile = None,
+    gains: GainsFile = None,
+    accuracy: CheckAccuracy = False,
+    json: Json = False,
+) -> int:
     """Run one co-simulation: results, metrics, plots."""
-    plan = load_scenario(scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])])
+    plan = load_scenario(
+        scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])]
+    )
     plan = titled(plan, settings or [])
     given = given_gains(gains)
     if accuracy:
         halved(plan)  # refused before anything is run
     ready = chosen_gains(plan, given) if accuracy else given
     with results_folder(output or default_folder(scenario)) as folder:
-        command = command_line("simulate", scenario, control=control, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy)
+        command = command_line(
+            "simulate",
+            scenario,
+            control=control,
+            settings=settings,
+            fmu=fmu,
+            gains=gains,
+            accuracy=accuracy,
+        )
         result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready)
         checked: dict[str, Accuracy] = {}
         if accuracy:
-            checked[plan.control] = check_accuracy([plan], [summarise(result)], folder.path, fmu=fmu, used=ready, given=given)
+            checked[plan.control] = check_accuracy(
+                [plan], [summarise(result)], folder.path, fmu=fmu, used=ready, given=given
+            )
             write_accuracy(folder.path, result.metrics, checked[plan.control].as_table())
         if plan.outputs.plots:
             with drawing(folder.path):
-                files += write_report({plan.control: stored(result)}, folder.path, tell=warn, accuracies=checked)
+                files += write_report(
+                    {plan.control: stored(result)}, folder.path, tell=warn, accuracies=checked
+                )
     if json:
         told = {ACCURACY: checked[plan.control].as_table()} if accuracy else {}
         show_json(_summary(result, folder.path, files) | told)
@@ -88,27 +115,45 @@ def simulate(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by `hexapod simulate`, `compare` or `study`.")],
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DIR", help="A folder written by `hexapod simulate`, `compare` or `study`."
+        ),
+    ],
     json: Json = False,
 ) -> None:
     """Make the plots and the report of a run, a comparison or a study again."""
     facts = read_facts(folder)
     if facts.get("kind") == STUDY:
-        from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415  slow to import
+        # slow to import
+        from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415
 
         found, files = report_on(folder)
         warn_of(found)
     elif facts.get("kind") == "compare":
         runs = {control: read_result(folder / control) for control in CONTROLS}
-        comparison = compare_runs(*(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS))
+        comparison = compare_runs(
+            *(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS)
+        )
         files = write_report(
-            runs, folder, tell=warn, comparison=comparison, scenario=read_scenario(folder), command=facts.get("command", ""),
+            runs,
+            folder,
+            tell=warn,
+            comparison=comparison,
+            scenario=read_scenario(folder),
+            command=facts.get("command", ""),
             accuracies=read_accuracies(folder),
-        )  # fmt: skip
+        )
     else:
         run = read_result(folder)
         control = run.facts["control"]
-        files = write_report({control: run}, folder, tell=warn, accuracies={control: run.accuracy} if run.accuracy else {})
+        files = write_report(
+            {control: run},
+            folder,
+            tell=warn,
+            accuracies={control: run.accuracy} if run.accuracy else {},
+        )
     if json:
         show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
         return
@@ -116,6 +161,10 @@ def report(
 
 
 def _summary(result: Result, folder: Path, files: list[Path]) -> dict[str, Any]:
-    names = {"control": result.scenario.control, "directory": str(folder), "files": [str(file) for file in files]}
+    names = {
+        "control": result.scenario.control,
+        "directory": str(folder),
+        "files": [str(file) for file in files],
+    }
     shown = {key: result.facts[key] for key in ("robot", "walk", "warnings")}
     return {"metrics": dict(result.metrics), **names, **shown, "status": result.outcome.status}

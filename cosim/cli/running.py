@@ -1,4 +1,6 @@
-"""What `hexapod simulate` and `compare` share: their options, a run into a folder, tables of metrics."""
+"""What `hexapod simulate` and `compare` share: their options, a run into a folder, tables of
+metrics.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,11 @@ from hexapod_cosim.models import HexapodError
 
 Name = Annotated[
     str,
-    typer.Argument(metavar="SCENARIO", help="A scenario file, or a name of `hexapod list scenarios`.", autocompletion=completion.scenario),
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A scenario file, or a name of `hexapod list scenarios`.",
+        autocompletion=completion.scenario,
+    ),
 ]
 Settings = Annotated[
     list[str] | None,
@@ -35,10 +41,21 @@ Settings = Annotated[
         autocompletion=completion.setting,
     ),
 ]
-FolderName = Annotated[Path | None, typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/SCENARIO.")]
-FmuFile = Annotated[Path | None, typer.Option("--fmu", metavar="FILE", help="Use this FMU instead of exporting the robot's own.")]
+FolderName = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/SCENARIO."),
+]
+FmuFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--fmu", metavar="FILE", help="Use this FMU instead of exporting the robot's own."
+    ),
+]
 GainsFile = Annotated[
-    Path | None, typer.Option("--gains", metavar="FILE", help="Gains from `hexapod design` instead of designing them now.")
+    Path | None,
+    typer.Option(
+        "--gains", metavar="FILE", help="Gains from `hexapod design` instead of designing them now."
+    ),
 ]
 
 
@@ -64,11 +81,15 @@ def command_line(
     given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
     options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
     flags = ["--check-accuracy"] if accuracy else []
-    return shlex.join(["hexapod", name, scenario, *(word for option in options for word in option), *flags])
+    return shlex.join(
+        ["hexapod", name, scenario, *(word for option in options for word in option), *flags]
+    )
 
 
 def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
-    """The scenario with a title that tells what was set, so that no report of another walk bears the plain one's name."""
+    """The scenario with a title that tells what was set, so that no report of another walk bears
+    the plain one's name.
+    """
     if any(text.startswith("title") for text in settings):
         return plan
     told = [text.replace(" ", "") for text in settings if not text.startswith(UNTITLED)]
@@ -76,11 +97,18 @@ def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
 
 
 def run_into(
-    plan: Scenario, folders: Sequence[Folder], command: str, *, fmu: Path | None, gains: Gains | None
+    plan: Scenario,
+    folders: Sequence[Folder],
+    command: str,
+    *,
+    fmu: Path | None,
+    gains: Gains | None,
 ) -> tuple[Result, list[Path]]:
-    """Runs, and writes into the last folder, clearing all of them once the run begins; an interrupt waits for what is being written.
+    """Runs, and writes into the last folder, clearing all of them once the run begins; an interrupt
+    waits for what is being written.
 
-    Raises RunError, or KeyboardInterrupt, with what was recorded on disk when the run does not complete.
+    Raises RunError, or KeyboardInterrupt, with what was recorded on disk when the run does not
+    complete.
     """
     with ExitStack() as whole:
 
@@ -100,19 +128,27 @@ def run_into(
         warn(f"stopped at {outcome.simulated:.3f} s; recorded so far: {files[1]}")
         raise KeyboardInterrupt
     if not result.completed:
-        what = f"the run ended at {outcome.simulated:.3f} s of {plan.duration:g} s: {outcome.reason}"
-        raise RunError(what, fix=f"what was recorded until then is in {files[1]}") from outcome.cause
+        what = (
+            f"the run ended at {outcome.simulated:.3f} s of {plan.duration:g} s: {outcome.reason}"
+        )
+        raise RunError(
+            what, fix=f"what was recorded until then is in {files[1]}"
+        ) from outcome.cause
     return result, files
 
 
 @contextmanager
 def drawing(folder: Path) -> Iterator[None]:
-    """Says that figures are drawn, on a terminal, and on an interrupt what is there and what is not."""
+    """Says that figures are drawn, on a terminal, and on an interrupt what is there and what is
+    not.
+    """
     try:
         with waiting("drawing figures and report"):
             yield
     except KeyboardInterrupt:
-        warn(f"the results in {folder} are whole, the figures are not: `hexapod report {folder}` draws them")
+        warn(
+            f"the results in {folder} are whole, the figures are not: `hexapod report {folder}` draws them"
+        )
         raise
 
 
@@ -130,7 +166,10 @@ def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> Non
     """Prints a report's rows; columns in which nothing stands are left out."""
     columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
     columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
-    columns |= {"change": [row["change"] for row in rows], "95 % interval": [row["interval"] for row in rows]}
+    columns |= {
+        "change": [row["change"] for row in rows],
+        "95 % interval": [row["interval"] for row in rows],
+    }
     columns |= {"": [row["verdict"] for row in rows]}
     shown = {name: texts for name, texts in columns.items() if any(texts)}
     right = [k for k, name in enumerate(shown) if name not in {"metric", "unit", ""}]

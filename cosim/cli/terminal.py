@@ -45,7 +45,10 @@ def show_files(files: Iterable[Path]) -> None:
     for file in files:
         folders.setdefault(file.parent, []).append(file.name)
     for folder, names in folders.items():
-        show_text(f"wrote {folder}/" + (names[0] if len(names) == 1 else "{" + ", ".join(sorted(names)) + "}"))
+        show_text(
+            f"wrote {folder}/"
+            + (names[0] if len(names) == 1 else "{" + ", ".join(sorted(names)) + "}")
+        )
 
 
 def show_text(text: str) -> None:
@@ -53,11 +56,14 @@ def show_text(text: str) -> None:
     print(fitted(text, sys.stdout))
 
 
-def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
+def show_table(
+    columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()
+) -> None:
     """Prints an aligned table; `right` are the columns of numbers.
 
-    On a terminal too narrow for it the last column is broken into lines where it is text, else columns stand closer together, else those
-    for which there is no room follow in a table of their own, below the same first column.
+    On a terminal too narrow for it the last column is broken into lines where it is text, else
+    columns stand closer together, else those for which there is no room follow in a table of their
+    own, below the same first column.
     """
     texts, width = [list(row) for row in rows], columns_of(sys.stdout)
     widths = [max(map(len, column)) for column in zip(columns, *texts, strict=True)]
@@ -69,14 +75,20 @@ def show_table(columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: 
         table = Table(box=None, pad_edge=False, padding=(0, gap, 0, 0))
         for k in block:
             last = k == len(columns) - 1
-            table.add_column(columns[k], justify="right" if k in right else "left", no_wrap=not last, overflow="fold")
+            table.add_column(
+                columns[k],
+                justify="right" if k in right else "left",
+                no_wrap=not last,
+                overflow="fold",
+            )
         for row in texts:
             table.add_row(*(Text(row[k]) for k in block))
         console.print(table)
 
 
 def _layout(widths: Sequence[int], width: int, *, broken: bool) -> tuple[int, list[list[int]]]:
-    """The gap between columns, and which of them stand side by side, for a table in a terminal of that width.
+    """The gap between columns, and which of them stand side by side, for a table in a terminal of
+    that width.
 
     broken: whether the last column may be broken into lines.
     """
@@ -87,7 +99,10 @@ def _layout(widths: Sequence[int], width: int, *, broken: bool) -> tuple[int, li
             return gap, [whole]
     blocks = [[0]]
     for k in whole[1:]:
-        if len(blocks[-1]) > 1 and sum(least[place] + GAP for place in blocks[-1]) + least[k] > width:
+        if (
+            len(blocks[-1]) > 1
+            and sum(least[place] + GAP for place in blocks[-1]) + least[k] > width
+        ):
             blocks.append([0])
         blocks[-1].append(k)
     return GAP, blocks
@@ -116,7 +131,9 @@ class _Simulated(ProgressColumn):
 
 
 class _Counted(ProgressColumn):
-    """How many of how many runs, how many a minute since the count began, `already` being there then, and how many failed."""
+    """How many of how many runs, how many a minute since the count began, `already` being there
+    then, and how many failed.
+    """
 
     def render(self, task: Task) -> Text:
         rate = f"{60.0 * _rate(task):4.0f} a minute" if _rate(task) else ""
@@ -155,7 +172,9 @@ def _whole() -> Column:
 
 @contextmanager
 def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[..., None]]:
-    """A progress bar that moves to and fro until it is told for the first time how much is done, and counts from there."""
+    """A progress bar that moves to and fro until it is told for the first time how much is done,
+    and counts from there.
+    """
     columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left(_whole()))
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total, start=False, already=0.0)
@@ -187,7 +206,9 @@ class Count(Protocol):
 
 @contextmanager
 def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Count]:
-    """A progress bar over a number of runs; where there is no terminal nothing, or a line now and then when `plain`."""
+    """A progress bar over a number of runs; where there is no terminal nothing, or a line now
+    and then when `plain`.
+    """
     if not sys.stderr.isatty():
         yield _PlainCount(label, total) if plain else lambda done, failed=0: None
         return
@@ -211,4 +232,8 @@ class _PlainCount:
             self._told = now
             rate = (done - self._already) / (now - self._begun)
             left = f", {_clock((self._total - done) / rate)} left" if rate else ""
-            print(f"{self._label}: {done} of {self._total}, {60.0 * rate:.0f} a minute{left}, {failed} failed", file=sys.stderr, flush=True)
+            print(
+                f"{self._label}: {done} of {self._total}, {60.0 * rate:.0f} a minute{left}, {failed} failed",
+                file=sys.stderr,
+                flush=True,
+            )

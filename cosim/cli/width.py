@@ -1,4 +1,6 @@
-"""Lines that fit a terminal: broken between words there, and left as they are in files and pipes."""
+"""Lines that fit a terminal: broken between words there, and left as they are in files and
+pipes.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ INDENT = "  "  # of what a broken line goes on with
 
 
 def columns_of(stream: TextIO) -> int | None:
-    """Width of the terminal behind a stream, which COLUMNS overrules; None where there is no terminal."""
+    """Width of the terminal behind a stream, which COLUMNS overrules; None where there is no
+    terminal.
+    """
     if not stream.isatty():
         return None
     told = os.environ.get("COLUMNS", "")
@@ -30,6 +34,9 @@ def fitted(text: str, stream: TextIO) -> str:
     if width is None:
         return text
     wrapped = (
-        textwrap.wrap(line, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False) for line in text.split("\n")
+        textwrap.wrap(
+            line, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False
+        )
+        for line in text.split("\n")
     )
     return "\n".join("\n".join(lines) for lines in wrapped)

@@ -1,4 +1,6 @@
-"""What there are FMUs of: the plant and its controller. Both live behind one FMI layer and are described in one form of interface.toml."""
+"""What there are FMUs of: the plant and its controller. Both live behind one FMI layer and are
+described in one form of interface.toml.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +23,24 @@ class Component:
 
 
 PLANT = Component(
-    name="plant", identifier="hexapod", tree="plant_fmu", installed="plant", header="hexapod/hexapod.h", prefix="", structure="", suffix="",
+    name="plant",
+    identifier="hexapod",
+    tree="plant_fmu",
+    installed="plant",
+    header="hexapod/hexapod.h",
+    prefix="",
+    structure="",
+    suffix="",
     description="Hexapod robot of {bodies} rigid bodies and {joints} servo joints, walking on compliant ground",
-)  # fmt: skip
+)
 CONTROLLER = Component(
-    name="controller", identifier="hexapod_controller", tree="controller_fmu", installed="plant/controller", header="hexapod/controller.h",
-    prefix="controller_", structure="Controller", suffix="_controller",
+    name="controller",
+    identifier="hexapod_controller",
+    tree="controller_fmu",
+    installed="plant/controller",
+    header="hexapod/controller.h",
+    prefix="controller_",
+    structure="Controller",
+    suffix="_controller",
     description="Walking controller of a hexapod robot: commands of its {joints} joints from a body velocity and from foot forces",
-)  # fmt: skip
+)

@@ -1,4 +1,6 @@
-"""Event sinks: functions that take messages about what a program waits for or corrects by itself."""
+"""Event sinks: functions that take messages about what a program waits for or corrects by
+itself.
+"""
 
 from __future__ import annotations
 

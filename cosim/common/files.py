@@ -18,21 +18,41 @@ RUN_FILE = "run.json"  # marks a folder as ours
 RUNNING = "running"
 STUDY = "study"  # the kind of a folder that goes on where it was
 OUR_FILES = (
-    "results.parquet", "results.csv", "commands.csv", "results.partial.parquet", "results.partial.csv", "seeds.csv", "seeds.partial.csv",
-    "metrics.json", "scenario.toml", "report.html", "plots", "kinematic", "compliant",
-)  # fmt: skip
+    "results.parquet",
+    "results.csv",
+    "commands.csv",
+    "results.partial.parquet",
+    "results.partial.csv",
+    "seeds.csv",
+    "seeds.partial.csv",
+    "metrics.json",
+    "scenario.toml",
+    "report.html",
+    "plots",
+    "kinematic",
+    "compliant",
+)
 
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to, which takes its place when the block ends well and vanishes when it does not.
+    """A path beside `path` to write to, which takes its place when the block ends well and vanishes
+    when it does not.
 
     Raises HexapodError for a folder, and for a place that cannot be written to.
     """
     if path.is_dir():
-        raise HexapodError("cannot write", got="a folder", expected="the name of a file", fix="name a file in it with -o", where=str(path))
+        raise HexapodError(
+            "cannot write",
+            got="a folder",
+            expected="the name of a file",
+            fix="name a file in it with -o",
+            where=str(path),
+        )
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+        handle, name = tempfile.mkstemp(
+            prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent
+        )
     except OSError as error:
         raise not_writable(path.parent, error) from error
     os.close(handle)
@@ -55,7 +75,10 @@ def _umask() -> int:
 @contextmanager
 def atomic_text(path: Path) -> Iterator[TextIO]:
     """The same as an open text file in UTF-8."""
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="\n") as file,
+    ):
         yield file
 
 
@@ -87,13 +110,26 @@ def not_writable(path: Path, error: OSError) -> HexapodError:
     """The error for a place that cannot be written to."""
     fix = "choose another place with -o"
     if isinstance(error, FileExistsError | NotADirectoryError):
-        return HexapodError("cannot write", got="a file where a folder should be", expected="a folder", fix=fix, where=str(path))
+        return HexapodError(
+            "cannot write",
+            got="a file where a folder should be",
+            expected="a folder",
+            fix=fix,
+            where=str(path),
+        )
     expected = "a place that can be written to"
-    return HexapodError("cannot write", got=error.strerror or str(error), expected=expected, fix=fix, where=str(path))
+    return HexapodError(
+        "cannot write",
+        got=error.strerror or str(error),
+        expected=expected,
+        fix=fix,
+        where=str(path),
+    )
 
 
 def claim_folder(folder: Path) -> list[Path]:
-    """Sees that results can go here, and touches no file. Returns the folders made for it, the innermost first.
+    """Sees that results can go here, and touches no file. Returns the folders made for it, the
+    innermost first.
 
     Raises HexapodError when the folder is someone else's, or cannot be written to.
     """
@@ -106,17 +142,28 @@ def claim_folder(folder: Path) -> list[Path]:
     except OSError as error:
         raise not_writable(folder, error) from error
     if RUN_FILE in entries and read_json(folder / RUN_FILE).get("kind") == STUDY:
-        raise HexapodError("the folder holds a study", got=str(folder), expected="a folder of its own", fix="choose another with -o")
+        raise HexapodError(
+            "the folder holds a study",
+            got=str(folder),
+            expected="a folder of its own",
+            fix="choose another with -o",
+        )
     if entries and RUN_FILE not in entries:
         expected = f"a new or empty folder, or an earlier run's (it has {RUN_FILE})"
         raise HexapodError(
-            "the folder holds other files", got=sorted(entries)[0], expected=expected, fix="choose another with -o", where=str(folder)
+            "the folder holds other files",
+            got=sorted(entries)[0],
+            expected=expected,
+            fix="choose another with -o",
+            where=str(folder),
         )
     return made
 
 
 def clear_folder(folder: Path) -> None:
-    """Clears a claimed folder of an earlier run's files and marks it as a run's. Raises HexapodError."""
+    """Clears a claimed folder of an earlier run's files and marks it as a run's. Raises
+    HexapodError.
+    """
     try:
         folder.mkdir(exist_ok=True)
         for name in OUR_FILES:
@@ -139,6 +186,17 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         fix = "give a folder written by `hexapod simulate`, `hexapod compare` or `hexapod study`"
-        raise HexapodError("not a results folder", got=str(path.parent), expected=f"a folder with {path.name}", fix=fix) from error
+        raise HexapodError(
+            "not a results folder",
+            got=str(path.parent),
+            expected=f"a folder with {path.name}",
+            fix=fix,
+        ) from error
     except ValueError as error:
-        raise HexapodError("damaged file", got=str(error), expected="JSON", fix="run the scenario again", where=str(path)) from error
+        raise HexapodError(
+            "damaged file",
+            got=str(error),
+            expected="JSON",
+            fix="run the scenario again",
+            where=str(path),
+        ) from error

@@ -10,7 +10,9 @@ HELD = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)  # what asking for a lock say
 
 
 def lock_file(file: TextIO) -> None:
-    """Until the file is closed or the process ends. Raises OSError: one of HELD when another has it, others where there are no locks."""
+    """Until the file is closed or the process ends. Raises OSError: one of HELD when another has
+    it, others where there are no locks.
+    """
     if sys.platform == "win32":
         import msvcrt  # noqa: PLC0415
 

@@ -1,4 +1,6 @@
-"""Where a component's files are: the binaries, the sources and interface.toml, in a source tree or in an installed wheel."""
+"""Where a component's files are: the binaries, the sources and interface.toml, in a source tree
+or in an installed wheel.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,20 @@ GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
 SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")  # of the plant's, in every component
 SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
 LOOP = "hexapod_master"  # the shared library of the co-simulation loop
-FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"  # each needs the headers of its own standard alone
+FMI2_SOURCE, FMI3_SOURCE = (
+    "fmi/fmi2.c",
+    "fmi/fmi3.c",
+)  # each needs the headers of its own standard alone
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
-X86 = {"x86_64", "amd64", "i386", "i486", "i586", "i686", "x86"}  # as platform.machine() has them in lower case
+X86 = {
+    "x86_64",
+    "amd64",
+    "i386",
+    "i486",
+    "i586",
+    "i686",
+    "x86",
+}  # as platform.machine() has them in lower case
 
 _HERE = Path(__file__).resolve().parents[1]
 _TREE = _HERE.parent / "plant_fmu"
@@ -28,36 +41,53 @@ _INSTALLED = _HERE.parent / "plant"
 
 
 def in_source_tree() -> bool:
-    """Whether this package runs from a source tree (an editable install, or build/typing on the path)."""
+    """Whether this package runs from a source tree (an editable install, or build/typing on the
+    path).
+    """
     return (_TREE / "interface.toml").is_file()
 
 
 def interface_file(component: Component = PLANT) -> Path:
     """A component's interface.toml."""
-    return _HERE.parent / (component.tree if in_source_tree() else component.installed) / "interface.toml"
+    return (
+        _HERE.parent
+        / (component.tree if in_source_tree() else component.installed)
+        / "interface.toml"
+    )
 
 
 def package_version() -> str:
-    """The version that pyproject.toml states, from there if it is at hand (an editable install's metadata may be older)."""
+    """The version that pyproject.toml states, from there if it is at hand (an editable install's
+    metadata may be older).
+    """
     if in_source_tree():
-        project = tomllib.loads((_TREE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+        project = tomllib.loads((_TREE.parent / "pyproject.toml").read_text(encoding="utf-8"))[
+            "project"
+        ]
         return str(project["version"])
     return metadata.version(DISTRIBUTION)
 
 
 @cache
 def code_hash() -> str:
-    """16 digits that tell this package's code from any other: of its Python files, robots and co-simulation loop."""
+    """16 digits that tell this package's code from any other: of its Python files, robots and
+    co-simulation loop.
+    """
     digest = hashlib.sha256()
     for folder in (_HERE, _HERE.parent / "controller", _HERE.parent / "models"):
         for path in sorted([*folder.rglob("*.py"), *folder.glob("*.toml")]):
-            digest.update(path.relative_to(_HERE.parent).as_posix().encode() + hashlib.sha256(path.read_bytes()).digest())
+            digest.update(
+                path.relative_to(_HERE.parent).as_posix().encode()
+                + hashlib.sha256(path.read_bytes()).digest()
+            )
     digest.update(shared_library(LOOP).read_bytes())
     return digest.hexdigest()[:16]
 
 
 def source_files(component: Component = PLANT) -> dict[str, Path]:
-    """A component's C sources and headers, by their path below an FMU's sources folder; includes resolve with -I sources."""
+    """A component's C sources and headers, by their path below an FMU's sources folder; includes
+    resolve with -I sources.
+    """
     found = _own_sources(component) | _sources_in("fmi", _fmi_folder())
     if component is not PLANT:
         found |= {name: path for name, path in _own_sources(PLANT).items() if _is_shared(name)}
@@ -65,9 +95,17 @@ def source_files(component: Component = PLANT) -> dict[str, Path]:
 
 
 def _own_sources(component: Component) -> dict[str, Path]:
-    root = _HERE.parent / component.tree if in_source_tree() else _HERE.parent / component.installed / "sources"
+    root = (
+        _HERE.parent / component.tree
+        if in_source_tree()
+        else _HERE.parent / component.installed / "sources"
+    )
     headers = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
-    found = _sources_in("src", root / "src") | _sources_in("hexapod", headers) | {"component.c": root / "component.c"}
+    found = (
+        _sources_in("src", root / "src")
+        | _sources_in("hexapod", headers)
+        | {"component.c": root / "component.c"}
+    )
     return found | {f"generated/{name}": root / "generated" / name for name in GENERATED_SOURCES}
 
 
@@ -77,8 +115,12 @@ def _fmi_folder() -> Path:
 
 
 def _sources_in(name: str, folder: Path) -> dict[str, Path]:
-    """C sources and headers of a folder, by their path below an FMU's sources folder, where it is called `name`."""
-    return {f"{name}/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*.[ch]")}
+    """C sources and headers of a folder, by their path below an FMU's sources folder, where it
+    is called `name`.
+    """
+    return {
+        f"{name}/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*.[ch]")
+    }
 
 
 def _is_shared(name: str) -> bool:
@@ -96,14 +138,20 @@ def fmi_headers() -> Path:
     """Folder of the standard's C headers: the installed fmpy's."""
     spec = util.find_spec("fmpy")
     if spec is None or spec.origin is None:
-        raise FmuError("no FMI headers", got="no package fmpy", expected="fmpy", fix="pip install fmpy")
+        raise FmuError(
+            "no FMI headers", got="no package fmpy", expected="fmpy", fix="pip install fmpy"
+        )
     return Path(spec.origin).parent / "c-code"
 
 
 def fmi2_platform() -> str:
-    """The folder of an FMI 2 archive that holds this machine's binary; processors that FMI 2 has no name for go by FMI 3's (2.0.5)."""
+    """The folder of an FMI 2 archive that holds this machine's binary; processors that FMI 2 has
+    no name for go by FMI 3's (2.0.5).
+    """
     system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
-    if system != "darwin" and platform.machine().lower() not in X86:  # darwin64 is for both processors of Macs
+    if (
+        system != "darwin" and platform.machine().lower() not in X86
+    ):  # darwin64 is for both processors of Macs
         return fmi3_platform()
     return system + ("64" if sys.maxsize > 2**32 else "32")
 
@@ -111,30 +159,51 @@ def fmi2_platform() -> str:
 def fmi3_platform() -> str:
     """The same in an FMI 3 archive."""
     system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
     return f"{machine}-{system}"
 
 
 def packed_binary(folder: str | Path, identifier: str) -> str | None:
-    """This machine's binary in an unpacked FMI 2 FMU; None if it is not where it should be: then fmpy looks, in linux64 on Arm too."""
+    """This machine's binary in an unpacked FMI 2 FMU; None if it is not where it should be: then
+    fmpy looks, in linux64 on Arm too.
+    """
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     path = Path(folder).resolve() / "binaries" / fmi2_platform() / f"{identifier}{suffix}"
     return str(path) if path.is_file() else None
 
 
 def binary(fmi_platform: str, component: Component = PLANT) -> Path:
-    """The FMU's shared library for a platform such as linux64, the newest at hand. Raises FmuError when there is none or it is stale."""
-    found = [path for folder in plant_folders() for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")]
+    """The FMU's shared library for a platform such as linux64, the newest at hand. Raises
+    FmuError when there is none or it is stale.
+    """
+    found = [
+        path
+        for folder in plant_folders()
+        for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")
+    ]
     if not found:
-        expected = "one of: " + ", ".join(platforms) if (platforms := installed_platforms()) else "a built one"
-        raise FmuError(f"no {component.name} binary for this platform", got=fmi_platform, expected=expected, fix=BUILD)
+        expected = (
+            "one of: " + ", ".join(platforms)
+            if (platforms := installed_platforms())
+            else "a built one"
+        )
+        raise FmuError(
+            f"no {component.name} binary for this platform",
+            got=fmi_platform,
+            expected=expected,
+            fix=BUILD,
+        )
     newest = max(found, key=lambda path: path.stat().st_mtime)
     _refuse_stale(newest, component)
     return newest
 
 
 def shared_library(name: str) -> Path:
-    """A shared library for this machine's own programs, the newest at hand. Raises FmuError when there is none."""
+    """A shared library for this machine's own programs, the newest at hand. Raises FmuError when
+    there is none.
+    """
     found = [path for folder in plant_folders() for path in (folder / "lib").glob(f"{name}.[sd]*")]
     if not found:
         raise FmuError("a library is missing", got=f"no {name}", expected="a built one", fix=BUILD)
@@ -143,17 +212,30 @@ def shared_library(name: str) -> Path:
 
 def installed_platforms() -> list[str]:
     """Platforms whose binary is at hand."""
-    return sorted({path.name for folder in plant_folders() for path in (folder / "binaries").glob("*") if path.is_dir()})
+    return sorted(
+        {
+            path.name
+            for folder in plant_folders()
+            for path in (folder / "binaries").glob("*")
+            if path.is_dir()
+        }
+    )
 
 
 def _built(path: Path) -> int:
-    """Whole seconds: an installation drops the rest, and would be older than sources written in the same second."""
+    """Whole seconds: an installation drops the rest, and would be older than sources written in
+    the same second.
+    """
     return int(path.stat().st_mtime)
 
 
 def _refuse_stale(path: Path, component: Component) -> None:
     """In a source tree the sources may have moved on since the binary was built."""
-    changed = [name for name, source in source_files(component).items() if _built(source) > _built(path)] if in_source_tree() else []
+    changed = (
+        [name for name, source in source_files(component).items() if _built(source) > _built(path)]
+        if in_source_tree()
+        else []
+    )
     if changed:
         raise FmuError(
             f"the {component.name} binary is older than its sources",
@@ -165,7 +247,11 @@ def _refuse_stale(path: Path, component: Component) -> None:
 
 
 def plant_folders() -> list[Path]:
-    """Folders laid out like the wheel's hexapod_cosim/plant: an editable install keeps it in site-packages, a build in build/plant."""
+    """Folders laid out like the wheel's hexapod_cosim/plant: an editable install keeps it in
+    site-packages, a build in build/plant.
+    """
     if not in_source_tree():
         return [_INSTALLED]
-    return [Path(entry) / "hexapod_cosim" / "plant" for entry in sys.path] + [_TREE.parent / "build" / "plant"]
+    return [Path(entry) / "hexapod_cosim" / "plant" for entry in sys.path] + [
+        _TREE.parent / "build" / "plant"
+    ]

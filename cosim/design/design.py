@@ -21,16 +21,24 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import LEG_NAMES, Robot, unknown_name
 from hexapod_cosim.models.records import Array
 
-STANCES: Mapping[str, Sequence[str]] = {"six legs": LEG_NAMES, "tripod LF LR RM": ("LF", "LR", "RM"), "tripod LM RF RR": ("LM", "RF", "RR")}
+STANCES: Mapping[str, Sequence[str]] = {
+    "six legs": LEG_NAMES,
+    "tripod LF LR RM": ("LF", "LR", "RM"),
+    "tripod LM RF RR": ("LM", "RF", "RR"),
+}
 OWN_WEIGHT = 1.0
 LOADS = (0.1, OWN_WEIGHT, 2.0)  # 1    mean load of the standing legs, in thirds of the weight
 
 
 def design_for(robot: Robot, period: float, requirements: Requirements | None = None) -> Gains:
     """Gains of a robot for a controller period [s]. Raises GainsError, FmuError."""
-    with threadpool_limits(1):  # its matrices are small: threads would wait for each other longer than they compute
+    with threadpool_limits(
+        1
+    ):  # its matrices are small: threads would wait for each other longer than they compute
         plants, left_out = examine_stances(robot, period)
-        return design_gains(robot, period, plants=plants, requirements=requirements, left_out=left_out)
+        return design_gains(
+            robot, period, plants=plants, requirements=requirements, left_out=left_out
+        )
 
 
 def standing_plants(robot: Robot, period: float) -> dict[str, StandingPlant]:
@@ -38,34 +46,58 @@ def standing_plants(robot: Robot, period: float) -> dict[str, StandingPlant]:
     return examine_stances(robot, period)[0]
 
 
-def examine_stances(robot: Robot, period: float) -> tuple[dict[str, StandingPlant], tuple[str, ...]]:
-    """The robot's FMU on level ground, linearised in its stances, under light and heavy loads, with its gears' friction and without.
+def examine_stances(
+    robot: Robot, period: float
+) -> tuple[dict[str, StandingPlant], tuple[str, ...]]:
+    """The robot's FMU on level ground, linearised in its stances, under light and heavy loads, with
+    its gears' friction and without.
 
     A gear's friction is a strong damper at standstill and none at walking speed. Stances and loads
     in which the robot does not stand are left out; the texts say which and why. Raises GainsError
     for a robot that stands in none, and for one or a period that no gains can be designed for.
     """
     if not period > 0.0:
-        raise GainsError("impossible controller period", got=period, expected="a number > 0", fix="give it in seconds")
+        raise GainsError(
+            "impossible controller period",
+            got=period,
+            expected="a number > 0",
+            fix="give it in seconds",
+        )
     if robot.friction.law == "none" or robot.friction.mu == 0.0:
         raise GainsError(
-            "compliant control answers to the feet's friction", got=f"friction law {robot.friction.law}, mu {robot.friction.mu}",
+            "compliant control answers to the feet's friction",
+            got=f"friction law {robot.friction.law}, mu {robot.friction.mu}",
             expected="a robot file whose feet have friction",
-            fix="give the file the friction of ordinary ground, and a scenario friction.mu = 0", where=robot.name,
-        )  # fmt: skip
+            fix="give the file the friction of ordinary ground, and a scenario friction.mu = 0",
+            where=robot.name,
+        )
     plants: dict[str, StandingPlant] = {}
     failures: dict[str, StanceError] = {}
     with level_fmu(robot) as fmu:
         for stance, standing in STANCES.items():
             for load, (motion, inputs) in _rests(fmu, robot, stance, standing, failures).items():
-                for gears, friction in (("gears stick", robot.servo.coulomb_friction), ("gears slip", 0.0)):
-                    plant = linearise(fmu, robot, motion, inputs, period=period, coulomb_friction=friction)
+                for gears, friction in (
+                    ("gears stick", robot.servo.coulomb_friction),
+                    ("gears slip", 0.0),
+                ):
+                    plant = linearise(
+                        fmu, robot, motion, inputs, period=period, coulomb_friction=friction
+                    )
                     plants[f"{stance}, load {load:g}, {gears}"] = plant
     if not plants:
         first = failures[next(iter(STANCES))]
         expected = "rest on six legs or on one of its tripods"
-        raise GainsError("the robot does not stand", got=f"{first.what}: {first.got}", expected=expected, fix=first.fix, where=robot.name)
-    return plants, tuple(f"{name}: {error.what} (got {error.got}, expected {error.expected})" for name, error in failures.items())
+        raise GainsError(
+            "the robot does not stand",
+            got=f"{first.what}: {first.got}",
+            expected=expected,
+            fix=first.fix,
+            where=robot.name,
+        )
+    return plants, tuple(
+        f"{name}: {error.what} (got {error.got}, expected {error.expected})"
+        for name, error in failures.items()
+    )
 
 
 def _rests(
@@ -80,7 +112,9 @@ def _rests(
         try:
             found[load] = rest(fmu, robot, standing=standing, load=load)
         except StanceError as error:
-            failures[stance if load == OWN_WEIGHT else f"{stance} under {load:g} times its weight"] = error
+            failures[
+                stance if load == OWN_WEIGHT else f"{stance} under {load:g} times its weight"
+            ] = error
             if load == OWN_WEIGHT:
                 return {}
     return {load: found[load] for load in LOADS if load in found}
@@ -88,15 +122,26 @@ def _rests(
 
 @contextmanager
 def level_fmu(robot: Robot) -> Iterator[Fmu]:
-    """The robot's FMU on level ground at height 0, exported for the occasion. Raises GainsError for a robot without position servos."""
+    """The robot's FMU on level ground at height 0, exported for the occasion. Raises GainsError
+    for a robot without position servos.
+    """
     if robot.servo.mode != "position" or robot.servo.kp <= 0.0:
         raise GainsError(
-            "compliant control shifts the servos' targets", got=f"servo mode {robot.servo.mode}, kp {robot.servo.kp}",
-            expected="servo mode position with kp > 0", fix="use position servos, or kinematic control",
-        )  # fmt: skip
-    down = (0.0, 0.0, -float(np.linalg.norm(robot.gravity)))  # level ground is what gravity is normal to
+            "compliant control shifts the servos' targets",
+            got=f"servo mode {robot.servo.mode}, kp {robot.servo.kp}",
+            expected="servo mode position with kp > 0",
+            fix="use position servos, or kinematic control",
+        )
+    down = (
+        0.0,
+        0.0,
+        -float(np.linalg.norm(robot.gravity)),
+    )  # level ground is what gravity is normal to
     level = replace(robot, gravity=down, terrain=replace(robot.terrain, kind="flat", height=0.0))
-    with TemporaryDirectory(prefix="hexapod-") as folder, Fmu(export_fmu(level, Path(folder) / f"{robot.name}.fmu")) as fmu:
+    with (
+        TemporaryDirectory(prefix="hexapod-") as folder,
+        Fmu(export_fmu(level, Path(folder) / f"{robot.name}.fmu")) as fmu,
+    ):
         yield fmu
 
 
@@ -113,5 +158,11 @@ def read_requirements(settings: Sequence[str], robot: Robot) -> Requirements:
         try:
             values[name] = float(text)
         except ValueError as error:
-            raise GainsError("not a number", got=text, expected=f"{name}=NUMBER", fix="give a number in SI units", where=name) from error
+            raise GainsError(
+                "not a number",
+                got=text,
+                expected=f"{name}=NUMBER",
+                fix="give a number in SI units",
+                where=name,
+            ) from error
     return requirements_for(robot, **values)

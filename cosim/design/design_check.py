@@ -1,4 +1,6 @@
-"""A design tried on the FMU itself: a small squeeze in the non-linear closed loop, beside what the linear one predicts."""
+"""A design tried on the FMU itself: a small squeeze in the non-linear closed loop, beside what
+the linear one predicts.
+"""
 
 from __future__ import annotations
 
@@ -46,13 +48,23 @@ class FeetLaws:
 
     def __init__(self, robot: Robot, laws: Laws, standing: Places, force: Array) -> None:
         """standing: which legs, (n,); force: (n, 3) at rest [N]."""
-        self._legs, self._kp, self._share, self._standing = LegSolver(robot), robot.servo.kp, weight_share(robot), standing
+        self._legs, self._kp, self._share, self._standing = (
+            LegSolver(robot),
+            robot.servo.kp,
+            weight_share(robot),
+            standing,
+        )
         self._rest, (self._pid, self._spring) = force[:, 2], laws.systems
         self._forces = deque([force] * (laws.delays + 1), maxlen=laws.delays + 1)
-        self._slip, self._bounce = np.zeros((self._pid.nstates, 2 * len(standing))), np.zeros((self._spring.nstates, len(standing)))
+        self._slip, self._bounce = (
+            np.zeros((self._pid.nstates, 2 * len(standing))),
+            np.zeros((self._spring.nstates, len(standing))),
+        )
 
     def step(self, force: Array, angle: Array) -> Array:
-        """N    (n, 3) that the servos are relieved of, after forces (n, 3) [N] at joint angles (6, 3)"""
+        """N    (n, 3) that the servos are relieved of, after forces (n, 3) [N] at joint angles
+        (6, 3)
+        """
         self._forces.append(force)
         late = self._forces[0]
         feet = self._legs.forward(angle)[self._standing]
@@ -79,25 +91,42 @@ class FeetLaws:
         return shift
 
 
-def check_design(robot: Robot, gains: Gains, *, stance: str | None = None, squeeze: float | None = None) -> DesignCheck:
+def check_design(
+    robot: Robot, gains: Gains, *, stance: str | None = None, squeeze: float | None = None
+) -> DesignCheck:
     """Legs that stand start to splay by a force, which both laws take away.
 
     In the FMU and in the linear closed loop. stance: by default the first in which the robot
     stands;  squeeze [N]: by default SQUEEZE of a third of the weight.
     """
     period = gains.period
-    laws = Laws(slip=gains.slip, suspension=gains.suspension, period=period, delays=delay_steps(gains.requirements, period=period))
+    laws = Laws(
+        slip=gains.slip,
+        suspension=gains.suspension,
+        period=period,
+        delays=delay_steps(gains.requirements, period=period),
+    )
     force = SQUEEZE * weight_share(robot) if squeeze is None else squeeze
     friction = robot.servo.coulomb_friction
     with level_fmu(robot) as fmu:
         motion, inputs = _rest(fmu, robot, stance)
         plant = linearise(fmu, robot, motion, inputs, period=period, coulomb_friction=friction)
         push, places = splay(robot, plant), np.flatnonzero(plant.standing)
-        time, forces = disturbed(closed_loop(robot, plant, laws), push, duration=DURATION * size_of(robot).time)
-        bench = Bench(fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=period)
+        time, forces = disturbed(
+            closed_loop(robot, plant, laws), push, duration=DURATION * size_of(robot).time
+        )
+        bench = Bench(
+            fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=period
+        )
         bench.start(motion, inputs)
         feet = FeetLaws(robot, laws, places, plant.force[places])
-        simulated = _run(bench, feet, inputs, np.outer(force * rising(time), push).reshape(len(time), -1, 3), places)
+        simulated = _run(
+            bench,
+            feet,
+            inputs,
+            np.outer(force * rising(time), push).reshape(len(time), -1, 3),
+            places,
+        )
     seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -force
     return DesignCheck(time=time, predicted=-push @ forces, simulated=seen)
 

@@ -2,16 +2,19 @@
 
     x(k+1) = A x(k) + B u(k)        y(k) = C x(k)
 
-x: torso's position and small rotation, joint angles, and the velocities of all these. One period of the FMU from x with the inputs u
-held is the exact sampled system, so nothing is approximated but the differences. Each column takes two fresh starts from the `initial`
-parameters, one on either side; those of angle_ref and speed_ref are kp and kd times torque_ref's, by eq. 13.
+x: torso's position and small rotation, joint angles, and the velocities of all these. One period of
+the FMU from x with the inputs u held is the exact sampled system, so nothing is approximated but
+the differences. Each column takes two fresh starts from the `initial` parameters, one on either
+side; those of angle_ref and speed_ref are kp and kd times torque_ref's, by eq. 13.
 
-Sizes of the differences. They must be small against what bends: the foot's depth in the ground (0.1 mm and more), the slip speed at which
-friction saturates (10 mm/s), the joint speed at which the gear's friction does (50 mrad/s); and large against the round-off of a start,
-1e-15 m in a contact of 5e4 N/m.
+Sizes of the differences. They must be small against what bends: the foot's depth in the ground (0.1
+mm and more), the slip speed at which friction saturates (10 mm/s), the joint speed at which the
+gear's friction does (50 mrad/s); and large against the round-off of a start, 1e-15 m in a contact
+of 5e4 N/m.
 
-Left out are the servos' torque limits, which no small motion sees but a heavy load does, and the error control, whose choice of steps
-would be noise: steps are fixed, and short against the times in which a foot swings on the ground.
+Left out are the servos' torque limits, which no small motion sees but a heavy load does, and the
+error control, whose choice of steps would be noise: steps are fixed, and short against the times in
+which a foot swings on the ground.
 """
 
 from __future__ import annotations
@@ -71,23 +74,38 @@ class Motion:
         """(48,) small changes that lead here from another."""
         w, x, y, z = other.values[3:7]
         turn = quaternion_product(self.values[3:7], np.array([w, -x, -y, -z]))
-        return np.concatenate([self.values[:3] - other.values[:3], 2.0 * turn[1:] / turn[0], self.values[7:] - other.values[7:]])
+        return np.concatenate(
+            [
+                self.values[:3] - other.values[:3],
+                2.0 * turn[1:] / turn[0],
+                self.values[7:] - other.values[7:],
+            ]
+        )
 
 
 class Bench:
-    """An FMU that is started over and over again. Inputs (60,): angle_ref, speed_ref, torque_ref of all joints, push force and torque."""
+    """An FMU that is started over and over again. Inputs (60,): angle_ref, speed_ref, torque_ref
+    of all joints, push force and torque.
+    """
 
-    def __init__(self, plant: Fmu, robot: Robot, *, coulomb_friction: float, slope: float, period: float) -> None:
-        """robot: the FMU's; coulomb_friction: of the gears [N m]; slope: of the feet's friction [s/m];
-        period [s].
+    def __init__(
+        self, plant: Fmu, robot: Robot, *, coulomb_friction: float, slope: float, period: float
+    ) -> None:
+        """robot: the FMU's; coulomb_friction: of the gears [N m]; slope: of the feet's friction
+        [s/m]; period [s].
         """
         size = size_of(robot)
         self.plant, self.period = plant, period
         self._sizes, self._torque = difference_sizes(size), TORQUE * (robot.servo.kp / STIFFNESS)
         step = period / math.ceil(period / (LONGEST_STEP * size.time) - 1e-9)
-        self._settings = plant.block(["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"])
+        self._settings = plant.block(
+            ["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"]
+        )
         self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step
-        pose, rates = [*vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"]], [*TORSO_RATES, *MEASURED["speed"]]
+        pose, rates = (
+            [*vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"]],
+            [*TORSO_RATES, *MEASURED["speed"]],
+        )
         seen = [*pose, *rates]
         self._seen = plant.block(seen)
         self._initial = plant.block([f"initial.{name.removeprefix('torso.')}" for name in seen])
@@ -122,13 +140,24 @@ class Bench:
         self._forces.get()
         return np.array(self._forces.values)
 
-    def differences(self, motion: Motion, inputs: Array, *, scale: float = 1.0) -> tuple[Array, Array, Array]:
-        """A (48, 48), B (48, 18) of the joints' torques and C (18, 48) of the feet's forces about a motion; scale: of the differences."""
+    def differences(
+        self, motion: Motion, inputs: Array, *, scale: float = 1.0
+    ) -> tuple[Array, Array, Array]:
+        """A (48, 48), B (48, 18) of the joints' torques and C (18, 48) of the feet's forces
+        about a motion; scale: of the differences.
+        """
         a, b, c = np.zeros((STATES, STATES)), np.zeros((STATES, ANGLES)), np.zeros((ANGLES, STATES))
         for k, change in enumerate(scale * np.diag(self._sizes)):
-            ahead, behind = (self._step_from(motion.moved(way), inputs) for way in (change, -change))
-            c[:, k], a[:, k] = (ahead[0] - behind[0]) / (2.0 * change[k]), ahead[1].less(behind[1]) / (2.0 * change[k])
-        for k, change in enumerate(scale * self._torque * np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]):
+            ahead, behind = (
+                self._step_from(motion.moved(way), inputs) for way in (change, -change)
+            )
+            c[:, k], a[:, k] = (
+                (ahead[0] - behind[0]) / (2.0 * change[k]),
+                ahead[1].less(behind[1]) / (2.0 * change[k]),
+            )
+        for k, change in enumerate(
+            scale * self._torque * np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]
+        ):
             ahead, behind = (self._step_from(motion, inputs + way) for way in (change, -change))
             b[:, k] = ahead[1].less(behind[1]) / (2.0 * scale * self._torque)
         return a, b, c
@@ -150,13 +179,23 @@ def difference_sizes(size: Size) -> Array:
 
 
 def linearise(
-    plant: Fmu, robot: Robot, motion: Motion, inputs: Array, *, period: float, coulomb_friction: float, scale: float = 1.0
+    plant: Fmu,
+    robot: Robot,
+    motion: Motion,
+    inputs: Array,
+    *,
+    period: float,
+    coulomb_friction: float,
+    scale: float = 1.0,
 ) -> StandingPlant:
-    """The FMU of a robot about a motion at rest, sampled with a period [s] over which the inputs are held.
+    """The FMU of a robot about a motion at rest, sampled with a period [s] over which the inputs
+    are held.
 
     coulomb_friction: of the gears [N m]; scale: of the differences.
     """
-    bench = Bench(plant, robot, coulomb_friction=coulomb_friction, slope=robot.friction.slope, period=period)
+    bench = Bench(
+        plant, robot, coulomb_friction=coulomb_friction, slope=robot.friction.slope, period=period
+    )
     a, b, c = bench.differences(motion, inputs, scale=scale)
     bench.start(motion, inputs)
     force = bench.force().reshape(LEGS, 3)
@@ -166,7 +205,13 @@ def linearise(
         states=_plain(STATE_NAMES), inputs=_plain(INPUT_NAMES), outputs=_plain(OUTPUT_NAMES),
     )  # fmt: skip
     torque = inputs[2 * ANGLES : 3 * ANGLES].reshape(LEGS, JOINTS)
-    return StandingPlant(system=system, angle=motion.angle.copy(), force=force, torque=torque, standing=force[:, 2] > 0.0)
+    return StandingPlant(
+        system=system,
+        angle=motion.angle.copy(),
+        force=force,
+        torque=torque,
+        standing=force[:, 2] > 0.0,
+    )
 
 
 def _plain(names: Sequence[str]) -> list[str]:

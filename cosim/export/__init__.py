@@ -1,1 +1,3 @@
-"""Writes FMUs, SSP packages and robot descriptions for other tools. Imports `common` to `master`."""
+"""Writes FMUs, SSP packages and robot descriptions for other tools. Imports `common` to
+`master`.
+"""

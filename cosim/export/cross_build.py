@@ -1,8 +1,10 @@
-"""Shared libraries for other systems and processors, compiled on this machine by the C compiler of the ziglang package.
+"""Shared libraries for other systems and processors, compiled on this machine by the C compiler of
+the ziglang package.
 
-Zig brings each system's headers and link stubs, so nothing else has to be installed. Sources are compiled in a folder of their own under
-their relative names, so no path of this machine gets into a binary, and what is built is a function of sources, compiler and flags alone:
-that is what the cache goes by.
+Zig brings each system's headers and link stubs, so nothing else has to be installed. Sources are
+compiled in a folder of their own under their relative names, so no path of this machine gets into a
+binary, and what is built is a function of sources, compiler and flags alone: that is what the cache
+goes by.
 """
 
 from __future__ import annotations
@@ -29,20 +31,32 @@ SHOWN_LINES = 12  # of a compiler's complaints
 PATIENCE = 1200  # s    the compiler was seen to wait for itself for ever, now and then, for Windows
 
 # as plant_fmu/CMakeLists.txt, with reasons
-COMPILE = ("-std=c11", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fvisibility=hidden", "-fno-ident")
+COMPILE = (
+    "-std=c11",
+    "-O3",
+    "-g0",
+    "-ffp-contract=off",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fvisibility=hidden",
+    "-fno-ident",
+)
 ELF = ("-fPIC", "-Wl,-z,relro,-z,now,--no-undefined", "-lm")
 
 
 @dataclass(frozen=True)
 class Target:
-    """A system and processor: how Zig calls it, how its shared libraries end, how they are linked."""
+    """A system and processor: how Zig calls it, how its shared libraries end, how they are
+    linked.
+    """
 
     triple: str
     suffix: str
     link: tuple[str, ...] = ()
 
 
-# the oldest systems in use: CentOS 7's C library, the first macOS for both processors, the C library that comes with Windows 10
+# the oldest systems in use: CentOS 7's C library, the first macOS for both processors, the C
+# library that comes with Windows 10
 TARGETS = {
     "x86_64-linux": Target("x86_64-linux-gnu.2.17", ".so", ELF),
     "aarch64-linux": Target("aarch64-linux-gnu.2.17", ".so", ELF),
@@ -56,7 +70,8 @@ TARGETS = {
 class Library:
     """What a shared library is built from.
 
-    sources: C files and headers by their path below the folder that includes are relative to. headers: further folders of headers.
+    sources: C files and headers by their path below the folder that includes are relative to.
+    headers: further folders of headers.
     """
 
     name: str
@@ -67,7 +82,14 @@ class Library:
     def digest(self) -> str:
         """A fingerprint of all that goes in."""
         parts = [self.name, *self.flags]
-        files = [*self.sources.items(), *((f"{n}/{path.name}", path) for n, folder in enumerate(self.headers) for path in _headers(folder))]
+        files = [
+            *self.sources.items(),
+            *(
+                (f"{n}/{path.name}", path)
+                for n, folder in enumerate(self.headers)
+                for path in _headers(folder)
+            ),
+        ]
         parts += [f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in files]
         return _digest(parts)
 
@@ -91,7 +113,13 @@ def find_compiler() -> Compiler:
     return Compiler((str(program), "cc"), metadata.version(PACKAGE))
 
 
-def build_library(library: Library, target: str, *, compiler: Compiler | None = None, cache_folder: Path | None = None) -> bytes:
+def build_library(
+    library: Library,
+    target: str,
+    *,
+    compiler: Compiler | None = None,
+    cache_folder: Path | None = None,
+) -> bytes:
     """The shared library for a target, from the cache if it was built before.
 
     Args:
@@ -120,7 +148,11 @@ def user_cache() -> Path:
 
 def _flags(library: Library, target: str) -> tuple[str, ...]:
     chosen = TARGETS[target]
-    link = (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",) if chosen.suffix == ".dylib" else chosen.link
+    link = (
+        (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",)
+        if chosen.suffix == ".dylib"
+        else chosen.link
+    )
     return ("-target", chosen.triple, "-mcpu=baseline", *COMPILE, "-shared", "-s", *link)
 
 
@@ -136,7 +168,14 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
             for header in _headers(folder):
                 (root / "in" / f"headers{number}" / header.name).write_bytes(header.read_bytes())
         (root / "out").mkdir()
-        includes = ["-I.", *(item for number in range(len(library.headers)) for item in ("-isystem", f"headers{number}"))]
+        includes = [
+            "-I.",
+            *(
+                item
+                for number in range(len(library.headers))
+                for item in ("-isystem", f"headers{number}")
+            ),
+        ]
         sources = [path for path in library.sources if path.endswith(".c")]
         _run([*command, *includes, *sources, "-o", f"../out/{out}"], root, target, cache_folder)
         return (root / "out" / out).read_bytes()
@@ -146,22 +185,42 @@ def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) ->
     environment = compiler_environment(root, cache_folder)
     try:
         process = subprocess.run(
-            command, cwd=root / "in", env=environment, capture_output=True, text=True, errors="replace", check=False, timeout=PATIENCE
+            command,
+            cwd=root / "in",
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+            timeout=PATIENCE,
         )
     except subprocess.TimeoutExpired as error:
         fix = "run it again: what is done so far is kept"
         raise FmuError(
-            f"cannot build for {target}", got="a compiler that hangs", expected=f"an end within {PATIENCE} s", fix=fix
+            f"cannot build for {target}",
+            got="a compiler that hangs",
+            expected=f"an end within {PATIENCE} s",
+            fix=fix,
         ) from error
     if process.returncode != 0:
-        complaint = "\n".join(process.stderr.splitlines()[:SHOWN_LINES]) or f"exit code {process.returncode}"
+        complaint = (
+            "\n".join(process.stderr.splitlines()[:SHOWN_LINES])
+            or f"exit code {process.returncode}"
+        )
         fix = "correct the sources, or install the compiler anew if it is damaged"
-        raise FmuError(f"cannot build for {target}", got=complaint, expected="sources that compile", fix=fix)
+        raise FmuError(
+            f"cannot build for {target}", got=complaint, expected="sources that compile", fix=fix
+        )
 
 
 def compiler_environment(scratch: Path, cache_folder: Path) -> dict[str, str]:
-    """Environment of the compiler: what it makes of the systems' libraries is kept in the cache, the rest goes to a scratch folder."""
-    folders = {"ZIG_LOCAL_CACHE_DIR": scratch / "zig", "ZIG_GLOBAL_CACHE_DIR": _writable(cache_folder / "zig", scratch)}
+    """Environment of the compiler: what it makes of the systems' libraries is kept in the cache,
+    the rest goes to a scratch folder.
+    """
+    folders = {
+        "ZIG_LOCAL_CACHE_DIR": scratch / "zig",
+        "ZIG_GLOBAL_CACHE_DIR": _writable(cache_folder / "zig", scratch),
+    }
     return os.environ | {name: str(folder) for name, folder in folders.items()}
 
 

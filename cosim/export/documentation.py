@@ -60,7 +60,11 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
         reference: whether the archive has reference results.
     """
     root = ElementTree.fromstring(description.encode())
-    environment = Environment(loader=PackageLoader("hexapod_cosim.cosim.export", "pages"), autoescape=True, undefined=StrictUndefined)
+    environment = Environment(
+        loader=PackageLoader("hexapod_cosim.cosim.export", "pages"),
+        autoescape=True,
+        undefined=StrictUndefined,
+    )
     robot, arrayed = interface.robot, str(root.get("fmiVersion")).startswith("3")
     return environment.get_template(f"{interface.component.name}.html.jinja").render(
         robot=robot,
@@ -74,7 +78,10 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
         capabilities=_capabilities(root),
         names=NAMES[arrayed],
         arrayed=arrayed,
-        groups={causality: variable_rows(interface, causality, arrayed=arrayed) for causality in CAUSALITIES},
+        groups={
+            causality: variable_rows(interface, causality, arrayed=arrayed)
+            for causality in CAUSALITIES
+        },
         weight=robot.total_mass * max(map(abs, robot.gravity)),
     )
 
@@ -84,7 +91,13 @@ def _capabilities(root: Element) -> list[Row]:
     found = {tag: root.find(tag) for tag in INTERFACES}
     offered = {tag: element for tag, element in found.items() if element is not None}
     return [
-        {"flag": flag, "meaning": meaning, "values": ", ".join(dict.fromkeys(_words(element.get(flag)) for element in offered.values()))}
+        {
+            "flag": flag,
+            "meaning": meaning,
+            "values": ", ".join(
+                dict.fromkeys(_words(element.get(flag)) for element in offered.values())
+            ),
+        }
         for flag, meaning in CAPABILITIES.items()
         if any(element.get(flag) is not None for element in offered.values())
     ]
@@ -99,15 +112,23 @@ def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> lis
     if arrayed:
         chosen = [array for array in arrays(interface) if array.first.causality == causality]
         sizes = ["".join(f"[{size}]" for size in array.shape) for array in chosen]
-        return [_row(array.name + size, array.description, array.elements, interface) for array, size in zip(chosen, sizes, strict=True)]
+        return [
+            _row(array.name + size, array.description, array.elements, interface)
+            for array, size in zip(chosen, sizes, strict=True)
+        ]
     variables = [variable for variable in interface.variables if variable.causality == causality]
     patterns = [pattern for pattern in interface.patterns if pattern.causality == causality]
-    return [_row(pattern.name, pattern.description, _matching(pattern, variables), interface) for pattern in patterns]
+    return [
+        _row(pattern.name, pattern.description, _matching(pattern, variables), interface)
+        for pattern in patterns
+    ]
 
 
 def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Interface) -> Row:
     first = variables[0]
-    display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(first.unit or "", "")
+    display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(
+        first.unit or "", ""
+    )
     choices = interface.enumerations[first.enumeration].items if first.enumeration else ()
     return {
         "name": name,
@@ -117,27 +138,37 @@ def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Inte
         "range": "" if choices else _range(first),
         "start": _starts(variables, [name for name, _ in choices]),
         "meaning": meaning,
-        "choices": "; ".join(f"{number} {name}: {text}" for number, (name, text) in enumerate(choices, start=1)),
+        "choices": "; ".join(
+            f"{number} {name}: {text}" for number, (name, text) in enumerate(choices, start=1)
+        ),
     }
 
 
 def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]:
     """The variables that a pattern stands for."""
     expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d\]")
-    expression = re.sub(r"\\\{(\w+)\\\}", lambda match: f"(?:{'|'.join(AXES.get(match[1], (r'[xyz]{2}',)))})", expression)
+    expression = re.sub(
+        r"\\\{(\w+)\\\}",
+        lambda match: f"(?:{'|'.join(AXES.get(match[1], (r'[xyz]{2}',)))})",
+        expression,
+    )
     return [variable for variable in variables if re.fullmatch(expression, variable.name)]
 
 
 def _range(variable: Variable) -> str:
     if variable.minimum is None and variable.maximum is None:
         return ""
-    low, high = ("" if bound is None else f"{bound:.4g}" for bound in (variable.minimum, variable.maximum))
+    low, high = (
+        "" if bound is None else f"{bound:.4g}" for bound in (variable.minimum, variable.maximum)
+    )
     return f"{low} to {high}" if low and high else f"from {low}" if low else f"to {high}"
 
 
 def _starts(variables: Sequence[Variable], choices: Sequence[str]) -> str:
     """The start values, in short: one if all are the same."""
-    values = list(dict.fromkeys(variable.start for variable in variables if variable.start is not None))
+    values = list(
+        dict.fromkeys(variable.start for variable in variables if variable.start is not None)
+    )
     if choices and values:
         return f"{values[0]} ({choices[int(values[0]) - 1]})"
     shown = list(dict.fromkeys(f"{value:.4g}" for value in values))

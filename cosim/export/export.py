@@ -1,4 +1,6 @@
-"""Packs an FMU: the same binary for every robot, with the robot's model description and start values."""
+"""Packs an FMU: the same binary for every robot, with the robot's model description and start
+values.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ from tempfile import TemporaryDirectory
 
 from hexapod_cosim.cosim.common.components import PLANT, Component
 from hexapod_cosim.cosim.common.files import atomic_path, not_writable
-from hexapod_cosim.cosim.common.plant_files import FMI2_SOURCE, FMI3_SOURCE, binary, fmi2_platform, fmi3_platform, source_files
+from hexapod_cosim.cosim.common.plant_files import (
+    FMI2_SOURCE,
+    FMI3_SOURCE,
+    binary,
+    fmi2_platform,
+    fmi3_platform,
+    source_files,
+)
 from hexapod_cosim.cosim.export.extras import extra_members
 from hexapod_cosim.cosim.export.platforms import build_binaries, choose_platforms, component_library
 from hexapod_cosim.cosim.export.reference import reference_members
@@ -25,37 +34,51 @@ FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) 
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
 
 
-def export_fmu(robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
+def export_fmu(
+    robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None
+) -> Path:
     """Writes a robot's FMU and returns its path.
 
     Args:
         robot: what the FMU's start values are.
         path: the file to write; it appears complete or not at all. Its folder is made if need be.
         fmi: version of the standard.
-        platforms: folders such as linux64, or "all", each cross-compiled; "sources": no binary at all. By default this machine's binary
-            as it was installed.
+        platforms: folders such as linux64, or "all", each cross-compiled; "sources": no binary at
+            all. By default this machine's binary as it was installed.
 
-    Raises FmuError: no binary, no cross compiler, a version or platform that is not offered; HexapodError: a path that cannot be written.
+    Raises FmuError: no binary, no cross compiler, a version or platform that is not offered;
+    HexapodError: a path that cannot be written.
     """
     return export_interface(load_interface(robot), path, fmi=fmi, platforms=platforms)
 
 
-def export_interface(interface: Interface, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None) -> Path:
+def export_interface(
+    interface: Interface, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None
+) -> Path:
     """Writes the FMU of a component with this interface, as `export_fmu` does."""
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
-        raise FmuError("no such FMI version", got=fmi, expected=offered, fix="export with one of these")
+        raise FmuError(
+            "no such FMI version", got=fmi, expected=offered, fix="export with one of these"
+        )
     component = interface.component
     if platforms is None:
         binaries = installed_binary(component, fmi=fmi)
     else:
-        binaries = build_binaries(component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi)
+        binaries = build_binaries(
+            component_library(component), choose_platforms(platforms, fmi=fmi), fmi=fmi
+        )
     return write_archive(Path(path), _members(interface, binaries, fmi))
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
-    """This machine's binary as it was built when this package was installed, by its path in the FMU."""
-    library, folder = binary(fmi2_platform(), component), fmi2_platform() if fmi == 2 else fmi3_platform()
+    """This machine's binary as it was built when this package was installed, by its path in the
+    FMU.
+    """
+    library, folder = (
+        binary(fmi2_platform(), component),
+        fmi2_platform() if fmi == 2 else fmi3_platform(),
+    )
     return {f"binaries/{folder}/{component.identifier}{library.suffix}": library.read_bytes()}
 
 
@@ -68,41 +91,66 @@ def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> d
     }
     members |= dict(binaries) | _sources(interface.component, fmi)
     reference = _reference(interface, members) if fmi == 2 else {}
-    return members | extra_members(interface, description.xml, fmi=fmi, reference=bool(reference)) | reference
+    return (
+        members
+        | extra_members(interface, description.xml, fmi=fmi, reference=bool(reference))
+        | reference
+    )
 
 
 def _sources(component: Component, fmi: int) -> dict[str, bytes]:
-    """All that the binary was made of, but for the other version's layer, whose headers an importer need not have."""
+    """All that the binary was made of, but for the other version's layer, whose headers an
+    importer need not have.
+    """
     other = FMI3_SOURCE if fmi == 2 else FMI2_SOURCE
     files = {name: path for name, path in source_files(component).items() if name != other}
     members = {f"sources/{name}": path.read_bytes() for name, path in files.items()}
     if fmi == 3:
-        description = render_build_description(component, (name for name in files if name.endswith(".c")))
+        description = render_build_description(
+            component, (name for name in files if name.endswith(".c"))
+        )
         members["sources/buildDescription.xml"] = description.encode()
     return members
 
 
 def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:
-    """Reference results of the plant where this machine can run it: none for an FMU that is packed for other platforms alone."""
-    if interface.component is not PLANT or not any(name.startswith(f"binaries/{fmi2_platform()}/") for name in members):
+    """Reference results of the plant where this machine can run it: none for an FMU that is
+    packed for other platforms alone.
+    """
+    if interface.component is not PLANT or not any(
+        name.startswith(f"binaries/{fmi2_platform()}/") for name in members
+    ):
         return {}
     with TemporaryDirectory(prefix="hexapod-export-") as folder:
         return reference_members(interface, write_archive(Path(folder) / "trial.fmu", members))
 
 
 def start_values(interface: Interface, guid: str) -> str:
-    """What the binary reads at instantiation: the GUID, then "reference value name" of every input and parameter, exactly; a checksum."""
+    """What the binary reads at instantiation: the GUID, then "reference value name" of every
+    input and parameter, exactly; a checksum.
+    """
     lines = [guid, *map(_start_line, interface.of_causality("input", "parameter"))]
-    return "\n".join([*lines, f"checksum {reduce(checksum, (line.encode() for line in lines), 0):016x}"]) + "\n"
+    return (
+        "\n".join(
+            [*lines, f"checksum {reduce(checksum, (line.encode() for line in lines), 0):016x}"]
+        )
+        + "\n"
+    )
 
 
 def _start_line(variable: Variable) -> str:
-    value = float(variable.start or 0.0).hex() if variable.type == "Real" else str(int(variable.start or 0))
+    value = (
+        float(variable.start or 0.0).hex()
+        if variable.type == "Real"
+        else str(int(variable.start or 0))
+    )
     return f"{variable.reference} {value} {variable.name}"
 
 
 def checksum(seed: int, data: bytes) -> int:
-    """hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, its high bits mixed into the low ones."""
+    """hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, its high bits mixed
+    into the low ones.
+    """
     value = seed ^ FNV_BASIS
     for place in range(0, len(data), WORD):
         value = (value ^ int.from_bytes(data[place : place + WORD], "little")) * FNV_PRIME & MASK
@@ -111,7 +159,9 @@ def checksum(seed: int, data: bytes) -> int:
 
 
 def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
-    """A ZIP archive, whole or not at all, the same bytes for the same members. Raises HexapodError when it cannot be written."""
+    """A ZIP archive, whole or not at all, the same bytes for the same members. Raises
+    HexapodError when it cannot be written.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,6 @@
-"""What an FMU holds besides what runs: page, picture, icon, terminals, licence. The same for every version of the standard."""
+"""What an FMU holds besides what runs: page, picture, icon, terminals, licence. The same for
+every version of the standard.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +9,35 @@ from hexapod_cosim.cosim.export.documentation import render_html
 from hexapod_cosim.cosim.export.portrait import draw_robot
 from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.interface import Interface
-from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON, render_terminals, render_terminals3
+from hexapod_cosim.cosim.interface.terminals import (
+    FOLDER,
+    ICON,
+    render_terminals,
+    render_terminals3,
+)
 
-PICTURES = {2: "model.png", 3: "documentation/diagram.png"}  # where each version of the standard has the model's picture
+PICTURES = {
+    2: "model.png",
+    3: "documentation/diagram.png",
+}  # where each version of the standard has the model's picture
 LICENCE = "documentation/licenses/license.txt"
 PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
 
 
-def extra_members(interface: Interface, description: str, *, fmi: int = 2, reference: bool = False) -> dict[str, bytes]:
-    """Contents by path in the archive, for an FMU whose modelDescription.xml is given, with reference results or without."""
-    ports = [array.name for array in arrays(interface) if array.first.causality in ("input", "output")]
+def extra_members(
+    interface: Interface, description: str, *, fmi: int = 2, reference: bool = False
+) -> dict[str, bytes]:
+    """Contents by path in the archive, for an FMU whose modelDescription.xml is given, with
+    reference results or without.
+    """
+    ports = [
+        array.name for array in arrays(interface) if array.first.causality in ("input", "output")
+    ]
     terminals = render_terminals(list(interface.by_name)) if fmi == 2 else render_terminals3(ports)
     return {
-        "documentation/index.html": render_html(interface, description, picture=PICTURES[fmi], reference=reference).encode(),
+        "documentation/index.html": render_html(
+            interface, description, picture=PICTURES[fmi], reference=reference
+        ).encode(),
         LICENCE: licence_file().read_bytes(),
         f"{FOLDER}/terminalsAndIcons.xml": terminals.encode(),
         **pictures(interface, fmi=fmi),
@@ -29,4 +47,7 @@ def extra_members(interface: Interface, description: str, *, fmi: int = 2, refer
 def pictures(interface: Interface, *, fmi: int = 2) -> dict[str, bytes]:
     """The robot's picture and icon by path in the archive."""
     sizes = {PICTURES[fmi]: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
-    return {path: draw_robot(interface.robot, width=width, height=height) for path, (width, height) in sizes.items()}
+    return {
+        path: draw_robot(interface.robot, width=width, height=height)
+        for path, (width, height) in sizes.items()
+    }

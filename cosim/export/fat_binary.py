@@ -1,4 +1,6 @@
-"""The universal Mach-O file: libraries for several processors in one, as Apple's lipo joins them."""
+"""The universal Mach-O file: libraries for several processors in one, as Apple's lipo joins
+them.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,18 @@ _HEADER, _SLICE, _MACH_HEADER = struct.Struct(">II"), struct.Struct(">5I"), stru
 def join_mach_o(slices: Sequence[bytes]) -> bytes:
     """One universal file of 64-bit Mach-O files, one a processor.
 
-    Layout (mach-o/fat.h, all big-endian): magic and number of slices; for each its processor, subtype, offset, size, alignment; the slices.
-    Raises FmuError when one is not such a file, or two are for the same processor.
+    Layout (mach-o/fat.h, all big-endian): magic and number of slices; for each its processor,
+    subtype, offset, size, alignment; the slices. Raises FmuError when one is not such a file, or
+    two are for the same processor.
     """
     processors = [_processor(data) for data in slices]
     if len(set(processors)) < len(processors):
-        raise FmuError("universal binary", got=f"processors {processors}", expected="each once", fix="join one file a processor")
+        raise FmuError(
+            "universal binary",
+            got=f"processors {processors}",
+            expected="each once",
+            fix="join one file a processor",
+        )
     out = bytearray(_HEADER.pack(FAT_MAGIC, len(slices)))
     offset = _aligned(_HEADER.size + _SLICE.size * len(slices))
     for processor, data in zip(processors, slices, strict=True):
@@ -33,10 +41,15 @@ def join_mach_o(slices: Sequence[bytes]) -> bytes:
 
 def _processor(data: bytes) -> tuple[int, int]:
     """Type and subtype of the processor that a Mach-O file is for."""
-    magic, kind, subtype = _MACH_HEADER.unpack(data[: _MACH_HEADER.size].ljust(_MACH_HEADER.size, b"\0"))
+    magic, kind, subtype = _MACH_HEADER.unpack(
+        data[: _MACH_HEADER.size].ljust(_MACH_HEADER.size, b"\0")
+    )
     if magic != MACH_O_64:
         raise FmuError(
-            "universal binary", got=f"a file that begins with {data[:4].hex()}", expected="64-bit Mach-O", fix="build it for macOS"
+            "universal binary",
+            got=f"a file that begins with {data[:4].hex()}",
+            expected="64-bit Mach-O",
+            fix="build it for macOS",
         )
     return kind, subtype
 

@@ -1,7 +1,8 @@
 """A robot as a picture: model.png and the icon of its FMU, drawn from the masses' own geometry.
 
-Rays parallel to the line of sight meet capsules (links) and a box (torso) in closed form. Everything stands in camera axes: x right,
-y up, z towards the eye, so that a pixel's ray is a line along z and the nearest surface the one with the largest z.
+Rays parallel to the line of sight meet capsules (links) and a box (torso) in closed form.
+Everything stands in camera axes: x right, y up, z towards the eye, so that a pixel's ray is a line
+along z and the nearest surface the one with the largest z.
 """
 
 from __future__ import annotations
@@ -20,14 +21,24 @@ from hexapod_cosim.models.kinematics import body_states, rotation_matrix
 from hexapod_cosim.models.records import Array, Robot
 from hexapod_cosim.models.statics import settled
 
-AZIMUTH, ELEVATION = math.radians(-52.0), math.radians(27.0)  # of the eye: from the front, left, above
-LIGHT = np.array([0.35, 0.55, 1.0]) / np.linalg.norm([0.35, 0.55, 1.0])  # towards the lamp, world axes
+AZIMUTH, ELEVATION = (
+    math.radians(-52.0),
+    math.radians(27.0),
+)  # of the eye: from the front, left, above
+LIGHT = np.array([0.35, 0.55, 1.0]) / np.linalg.norm(
+    [0.35, 0.55, 1.0]
+)  # towards the lamp, world axes
 AMBIENT, SHADOW = 0.38, 0.34  # share of light everywhere; opacity of the deepest shadow
 SAMPLES = 2  # per pixel, each way
 PENUMBRA = 1.35  # a shadow fades out at this many radii
 MARGIN = 1.08  # of the picture around the robot
 THICKNESS = (0.30, 0.24, 0.17)  # radius of coxa, femur, tibia, of the coxa's length
-COLOURS = {"torso": (62, 92, 128), "coxa": (70, 74, 82), "femur": (226, 132, 52), "tibia": (96, 102, 112)}
+COLOURS = {
+    "torso": (62, 92, 128),
+    "coxa": (70, 74, 82),
+    "femur": (226, 132, 52),
+    "tibia": (96, 102, 112),
+}
 
 Points = NDArray[np.float64]  # (3, height, width)
 Extent = tuple[Array, Array]  # lower left and upper right corner of what a shape covers
@@ -49,16 +60,22 @@ class Capsule:
 
     def distance(self, point: Points) -> Array:
         """From points to the axis [m]."""
-        share = np.tensordot(self.end - self.start, point - _column(self.start), axes=1) / self._square
+        share = (
+            np.tensordot(self.end - self.start, point - _column(self.start), axes=1) / self._square
+        )
         return np.asarray(np.linalg.norm(self._from_axis(point, share), axis=0))
 
     def meet(self, x: Array, y: Array) -> tuple[Array, Points]:
-        """Height z at which rays meet the surface, -inf where they do not, and the normals there."""
+        """Height z at which rays meet the surface, -inf where they do not, and the normals
+        there.
+        """
         z = self._side(x, y)
         for centre in (self.start, self.end):
             z = np.fmax(z, _sphere(x, y, centre, self.radius))
         point = np.stack([x, y, np.where(np.isfinite(z), z, 0.0)])
-        share = np.tensordot(self.end - self.start, point - _column(self.start), axes=1) / self._square
+        share = (
+            np.tensordot(self.end - self.start, point - _column(self.start), axes=1) / self._square
+        )
         return z, self._from_axis(point, share) / self.radius
 
     @property
@@ -66,7 +83,9 @@ class Capsule:
         return float(np.sum((self.end - self.start) ** 2)) or 1.0
 
     def _from_axis(self, point: Points, share: Array) -> Points:
-        return point - _column(self.start) - _column(self.end - self.start) * np.clip(share, 0.0, 1.0)
+        return (
+            point - _column(self.start) - _column(self.end - self.start) * np.clip(share, 0.0, 1.0)
+        )
 
     def _side(self, x: Array, y: Array) -> Array:
         """The cylinder between the ends: |p - a|^2 - (d.(p - a))^2 / d.d = r^2, quadratic in z."""
@@ -124,7 +143,9 @@ def _sphere(x: Array, y: Array, centre: Array, radius: float) -> Array:
 
 @lru_cache(maxsize=8)
 def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
-    """The robot standing on the ground as a PNG with a transparent background. Raises RobotError when it cannot stand."""
+    """The robot standing on the ground as a PNG with a transparent background. Raises RobotError
+    when it cannot stand.
+    """
     camera = _camera()
     capsules, box = _shapes(robot, camera)
     x, y = _grid(capsules, box, width * SAMPLES, height * SAMPLES)
@@ -133,13 +154,21 @@ def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
     mean = colour.reshape(height, SAMPLES, width, SAMPLES, 4).mean(axis=(1, 3))
     mean[..., :3] /= np.fmax(mean[..., 3:], 1e-9)
     data = io.BytesIO()
-    Image.fromarray(np.round(255.0 * mean).astype(np.uint8), "RGBA").save(data, "PNG", optimize=True)
+    Image.fromarray(np.round(255.0 * mean).astype(np.uint8), "RGBA").save(
+        data, "PNG", optimize=True
+    )
     return data.getvalue()
 
 
 def _camera() -> Array:
     """Camera axes (rows) in world axes."""
-    toward = np.array([math.cos(ELEVATION) * math.cos(AZIMUTH), math.cos(ELEVATION) * math.sin(AZIMUTH), math.sin(ELEVATION)])
+    toward = np.array(
+        [
+            math.cos(ELEVATION) * math.cos(AZIMUTH),
+            math.cos(ELEVATION) * math.sin(AZIMUTH),
+            math.sin(ELEVATION),
+        ]
+    )
     right = np.array([-math.sin(AZIMUTH), math.cos(AZIMUTH), 0.0])
     return np.array([right, np.cross(toward, right), toward])
 
@@ -147,17 +176,25 @@ def _camera() -> Array:
 def _shapes(robot: Robot, camera: Array) -> tuple[list[Capsule], Box]:
     """Links and torso of the standing robot, in camera axes."""
     position, quaternion, angle = settled(robot)
-    bodies = body_states(robot, position, quaternion, np.zeros(3), np.zeros(3), angle, np.zeros_like(angle))
+    bodies = body_states(
+        robot, position, quaternion, np.zeros(3), np.zeros(3), angle, np.zeros_like(angle)
+    )
     capsules = []
-    for body, (leg, joint) in zip(bodies[1:], ((leg, joint) for leg in range(6) for joint in range(3)), strict=True):
+    for body, (leg, joint) in zip(
+        bodies[1:], ((leg, joint) for leg in range(6) for joint in range(3)), strict=True
+    ):
         link, turn = robot.legs[leg].links[joint], rotation_matrix(body[3:7])
         start = body[:3] - turn @ np.array(link.com)
         radius = THICKNESS[joint] * robot.legs[leg].links[0].length
         colour = COLOURS[("coxa", "femur", "tibia")[joint]]
-        capsules.append(Capsule(camera @ start, camera @ (start + turn @ np.array(link.tip)), radius, colour))
+        capsules.append(
+            Capsule(camera @ start, camera @ (start + turn @ np.array(link.tip)), radius, colour)
+        )
     turn = rotation_matrix(quaternion)
     middle = position - turn @ np.array(robot.torso.com)
-    return capsules, Box(camera @ middle, camera @ turn, 0.5 * np.array(robot.torso.size), COLOURS["torso"])
+    return capsules, Box(
+        camera @ middle, camera @ turn, 0.5 * np.array(robot.torso.size), COLOURS["torso"]
+    )
 
 
 def _grid(capsules: Sequence[Capsule], box: Box, width: int, height: int) -> tuple[Array, Array]:
@@ -173,7 +210,9 @@ def _grid(capsules: Sequence[Capsule], box: Box, width: int, height: int) -> tup
 
 
 def _shade(capsules: Sequence[Capsule], box: Box, camera: Array, x: Array, y: Array) -> Array:
-    """Colours (height, width, 4) of 0 to 1: shadows on the ground, over them the nearest surfaces."""
+    """Colours (height, width, 4) of 0 to 1: shadows on the ground, over them the nearest
+    surfaces.
+    """
     colour = np.zeros((*x.shape, 4))
     colour[..., 3] = SHADOW * _shadow(capsules, box, camera, x, y)
     nearest = np.full_like(x, -np.inf)
@@ -181,10 +220,16 @@ def _shade(capsules: Sequence[Capsule], box: Box, camera: Array, x: Array, y: Ar
     for shape in shapes:
         part = _window(shape.extent(), x, y)
         z, normal = shape.meet(x[part], y[part])
-        light = AMBIENT + (1.0 - AMBIENT) * np.fmax(np.tensordot(camera @ LIGHT, normal, axes=1), 0.0)
+        light = AMBIENT + (1.0 - AMBIENT) * np.fmax(
+            np.tensordot(camera @ LIGHT, normal, axes=1), 0.0
+        )
         seen = z > nearest[part]
         nearest[part][seen] = z[seen]
-        colour[part][seen] = np.append(light[seen, None] * np.array(shape.colour) / 255.0, np.ones((int(seen.sum()), 1)), axis=1)
+        colour[part][seen] = np.append(
+            light[seen, None] * np.array(shape.colour) / 255.0,
+            np.ones((int(seen.sum()), 1)),
+            axis=1,
+        )
     return colour
 
 
@@ -203,7 +248,10 @@ def _shadow(capsules: Iterable[Capsule], box: Box, camera: Array, x: Array, y: A
     body = Capsule(box.centre - spine, box.centre + spine, float(box.half[1]), box.colour)
     depth = np.zeros_like(x)
     for shape in (*capsules, body):
-        start, end = (point - lamp * float(up @ point) / float(up @ lamp) for point in (shape.start, shape.end))
+        start, end = (
+            point - lamp * float(up @ point) / float(up @ lamp)
+            for point in (shape.start, shape.end)
+        )
         cast = Capsule(start, end, shape.radius, shape.colour)
         part = _window(cast.extent(PENUMBRA), x, y)
         ground = np.stack([x[part], y[part], -(up[0] * x[part] + up[1] * y[part]) / up[2]])

@@ -1,8 +1,10 @@
-"""Reference results inside an FMU: what a short run gave where it was packed, for importers to compare with.
+"""Reference results inside an FMU: what a short run gave where it was packed, for importers to
+compare with.
 
-Laid out as the FMI cross-check has it: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. The inputs (a pushed torso, two moved joints) are sampled
-at every communication step, so that it does not matter how an importer interpolates; the outputs depend on the state alone, so that it
-does not matter whether it reads them before or after it sets the next inputs.
+Laid out as the FMI cross-check has it: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. The inputs (a
+pushed torso, two moved joints) are sampled at every communication step, so that it does not matter
+how an importer interpolates; the outputs depend on the state alone, so that it does not matter
+whether it reads them before or after it sets the next inputs.
 """
 
 from __future__ import annotations
@@ -20,16 +22,31 @@ PUSH = 0.05  # of the robot's weight, at most
 SWING = 0.05  # rad, of the moved joints at most
 MOVED = ("LF.femur.angle_ref", "RR.coxa.angle_ref")
 OUTPUTS = (
-    "torso.position[1]", "torso.position[2]", "torso.position[3]", "torso.roll", "torso.pitch", "torso.yaw",
-    "LF.femur.angle", "RR.coxa.angle", "LM.foot.normal_force", "RM.foot.normal_force", "energy.kinetic",
-)  # fmt: skip
-TOLERANCE = 1e-6  # stated in NAME_ref.opt: solvers elsewhere round differently; the same binary gives the same digits
+    "torso.position[1]",
+    "torso.position[2]",
+    "torso.position[3]",
+    "torso.roll",
+    "torso.pitch",
+    "torso.yaw",
+    "LF.femur.angle",
+    "RR.coxa.angle",
+    "LM.foot.normal_force",
+    "RM.foot.normal_force",
+    "energy.kinetic",
+)
+# stated in NAME_ref.opt: solvers elsewhere round differently; the same binary gives the same digits
+TOLERANCE = 1e-6
 DIGITS = 12
 
 
 def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
-    """The three files by their path in the archive, from a run of the robot's packed FMU. Raises FmuError when it does not run."""
-    inputs = [(k * STEP, *(float(f"{value:.{DIGITS}g}") for value in _inputs(interface, k * STEP))) for k in range(STEPS + 1)]
+    """The three files by their path in the archive, from a run of the robot's packed FMU. Raises
+    FmuError when it does not run.
+    """
+    inputs = [
+        (k * STEP, *(float(f"{value:.{DIGITS}g}") for value in _inputs(interface, k * STEP)))
+        for k in range(STEPS + 1)
+    ]
     names = input_names()
     outputs = _run(fmu, names, inputs)
     start = f"{FOLDER}/{interface.robot.name}"
@@ -37,7 +54,9 @@ def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
     return {
         f"{start}_in.csv": _csv(("time", *names), inputs),
         f"{start}_ref.csv": _csv(("time", *OUTPUTS), outputs),
-        f"{start}_ref.opt": "".join(f"{name},{value!r}\n" for name, value in options.items()).encode(),
+        f"{start}_ref.opt": "".join(
+            f"{name},{value!r}\n" for name, value in options.items()
+        ).encode(),
     }
 
 
@@ -51,10 +70,15 @@ def _inputs(interface: Interface, time: float) -> tuple[float, ...]:
     weight = interface.robot.total_mass * math.hypot(*interface.robot.gravity)
     pushes = [PUSH * weight * math.sin(2.0 * math.pi * rate * time) for rate in (1.0, 1.5)]
     swings = [SWING * (1.0 - math.cos(2.0 * math.pi * rate * time)) / 2.0 for rate in (2.0, 1.0)]
-    return *pushes, *(float(interface.variable(name).start or 0.0) + swing for name, swing in zip(MOVED, swings, strict=True))
+    return *pushes, *(
+        float(interface.variable(name).start or 0.0) + swing
+        for name, swing in zip(MOVED, swings, strict=True)
+    )
 
 
-def _run(fmu: Path, names: Sequence[str], inputs: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+def _run(
+    fmu: Path, names: Sequence[str], inputs: Sequence[Sequence[float]]
+) -> list[tuple[float, ...]]:
     with Fmu(fmu, name="reference") as plant:
         plant.initialise(0.0, STEPS * STEP)
         given, seen = plant.block(names), plant.block(OUTPUTS)
@@ -79,4 +103,7 @@ def read_csv(data: bytes) -> Mapping[str, list[float]]:
     """Columns of such a file by name."""
     header, *rows = data.decode().splitlines()
     columns = zip(*([float(value) for value in row.split(",")] for row in rows), strict=True)
-    return {name.strip('"'): list(column) for name, column in zip(header.split(","), columns, strict=True)}
+    return {
+        name.strip('"'): list(column)
+        for name, column in zip(header.split(","), columns, strict=True)
+    }

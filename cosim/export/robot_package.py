@@ -15,7 +15,10 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
-PLANT, CONTROLLER = "plant", "controller"  # in the order in which their outputs follow from each other
+PLANT, CONTROLLER = (
+    "plant",
+    "controller",
+)  # in the order in which their outputs follow from each other
 SUFFIX = ".ssp"
 FMI = 2
 STOP = 10.0  # s
@@ -25,23 +28,36 @@ Values = Mapping[str, Mapping[str, float]]  # by component and name
 
 
 def export_package(
-    setup: ControllerSetup, path: str | Path, *, values: Values = NOTHING, stop: float = STOP, platforms: Iterable[str] | None = None
+    setup: ControllerSetup,
+    path: str | Path,
+    *,
+    values: Values = NOTHING,
+    stop: float = STOP,
+    platforms: Iterable[str] | None = None,
 ) -> Path:
-    """Writes a package of a controller's robot, the controller, what connects them and their parameters, and returns its path.
+    """Writes a package of a controller's robot, the controller, what connects them and their
+    parameters, and returns its path.
 
     Args:
         setup: the controller and its robot.
         path: the file to write; it appears complete or not at all.
-        values: of parameters and of the walking command, in place of what the FMUs start with and of 0.08 m/s straight on.
+        values: of parameters and of the walking command, in place of what the FMUs start with and
+            of 0.08 m/s straight on.
         stop: time at which tools end if they are told nothing else [s].
-        platforms: of both FMUs, as for `export_fmu`, but one at least: what uses a package compiles nothing.
+        platforms: of both FMUs, as for `export_fmu`, but one at least: what uses a package compiles
+            nothing.
 
     Raises what `export_fmu`, `export_controller` and `export_ssp` raise, FmuError for no platform.
     """
     chosen = None if platforms is None else choose_platforms(platforms, fmi=FMI)
     if chosen == []:
         fix = "name platforms, or leave out --platforms for this machine's"
-        raise FmuError("a package of FMUs without binaries", got="--platforms sources", expected="a binary at least", fix=fix)
+        raise FmuError(
+            "a package of FMUs without binaries",
+            got="--platforms sources",
+            expected="a binary at least",
+            fix=fix,
+        )
     walk = {CONTROLLER: {**WALK, **values.get(CONTROLLER, NOTHING)}}
     with TemporaryDirectory(prefix="hexapod-package-") as folder:
         fmus = {
@@ -49,19 +65,34 @@ def export_package(
             CONTROLLER: export_controller(setup, Path(folder) / "controller.fmu", platforms=chosen),
         }
         experiment = Experiment(step=setup.period, stop=stop)
-        return export_ssp(path, fmus, title=setup.robot.name, experiment=experiment, values={**values, **walk})
+        return export_ssp(
+            path, fmus, title=setup.robot.name, experiment=experiment, values={**values, **walk}
+        )
 
 
-def chosen_package(path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None, fmi: int = 2) -> bool:
+def chosen_package(
+    path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None, fmi: int = 2
+) -> bool:
     """Whether a package is asked for, by name or by the suffix of the file.
 
-    Raises HexapodError for two formats, for values of none, and for FMI 3.0, whose arrays an SSP 1.0 package cannot connect.
+    Raises HexapodError for two formats, for values of none, and for FMI 3.0, whose arrays an SSP
+    1.0 package cannot connect.
     """
     package = wanted or (path is not None and path.suffix == SUFFIX)
     if package and described:
-        raise HexapodError("two formats at once", got="--ssp and a URDF or MJCF", expected="one of them", fix="run the command twice")
+        raise HexapodError(
+            "two formats at once",
+            got="--ssp and a URDF or MJCF",
+            expected="one of them",
+            fix="run the command twice",
+        )
     if package and fmi != FMI:
-        raise HexapodError("no package of such FMUs", got=f"--fmi {fmi}", expected=f"--fmi {FMI}", fix="leave out --fmi")
+        raise HexapodError(
+            "no package of such FMUs",
+            got=f"--fmi {fmi}",
+            expected=f"--fmi {FMI}",
+            fix="leave out --fmi",
+        )
     if values and not package:
         fix = "add --ssp; a robot's own values belong into its file"
         raise HexapodError("--set without a package", got=values[0], expected="--ssp", fix=fix)
@@ -72,7 +103,9 @@ def package_path(path: Path | None, name: str) -> Path:
     """Where a package goes. Raises HexapodError for what is no package's name."""
     if path is not None and (path.is_dir() or path.suffix != SUFFIX):
         fix = f"write -o {path / name if path.is_dir() else path.with_suffix('')}{SUFFIX}"
-        raise HexapodError("not a package's name", got=path.name, expected=f"a file that ends in {SUFFIX}", fix=fix)
+        raise HexapodError(
+            "not a package's name", got=path.name, expected=f"a file that ends in {SUFFIX}", fix=fix
+        )
     return path or Path(f"{name}{SUFFIX}")
 
 
@@ -86,10 +119,22 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
             raise unknown_name("component", component, (PLANT, CONTROLLER), where=f"--set {text}")
         if variable in GRAVITY_NAMES:
             fix = "write gravity = [0, 0, -1.62] into the robot's file: gains and the standing pose follow from it"
-            raise HexapodError("gravity of one component alone", got=name, expected="the same for both", fix=fix, where=f"--set {text}")
+            raise HexapodError(
+                "gravity of one component alone",
+                got=name,
+                expected="the same for both",
+                fix=fix,
+                where=f"--set {text}",
+            )
         try:
             found.setdefault(component, {})[variable] = float(number)
         except ValueError as error:
             fix = "write --set controller.command.vx=0.05"
-            raise HexapodError("not a number", got=number, expected="COMPONENT.NAME=NUMBER", fix=fix, where=f"--set {text}") from error
+            raise HexapodError(
+                "not a number",
+                got=number,
+                expected="COMPONENT.NAME=NUMBER",
+                fix=fix,
+                where=f"--set {text}",
+            ) from error
     return found

@@ -1,7 +1,9 @@
-"""The variables as FMI 3 has them: one for each pattern of interface.toml, an array if the pattern has axes.
+"""The variables as FMI 3 has them: one for each pattern of interface.toml, an array if the pattern
+has axes.
 
-The name is the pattern's without its axes, the dimensions are the axes in the name's order, and the value reference is that of the first
-element: LF.coxa.angle_ref, LF.femur.angle_ref, ... RR.tibia.angle_ref of FMI 2 are angle_ref[6][3].
+The name is the pattern's without its axes, the dimensions are the axes in the name's order, and the
+value reference is that of the first element: LF.coxa.angle_ref, LF.femur.angle_ref, ...
+RR.tibia.angle_ref of FMI 2 are angle_ref[6][3].
 """
 
 from __future__ import annotations
@@ -40,15 +42,24 @@ class Array:
 
 
 def arrays(interface: Interface) -> tuple[Array, ...]:
-    """All variables, in the order of interface.toml. Raises HexapodError when two patterns would have one name."""
+    """All variables, in the order of interface.toml. Raises HexapodError when two patterns would
+    have one name.
+    """
     found: list[Array] = []
     for causality in CAUSALITIES:
         variables = iter(interface.of_causality(causality))
-        found += [_array(pattern, variables) for pattern in interface.patterns if pattern.causality == causality]
+        found += [
+            _array(pattern, variables)
+            for pattern in interface.patterns
+            if pattern.causality == causality
+        ]
     names = [array.name for array in found]
     if twice := {name for name in names if names.count(name) > 1}:
         raise HexapodError(
-            "names of FMI 3 variables", got=f"twice {', '.join(sorted(twice))}", expected="each once", fix="rename a pattern"
+            "names of FMI 3 variables",
+            got=f"twice {', '.join(sorted(twice))}",
+            expected="each once",
+            fix="rename a pattern",
         )
     return tuple(found)
 
@@ -62,7 +73,13 @@ def _array(pattern: Pattern, variables: Iterator[Variable]) -> Array:
     """The array of a pattern, whose elements are the next variables."""
     shape = tuple(len(labels) for _, labels in pattern.axes)
     elements = tuple(islice(variables, math.prod(shape)))
-    return Array(name=array_name(pattern.name), pattern=pattern.name, shape=shape, elements=elements, description=_description(pattern))
+    return Array(
+        name=array_name(pattern.name),
+        pattern=pattern.name,
+        shape=shape,
+        elements=elements,
+        description=_description(pattern),
+    )
 
 
 def _description(pattern: Pattern) -> str:

@@ -1,4 +1,6 @@
-"""The controller's FMU variables, expanded from controller_fmu/interface.toml for one set-up of the controller."""
+"""The controller's FMU variables, expanded from controller_fmu/interface.toml for one set-up of
+the controller.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,14 @@ from types import SimpleNamespace
 
 from hexapod_cosim.controller import Controller, Gains, Gait, Parts
 from hexapod_cosim.controller.controller import gains_warnings
-from hexapod_cosim.controller.gains import TRIPOD_LEGS, HoldGains, LimitGains, SlipGains, SupportGains, SuspensionGains
+from hexapod_cosim.controller.gains import (
+    TRIPOD_LEGS,
+    HoldGains,
+    LimitGains,
+    SlipGains,
+    SupportGains,
+    SuspensionGains,
+)
 from hexapod_cosim.controller.size import requirements_for
 from hexapod_cosim.cosim.common.components import CONTROLLER
 from hexapod_cosim.cosim.interface.interface import Interface, expand_interface
@@ -36,22 +45,34 @@ class ControllerSetup:
         return gains_warnings(self.robot, self.gains, self.period)
 
     def build(self) -> Controller:
-        """The Python controller of this set-up. Raises RobotError, ControllerError for one that cannot be."""
-        return Controller(self.robot, period=self.period, gait=self.gait, gains=self.gains, parts=self.parts)
+        """The Python controller of this set-up. Raises RobotError, ControllerError for one that
+        cannot be.
+        """
+        return Controller(
+            self.robot, period=self.period, gait=self.gait, gains=self.gains, parts=self.parts
+        )
 
 
 @lru_cache(maxsize=16)
 def load_controller_interface(setup: ControllerSetup) -> Interface:
-    """The interface of a controller's FMU. Raises what `Controller` raises, HexapodError when a value does not fit its variable."""
+    """The interface of a controller's FMU. Raises what `Controller` raises, HexapodError when a
+    value does not fit its variable.
+    """
     setup.build()  # refuses what the C, which takes joint axes and gaits for granted, could not
     return expand_interface(CONTROLLER, setup.robot, controller_roots(setup))
 
 
 def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
     """What the path of a start value of the controller may begin with."""
-    settings = SimpleNamespace(control="kinematic" if setup.gains is None else "compliant", period=setup.period, upright=UPRIGHT)
+    settings = SimpleNamespace(
+        control="kinematic" if setup.gains is None else "compliant",
+        period=setup.period,
+        upright=UPRIGHT,
+    )
     gains = passive_gains(setup.robot) if setup.gains is None else setup.gains
-    return SimpleNamespace(robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings)
+    return SimpleNamespace(
+        robot=setup.robot, gait=setup.gait, gains=gains, parts=setup.parts, settings=settings
+    )
 
 
 def controller_parameters(setup: ControllerSetup) -> dict[str, float]:
@@ -67,15 +88,24 @@ def _build_kinematic(robot: Robot, gait: Gait, period: float) -> None:
 
 
 def passive_gains(robot: Robot) -> SimpleNamespace:
-    """What the gains' parameters start with under kinematic control, which has none: a law against slip that answers nothing, and
-    what requirements alone say of the rest.
+    """What the gains' parameters start with under kinematic control, which has none: a law against
+    slip that answers nothing, and what requirements alone say of the rest.
     """
     wanted, servo = requirements_for(robot), robot.servo
-    stiffness, omega = robot.weight / TRIPOD_LEGS / wanted.deflection, 2.0 * math.pi * wanted.frequency
+    stiffness, omega = (
+        robot.weight / TRIPOD_LEGS / wanted.deflection,
+        2.0 * math.pi * wanted.frequency,
+    )
     slip = SlipGains(
-        kp=0.0, ki=0.0, kd=0.0, derivative_time=wanted.filter_time, filter_time=wanted.filter_time, load_time=wanted.load_time,
-        tracking_time=wanted.filter_time, limit=wanted.slip_limit,
-    )  # fmt: skip
+        kp=0.0,
+        ki=0.0,
+        kd=0.0,
+        derivative_time=wanted.filter_time,
+        filter_time=wanted.filter_time,
+        load_time=wanted.load_time,
+        tracking_time=wanted.filter_time,
+        limit=wanted.slip_limit,
+    )
     suspension = SuspensionGains(
         mass=stiffness / omega**2,
         damping=2.0 * wanted.damping_ratio * stiffness / omega,
@@ -83,9 +113,19 @@ def passive_gains(robot: Robot) -> SimpleNamespace:
         limit=wanted.deflection_limit,
     )
     hold = HoldGains(
-        attitude_rate=wanted.attitude_rate, height_rate=wanted.height_rate, ground_time=wanted.ground_time, angle_limit=wanted.angle_limit,
-        height_limit=wanted.height_limit, path_rate=wanted.path_rate, speed_limit=wanted.speed_limit, turn_limit=wanted.turn_limit,
-    )  # fmt: skip
+        attitude_rate=wanted.attitude_rate,
+        height_rate=wanted.height_rate,
+        ground_time=wanted.ground_time,
+        angle_limit=wanted.angle_limit,
+        height_limit=wanted.height_limit,
+        path_rate=wanted.path_rate,
+        speed_limit=wanted.speed_limit,
+        turn_limit=wanted.turn_limit,
+    )
     support = SupportGains(handover_time=wanted.handover_time, weight_time=wanted.weight_time)
-    limits = LimitGains(speed=wanted.speed_share * servo.speed_max, torque=wanted.torque_share * servo.torque_max)
-    return SimpleNamespace(slip=slip, suspension=suspension, support=support, hold=hold, limits=limits)
+    limits = LimitGains(
+        speed=wanted.speed_share * servo.speed_max, torque=wanted.torque_share * servo.torque_max
+    )
+    return SimpleNamespace(
+        slip=slip, suspension=suspension, support=support, hold=hold, limits=limits
+    )

@@ -1,4 +1,6 @@
-"""The FMU's variables, expanded from plant_fmu/interface.toml for one robot: the only list of names, references and start values."""
+"""The FMU's variables, expanded from plant_fmu/interface.toml for one robot: the only list of
+names, references and start values.
+"""
 
 from __future__ import annotations
 
@@ -23,13 +25,21 @@ Causality = Literal["input", "output", "parameter", "local"]
 Type = Literal["Real", "Boolean", "Enumeration"]
 
 CAUSALITIES: tuple[Causality, ...] = ("input", "output", "parameter", "local")
-DEFAULT_VARIABILITY = {"input": "continuous", "output": "continuous", "parameter": "fixed", "local": "continuous"}
-POSE_DECIMALS = 10  # of the settled pose (m, rad): far below what matters, far above what differs between machines
+DEFAULT_VARIABILITY = {
+    "input": "continuous",
+    "output": "continuous",
+    "parameter": "fixed",
+    "local": "continuous",
+}
+# of the settled pose (m, rad): far below what matters, far above what differs between machines
+POSE_DECIMALS = 10
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unit:
-    """A unit as exponents of the SI base units (None where FMI's integers cannot say it) and as users like to see it."""
+    """A unit as exponents of the SI base units (None where FMI's integers cannot say it) and as
+    users like to see it.
+    """
 
     name: str
     exponents: Mapping[str, int] | None
@@ -39,7 +49,9 @@ class Unit:
 
 @dataclass(frozen=True, kw_only=True)
 class Enumeration:
-    """A choice; item k of `items` (name, description) has the number k + 1 and the C constant {prefix}_{NAME}."""
+    """A choice; item k of `items` (name, description) has the number k + 1 and the C constant
+    {prefix}_{NAME}.
+    """
 
     name: str
     prefix: str
@@ -73,14 +85,20 @@ class Variable:
     start: float | int | None  # None for outputs
     enumeration: str | None
     field: str  # lvalue in struct hxVariables
-    depends: tuple[str, ...] | None  # of an output or local: the states and inputs it is a direct function of; None: all
-    initial: tuple[str, ...] | None  # the parameters it comes from at the start, besides those of its states; None: all
+    depends: (
+        tuple[str, ...] | None
+    )  # of an output or local: the states and inputs it is a direct function of; None: all
+    initial: (
+        tuple[str, ...] | None
+    )  # the parameters it comes from at the start, besides those of its states; None: all
     description: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """A continuous state of model exchange, its derivative and the parameters it starts from, by the names of their variables."""
+    """A continuous state of model exchange, its derivative and the parameters it starts from, by
+    the names of their variables.
+    """
 
     name: str
     derivative: str
@@ -93,7 +111,9 @@ class Pattern:
     """One entry of interface.toml: what its variables have in common."""
 
     name: str
-    axes: tuple[tuple[str, tuple[str, ...]], ...]  # of the name, each with its labels; the variables come with the first axis slowest
+    axes: tuple[
+        tuple[str, tuple[str, ...]], ...
+    ]  # of the name, each with its labels; the variables come with the first axis slowest
     causality: Causality
     kind: str  # the unit, or the type
     description: str
@@ -169,12 +189,16 @@ class Interface:
 
 @lru_cache(maxsize=16)
 def load_interface(robot: Robot) -> Interface:
-    """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit its variable."""
+    """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit
+    its variable.
+    """
     return expand_interface(PLANT, robot, plant_roots(robot))
 
 
 def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace) -> Interface:
-    """A component's interface, with start values from the attributes of `roots`. Raises HexapodError when one does not fit its variable."""
+    """A component's interface, with start values from the attributes of `roots`. Raises
+    HexapodError when one does not fit its variable.
+    """
     table = read_table(component)
     enumerations = enumerations_of(component)
     variables = tuple(_expand_all(table, enumerations, roots))
@@ -186,7 +210,11 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
         states=tuple(_states(table)),
         event_indicators=table["event"]["indicators"] if "event" in table else 0,
         shows_events=table["event"]["shown_by"] if "event" in table else None,
-        patterns=tuple(_pattern(entry, causality, table["axis"]) for causality in CAUSALITIES for entry in table.get(causality, [])),
+        patterns=tuple(
+            _pattern(entry, causality, table["axis"])
+            for causality in CAUSALITIES
+            for entry in table.get(causality, [])
+        ),
         units=tuple(_unit(name, entry) for name, entry in table["unit"].items()),
         enumerations=enumerations,
         log_categories=table["log_category"],
@@ -205,7 +233,10 @@ def read_table(component: Component) -> dict[str, Any]:
 @cache
 def enumerations_of(component: Component) -> Mapping[str, Enumeration]:
     """A component's choices by name."""
-    return {name: _enumeration(name, entry) for name, entry in read_table(component)["enumeration"].items()}
+    return {
+        name: _enumeration(name, entry)
+        for name, entry in read_table(component)["enumeration"].items()
+    }
 
 
 def plant_roots(robot: Robot) -> SimpleNamespace:
@@ -215,7 +246,11 @@ def plant_roots(robot: Robot) -> SimpleNamespace:
 
 def _settled_pose(robot: Robot) -> SimpleNamespace:
     position, quaternion, angle = settled(robot)
-    return SimpleNamespace(position=_rounded(position), quaternion=_rounded(quaternion), angle=[_rounded(leg) for leg in angle])
+    return SimpleNamespace(
+        position=_rounded(position),
+        quaternion=_rounded(quaternion),
+        angle=[_rounded(leg) for leg in angle],
+    )
 
 
 def _rounded(values: Iterable[float]) -> list[float]:
@@ -230,28 +265,51 @@ def _enumeration(name: str, entry: Mapping[str, str]) -> Enumeration:
 def _unit(name: str, entry: Any) -> Unit:
     if isinstance(entry, str):
         return Unit(name=name, exponents=None, display=None)
-    display = (entry["display"]["name"], float(entry["display"]["factor"])) if "display" in entry else None
+    display = (
+        (entry["display"]["name"], float(entry["display"]["factor"]))
+        if "display" in entry
+        else None
+    )
     exponents = {key: value for key, value in entry.items() if key not in ("display", "type")}
     return Unit(name=name, exponents=exponents, display=display, type=entry.get("type"))
 
 
-def _pattern(entry: Mapping[str, Any], causality: Causality, axes: Mapping[str, list[str]]) -> Pattern:
+def _pattern(
+    entry: Mapping[str, Any], causality: Causality, axes: Mapping[str, list[str]]
+) -> Pattern:
     own = tuple((axis, tuple(labels)) for axis, labels in own_axes(entry, axes).items())
     kind = entry.get("unit", entry.get("type", ""))
-    return Pattern(name=entry["name"], axes=own, causality=causality, kind=kind, description=entry["description"])
+    return Pattern(
+        name=entry["name"],
+        axes=own,
+        causality=causality,
+        kind=kind,
+        description=entry["description"],
+    )
 
 
-def _expand_all(table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace) -> Iterable[Variable]:
+def _expand_all(
+    table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace
+) -> Iterable[Variable]:
     for causality in CAUSALITIES:
-        places = itertools.chain.from_iterable(expand(entry, table["axis"]) for entry in table.get(causality, []))
-        for reference, (entry, place) in enumerate(places, start=table["first_reference"][causality]):
+        places = itertools.chain.from_iterable(
+            expand(entry, table["axis"]) for entry in table.get(causality, [])
+        )
+        for reference, (entry, place) in enumerate(
+            places, start=table["first_reference"][causality]
+        ):
             yield _variable(entry, place, reference, causality, enumerations, roots, table)
 
 
 def _variable(
-    entry: Mapping[str, Any], place: Mapping[str, tuple[int, str]], reference: int, causality: Causality,
-    enumerations: Mapping[str, Enumeration], roots: SimpleNamespace, table: Mapping[str, Any],
-) -> Variable:  # fmt: skip
+    entry: Mapping[str, Any],
+    place: Mapping[str, tuple[int, str]],
+    reference: int,
+    causality: Causality,
+    enumerations: Mapping[str, Enumeration],
+    roots: SimpleNamespace,
+    table: Mapping[str, Any],
+) -> Variable:
     labels = {axis: label for axis, (_, label) in place.items()}
     enumeration = enumerations.get(entry.get("type", ""))
     kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
@@ -260,7 +318,12 @@ def _variable(
         reference=reference,
         type=kind,
         causality=causality,
-        variability=entry.get("variability", DEFAULT_VARIABILITY[causality] if kind == "Real" or causality == "parameter" else "discrete"),
+        variability=entry.get(
+            "variability",
+            DEFAULT_VARIABILITY[causality]
+            if kind == "Real" or causality == "parameter"
+            else "discrete",
+        ),
         unit=entry.get("unit"),
         minimum=1 if enumeration else entry.get("min"),
         maximum=len(enumeration.items) if enumeration else entry.get("max"),
@@ -290,13 +353,20 @@ def _states(table: Mapping[str, Any]) -> Iterable[State]:
 
 
 def _start(
-    given: float | str | None, place: Mapping[str, tuple[int, str]], enumeration: Enumeration | None, roots: SimpleNamespace
+    given: float | str | None,
+    place: Mapping[str, tuple[int, str]],
+    enumeration: Enumeration | None,
+    roots: SimpleNamespace,
 ) -> float | int | None:
     if not isinstance(given, str):
         return given
     value: Any = roots
     for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
-        value = getattr(value, attribute) if attribute else value[place[axis][0] if axis in place else int(axis)]
+        value = (
+            getattr(value, attribute)
+            if attribute
+            else value[place[axis][0] if axis in place else int(axis)]
+        )
     if isinstance(value, bool):
         return value
     return enumeration.number(value) if enumeration else float(value)
@@ -306,7 +376,9 @@ def _check_start(variable: Variable) -> None:
     """A start value outside its variable's range would make an FMU that importers refuse."""
     low = -math.inf if variable.minimum is None else variable.minimum
     high = math.inf if variable.maximum is None else variable.maximum
-    if variable.start is not None and not (low <= variable.start <= high and math.isfinite(variable.start)):
+    if variable.start is not None and not (
+        low <= variable.start <= high and math.isfinite(variable.start)
+    ):
         raise HexapodError(
             "start value out of range",
             got=variable.start,

@@ -13,7 +13,8 @@ from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCE, source_files
 from hexapod_cosim.cosim.interface.interface import Enumeration, Interface, Unit, Variable
 
-# what the binary can do; tests/fmi/test_fmi.py and tests/fmi/test_fmi_exchange.py hold each of these to its word
+# what the binary can do; tests/fmi/test_fmi.py and tests/fmi/test_fmi_exchange.py hold each of
+# these to its word
 BOTH = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
@@ -21,8 +22,9 @@ BOTH = {
     "canSerializeFMUstate": "true",
 }
 MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"} | BOTH
-# canInterpolateInputs: derivatives of inputs are taken whenever they are given, but some masters that connect sources without any
-# refuse an FMU that declares it, and none refuses one that does not
+# canInterpolateInputs: derivatives of inputs are taken whenever they are given, but some masters
+# that connect sources without any refuse an FMU that declares it, and none refuses one that does
+# not
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
     "canInterpolateInputs": "false",
@@ -32,7 +34,9 @@ CO_SIMULATION = {
 
 @dataclass(frozen=True)
 class ModelDescription:
-    """The document and its GUID, a fingerprint of the document: any other variable, unit, value or version is another GUID."""
+    """The document and its GUID, a fingerprint of the document: any other variable, unit, value
+    or version is another GUID.
+    """
 
     guid: str
     xml: str
@@ -50,13 +54,23 @@ def render_fmi2(interface: Interface) -> ModelDescription:
 
 
 def _document(interface: Interface) -> Element:
-    own = {"fmiVersion": "2.0", "guid": "", "numberOfEventIndicators": str(interface.event_indicators)}
+    own = {
+        "fmiVersion": "2.0",
+        "guid": "",
+        "numberOfEventIndicators": str(interface.event_indicators),
+    }
     root = Element("fmiModelDescription", own | general_facts(interface))
     _add_interfaces(root, interface)
     add_units(root, interface.units)
     _add_types(root, interface.enumerations.values(), interface.units)
     add_log_categories(root, interface)
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(interface.stop_time), stepSize=repr(interface.step))
+    SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0",
+        stopTime=repr(interface.stop_time),
+        stepSize=repr(interface.step),
+    )
     _add_provenance(root, interface)
     variables = SubElement(root, "ModelVariables")
     for variable in interface.variables:
@@ -66,13 +80,21 @@ def _document(interface: Interface) -> Element:
 
 
 def _add_interfaces(root: Element, interface: Interface) -> None:
-    """Model exchange for components with continuous states, whose derivatives are exact; co-simulation."""
+    """Model exchange for components with continuous states, whose derivatives are exact;
+    co-simulation.
+    """
     differentiable = {"providesDirectionalDerivative": _flag(bool(interface.states))}
     order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
     identifier = {"modelIdentifier": interface.component.identifier}
     if interface.states:
-        _add_sources(SubElement(root, "ModelExchange", identifier | MODEL_EXCHANGE | differentiable), interface.component)
-    _add_sources(SubElement(root, "CoSimulation", identifier | CO_SIMULATION | order | differentiable), interface.component)
+        _add_sources(
+            SubElement(root, "ModelExchange", identifier | MODEL_EXCHANGE | differentiable),
+            interface.component,
+        )
+    _add_sources(
+        SubElement(root, "CoSimulation", identifier | CO_SIMULATION | order | differentiable),
+        interface.component,
+    )
 
 
 def _flag(value: bool) -> str:
@@ -91,10 +113,13 @@ def general_facts(interface: Interface) -> dict[str, str]:
     robot = interface.robot
     joints = sum(len(leg.links) for leg in robot.legs)
     return {
-        "modelName": robot.name + interface.component.suffix, "version": interface.version, "license": "MIT",
+        "modelName": robot.name + interface.component.suffix,
+        "version": interface.version,
+        "license": "MIT",
         "description": interface.component.description.format(bodies=1 + joints, joints=joints),
-        "generationTool": f"{DISTRIBUTION} {interface.version}", "variableNamingConvention": "structured",
-    }  # fmt: skip
+        "generationTool": f"{DISTRIBUTION} {interface.version}",
+        "variableNamingConvention": "structured",
+    }
 
 
 def add_log_categories(root: Element, interface: Interface) -> None:
@@ -110,7 +135,11 @@ def add_units(root: Element, units: Iterable[Unit]) -> None:
     for unit in units:
         element = SubElement(parent, "Unit", name=unit.name)
         if unit.exponents is not None:
-            SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in unit.exponents.items()})
+            SubElement(
+                element,
+                "BaseUnit",
+                {base: str(exponent) for base, exponent in unit.exponents.items()},
+            )
         if unit.display is not None:
             SubElement(element, "DisplayUnit", name=unit.display[0], factor=repr(unit.display[1]))
 
@@ -128,7 +157,11 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
 def _add_real_type(parent: Element, unit: Unit) -> None:
     if unit.type is not None:
         display = {"displayUnit": unit.display[0]} if unit.display else {}
-        SubElement(SubElement(parent, "SimpleType", name=unit.type), "Real", {"quantity": unit.type, "unit": unit.name} | display)
+        SubElement(
+            SubElement(parent, "SimpleType", name=unit.type),
+            "Real",
+            {"quantity": unit.type, "unit": unit.name} | display,
+        )
 
 
 def _add_provenance(root: Element, interface: Interface) -> None:
@@ -137,11 +170,18 @@ def _add_provenance(root: Element, interface: Interface) -> None:
 
 
 def _add_variable(parent: Element, variable: Variable, interface: Interface) -> None:
-    element = SubElement(parent, "ScalarVariable", {
-        "name": variable.name, "valueReference": str(variable.reference), "causality": variable.causality,
-        "variability": variable.variability, "initial": "exact" if variable.causality == "parameter" else "calculated",
-        "description": variable.description,
-    })  # fmt: skip
+    element = SubElement(
+        parent,
+        "ScalarVariable",
+        {
+            "name": variable.name,
+            "valueReference": str(variable.reference),
+            "causality": variable.causality,
+            "variability": variable.variability,
+            "initial": "exact" if variable.causality == "parameter" else "calculated",
+            "description": variable.description,
+        },
+    )
     if variable.causality == "input":
         del element.attrib["initial"]  # the standard forbids to state it
     displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
@@ -157,7 +197,11 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
         "derivative": interface.derivative_of.get(variable.name),
         "reinit": "true" if variable.name in interface.reinitialised else None,
     }
-    SubElement(element, variable.type, {name: attribute_text(value) for name, value in attributes.items() if value is not None})
+    SubElement(
+        element,
+        variable.type,
+        {name: attribute_text(value) for name, value in attributes.items() if value is not None},
+    )
 
 
 def attribute_text(value: float | int | str) -> str:
@@ -168,11 +212,16 @@ def attribute_text(value: float | int | str) -> str:
 
 
 def _add_structure(root: Element, interface: Interface) -> None:
-    """Outputs and derivatives with what they depend on now; the same and the states with what they depend on at the start."""
+    """Outputs and derivatives with what they depend on now; the same and the states with what
+    they depend on at the start.
+    """
     structure = SubElement(root, "ModelStructure")
     outputs = [variable.name for variable in interface.of_causality("output")]
     derivatives = [state.derivative for state in interface.states]
-    initial = sorted({*outputs, *derivatives, *(state.name for state in interface.states)}, key=interface.index.__getitem__)
+    initial = sorted(
+        {*outputs, *derivatives, *(state.name for state in interface.states)},
+        key=interface.index.__getitem__,
+    )
     for title, names, depends in (
         ("Outputs", outputs, interface.depends),
         ("Derivatives", derivatives, interface.depends),
@@ -184,9 +233,13 @@ def _add_structure(root: Element, interface: Interface) -> None:
                 _add_unknown(parent, interface, name, depends(name))
 
 
-def _add_unknown(parent: Element, interface: Interface, name: str, depends: Iterable[str] | None) -> None:
+def _add_unknown(
+    parent: Element, interface: Interface, name: str, depends: Iterable[str] | None
+) -> None:
     """Without dependencies an unknown depends on all knowns."""
     attributes = {"index": str(interface.index[name])}
     if depends is not None:
-        attributes["dependencies"] = " ".join(map(str, sorted(interface.index[known] for known in depends)))
+        attributes["dependencies"] = " ".join(
+            map(str, sorted(interface.index[known] for known in depends))
+        )
     SubElement(parent, "Unknown", attributes)

@@ -1,4 +1,6 @@
-"""modelDescription.xml and buildDescription.xml of FMI 3.0: the interface of FMI 2.0 with arrays in the place of their elements."""
+"""modelDescription.xml and buildDescription.xml of FMI 3.0: the interface of FMI 2.0 with arrays
+in the place of their elements.
+"""
 
 from __future__ import annotations
 
@@ -41,15 +43,26 @@ TIME = "time"
 
 
 def render_fmi3(interface: Interface) -> ModelDescription:
-    """The model description of a robot's FMI 3.0 FMU. Its token is the GUID of the FMI 2.0 one: the same binary, values and robot."""
+    """The model description of a robot's FMI 3.0 FMU. Its token is the GUID of the FMI 2.0 one:
+    the same binary, values and robot.
+    """
     guid = render_fmi2(interface).guid
     variables = arrays(interface)
-    root = Element("fmiModelDescription", {"fmiVersion": "3.0", "instantiationToken": guid} | general_facts(interface))
+    root = Element(
+        "fmiModelDescription",
+        {"fmiVersion": "3.0", "instantiationToken": guid} | general_facts(interface),
+    )
     _add_interfaces(root, interface)
     add_units(root, interface.units)
     _add_types(root, interface.enumerations.values(), interface.units)
     add_log_categories(root, interface)
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(interface.stop_time), stepSize=repr(interface.step))
+    SubElement(
+        root,
+        "DefaultExperiment",
+        startTime="0",
+        stopTime=repr(interface.stop_time),
+        stepSize=repr(interface.step),
+    )
     _add_variables(root, interface, variables)
     _add_structure(root, interface, variables)
     _add_provenance(root, interface)
@@ -60,13 +73,22 @@ def render_build_description(component: Component, sources: Iterable[str]) -> st
     """buildDescription.xml of a component, for C files below the archive's sources folder."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(
-        root, "BuildConfiguration", modelIdentifier=component.identifier, description="C11 and its library, nothing else"
+        root,
+        "BuildConfiguration",
+        modelIdentifier=component.identifier,
+        description="C11 and its library, nothing else",
     )
     files = SubElement(configuration, "SourceFileSet", language="C11")
     for name in sources:
         SubElement(files, "SourceFile", name=name)
     SubElement(files, "IncludeDirectory", name=".")
-    SubElement(configuration, "Library", name="m", external="true", description="mathematics of the C library, where it stands apart")
+    SubElement(
+        configuration,
+        "Library",
+        name="m",
+        external="true",
+        description="mathematics of the C library, where it stands apart",
+    )
     return _document(root)
 
 
@@ -77,14 +99,20 @@ def _document(root: Element) -> str:
 
 
 def _add_interfaces(root: Element, interface: Interface) -> None:
-    """Model exchange for components with continuous states, whose derivatives are exact; co-simulation."""
+    """Model exchange for components with continuous states, whose derivatives are exact;
+    co-simulation.
+    """
     has_states = bool(interface.states)
     both = {"modelIdentifier": interface.component.identifier} | CAPABILITIES
     both |= {"providesDirectionalDerivatives": "true" if has_states else "false"}
     if has_states:
         SubElement(root, "ModelExchange", both | MODEL_EXCHANGE)
     events = dict.fromkeys(EVENTS, "true" if has_states else "false")
-    SubElement(root, "CoSimulation", both | CO_SIMULATION | events | {"maxOutputDerivativeOrder": str(int(has_states))})
+    SubElement(
+        root,
+        "CoSimulation",
+        both | CO_SIMULATION | events | {"maxOutputDerivativeOrder": str(int(has_states))},
+    )
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
@@ -96,16 +124,28 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
     for unit in units:
         if unit.type is not None:
             display = {"displayUnit": unit.display[0]} if unit.display else {}
-            SubElement(parent, "Float64Type", {"name": unit.type, "quantity": unit.type, "unit": unit.name} | display)
+            SubElement(
+                parent,
+                "Float64Type",
+                {"name": unit.type, "quantity": unit.type, "unit": unit.name} | display,
+            )
 
 
 def _add_variables(root: Element, interface: Interface, variables: Iterable[Array]) -> None:
     parent = SubElement(root, "ModelVariables")
     reference = str(interface.first_reference["independent"])
-    SubElement(parent, "Float64", {
-        "name": TIME, "valueReference": reference, "causality": "independent", "variability": "continuous", "unit": "s",
-        "description": "Simulated time",
-    })  # fmt: skip
+    SubElement(
+        parent,
+        "Float64",
+        {
+            "name": TIME,
+            "valueReference": reference,
+            "causality": "independent",
+            "variability": "continuous",
+            "unit": "s",
+            "description": "Simulated time",
+        },
+    )
     references = _references(variables)
     derivative_of = {state.derivative: references[state.name] for state in interface.states}
     for variable in variables:
@@ -117,7 +157,9 @@ def _references(variables: Iterable[Array]) -> dict[str, int]:
     return {element.name: array.reference for array in variables for element in array.elements}
 
 
-def _add_variable(parent: Element, array: Array, interface: Interface, derivative_of: int | None) -> None:
+def _add_variable(
+    parent: Element, array: Array, interface: Interface, derivative_of: int | None
+) -> None:
     first = array.first
     displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
     types = {unit.name: unit.type for unit in interface.units}
@@ -138,7 +180,9 @@ def _add_variable(parent: Element, array: Array, interface: Interface, derivativ
         "derivative": derivative_of,
         "reinit": "true" if first.name in interface.reinitialised else None,
     }
-    stated = {name: attribute_text(value) for name, value in attributes.items() if value is not None}
+    stated = {
+        name: attribute_text(value) for name, value in attributes.items() if value is not None
+    }
     element = SubElement(parent, TYPES[first.type], stated)
     for size in array.shape:
         SubElement(element, "Dimension", start=str(size))
@@ -146,34 +190,53 @@ def _add_variable(parent: Element, array: Array, interface: Interface, derivativ
 
 def _starts(array: Array) -> str | None:
     """The elements' start values; None for outputs."""
-    return None if array.first.start is None else " ".join(attribute_text(e.start) for e in array.elements if e.start is not None)
+    return (
+        None
+        if array.first.start is None
+        else " ".join(attribute_text(e.start) for e in array.elements if e.start is not None)
+    )
 
 
 def _add_structure(root: Element, interface: Interface, variables: tuple[Array, ...]) -> None:
     """What FMI 2.0's tells of elements, of their arrays; event indicators are arrays too."""
     structure = SubElement(root, "ModelStructure")
-    by_reference, references = {array.reference: array for array in variables}, _references(variables)
+    by_reference, references = (
+        {array.reference: array for array in variables},
+        _references(variables),
+    )
     outputs = [array for array in variables if array.first.causality == "output"]
-    derivatives = _holding([state.derivative for state in interface.states], references, by_reference)
+    derivatives = _holding(
+        [state.derivative for state in interface.states], references, by_reference
+    )
     states = _holding([state.name for state in interface.states], references, by_reference)
     initial = sorted({array.reference for array in (*outputs, *derivatives, *states)})
     indicators = [array for array in variables if array.pattern == interface.shows_events]
     for title, arrays_, depends in (
         ("Output", outputs, interface.depends),
         ("ContinuousStateDerivative", derivatives, interface.depends),
-        ("InitialUnknown", [by_reference[reference] for reference in initial], interface.depends_initially),
+        (
+            "InitialUnknown",
+            [by_reference[reference] for reference in initial],
+            interface.depends_initially,
+        ),
         ("EventIndicator", indicators, interface.depends),
     ):
         for array in arrays_:
             _add_unknown(structure, title, array, _knowns(array, depends, references))
 
 
-def _holding(names: Iterable[str], references: Mapping[str, int], by_reference: Mapping[int, Array]) -> list[Array]:
+def _holding(
+    names: Iterable[str], references: Mapping[str, int], by_reference: Mapping[int, Array]
+) -> list[Array]:
     """The arrays that hold elements, each once, in the order of these."""
-    return [by_reference[reference] for reference in dict.fromkeys(references[name] for name in names)]
+    return [
+        by_reference[reference] for reference in dict.fromkeys(references[name] for name in names)
+    ]
 
 
-def _knowns(array: Array, depends: Callable[[str], tuple[str, ...] | None], references: Mapping[str, int]) -> list[int] | None:
+def _knowns(
+    array: Array, depends: Callable[[str], tuple[str, ...] | None], references: Mapping[str, int]
+) -> list[int] | None:
     """References of the arrays that some element depends on; None: all."""
     found: set[int] = set()
     for element in array.elements:
@@ -184,7 +247,9 @@ def _knowns(array: Array, depends: Callable[[str], tuple[str, ...] | None], refe
     return sorted(found)
 
 
-def _add_unknown(structure: Element, title: str, array: Array, knowns: Iterable[int] | None) -> None:
+def _add_unknown(
+    structure: Element, title: str, array: Array, knowns: Iterable[int] | None
+) -> None:
     attributes = {"valueReference": str(array.reference)}
     if knowns is not None:
         attributes["dependencies"] = " ".join(map(str, knowns))

@@ -1,4 +1,6 @@
-"""Start values of an FMU's parameters without the rest of its interface: what a run sets that walks a robot on another one's FMU."""
+"""Start values of an FMU's parameters without the rest of its interface: what a run sets that
+walks a robot on another one's FMU.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,19 @@ from hexapod_cosim.cosim.interface.interface import Enumeration, enumerations_of
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
 
 Step = str | int  # an attribute's name or a place in a sequence
-Row = tuple[str, Any, tuple[Step, ...], Enumeration | None]  # name, a constant or None, else the way from the roots to the value
+Row = tuple[
+    str, Any, tuple[Step, ...], Enumeration | None
+]  # name, a constant or None, else the way from the roots to the value
 
 
 def parameter_values(component: Component, roots: SimpleNamespace) -> dict[str, float]:
-    """All parameters that start with something, by name, as `expand_interface` has them; their ranges are the FMU's to judge."""
-    return {name: constant if constant is not None else _value(roots, way, choices) for name, constant, way, choices in _rows(component)}
+    """All parameters that start with something, by name, as `expand_interface` has them; their
+    ranges are the FMU's to judge.
+    """
+    return {
+        name: constant if constant is not None else _value(roots, way, choices)
+        for name, constant, way, choices in _rows(component)
+    }
 
 
 def _value(roots: SimpleNamespace, way: tuple[Step, ...], choices: Enumeration | None) -> float:

@@ -1,8 +1,9 @@
 """terminalsAndIcons.xml: the FMU's variables bundled as a user connects them, and its icon.
 
-Defined by FMI 3.0 (section 2.4.9), in the same folder and form since FMI 2.0.4. Legs have a terminal each: command (what a controller
-gives), state (what joint sensors measure) and foot (the contact); the torso has push, motion and imu. Terminals match by their members'
-names (rule "plug"), so that a controller's terminal of the same members connects in one go.
+Defined by FMI 3.0 (section 2.4.9), in the same folder and form since FMI 2.0.4. Legs have a
+terminal each: command (what a controller gives), state (what joint sensors measure) and foot (the
+contact); the torso has push, motion and imu. Terminals match by their members' names (rule "plug"),
+so that a controller's terminal of the same members connects in one go.
 """
 
 from __future__ import annotations
@@ -15,14 +16,24 @@ from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 FOLDER = "terminalsAndIcons"
 ICON = "icon.png"
-COMMANDS, STATES = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref"), ("angle", "speed", "torque")
+COMMANDS, STATES = (
+    ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref"),
+    ("angle", "speed", "torque"),
+)
 BODY = ("vx", "vy", "yaw_rate", "height", "roll", "pitch")  # of a controller
 Group = tuple[str, str, tuple[str, ...]]  # name, meaning, members
-LEGS: tuple[Group, ...] = (("command", "joint commands", COMMANDS), ("state", "joint states", STATES))
+LEGS: tuple[Group, ...] = (
+    ("command", "joint commands", COMMANDS),
+    ("state", "joint states", STATES),
+)
 FOOT = "contact of the foot with the ground"
 TORSO: tuple[Group, ...] = (
     ("push", "disturbing force and torque", ("torso.push_force", "torso.push_torque")),
-    ("motion", "position, attitude and their rates", ("torso.position", "torso.quaternion", "torso.velocity", "torso.angular_velocity")),
+    (
+        "motion",
+        "position, attitude and their rates",
+        ("torso.position", "torso.quaternion", "torso.velocity", "torso.angular_velocity"),
+    ),
     ("command", "what the torso is told to do", tuple(f"command.{name}" for name in BODY)),
     ("imu", "an ideal inertial sensor", ("imu.specific_force", "imu.angular_velocity")),
 )
@@ -31,28 +42,49 @@ MILLIMETRES = 0.1  # of a diagram, per unit of these coordinates
 
 
 def render_terminals(names: Sequence[str]) -> str:
-    """The document for an FMU whose variables have these names; arrays are spelt out, as FMI 2.0 has them."""
+    """The document for an FMU whose variables have these names; arrays are spelt out, as FMI 2.0
+    has them.
+    """
     root, terminals = _document()
     for leg in LEG_NAMES:
         _add_leg(terminals, leg, names)
     torso = _add(terminals, "torso", "what happens to the torso")
     for name, text, starts in TORSO:
-        members = [(variable, variable.partition(".")[2]) for variable in names if variable.partition("[")[0] in starts]
+        members = [
+            (variable, variable.partition(".")[2])
+            for variable in names
+            if variable.partition("[")[0] in starts
+        ]
         if members:
             _add(torso, name, text, members)
     return _text(root)
 
 
 def render_terminals3(names: Sequence[str]) -> str:
-    """The document for an FMI 3.0 FMU with these inputs and outputs, arrays over legs and joints: the same terminals, once for all legs."""
+    """The document for an FMI 3.0 FMU with these inputs and outputs, arrays over legs and
+    joints: the same terminals, once for all legs.
+    """
     root, terminals = _document()
     legs = _add(terminals, "legs", "all legs: arrays over legs and joints")
     for name, text, quantities in LEGS:
-        _add(legs, name, text, [(quantity, quantity) for quantity in quantities if quantity in names])
-    _add(legs, "foot", FOOT, [(variable, variable.removeprefix("foot.")) for variable in names if variable.startswith("foot.")])
+        _add(
+            legs, name, text, [(quantity, quantity) for quantity in quantities if quantity in names]
+        )
+    _add(
+        legs,
+        "foot",
+        FOOT,
+        [
+            (variable, variable.removeprefix("foot."))
+            for variable in names
+            if variable.startswith("foot.")
+        ],
+    )
     torso = _add(terminals, "torso", "what happens to the torso")
     for name, text, starts in TORSO:
-        members = [(variable, variable.partition(".")[2]) for variable in names if variable in starts]
+        members = [
+            (variable, variable.partition(".")[2]) for variable in names if variable in starts
+        ]
         if members:
             _add(torso, name, text, members)
     return _text(root)
@@ -61,9 +93,16 @@ def render_terminals3(names: Sequence[str]) -> str:
 def _document() -> tuple[Element, Element]:
     """A document with the icon's place, and the element for its terminals."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-    corners = {"x1": repr(-HALF_SIZE), "y1": repr(-HALF_SIZE), "x2": repr(HALF_SIZE), "y2": repr(HALF_SIZE)}
+    corners = {
+        "x1": repr(-HALF_SIZE),
+        "y1": repr(-HALF_SIZE),
+        "x2": repr(HALF_SIZE),
+        "y2": repr(HALF_SIZE),
+    }
     picture = SubElement(root, "GraphicalRepresentation")
-    SubElement(picture, "CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": repr(MILLIMETRES)})
+    SubElement(
+        picture, "CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": repr(MILLIMETRES)}
+    )
     SubElement(picture, "Icon", corners)
     return root, SubElement(root, "Terminals")
 
@@ -77,9 +116,16 @@ def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
     terminal = _add(parent, leg, f"leg {leg}")
     for name, text, quantities in LEGS:
         members = [f"{joint}.{quantity}" for joint in JOINT_NAMES for quantity in quantities]
-        _add(terminal, name, text, [(f"{leg}.{member}", member) for member in members if f"{leg}.{member}" in names])
+        _add(
+            terminal,
+            name,
+            text,
+            [(f"{leg}.{member}", member) for member in members if f"{leg}.{member}" in names],
+        )
     start = f"{leg}.foot."
-    foot = [(variable, variable.removeprefix(start)) for variable in names if variable.startswith(start)]
+    foot = [
+        (variable, variable.removeprefix(start)) for variable in names if variable.startswith(start)
+    ]
     _add(terminal, "foot", FOOT, foot)
 
 
@@ -87,5 +133,11 @@ def _add(parent: Element, name: str, text: str, members: Iterable[tuple[str, str
     """A terminal of (variable, member) pairs."""
     terminal = SubElement(parent, "Terminal", name=name, matchingRule="plug", description=text)
     for variable, member in members:
-        SubElement(terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind="signal")
+        SubElement(
+            terminal,
+            "TerminalMemberVariable",
+            variableName=variable,
+            memberName=member,
+            variableKind="signal",
+        )
     return terminal

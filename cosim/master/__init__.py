@@ -1,1 +1,3 @@
-"""The co-simulation master: FMUs, signals, sensors and the loop, in Python and in C. Imports `common` to `scenario`."""
+"""The co-simulation master: FMUs, signals, sensors and the loop, in Python and in C. Imports
+`common` to `scenario`.
+"""

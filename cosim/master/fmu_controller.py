@@ -1,4 +1,6 @@
-"""A controller FMU in the place of the Python controller: the master steps it as it steps `Controller`."""
+"""A controller FMU in the place of the Python controller: the master steps it as it steps
+`Controller`.
+"""
 
 from __future__ import annotations
 
@@ -33,15 +35,26 @@ class FmuController:
         self._outputs = fmu.block([*joints, *shift, *lifts_and_plan, *acceleration_names])
         self._flags = fmu.block([f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES])
         ends = LEGS * np.array([3, 6, 9, 11, 12, 15])
-        angle, speed, torque, shifts, lifts, feet, acceleration = np.split(self._outputs.values, ends)
+        angle, speed, torque, shifts, lifts, feet, acceleration = np.split(
+            self._outputs.values, ends
+        )
         self._out = JointCommand(*(part.reshape(LEGS, 3) for part in (angle, speed, torque)))
         if acceleration_names:
             self._out.acceleration_ref = acceleration.reshape(LEGS, 3)
         swinging, unreachable, fallback = self._shown = np.zeros((len(FLAGS), LEGS), dtype=np.bool_)
-        self.diagnostics = Diagnostics(swinging, feet.reshape(LEGS, 3), shifts.view(np.complex128), lifts, unreachable, fallback)
+        self.diagnostics = Diagnostics(
+            swinging,
+            feet.reshape(LEGS, 3),
+            shifts.view(np.complex128),
+            lifts,
+            unreachable,
+            fallback,
+        )
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """The joint commands for [t, t + period). The result's arrays are reused by the next step. Raises FmuError."""
+        """The joint commands for [t, t + period). The result's arrays are reused by the next
+        step. Raises FmuError.
+        """
         self._sense(command, measurement)
         self._inputs.set()
         self._outputs.get()

@@ -1,4 +1,6 @@
-"""What FMUs say, each to its own log: fmpy's formatter of messages knows one Python function in a process, so all instances share ours."""
+"""What FMUs say, each to its own log: fmpy's formatter of messages knows one Python function in
+a process, so all instances share ours.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,16 @@ STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 WARNING = STATUS.index("warning")
 KEPT = 20  # messages
 
-_logs: dict[int, deque[str]] = {}  # by the environment that an instance hands back with its messages
+_logs: dict[
+    int, deque[str]
+] = {}  # by the environment that an instance hands back with its messages
 _environments = count(1)
 
 
 class FmuLog:
-    """Warnings and errors of one instance, the newest last; `callbacks` are what it is made with."""
+    """Warnings and errors of one instance, the newest last; `callbacks` are what it is made
+    with.
+    """
 
     def __init__(self) -> None:
         self.messages: deque[str] = deque(maxlen=KEPT)
@@ -36,10 +42,14 @@ class FmuLog:
         _logs.pop(self._environment, None)
 
 
-def _write(environment: int | None, _name: bytes, status: int, _category: bytes, message: bytes) -> None:
+def _write(
+    environment: int | None, _name: bytes, status: int, _category: bytes, message: bytes
+) -> None:
     log = _logs.get(environment or 0)
     if status >= WARNING and log is not None:
         log.append(message.decode("utf-8", errors="replace"))
 
 
-_logger = fmi2CallbackLoggerTYPE(_write)  # lives as long as the process: the formatter keeps its address
+_logger = fmi2CallbackLoggerTYPE(
+    _write
+)  # lives as long as the process: the formatter keeps its address

@@ -1,4 +1,6 @@
-"""The feet's force sensors as they are: noisy, late, now and then broken. Contacts are derived from forces and share their fate."""
+"""The feet's force sensors as they are: noisy, late, now and then broken. Contacts are derived
+from forces and share their fate.
+"""
 
 from __future__ import annotations
 
@@ -15,32 +17,48 @@ DEAD, STUCK = (FAULTS.index(name) + 1 for name in ("dead", "stuck"))
 
 @dataclass(frozen=True, kw_only=True)
 class SensorSettings:
-    """All that is wrong with the feet's force sensors. A fault is what comes out last, after noise and delay."""
+    """All that is wrong with the feet's force sensors. A fault is what comes out last, after
+    noise and delay.
+    """
 
     noise: float = 0.0  # 1    standard deviation, as a share of the force
     seed: int = 0  # of the noise
     delay: int = 0  # whole macro-steps by which readings are late; before them the first one holds
-    faults: NDArray[np.int8] | None = None  # (steps + 1, 6) numbers of FAULTS from 1, 0 none, step by step
+    faults: NDArray[np.int8] | None = (
+        None  # (steps + 1, 6) numbers of FAULTS from 1, 0 none, step by step
+    )
 
 
 def noise_factors(settings: SensorSettings, count: int) -> NDArray[np.float64] | None:
-    """(count, 6, 3) what the forces of so many macro-steps are multiplied by, as `ForceSensor` draws it; None without noise."""
+    """(count, 6, 3) what the forces of so many macro-steps are multiplied by, as `ForceSensor`
+    draws it; None without noise.
+    """
     if not settings.noise:
         return None
-    return 1.0 + settings.noise * np.random.default_rng(settings.seed).standard_normal((count, len(LEG_NAMES), 3))
+    return 1.0 + settings.noise * np.random.default_rng(settings.seed).standard_normal(
+        (count, len(LEG_NAMES), 3)
+    )
 
 
 class ForceSensor:
     """Turns true forces and contacts into readings, once a macro-step.
 
-    Attributes: force: (6, 3) [N] ground on foot, world axes;  contact: (6,). Both are brought up to date by `read`.
+    Attributes: force: (6, 3) [N] ground on foot, world axes;  contact: (6,). Both are brought up to
+    date by `read`.
     """
 
     def __init__(self, settings: SensorSettings) -> None:
         delay, legs = settings.delay, len(LEG_NAMES)
         self.force, self.contact = np.zeros((legs, 3)), np.zeros(legs, dtype=np.bool_)
-        self._forces, self._contacts = np.zeros((delay + 1, legs, 3)), np.zeros((delay + 1, legs), dtype=np.bool_)
-        self._noise, self._generator, self._faults = settings.noise, np.random.default_rng(settings.seed), settings.faults
+        self._forces, self._contacts = (
+            np.zeros((delay + 1, legs, 3)),
+            np.zeros((delay + 1, legs), dtype=np.bool_),
+        )
+        self._noise, self._generator, self._faults = (
+            settings.noise,
+            np.random.default_rng(settings.seed),
+            settings.faults,
+        )
         self._count = 0
 
     def read(self, force: NDArray[np.float64], contact: NDArray[np.int32]) -> None:

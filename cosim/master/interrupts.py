@@ -22,7 +22,9 @@ class _Hold:
 
 @contextmanager
 def held_interrupts() -> Iterator[None]:
-    """Keeps an interrupt back until the block has ended well; only Python's main thread receives any. Raises KeyboardInterrupt then."""
+    """Keeps an interrupt back until the block has ended well; only Python's main thread receives
+    any. Raises KeyboardInterrupt then.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -39,7 +41,9 @@ def held_interrupts() -> Iterator[None]:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """A part within `held_interrupts` that an interrupt does end, one that was kept back before it too. Raises KeyboardInterrupt."""
+    """A part within `held_interrupts` that an interrupt does end, one that was kept back before
+    it too. Raises KeyboardInterrupt.
+    """
     hold = signal.getsignal(signal.SIGINT)
     if not isinstance(hold, _Hold):
         yield
@@ -57,7 +61,9 @@ def interruptible() -> Iterator[None]:
 
 @contextmanager
 def deaf_to_interrupts() -> Iterator[None]:
-    """Processes begun within the block never hear Ctrl-C, which a terminal sends to all of them; this one hears it when the block ends."""
+    """Processes begun within the block never hear Ctrl-C, which a terminal sends to all of them;
+    this one hears it when the block ends.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,4 +1,6 @@
-"""The co-simulation loop: at t_k = start + k h read outputs -> controller -> set inputs -> record -> step to t_k + h."""
+"""The co-simulation loop: at t_k = start + k h read outputs -> controller -> set inputs ->
+record -> step to t_k + h.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ class Outcome:
     wall: float  # s, the whole loop
     recording: Recording
     cause: Exception | None = None  # of a failure
-    every_step: Recording | None = None  # what is judged, of every macro-step; None: the recording has them all
+    every_step: Recording | None = (
+        None  # what is judged, of every macro-step; None: the recording has them all
+    )
     finished: datetime = field(default_factory=lambda: datetime.now(UTC), compare=False)
 
     @property
@@ -56,12 +60,19 @@ class Outcome:
 
 
 def run(
-    plant: Plant, signals: Signals, controller: JointController, schedule: Schedule, recorder: Recorder, *, h: float,
+    plant: Plant,
+    signals: Signals,
+    controller: JointController,
+    schedule: Schedule,
+    recorder: Recorder,
+    *,
+    h: float,
     progress: Progress | None = None,
-) -> Outcome:  # fmt: skip
+) -> Outcome:
     """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
 
-    A step that the plant refuses, whatever a controller raises and an interrupt end the run; the outcome says which.
+    A step that the plant refuses, whatever a controller raises and an interrupt end the run; the
+    outcome says which.
     """
     status, reason, begin, cause = COMPLETED, "", perf_counter(), None
     try:
@@ -70,21 +81,31 @@ def run(
     except KeyboardInterrupt:
         status, reason = INTERRUPTED, "interrupted"
     except Exception as error:  # a controller may raise anything: the rows before it are kept
-        status, reason, cause = FAILED, str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}", error
+        status, reason, cause = (
+            FAILED,
+            str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}",
+            error,
+        )
     wall, judged = perf_counter() - begin, recorder.judged
     simulated = float(judged.time[-1] - schedule.times[0]) if len(judged.time) else 0.0
     return Outcome(status, reason, simulated, wall, recorder.recording, cause, judged)
 
 
 def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
-    """What the controller shows of itself, if it is ours: planned swing, legs that could not follow, corrections of the feet [m]."""
+    """What the controller shows of itself, if it is ours: planned swing, legs that could not
+    follow, corrections of the feet [m].
+    """
     shown = getattr(controller, "diagnostics", None)
     if not isinstance(shown, Diagnostics):
         return {}
     six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift", "fallback")}
-    shift = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2))  # x + i y in memory is x, y
+    shift = tuple(
+        name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2)
+    )  # x + i y in memory is x, y
     planned = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
-    told = {tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()}
+    told = {
+        tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()
+    }
     return told | {shift: shown.shift.view(float), planned: shown.planned}
 
 
@@ -98,7 +119,13 @@ def _loop(
     h: float,
     progress: Progress | None,
 ) -> None:
-    read, control, write, record, advance = signals.read, controller.step, signals.write, recorder.record, plant.step
+    read, control, write, record, advance = (
+        signals.read,
+        controller.step,
+        signals.write,
+        recorder.record,
+        plant.step,
+    )
     pushes, measurement = schedule.pushes, signals.measurement
     read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):

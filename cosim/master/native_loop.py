@@ -1,7 +1,9 @@
-"""The master's loop in C (master/src/master.c): the same walk as `master.run` with an `FmuController`, without Python between macro-steps.
+"""The master's loop in C (master/src/master.c): the same walk as `master.run` with an
+`FmuController`, without Python between macro-steps.
 
-The FMUs are loaded, initialised and freed by `Fmu`, in Python; the loop gets their functions and references and drives them through FMI
-alone. It runs for some macro-steps at a time without the interpreter's lock: interrupts are heard in between, other threads go on.
+The FMUs are loaded, initialised and freed by `Fmu`, in Python; the loop gets their functions and
+references and drives them through FMI alone. It runs for some macro-steps at a time without the
+interpreter's lock: interrupts are heard in between, other threads go on.
 """
 
 from __future__ import annotations
@@ -23,7 +25,13 @@ from hexapod_cosim.cosim.master.force_sensor import SensorSettings, noise_factor
 from hexapod_cosim.cosim.master.interrupts import interruptible
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, Outcome, Progress
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, Peaks, Recording, kept_moments
-from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED, PUSH, refuse_foreign
+from hexapod_cosim.cosim.master.signals import (
+    ACCELERATION,
+    COMMANDED,
+    MEASURED,
+    PUSH,
+    refuse_foreign,
+)
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
@@ -42,7 +50,9 @@ _Pointer = ct.c_void_p
 class _Fmu(ct.Structure):
     """hxMasterFmu"""
 
-    _fields_ = [(name, _Pointer) for name in ("instance", "get_real", "get_boolean", "set_real", "do_step")]
+    _fields_ = [
+        (name, _Pointer) for name in ("instance", "get_real", "get_boolean", "set_real", "do_step")
+    ]
 
 
 class _Block(ct.Structure):
@@ -62,7 +72,13 @@ class _Sensor(ct.Structure):
 class _Table(ct.Structure):
     """hxMasterTable"""
 
-    _fields_ = [("column", _Pointer), ("columns", _Size), ("row", _Pointer), ("stride", _Size), ("rows", _Size)]
+    _fields_ = [
+        ("column", _Pointer),
+        ("columns", _Size),
+        ("row", _Pointer),
+        ("stride", _Size),
+        ("rows", _Size),
+    ]
 
 
 class _Peaks(ct.Structure):
@@ -79,8 +95,20 @@ class _Master(ct.Structure):
 
     _fields_ = [
         *((name, _Fmu) for name in ("plant", "controller")),
-        *((name, _Block) for name in ("plant_output", "plant_flag", "plant_input", "controller_output", "controller_flag")),
-        *((name, _Pointer) for name in ("flag", "value", "controller_input", "controller_value", "sensed")),
+        *(
+            (name, _Block)
+            for name in (
+                "plant_output",
+                "plant_flag",
+                "plant_input",
+                "controller_output",
+                "controller_flag",
+            )
+        ),
+        *(
+            (name, _Pointer)
+            for name in ("flag", "value", "controller_input", "controller_value", "sensed")
+        ),
         *((name, _Size) for name in ("command_count", "sensed_count")),
         ("sensor", _Sensor),
         *((name, _Pointer) for name in ("time", "command", "push")),
@@ -97,14 +125,20 @@ class _Master(ct.Structure):
 
 # hxMasterCall, from 1: which FMU, and what the message says; a step's says more
 CALLS = (
-    ("plant", "the FMU does not give its outputs"), ("plant", "the FMU does not take its inputs"), ("plant", ""),
-    ("controller", "the FMU does not give its outputs"), ("controller", "the FMU does not take its inputs"), ("controller", ""),
-)  # fmt: skip
+    ("plant", "the FMU does not give its outputs"),
+    ("plant", "the FMU does not take its inputs"),
+    ("plant", ""),
+    ("controller", "the FMU does not give its outputs"),
+    ("controller", "the FMU does not take its inputs"),
+    ("controller", ""),
+)
 
 
 @cache
 def _library() -> ct.CDLL:
-    """The loop, its functions' types declared. Raises FmuError when it is missing or another version's."""
+    """The loop, its functions' types declared. Raises FmuError when it is missing or another
+    version's.
+    """
     path = shared_library(LOOP)
     library = ct.CDLL(str(path))
     library.hx_master_size.restype = _Size
@@ -117,24 +151,41 @@ def _library() -> ct.CDLL:
 
 
 class NativeMaster:
-    """A plant FMU wired to a controller FMU, for any number of runs one after the other. Of all signals `columns` are recorded; None: all.
+    """A plant FMU wired to a controller FMU, for any number of runs one after the other. Of all
+    signals `columns` are recorded; None: all.
 
-    Where not every macro-step is recorded, all of them are of `judged`. Raises FmuError when either is not what `hexapod export` makes.
+    Where not every macro-step is recorded, all of them are of `judged`. Raises FmuError when either
+    is not what `hexapod export` makes.
     """
 
-    def __init__(self, plant: Fmu, controller: Fmu, *, columns: Sequence[str] | None = None, judged: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        plant: Fmu,
+        controller: Fmu,
+        *,
+        columns: Sequence[str] | None = None,
+        judged: Sequence[str] = (),
+    ) -> None:
         self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
         seen, flagged = plant.names("output"), plant.names("output", "Boolean")
         refuse_foreign(seen, plant.names("input"), flagged)
         shown = {"insides": INSIDES, "flags": CONTROLLER_FLAGS}  # of the controller
         if columns is not None:  # what nobody looks at is not read
             wanted = {*columns, *(name for key in SENSED for name in MEASURED[key])}
-            seen, flagged = ([name for name in names if name in wanted] for names in (seen, flagged))
-            shown = {key: [name for name in names if f"controller.{name}" in wanted] for key, names in shown.items()}
+            seen, flagged = (
+                [name for name in names if name in wanted] for names in (seen, flagged)
+            )
+            shown = {
+                key: [name for name in names if f"controller.{name}" in wanted]
+                for key, names in shown.items()
+            }
         told = (f"controller.{name}" for names in shown.values() for name in names)
         both = set(plant.names("input")) & set(controller.names("output"))
         self._commands = [*JOINT_COMMANDS, *(ACCELERATION if set(ACCELERATION) <= both else [])]
-        self._places = {name: place for place, name in enumerate((*seen, *flagged, *PUSH, *self._commands, *told))}
+        self._places = {
+            name: place
+            for place, name in enumerate((*seen, *flagged, *PUSH, *self._commands, *told))
+        }
         self._reading = len(self._places)  # the sensors' readings come last, and are not recorded
         self._value = np.zeros(self._reading + len(FORCE))
         self.columns = tuple(self._places if columns is None else columns)
@@ -142,26 +193,46 @@ class NativeMaster:
         self._keep: list[NDArray[Any]] = []  # what the structure points to
         self._master = self._wire(seen, flagged, **shown)
 
-    def _wire(self, seen: list[str], flagged: list[str], *, insides: list[str], flags: list[str]) -> _Master:
+    def _wire(
+        self, seen: list[str], flagged: list[str], *, insides: list[str], flags: list[str]
+    ) -> _Master:
         """What is the same in all runs."""
         plant, controller = self._fmus["plant"], self._fmus["controller"]
         sensed = [name for key in SENSED for name in MEASURED[key]]
         peaks = Peaks(tuple(self._places))
-        room = {name: self._hold(np.zeros(len(peaks.places))) for name in ("largest", "seen", "kept")}
+        room = {
+            name: self._hold(np.zeros(len(peaks.places))) for name in ("largest", "seen", "kept")
+        }
         return _Master(
-            plant=_functions(plant), controller=_functions(controller),
-            plant_output=self._block(plant, seen), plant_flag=self._block(plant, flagged),
+            plant=_functions(plant),
+            controller=_functions(controller),
+            plant_output=self._block(plant, seen),
+            plant_flag=self._block(plant, flagged),
             plant_input=self._block(plant, [*PUSH, *self._commands]),
             controller_output=self._block(controller, [*self._commands, *insides]),
             controller_flag=self._block(controller, flags, self._reading - len(flags)),
-            flag=self._hold(np.zeros(max(len(flagged), len(CONTROLLER_FLAGS)), dtype=np.int32)), value=self._value.ctypes.data,
+            flag=self._hold(np.zeros(max(len(flagged), len(CONTROLLER_FLAGS)), dtype=np.int32)),
+            value=self._value.ctypes.data,
             controller_input=self._references(controller, [*COMMANDS, *sensed]),
             controller_value=self._hold(np.zeros(len(COMMANDS) + len(sensed))),
-            command_count=len(COMMANDS), sensed_count=len(sensed), push_count=len(PUSH), push_place=self._places[PUSH[0]],
-            kept=_Table(self._indices([self._places[name] for name in self.columns]), len(self.columns)),
-            judged=_Table(self._indices([self._places[name] for name in self._judged]), len(self._judged)),
-            peaks=_Peaks(self._indices(peaks.places), len(peaks.places), self._indices(peaks.counts), len(peaks.counts), **room),
-        )  # fmt: skip
+            command_count=len(COMMANDS),
+            sensed_count=len(sensed),
+            push_count=len(PUSH),
+            push_place=self._places[PUSH[0]],
+            kept=_Table(
+                self._indices([self._places[name] for name in self.columns]), len(self.columns)
+            ),
+            judged=_Table(
+                self._indices([self._places[name] for name in self._judged]), len(self._judged)
+            ),
+            peaks=_Peaks(
+                self._indices(peaks.places),
+                len(peaks.places),
+                self._indices(peaks.counts),
+                len(peaks.counts),
+                **room,
+            ),
+        )
 
     def _hold(self, array: NDArray[Any]) -> int:
         """The address of an array that lives as long as this."""
@@ -175,13 +246,23 @@ class NativeMaster:
         return self._hold(np.array(fmu.references(names), dtype=np.uint32))
 
     def _block(self, fmu: Fmu, names: Sequence[str], place: int | None = None) -> _Block:
-        return _Block(self._references(fmu, names), len(names), self._places[names[0]] if place is None else place)
+        return _Block(
+            self._references(fmu, names),
+            len(names),
+            self._places[names[0]] if place is None else place,
+        )
 
     def run(
-        self, schedule: Schedule, *, h: float, every: int = 1, sensor: SensorSettings | None = None, progress: Progress | None = None
+        self,
+        schedule: Schedule,
+        *,
+        h: float,
+        every: int = 1,
+        sensor: SensorSettings | None = None,
+        progress: Progress | None = None,
     ) -> Outcome:
-        """Runs both FMUs, just initialised, over the whole schedule in macro-steps of h [s], of which one of `every` is recorded; as
-        `master.run`, but that it never raises.
+        """Runs both FMUs, just initialised, over the whole schedule in macro-steps of h [s], of
+        which one of `every` is recorded; as `master.run`, but that it never raises.
         """
         master = self._master
         kept = _laid_out(master.kept, self.columns, schedule, every)
@@ -204,24 +285,45 @@ class NativeMaster:
     def _lay_in(self, schedule: Schedule, sensor: SensorSettings | None) -> list[NDArray[Any]]:
         """Points the structure to what is this run's own, and returns that."""
         master, count = self._master, len(schedule.rows)
-        arrays: dict[str, NDArray[Any] | None] = {"time": schedule.times, "command": schedule.rows, "push": schedule.pushes}
-        reals = {name: None if array is None else np.ascontiguousarray(array, dtype=np.float64) for name, array in arrays.items()}
+        arrays: dict[str, NDArray[Any] | None] = {
+            "time": schedule.times,
+            "command": schedule.rows,
+            "push": schedule.pushes,
+        }
+        reals = {
+            name: None if array is None else np.ascontiguousarray(array, dtype=np.float64)
+            for name, array in arrays.items()
+        }
         for name, array in reals.items():
             setattr(master, name, None if array is None else array.ctypes.data)
         parts, sensed = {}, self._places[FORCE[0]]
         if sensor is not None:
-            parts = {"memory": np.zeros((sensor.delay + 1, len(FORCE))), "factor": noise_factors(sensor, count), "fault": sensor.faults}
+            parts = {
+                "memory": np.zeros((sensor.delay + 1, len(FORCE))),
+                "factor": noise_factors(sensor, count),
+                "fault": sensor.faults,
+            }
         master.sensor = _Sensor(
-            **{name: array.ctypes.data for name, array in parts.items() if array is not None}, delay=0 if sensor is None else sensor.delay,
-            feet=len(LEG_NAMES), forces=len(FORCE), place=sensed, reading=self._reading,
-        )  # fmt: skip
+            **{name: array.ctypes.data for name, array in parts.items() if array is not None},
+            delay=0 if sensor is None else sensor.delay,
+            feet=len(LEG_NAMES),
+            forces=len(FORCE),
+            place=sensed,
+            reading=self._reading,
+        )
         force = self._reading if parts else sensed
-        places = [force + k if name in FORCE else self._places[name] for key in SENSED for k, name in enumerate(MEASURED[key])]
+        places = [
+            force + k if name in FORCE else self._places[name]
+            for key in SENSED
+            for k, name in enumerate(MEASURED[key])
+        ]
         where = np.array(places, dtype=np.uintp)
         master.sensed = where.ctypes.data
         return [array for array in (*reals.values(), *parts.values(), where) if array is not None]
 
-    def _drive(self, times: NDArray[np.float64], h: float, progress: Progress | None) -> tuple[str, str, Exception | None]:
+    def _drive(
+        self, times: NDArray[np.float64], h: float, progress: Progress | None
+    ) -> tuple[str, str, Exception | None]:
         """All macro-steps: status, reason and cause of the outcome."""
         master, library, steps = self._master, self._library, len(times) - 1
         try:
@@ -246,7 +348,9 @@ class NativeMaster:
         return fmu.failure(what, status) if what else fmu.step_failure(t, status)
 
 
-def _laid_out(table: _Table, columns: Sequence[str], schedule: Schedule, every: int) -> NDArray[np.float64]:
+def _laid_out(
+    table: _Table, columns: Sequence[str], schedule: Schedule, every: int
+) -> NDArray[np.float64]:
     """Room for a table's rows, with times and commands, to which the table then points."""
     moments = kept_moments(len(schedule.rows), every)
     data = np.empty((len(moments), 1 + len(columns) + len(COMMAND_COLUMNS)))
@@ -260,4 +364,10 @@ def _recorded(columns: Sequence[str], data: NDArray[np.float64], table: _Table) 
 
 
 def _functions(fmu: Fmu) -> _Fmu:
-    return _Fmu(fmu.component, *(fmu.address(name) for name in ("fmi2GetReal", "fmi2GetBoolean", "fmi2SetReal", "fmi2DoStep")))
+    return _Fmu(
+        fmu.component,
+        *(
+            fmu.address(name)
+            for name in ("fmi2GetReal", "fmi2GetBoolean", "fmi2SetReal", "fmi2DoStep")
+        ),
+    )

@@ -1,4 +1,6 @@
-"""What the master asks of a plant, so that anything that can do the same may stand in for an FMU."""
+"""What the master asks of a plant, so that anything that can do the same may stand in for an
+FMU.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ class Block(Protocol):
     @property
     def names(self) -> tuple[str, ...]: ...
     @property
-    def values(self) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer the calls fill and read
+    def values(
+        self,
+    ) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer the calls fill and read
     def get(self) -> None: ...
     def set(self) -> None: ...
 

@@ -12,14 +12,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.cosim.interface.names import JOINTS, LEGS, foot_names, foot_vector_names, joint_names, vector_names
+from hexapod_cosim.cosim.interface.names import (
+    JOINTS,
+    LEGS,
+    foot_names,
+    foot_vector_names,
+    joint_names,
+    vector_names,
+)
 from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.models import HexapodError, ScenarioError, nearest_name
 
 Array = NDArray[np.float64]
 PEAKS = ("peak_force", "peak_force_rate")  # of a foot within the last communication step
 LANDING_RATE, LANDINGS = "landing_rate", "landings"
-COMMAND_COLUMNS = ("command.vx", "command.vy", "command.yaw_rate", "command.height", "command.roll", "command.pitch")
+COMMAND_COLUMNS = (
+    "command.vx",
+    "command.vy",
+    "command.yaw_rate",
+    "command.height",
+    "command.roll",
+    "command.pitch",
+)
 
 
 class ColumnError(HexapodError):
@@ -28,7 +42,9 @@ class ColumnError(HexapodError):
 
 @dataclass(frozen=True)
 class Recording:
-    """Rows of a run. Row k: outputs read at time[k], and the inputs set then, which hold until time[k + 1]."""
+    """Rows of a run. Row k: outputs read at time[k], and the inputs set then, which hold until
+    time[k + 1].
+    """
 
     names: tuple[str, ...]  # the first is "time" [s]
     data: Array  # (rows, names)
@@ -51,7 +67,11 @@ class Recording:
         for name in names:
             if name not in self._index:
                 near = nearest_name(name, self.names)
-                fix = f"did you mean {near!r}?" if near else "record it: outputs.csv names the columns that are kept"
+                fix = (
+                    f"did you mean {near!r}?"
+                    if near
+                    else "record it: outputs.csv names the columns that are kept"
+                )
                 raise ColumnError("no such column in the recording", got=name, fix=fix)
         return self.data[:, [self._index[name] for name in names]]
 
@@ -76,21 +96,31 @@ class Recording:
         return Recording(self.names, self.data[chosen])
 
     def chosen(self, patterns: Sequence[str]) -> Recording:
-        """Time and the columns that match a pattern (`*` any text). Raises ScenarioError when a pattern matches nothing."""
+        """Time and the columns that match a pattern (`*` any text). Raises ScenarioError when a
+        pattern matches nothing.
+        """
         keep = chosen_columns(self.names, patterns)
         if len(keep) == len(self.names):
             return self
         return Recording(tuple(self.names[k] for k in keep), self.data[:, keep])
 
 
-def chosen_columns(names: Sequence[str], patterns: Sequence[str], *, where: str = "outputs.csv") -> list[int]:
-    """Places of time and of the names that match a pattern (`*` any text). Raises ScenarioError when a pattern matches nothing."""
+def chosen_columns(
+    names: Sequence[str], patterns: Sequence[str], *, where: str = "outputs.csv"
+) -> list[int]:
+    """Places of time and of the names that match a pattern (`*` any text). Raises ScenarioError
+    when a pattern matches nothing.
+    """
     for pattern in patterns:
         if not any(_matches(name, pattern) for name in names):
             near = nearest_name(pattern, names)
             fix = f"did you mean {near!r}?" if near else "`fmpy info` lists the names"
             raise ScenarioError("no output has this name", got=pattern, fix=fix, where=where)
-    return [k for k, name in enumerate(names) if k == 0 or any(_matches(name, pattern) for pattern in patterns)]
+    return [
+        k
+        for k, name in enumerate(names)
+        if k == 0 or any(_matches(name, pattern) for pattern in patterns)
+    ]
 
 
 def _matches(name: str, pattern: str) -> bool:
@@ -98,28 +128,43 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 class Recorder:
-    """Fills rows of a run; times (rows,) and body commands (rows, 6) are known beforehand, so a row copies the plant's values and no more.
+    """Fills rows of a run; times (rows,) and body commands (rows, 6) are known beforehand, so a row
+    copies the plant's values and no more.
 
-    `extra` holds further things to record: an array, seen afresh at every row, under the names of its entries in memory order. With
-    `every` > 1 only one of so many rows is kept, the last one always; then `judged` names what all rows are kept of, and in the rows
-    kept the plant's peaks are the largest since the row before.
+    `extra` holds further things to record: an array, seen afresh at every row, under the names of
+    its entries in memory order. With `every` > 1 only one of so many rows is kept, the last one
+    always; then `judged` names what all rows are kept of, and in the rows kept the plant's peaks
+    are the largest since the row before.
     """
 
     def __init__(
-        self, signals: Signals, times: Array, commands: Array, *, extra: Mapping[tuple[str, ...], NDArray[Any]] = MappingProxyType({}),
-        every: int = 1, judged: Sequence[str] = (),
-    ) -> None:  # fmt: skip
-        sources = {signals.names: signals.values} | {names: array.reshape(-1) for names, array in extra.items()}
+        self,
+        signals: Signals,
+        times: Array,
+        commands: Array,
+        *,
+        extra: Mapping[tuple[str, ...], NDArray[Any]] = MappingProxyType({}),
+        every: int = 1,
+        judged: Sequence[str] = (),
+    ) -> None:
+        sources = {signals.names: signals.values} | {
+            names: array.reshape(-1) for names, array in extra.items()
+        }
         self.names = ("time", *(name for names in sources for name in names), *COMMAND_COLUMNS)
         ends = np.cumsum([1, *map(len, sources)]).tolist()
         self._thinned = None if every == 1 else Thinned(self.names, judged, len(times), every)
         rows = len(times) if every == 1 else 1  # of which one is filled again and again
-        self._data = np.full((rows, len(self.names)), np.nan)  # filled, so that no row is the first to touch its memory
+        self._data = np.full(
+            (rows, len(self.names)), np.nan
+        )  # filled, so that no row is the first to touch its memory
         self._times, self._commands = self._data[:, 0], self._data[:, ends[-1] :]
         self._known = times, commands
         if every == 1:
             self._times[:], self._commands[:] = times, commands
-        self._copies = [(self._data[:, begin:end], source) for (begin, end), source in zip(pairwise(ends), sources.values(), strict=True)]
+        self._copies = [
+            (self._data[:, begin:end], source)
+            for (begin, end), source in zip(pairwise(ends), sources.values(), strict=True)
+        ]
         self._count = 0
 
     def record(self) -> None:
@@ -149,7 +194,9 @@ class Recorder:
 
 
 class Thinned:
-    """Rows of which one of `every` is kept, and the last; of all of them what is judged. For `rows` rows at most."""
+    """Rows of which one of `every` is kept, and the last; of all of them what is judged. For
+    `rows` rows at most.
+    """
 
     def __init__(self, names: Sequence[str], judged: Sequence[str], rows: int, every: int) -> None:
         wanted = {"time", *judged, *COMMAND_COLUMNS}
@@ -186,7 +233,8 @@ def kept_moments(rows: int, every: int) -> NDArray[np.intp]:
 class Peaks:
     """Columns of peaks, folded: the largest value since the row that was kept last.
 
-    A landing's rate begins anew at a touch-down; so does its largest, at the first touch-down since then.
+    A landing's rate begins anew at a touch-down; so does its largest, at the first touch-down since
+    then.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -197,12 +245,18 @@ class Peaks:
         self.places = [place[name] for name in (*plain, *restarted)]
         self.counts = [place[name] for name in counts]  # of the last ones of these places
         self._fresh = np.zeros(len(self.places), dtype=np.bool_)
-        self._largest, self._seen, self._kept = np.zeros(len(self.places)), np.zeros(len(counts)), np.zeros(len(counts))
+        self._largest, self._seen, self._kept = (
+            np.zeros(len(self.places)),
+            np.zeros(len(counts)),
+            np.zeros(len(counts)),
+        )
 
     def see(self, row: Array) -> None:
         """Takes a row's peaks in."""
         counts = row[self.counts]
-        self._fresh[len(self.places) - len(counts) :] = (counts != self._seen) & (self._seen == self._kept)
+        self._fresh[len(self.places) - len(counts) :] = (counts != self._seen) & (
+            self._seen == self._kept
+        )
         values = row[self.places]
         self._largest = np.where(self._fresh, values, np.maximum(self._largest, values))
         self._seen = counts

@@ -1,7 +1,9 @@
-"""Which variable is what: the plant's outputs seen as arrays (leg, joint, axis), its inputs as arrays to write. No copies: all are views.
+"""Which variable is what: the plant's outputs seen as arrays (leg, joint, axis), its inputs as
+arrays to write. No copies: all are views.
 
-All values stand in one row, outputs, flags, inputs, which the FMU fills and reads and which a recorder copies in one piece. The outputs a
-controller needs come first, so that each is one contiguous piece of it.
+All values stand in one row, outputs, flags, inputs, which the FMU fills and reads and which a
+recorder copies in one piece. The outputs a controller needs come first, so that each is one
+contiguous piece of it.
 """
 
 from __future__ import annotations
@@ -12,7 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import JointCommand, Measurement
-from hexapod_cosim.cosim.interface.names import AXES, JOINTS, LEGS, foot_names, foot_vector_names, joint_names, vector_names
+from hexapod_cosim.cosim.interface.names import (
+    AXES,
+    JOINTS,
+    LEGS,
+    foot_names,
+    foot_vector_names,
+    joint_names,
+    vector_names,
+)
 from hexapod_cosim.cosim.master.force_sensor import ForceSensor
 from hexapod_cosim.cosim.master.protocols import Plant
 from hexapod_cosim.models import FmuError
@@ -24,21 +34,29 @@ MEASURED = {
     "quaternion": vector_names("torso.quaternion", 4),
     "angular_velocity": vector_names("torso.angular_velocity"),
 }
-COMMANDED = {quantity: joint_names(quantity) for quantity in ("angle_ref", "speed_ref", "torque_ref")}
+COMMANDED = {
+    quantity: joint_names(quantity) for quantity in ("angle_ref", "speed_ref", "torque_ref")
+}
 ACCELERATION = joint_names("acceleration_ref")  # which plants made before have not
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 CONTACT = foot_names("contact")
 
 
 class Signals:
-    """The plant's blocks and the views on them. `sensor` stands between the feet and the measurement; None: what is measured is true.
+    """The plant's blocks and the views on them. `sensor` stands between the feet and the
+    measurement; None: what is measured is true.
 
-    Attributes: names, values: of the whole row, flags as 0 and 1;  outputs, flags, inputs: its blocks;  measurement: what a robot senses;
-    push: (6,) force [N] and torque [N m] on the torso, world axes, to be written.
+    Attributes: names, values: of the whole row, flags as 0 and 1;  outputs, flags, inputs: its
+    blocks;  measurement: what a robot senses; push: (6,) force [N] and torque [N m] on the torso,
+    world axes, to be written.
     """
 
     def __init__(self, plant: Plant, *, sensor: ForceSensor | None = None) -> None:
-        outputs, inputs, flags = plant.names("output"), plant.names("input"), plant.names("output", "Boolean")
+        outputs, inputs, flags = (
+            plant.names("output"),
+            plant.names("input"),
+            plant.names("output", "Boolean"),
+        )
         refuse_foreign(outputs, inputs, flags)
         seen = _first([name for names in MEASURED.values() for name in names], outputs)
         flagged = _first(CONTACT, flags)
@@ -46,10 +64,14 @@ class Signals:
         written = [*(name for names in COMMANDED.values() for name in names), *PUSH, *planned]
         self.names = (*seen, *flagged, *written)
         self.values: NDArray[np.float64] = np.zeros(len(self.names))
-        output_row, self._flag_row, input_row = np.split(self.values, np.cumsum([len(seen), len(flagged)]))
+        output_row, self._flag_row, input_row = np.split(
+            self.values, np.cumsum([len(seen), len(flagged)])
+        )
         self.outputs, self.inputs = plant.block(seen, output_row), plant.block(written, input_row)
         self.flags = plant.block(flagged)
-        self._angle_ref, self._speed_ref, self._torque_ref = input_row[: 3 * LEGS * JOINTS].reshape(3, LEGS, JOINTS)
+        self._angle_ref, self._speed_ref, self._torque_ref = input_row[: 3 * LEGS * JOINTS].reshape(
+            3, LEGS, JOINTS
+        )
         self.push: NDArray[np.float64] = input_row[3 * LEGS * JOINTS : len(written) - len(planned)]
         self._acceleration_ref = input_row[len(written) - len(planned) :].reshape(-1, LEGS, JOINTS)
         self._contact = np.zeros(LEGS, dtype=bool)
@@ -98,10 +120,17 @@ def _first(names: Sequence[str], among: Sequence[str]) -> list[str]:
 def refuse_foreign(outputs: Sequence[str], inputs: Sequence[str], flags: Sequence[str]) -> None:
     """Raises FmuError when the plant lacks a variable that every hexapod FMU has."""
     have = {*outputs, *inputs, *flags}
-    need = [name for names in (*MEASURED.values(), *COMMANDED.values(), PUSH, CONTACT) for name in names]
+    need = [
+        name for names in (*MEASURED.values(), *COMMANDED.values(), PUSH, CONTACT) for name in names
+    ]
     missing = [name for name in need if name not in have]
     if missing:
-        got = f"no {missing[0]}" + (f" and {len(missing) - 1} more missing" if len(missing) > 1 else "")
+        got = f"no {missing[0]}" + (
+            f" and {len(missing) - 1} more missing" if len(missing) > 1 else ""
+        )
         raise FmuError(
-            "not a hexapod plant", got=got, expected="the variables of every hexapod FMU", fix="use an FMU made by `hexapod export`"
+            "not a hexapod plant",
+            got=got,
+            expected="the variables of every hexapod FMU",
+            fix="use an FMU made by `hexapod export`",
         )

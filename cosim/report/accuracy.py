@@ -16,9 +16,23 @@ Metrics = Mapping[str, Mapping[str, float | None]]
 
 
 def with_errors(rows: Rows, accuracies: Mapping[str, Accuracy]) -> Rows:
-    """The rows of a report's table with the solver's error beside each value, in the order of the controls."""
-    return [row | {"values": [_with_error(row["name"], *pair) for pair in zip(row["values"], accuracies.values(), strict=True)]}
-            for row in rows] if accuracies else rows  # fmt: skip
+    """The rows of a report's table with the solver's error beside each value, in the order of
+    the controls.
+    """
+    return (
+        [
+            row
+            | {
+                "values": [
+                    _with_error(row["name"], *pair)
+                    for pair in zip(row["values"], accuracies.values(), strict=True)
+                ]
+            }
+            for row in rows
+        ]
+        if accuracies
+        else rows
+    )
 
 
 def _with_error(name: str, text: str, accuracy: Accuracy) -> str:
@@ -27,13 +41,16 @@ def _with_error(name: str, text: str, accuracy: Accuracy) -> str:
 
 
 def effect_rows(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> Rows:
-    """Of the rows of a report's table, those that half the macro-step may change: name, unit, and by control by how much it does."""
+    """Of the rows of a report's table, those that half the macro-step may change: name, unit,
+    and by control by how much it does.
+    """
     return [
         {
             "name": (name := row["name"]),
             "unit": row["unit"],
             "values": [
-                _effect(name, item.macro_step_effect.get(name, math.nan), metrics[label].get(name)) for label, item in accuracies.items()
+                _effect(name, item.macro_step_effect.get(name, math.nan), metrics[label].get(name))
+                for label, item in accuracies.items()
             ],
         }
         for row in rows
@@ -45,8 +62,12 @@ def _effect(name: str, effect: float, value: float | None) -> str:
     if not math.isfinite(effect):
         return "-"
     text = _short(name, effect)
-    share = effect / value if value is not None and abs(value) > FLOORS.get(name, 0.0) else 0.0  # relative to next to nothing is none
-    return f"{'' if text == '0' or effect < 0.0 else '+'}{text}" + (f" ({100.0 * share:+.1f} %)" if abs(share) >= SHOWN else "")
+    share = (
+        effect / value if value is not None and abs(value) > FLOORS.get(name, 0.0) else 0.0
+    )  # relative to next to nothing is none
+    return f"{'' if text == '0' or effect < 0.0 else '+'}{text}" + (
+        f" ({100.0 * share:+.1f} %)" if abs(share) >= SHOWN else ""
+    )
 
 
 def _short(name: str, value: float) -> str:
@@ -60,7 +81,11 @@ def about_accuracy(accuracies: Mapping[str, Accuracy]) -> str:
         return ""
     first = next(iter(accuracies.values()))
     counted = sorted({item.runs for item in accuracies.values()})
-    means = f" Means over {' and '.join(map(str, counted))} runs of each control." if counted[-1] > 1 else ""
+    means = (
+        f" Means over {' and '.join(map(str, counted))} runs of each control."
+        if counted[-1] > 1
+        else ""
+    )
     return (
         f"± is the solver's error: by so much a value differs from that of the same walk at {first.reference}, with the same commands and "
         f"control period.{means} Half the macro-step, {first.macro_step:g} s, in which the controller acts and outputs are read twice as "

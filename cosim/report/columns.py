@@ -27,7 +27,9 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
-MOST_ROWS = 20_000  # of a run: 100 s at 5 ms as they are; more would only make the page slow to open
+MOST_ROWS = (
+    20_000  # of a run: 100 s at 5 ms as they are; more would only make the page slow to open
+)
 ENERGIES = ("actuator_work", "dissipated", "potential", "kinetic", "push_work", "residual")
 
 
@@ -41,8 +43,9 @@ class Chosen:
 
 
 def choose(view: View, *, most_rows: int = MOST_ROWS) -> Chosen:
-    """The columns of a report. Of longer recordings two rows stand for each `bucket` of rows: what is replayed is as it was at their times,
-    what is drawn as a curve holds the bucket's least and largest value, in the order in which they came, so that no peak is lost.
+    """The columns of a report. Of longer recordings two rows stand for each `bucket` of rows: what
+    is replayed is as it was at their times, what is drawn as a curve holds the bucket's least and
+    largest value, in the order in which they came, so that no peak is lost.
     """
     replayed, drawn = _gathered(view, REPLAYED), _gathered(view, DRAWN)
     time = view.recording.time
@@ -51,11 +54,15 @@ def choose(view: View, *, most_rows: int = MOST_ROWS) -> Chosen:
     bucket = -(-2 * len(time) // most_rows)
     rows = _two_of_each(len(time), bucket)
     envelopes = {name: envelope(values, bucket) for name, values in drawn.items()}
-    return Chosen(time[rows], {name: values[rows] for name, values in replayed.items()} | envelopes, bucket)
+    return Chosen(
+        time[rows], {name: values[rows] for name, values in replayed.items()} | envelopes, bucket
+    )
 
 
 def _two_of_each(rows: int, bucket: int) -> NDArray[np.intp]:
-    """First and middle row of each bucket, the recording's last row instead of the last one's middle."""
+    """First and middle row of each bucket, the recording's last row instead of the last one's
+    middle.
+    """
     first = np.arange(0, rows, bucket)
     chosen = np.column_stack([first, np.minimum(first + bucket // 2, rows - 1)]).reshape(-1)
     chosen[-1] = rows - 1
@@ -63,7 +70,9 @@ def _two_of_each(rows: int, bucket: int) -> NDArray[np.intp]:
 
 
 def envelope(values: Array, bucket: int) -> Array:
-    """(2 x buckets,) least and largest value of each bucket of rows, in the order in which they came."""
+    """(2 x buckets,) least and largest value of each bucket of rows, in the order in which they
+    came.
+    """
     short = -len(values) % bucket
     table = np.concatenate([values, np.repeat(values[-1:], short)]).reshape(-1, bucket)
     places = np.sort(np.column_stack([table.argmin(axis=1), table.argmax(axis=1)]), axis=1)
@@ -84,9 +93,14 @@ def _gathered(view: View, makers: Mapping[str, Maker]) -> Columns:
 
 
 def _pose(view: View) -> Iterator[tuple[str, Array]]:
-    """Position [m] and attitude of the torso, angles of the joints [rad]: what the viewer's kinematics starts from."""
+    """Position [m] and attitude of the torso, angles of the joints [rad]: what the viewer's
+    kinematics starts from.
+    """
     yield from _split(("torso.x", "torso.y", "torso.z"), view.recording.vector("torso.position"))
-    yield from _split(("torso.qw", "torso.qx", "torso.qy", "torso.qz"), view.recording.vector("torso.quaternion", 4))
+    yield from _split(
+        ("torso.qw", "torso.qx", "torso.qy", "torso.qz"),
+        view.recording.vector("torso.quaternion", 4),
+    )
     names = [f"{leg}.{joint}.angle" for leg in LEG_NAMES for joint in JOINT_NAMES]
     yield from _split(names, view.recording.joints("angle").reshape(-1, len(names)))
 
@@ -94,7 +108,10 @@ def _pose(view: View) -> Iterator[tuple[str, Array]]:
 def _forces(view: View) -> Iterator[tuple[str, Array]]:
     """Forces on the feet in body weights, world axes."""
     force = view.recording.foot_vectors("force") / robot_weight(view.parameters)
-    yield from _split([f"{leg}.force.{axis}" for leg in LEG_NAMES for axis in "xyz"], force.reshape(len(force), -1))
+    yield from _split(
+        [f"{leg}.force.{axis}" for leg in LEG_NAMES for axis in "xyz"],
+        force.reshape(len(force), -1),
+    )
 
 
 def _contacts(view: View) -> Iterator[tuple[str, Array]]:
@@ -108,7 +125,9 @@ def _swings(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _slipped(view: View) -> Iterator[tuple[str, Array]]:
-    """Way [m] that each foot has slipped since the start, world x and y: what its velocity under load sums up to."""
+    """Way [m] that each foot has slipped since the start, world x and y: what its velocity under
+    load sums up to.
+    """
     time = view.recording.time
     loaded = bearing_load(view.recording, view.parameters)
     velocity = np.where(loaded[:, :, None], view.recording.foot_vectors("velocity"), 0.0)[:, :, :2]
@@ -122,21 +141,30 @@ def _commanded(view: View) -> Iterator[tuple[str, Array]]:
 
 def _normal_forces(view: View) -> Iterator[tuple[str, Array]]:
     """In body weights."""
-    yield from _split([f"{leg}.load" for leg in LEG_NAMES], view.recording.feet("normal_force") / robot_weight(view.parameters))
+    yield from _split(
+        [f"{leg}.load" for leg in LEG_NAMES],
+        view.recording.feet("normal_force") / robot_weight(view.parameters),
+    )
 
 
 def _slip(view: View) -> Iterator[tuple[str, Array]]:
-    """Speed of loaded feet along the ground [mm/s], and the way [mm] slipped by all feet since the start."""
+    """Speed of loaded feet along the ground [mm/s], and the way [mm] slipped by all feet since
+    the start.
+    """
     speed = 1e3 * slip_under_load(view.recording, view.parameters)
     yield from _split([f"{leg}.slip" for leg in LEG_NAMES], speed)
     yield "slip.way", running_integral(view.recording.time, speed.sum(axis=1))
 
 
 def _feet(view: View) -> Iterator[tuple[str, Array]]:
-    """Distance of each foot's centre from where the command plans it, torso frame [mm]; nothing when the controller does not tell."""
+    """Distance of each foot's centre from where the command plans it, torso frame [mm]; nothing
+    when the controller does not tell.
+    """
     errors = foot_errors(view.recording, view.parameters)
     if len(errors):
-        yield from _split([f"{leg}.off" for leg in LEG_NAMES], 1e3 * np.linalg.norm(errors, axis=-1))
+        yield from _split(
+            [f"{leg}.off" for leg in LEG_NAMES], 1e3 * np.linalg.norm(errors, axis=-1)
+        )
 
 
 def _height(view: View) -> Iterator[tuple[str, Array]]:
@@ -150,7 +178,10 @@ def _attitude(view: View) -> Iterator[tuple[str, Array]]:
 
 def _torques(view: View) -> Iterator[tuple[str, Array]]:
     """Largest absolute torque [N m] among the six legs, joint by joint."""
-    yield from _split([f"{joint}.torque" for joint in JOINT_NAMES], np.abs(view.recording.joints("torque")).max(axis=1))
+    yield from _split(
+        [f"{joint}.torque" for joint in JOINT_NAMES],
+        np.abs(view.recording.joints("torque")).max(axis=1),
+    )
 
 
 def _energies(view: View) -> Iterator[tuple[str, Array]]:
@@ -161,8 +192,13 @@ def _energies(view: View) -> Iterator[tuple[str, Array]]:
 
 
 REPLAYED: dict[str, Maker] = {
-    "pose": _pose, "forces": _forces, "contacts": _contacts, "swings": _swings, "slipped": _slipped, "commanded": _commanded,
-}  # fmt: skip
+    "pose": _pose,
+    "forces": _forces,
+    "contacts": _contacts,
+    "swings": _swings,
+    "slipped": _slipped,
+    "commanded": _commanded,
+}
 DRAWN: dict[str, Maker] = {
     "normal_forces": _normal_forces, "slip": _slip, "feet": _feet,
     "height": _height, "attitude": _attitude, "torques": _torques, "energies": _energies,

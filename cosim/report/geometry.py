@@ -1,4 +1,6 @@
-"""What the viewer draws: the robot and the ground of a run, as its FMU's parameters describe them."""
+"""What the viewer draws: the robot and the ground of a run, as its FMU's parameters describe
+them.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def describe_robot(run: Stored) -> dict[str, Any]:
         "foot": parameters["foot.radius"],
         "legs": [_leg(parameters, leg) for leg in LEG_NAMES],
         "joints": list(JOINT_NAMES),
-        "colours": {name: f"rgb({red},{green},{blue})" for name, (red, green, blue) in COLOURS.items()},
+        "colours": {
+            name: f"rgb({red},{green},{blue})" for name, (red, green, blue) in COLOURS.items()
+        },
         "thickness": list(THICKNESS),
     }
 
@@ -38,22 +42,33 @@ def _leg(parameters: Parameters, leg: str) -> dict[str, Any]:
     links = [
         {
             "axis": _vector(parameters, f"{leg}.{joint}.axis"),
-            "tip": [parameters[f"{leg}.{joint}.{part}"] for part in ("length", "offset_y", "offset_z")],
+            "tip": [
+                parameters[f"{leg}.{joint}.{part}"] for part in ("length", "offset_y", "offset_z")
+            ],
         }
         for joint in JOINT_NAMES
     ]
-    return {"name": leg, "hip": _vector(parameters, f"{leg}.hip_position"), "yaw": parameters[f"{leg}.hip_yaw"], "links": links}
+    return {
+        "name": leg,
+        "hip": _vector(parameters, f"{leg}.hip_position"),
+        "yaw": parameters[f"{leg}.hip_yaw"],
+        "links": links,
+    }
 
 
 def torso_size(run: Stored) -> list[float]:
-    """Edges of the torso [m]: the robot file's where it is at hand and still the same robot, else what spans the hips."""
+    """Edges of the torso [m]: the robot file's where it is at hand and still the same robot,
+    else what spans the hips.
+    """
     parameters = run.view.parameters
     hips = np.array([_vector(parameters, f"{leg}.hip_position") for leg in LEG_NAMES])
     try:
         robot = load_robot(tomllib.loads(run.scenario)["robot"])
     except (HexapodError, KeyError, TypeError, tomllib.TOMLDecodeError):
         robot = None
-    if robot is not None and np.allclose(hips, [leg.hip_position for leg in robot.legs], rtol=0.0, atol=SAME):
+    if robot is not None and np.allclose(
+        hips, [leg.hip_position for leg in robot.legs], rtol=0.0, atol=SAME
+    ):
         return [float(edge) for edge in robot.torso.size]
     length, width = np.ptp(hips[:, :2], axis=0).tolist()
     return [length, width, FLATNESS * width]

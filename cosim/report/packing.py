@@ -1,8 +1,9 @@
-"""Columns of numbers as text small enough for a page: 16-bit steps of each column's own range, differences, deflate, base64.
+"""Columns of numbers as text small enough for a page: 16-bit steps of each column's own range,
+differences, deflate, base64.
 
-A column of range D comes back within D/131070 (`error_bound`), plus the rounding of the reader's 32-bit floats. That is a hundredth of
-a pixel of a plot 1000 pixels high, and 40 um of a torso that walked 5 m. Errors don't add up: the differences are of the steps, exact
-modulo 2^16.
+A column of range D comes back within D/131070 (`error_bound`), plus the rounding of the reader's
+32-bit floats. That is a hundredth of a pixel of a plot 1000 pixels high, and 40 um of a torso that
+walked 5 m. Errors don't add up: the differences are of the steps, exact modulo 2^16.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ TICK = 1e-6  # s    of a time, which is stored in 32 bits: 71 minutes from the f
 
 
 def pack(time: Array, columns: Mapping[str, Array]) -> dict[str, Any]:
-    """What the page's viewer unpacks: rows, start and tick of the time [s], names, scales and offsets of the columns, and their data.
+    """What the page's viewer unpacks: rows, start and tick of the time [s], names, scales and
+    offsets of the columns, and their data.
 
-    The data hold `time`'s ticks since the start (their low, then their high 16 bits), then each column (rows,) in order. Columns with
-    values that are no numbers are left out.
+    The data hold `time`'s ticks since the start (their low, then their high 16 bits), then each
+    column (rows,) in order. Columns with values that are no numbers are left out.
     """
     tick = max(TICK, (time[-1] - time[0]) / 2**31) if len(time) else TICK
     ticks = np.round((time - time[:1]) / tick).astype(np.uint32)
@@ -58,7 +60,11 @@ def _steps(values: Array, scale: float, offset: float) -> NDArray[np.uint16]:
 
 
 def _deflated(rows: NDArray[np.uint16]) -> str:
-    """Differences along each row, all their low bytes before all their high ones, which are mostly equal and so cost next to nothing."""
+    """Differences along each row, all their low bytes before all their high ones, which are
+    mostly equal and so cost next to nothing.
+    """
     differences = np.diff(rows, axis=1, prepend=np.zeros((len(rows), 1), np.uint16)).astype("<u2")
     planes = differences.reshape(-1).view(np.uint8).reshape(-1, 2).T
-    return base64.b64encode(zlib.compress(np.ascontiguousarray(planes).tobytes(), 9)).decode("ascii")
+    return base64.b64encode(zlib.compress(np.ascontiguousarray(planes).tobytes(), 9)).decode(
+        "ascii"
+    )

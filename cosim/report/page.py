@@ -32,14 +32,17 @@ def environment() -> Environment:
 
 def render(template: str, **content: Any) -> str:
     """A page in the colours of the figures."""
-    from hexapod_cosim.cosim.report.plots import STYLES  # noqa: PLC0415  matplotlib is slow to import
+    # matplotlib is slow to import
+    from hexapod_cosim.cosim.report.plots import STYLES  # noqa: PLC0415
 
     colours = {label: style["color"] for label, style in STYLES.items()}
     return environment().get_template(template).render(colours=colours, **content)
 
 
 def viewer_script() -> Markup | None:
-    """The viewer's JavaScript, the newest at hand, to stand in a <script>; None where the installation has none."""
+    """The viewer's JavaScript, the newest at hand, to stand in a <script>; None where the
+    installation has none.
+    """
     found = [folder / VIEWER for folder in plant_folders() if (folder / VIEWER).is_file()]
     if not found:
         return None

@@ -13,11 +13,20 @@ from hexapod_cosim.cosim.results.results import Stored
 from hexapod_cosim.cosim.results.walk import CONTACT_SHARE
 
 
-def make_payload(runs: Mapping[str, Stored], *, most_rows: int = MOST_ROWS) -> tuple[dict[str, Any], list[str]]:
-    """The runs for the viewer, and in words how those were thinned that have more than `most_rows` rows."""
+def make_payload(
+    runs: Mapping[str, Stored], *, most_rows: int = MOST_ROWS
+) -> tuple[dict[str, Any], list[str]]:
+    """The runs for the viewer, and in words how those were thinned that have more than
+    `most_rows` rows.
+    """
     chosen = {label: choose(run.view, most_rows=most_rows) for label, run in runs.items()}
-    thinned = [_told(label, run, chosen[label]) for label, run in runs.items() if chosen[label].bucket > 1]
-    content = {"contact": CONTACT_SHARE, "runs": [_describe(label, run, chosen[label]) for label, run in runs.items()]}
+    thinned = [
+        _told(label, run, chosen[label]) for label, run in runs.items() if chosen[label].bucket > 1
+    ]
+    content = {
+        "contact": CONTACT_SHARE,
+        "runs": [_describe(label, run, chosen[label]) for label, run in runs.items()],
+    }
     return content, thinned
 
 
@@ -29,7 +38,11 @@ def as_json(payload: Mapping[str, Any]) -> str:
 def _describe(label: str, run: Stored, chosen: Chosen) -> dict[str, Any]:
     view = run.view
     about = {"label": label, "period": view.period, "bucket": chosen.bucket}
-    return about | {"robot": describe_robot(run), "ground": describe_ground(view.parameters)} | pack(chosen.time, chosen.columns)
+    return (
+        about
+        | {"robot": describe_robot(run), "ground": describe_ground(view.parameters)}
+        | pack(chosen.time, chosen.columns)
+    )
 
 
 def _told(label: str, run: Stored, chosen: Chosen) -> str:

@@ -1,4 +1,6 @@
-"""Static figures of one run or of several laid over each other, whose lines are told apart by colours and by dashes."""
+"""Static figures of one run or of several laid over each other, whose lines are told apart by
+colours and by dashes.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,13 @@ PLANNED = "0.85"  # grey of the swing that the gait plans
 LEAST_WIDTH = 2.0  # mm of the sideways axis: less would show round-off as a drift
 STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
 SIDES, PLACES = {"L": "left", "R": "right"}, {"F": "front", "M": "middle", "R": "rear"}
-BOOKS = {"actuator_work": "-", "dissipated": (0, (5, 1.2)), "potential": (0, (1, 1)), "kinetic": "-", "push_work": (0, (3, 1, 1, 1))}
+BOOKS = {
+    "actuator_work": "-",
+    "dissipated": (0, (5, 1.2)),
+    "potential": (0, (1, 1)),
+    "kinetic": "-",
+    "push_work": (0, (3, 1, 1, 1)),
+}
 
 Views = Mapping[str, View]  # by control
 
@@ -59,14 +67,18 @@ def foot_forces(views: Views) -> Figure:
 
 
 def slip(views: Views) -> Figure:
-    """Way slipped by all feet since the start, and the slip speed of each foot over the last cycles."""
+    """Way slipped by all feet since the start, and the slip speed of each foot over the last
+    cycles.
+    """
     figure = Figure(figsize=(WIDTH, 5.0))
     grid = figure.add_gridspec(3, 3)
     top = figure.add_subplot(grid[0, :])
     axes = np.ravel(grid[1:, :].subgridspec(2, 3).subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
     for label, view in views.items():
         time, speed = view.recording.time, slip_under_load(view.recording, view.parameters)
-        top.plot(time, 1e3 * running_integral(time, speed.sum(axis=1)), label=label, **STYLES[label])
+        top.plot(
+            time, 1e3 * running_integral(time, speed.sum(axis=1)), label=label, **STYLES[label]
+        )
         last = slice(-len(view.last_cycles().recording.time), None)
         for leg, axis in enumerate(axes):
             axis.plot(time[last], 1e3 * speed[last, leg], **STYLES[label])
@@ -79,7 +91,9 @@ def slip(views: Views) -> Figure:
 
 
 def feet(views: Views) -> Figure:
-    """Each foot's planned and real path in the torso's frame over the last cycles, seen from the side."""
+    """Each foot's planned and real path in the torso's frame over the last cycles, seen from the
+    side.
+    """
     figure = Figure(figsize=(WIDTH, 3.8))
     axes = figure.subplots(2, 3, sharey=True)
     for number, (label, view) in enumerate(views.items()):
@@ -102,10 +116,21 @@ def posture(views: Views) -> Figure:
     axes = figure.subplots(4, 1, sharex=True)
     for label, view in views.items():
         recording = view.recording
-        axes[0].plot(recording.time, 1e3 * body_height(recording, view.parameters), label=label, **STYLES[label])
+        axes[0].plot(
+            recording.time,
+            1e3 * body_height(recording, view.parameters),
+            label=label,
+            **STYLES[label],
+        )
         for axis, name in zip(axes[1:], ("roll", "pitch", "yaw"), strict=True):
-            axis.plot(recording.time, np.degrees(np.unwrap(recording.column(f"torso.{name}"))), **STYLES[label])
-    for axis, text in zip(axes, ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"), strict=True):
+            axis.plot(
+                recording.time,
+                np.degrees(np.unwrap(recording.column(f"torso.{name}"))),
+                **STYLES[label],
+            )
+    for axis, text in zip(
+        axes, ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"), strict=True
+    ):
         axis.set_ylabel(text)
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(axes)
@@ -120,9 +145,22 @@ def path(views: Views) -> Figure:
     for label, view in views.items():
         position = view.recording.vector("torso.position")
         axis.plot(position[:, 0], 1e3 * position[:, 1], label=label, **STYLES[label])
-        axis.plot(position[-1, 0], 1e3 * position[-1, 1], marker="o", markersize=4, clip_on=False, color=STYLES[label]["color"])
+        axis.plot(
+            position[-1, 0],
+            1e3 * position[-1, 1],
+            marker="o",
+            markersize=4,
+            clip_on=False,
+            color=STYLES[label]["color"],
+        )
     commanded = commanded_path(next(iter(views.values())).recording)
-    axis.plot(commanded[:, 0], 1e3 * commanded[:, 1], color="0.45", linestyle=":", label="commanded, without its ramps")
+    axis.plot(
+        commanded[:, 0],
+        1e3 * commanded[:, 1],
+        color="0.45",
+        linestyle=":",
+        label="commanded, without its ramps",
+    )
     axis.margins(x=0.02)
     axis.set_xlabel("x [m]")
     axis.set_ylabel("y [mm]")
@@ -135,8 +173,14 @@ def path(views: Views) -> Figure:
     missing = max(LEAST_WIDTH - (high - low), 0.0)
     axis.set_ylim(low - missing / 2, high + missing / 2)
     figure.draw_without_rendering()  # lays out: the size of the axes is known after it
-    enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height))
-    axis.set_title(f"not to scale: y is drawn about {enlarged:.0f} times larger than x", loc="right", fontsize="small")
+    enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (
+        1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height)
+    )
+    axis.set_title(
+        f"not to scale: y is drawn about {enlarged:.0f} times larger than x",
+        loc="right",
+        fontsize="small",
+    )
     return figure
 
 
@@ -164,7 +208,9 @@ def torques(views: Views) -> Figure:
 
 
 def energy(views: Views) -> Figure:
-    """The energy audit: what went in, where it is, where it went, and what the books do not explain."""
+    """The energy audit: what went in, where it is, where it went, and what the books do not
+    explain.
+    """
     figure = Figure(figsize=(WIDTH, 0.3 + 2.4 * len(views)))
     axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
     pushed = any(np.ptp(view.recording.column("energy.push_work")) for view in views.values())
@@ -177,7 +223,14 @@ def energy(views: Views) -> Figure:
         for color, (name, style) in zip(PALETTE, BOOKS.items(), strict=False):
             if name != "push_work" or pushed:
                 values = recording.column(f"energy.{name}")
-                axis.plot(recording.time, values - values[0], color=color, linestyle=style, label=name.replace("_", " "), linewidth=1.0)
+                axis.plot(
+                    recording.time,
+                    values - values[0],
+                    color=color,
+                    linestyle=style,
+                    label=name.replace("_", " "),
+                    linewidth=1.0,
+                )
         axis.set_title(label)
         axis.set_ylabel("since the start [J]")
     for axis in axes[-1]:
@@ -189,7 +242,9 @@ def energy(views: Views) -> Figure:
 
 
 def footfall(views: Views) -> Figure:
-    """Which foot is on the ground when, over the last cycles; a grey band is where the gait wants it in the air."""
+    """Which foot is on the ground when, over the last cycles; a grey band is where the gait
+    wants it in the air.
+    """
     figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * len(views)))
     axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
     for axis, (label, view) in zip(axes, views.items(), strict=True):
@@ -198,13 +253,22 @@ def footfall(views: Views) -> Figure:
             swinging = f"controller.{name}.swinging"
             if swinging in end.names:
                 _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color=PLANNED)
-            _bars(axis, end.time, end.feet("contact")[:, leg] > 0.5, leg, height=0.5, color=STYLES[label]["color"])
+            _bars(
+                axis,
+                end.time,
+                end.feet("contact")[:, leg] > 0.5,
+                leg,
+                height=0.5,
+                color=STYLES[label]["color"],
+            )
         axis.set_yticks(range(len(LEG_NAMES)), LEG_NAMES)
         axis.invert_yaxis()
         axis.set_title(label)
         axis.grid(visible=False)
     axes[-1].set_xlabel("time [s]")
-    keys = {f"on the ground, {label}": STYLES[label]["color"] for label in views} | {"swing the gait plans": PLANNED}
+    keys = {f"on the ground, {label}": STYLES[label]["color"] for label in views} | {
+        "swing the gait plans": PLANNED
+    }
     patches = [Patch(color=color, linewidth=0) for color in keys.values()]
     figure.legend(patches, list(keys), loc="outside upper center", ncols=len(keys))
     return figure
@@ -213,7 +277,10 @@ def footfall(views: Views) -> Figure:
 def _bars(axis: Axes, time: Array, on: Any, row: int, *, height: float, color: str) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     last = len(time) - 1
-    spans = [(time[begin], time[min(end, last)] - time[begin]) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+    spans = [
+        (time[begin], time[min(end, last)] - time[begin])
+        for begin, end in zip(edges[::2], edges[1::2], strict=True)
+    ]
     axis.broken_barh(spans, (row - height / 2, height), color=color, linewidth=0)
 
 
@@ -245,20 +312,52 @@ class Drawing:
 
 
 FIGURES: dict[str, Drawing] = {
-    "foot_forces": Drawing("Foot forces", "Normal force of each foot over the last gait cycles, in body weights.", foot_forces),
-    "slip": Drawing("Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.", slip),
-    "feet": Drawing("Planned and real feet", "Each foot's path in the torso's frame over the last gait cycles, from the side.", feet),
-    "posture": Drawing("Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", posture),
-    "path": Drawing("Path of the torso", "The torso from above, its end marked by a dot, and where the command leads.", path),
-    "torques": Drawing("Torques", "The largest absolute torque over the six legs, joint by joint, over the last gait cycles.", torques),
-    "energy": Drawing("Energy audit", "Work, loss and stored energy; on its own axis, the residual that the books leave.", energy),
-    "footfall": Drawing("Footfall", "Coloured: the foot is on the ground. Grey: the gait plans it to swing.", footfall),
+    "foot_forces": Drawing(
+        "Foot forces",
+        "Normal force of each foot over the last gait cycles, in body weights.",
+        foot_forces,
+    ),
+    "slip": Drawing(
+        "Slip",
+        "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.",
+        slip,
+    ),
+    "feet": Drawing(
+        "Planned and real feet",
+        "Each foot's path in the torso's frame over the last gait cycles, from the side.",
+        feet,
+    ),
+    "posture": Drawing(
+        "Height and attitude",
+        "Height of the torso above the ground, and its roll, pitch and yaw.",
+        posture,
+    ),
+    "path": Drawing(
+        "Path of the torso",
+        "The torso from above, its end marked by a dot, and where the command leads.",
+        path,
+    ),
+    "torques": Drawing(
+        "Torques",
+        "The largest absolute torque over the six legs, joint by joint, over the last gait cycles.",
+        torques,
+    ),
+    "energy": Drawing(
+        "Energy audit",
+        "Work, loss and stored energy; on its own axis, the residual that the books leave.",
+        energy,
+    ),
+    "footfall": Drawing(
+        "Footfall",
+        "Coloured: the foot is on the ground. Grey: the gait plans it to swing.",
+        footfall,
+    ),
 }
 
 
 def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]]:
-    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that lacks its columns is not drawn; one
-    of that name from an earlier report is taken away.
+    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that
+    lacks its columns is not drawn; one of that name from an earlier report is taken away.
     """
     folder.mkdir(exist_ok=True)
     saved: list[Path] = []
@@ -276,5 +375,7 @@ def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]
                 saved.append(folder / f"{name}.{kind}")
                 with atomic_path(saved[-1]) as temporary:
                     figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
-                figure.set_layout_engine("none")  # laid out once is enough: it takes as long as the drawing
+                figure.set_layout_engine(
+                    "none"
+                )  # laid out once is enough: it takes as long as the drawing
     return saved, skipped

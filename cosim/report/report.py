@@ -1,4 +1,6 @@
-"""The report of a run or a comparison: one HTML file with everything in it, that replays the walk and works without a network."""
+"""The report of a run or a comparison: one HTML file with everything in it, that replays the
+walk and works without a network.
+"""
 
 from __future__ import annotations
 
@@ -37,16 +39,35 @@ class Section(NamedTuple):
 
 SECTIONS = (
     Section("foot_forces", "Foot forces", "Normal force of each foot, in body weights."),
-    Section("slip", "Slip", "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot."),
+    Section(
+        "slip",
+        "Slip",
+        "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.",
+    ),
     Section(
         "feet",
         "Planned and real feet",
         "How far each foot's centre is from where the command plans it, in the torso's frame; the figures show both paths.",
     ),
-    Section("posture", "Height and attitude", "Height of the torso above the ground, and its roll, pitch and yaw.", "pairs"),
+    Section(
+        "posture",
+        "Height and attitude",
+        "Height of the torso above the ground, and its roll, pitch and yaw.",
+        "pairs",
+    ),
     Section("torques", "Torques", "The largest absolute torque over the six legs, joint by joint."),
-    Section("energy", "Energy audit", "Work, loss and stored energy since the start; beside them what the books do not explain.", "pairs"),
-    Section("footfall", "Footfall", "Bars: the foot is on the ground. Grey bands: the gait plans it to swing.", "wide"),
+    Section(
+        "energy",
+        "Energy audit",
+        "Work, loss and stored energy since the start; beside them what the books do not explain.",
+        "pairs",
+    ),
+    Section(
+        "footfall",
+        "Footfall",
+        "Bars: the foot is on the ground. Grey bands: the gait plans it to swing.",
+        "wide",
+    ),
     Section(
         "path",
         "Path of the torso",
@@ -66,13 +87,15 @@ def write_report(
     command: str | None = None,
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
 ) -> list[Path]:
-    """Draws the figures and writes report.html for runs by control. Returns the files, the report last.
+    """Draws the figures and writes report.html for runs by control. Returns the files, the report
+    last.
 
-    `tell` hears what could not be drawn. A comparison, whose figures are over all seeds while the runs are those of the first one, says
-    by what `scenario` (TOML) and `command` it was made; a single run has its own. `accuracies`, by control, are of the figures where they
-    were checked.
+    `tell` hears what could not be drawn. A comparison, whose figures are over all seeds while the
+    runs are those of the first one, says by what `scenario` (TOML) and `command` it was made; a
+    single run has its own. `accuracies`, by control, are of the figures where they were checked.
     """
-    from hexapod_cosim.cosim.report.plots import FIGURES, save_figures  # noqa: PLC0415  matplotlib is slow to import
+    # matplotlib is slow to import
+    from hexapod_cosim.cosim.report.plots import FIGURES, save_figures  # noqa: PLC0415
 
     files, skipped = save_figures({label: run.view for label, run in runs.items()}, folder / PLOTS)
     missing = [f"{FIGURES[name].title} is not drawn: {reason}" for name, reason in skipped.items()]
@@ -80,7 +103,11 @@ def write_report(
         tell(text)
     first = next(iter(runs.values()))
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
-    metrics = {label: run.metrics for label, run in runs.items()} if comparison is None else comparison.means
+    metrics = (
+        {label: run.metrics for label, run in runs.items()}
+        if comparison is None
+        else comparison.means
+    )
     page = render(
         "report.html.jinja",
         title=first.facts["title"],
@@ -88,13 +115,20 @@ def write_report(
         facts={label: run.facts for label, run in runs.items()},
         told={label: _told(run.facts) for label, run in runs.items()},
         walked={label: _walked(run.facts) for label, run in runs.items()},
-        warnings=[f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]] + content.pop("losses"),
+        warnings=[
+            f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
+        ]
+        + content.pop("losses"),
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
         scenario=first.scenario if scenario is None else scenario,
         command=first.facts.get("command", "") if command is None else command,
         creep=creep_note(first.facts["parameters"]),
-        gains={label: to_toml(run.facts["gains"]) for label, run in runs.items() if run.facts.get("gains")},
+        gains={
+            label: to_toml(run.facts["gains"])
+            for label, run in runs.items()
+            if run.facts.get("gains")
+        },
         accuracy=about_accuracy(accuracies),
         effects=effect_rows(content["rows"], accuracies, metrics),
         notes=[f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
@@ -106,7 +140,9 @@ def write_report(
 
 
 def _one_run(run: Stored) -> dict[str, Any]:
-    rows = metric_rows({run.facts["control"]: run.metrics}, net_slip=has_net_slip(run.facts["parameters"]))
+    rows = metric_rows(
+        {run.facts["control"]: run.metrics}, net_slip=has_net_slip(run.facts["parameters"])
+    )
     return {
         "headline": plain_headline(run.metrics, run.facts),
         "cards": [],
@@ -118,12 +154,21 @@ def _one_run(run: Stored) -> dict[str, Any]:
 
 
 def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, Any]:
-    rows, notes = comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"])), about(comparison)
+    rows, notes = (
+        comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"])),
+        about(comparison),
+    )
     means = notes.partition(f"; {METHOD}")[0]
     means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
     lead = f"Robot {facts['robot']['name']}. {means}"
-    return {"headline": headline(comparison), "cards": cards(comparison), "rows": rows, "about": notes, "losses": comparison.losses,
-            "lead": lead}  # fmt: skip
+    return {
+        "headline": headline(comparison),
+        "cards": cards(comparison),
+        "rows": rows,
+        "about": notes,
+        "losses": comparison.losses,
+        "lead": lead,
+    }
 
 
 def _replay(runs: Mapping[str, Stored]) -> dict[str, Any]:
@@ -132,7 +177,12 @@ def _replay(runs: Mapping[str, Stored]) -> dict[str, Any]:
     if script is None:
         return {"viewer": "", "payload": "", "thinned": [], "no_viewer": NO_VIEWER}
     payload, thinned = make_payload(runs)
-    return {"viewer": script, "payload": Markup(as_json(payload)), "thinned": thinned, "no_viewer": ""}
+    return {
+        "viewer": script,
+        "payload": Markup(as_json(payload)),
+        "thinned": thinned,
+        "no_viewer": "",
+    }
 
 
 def _told(facts: Mapping[str, Any]) -> str:
@@ -142,7 +192,9 @@ def _told(facts: Mapping[str, Any]) -> str:
 def _walked(facts: Mapping[str, Any]) -> str:
     """How long and how fast; without a speed when too short a time to tell."""
     speed = (facts.get("walk") or {}).get("mean_speed")
-    return f"{facts['simulated']:.6g} s" + (f" at {1e3 * speed:.3g} mm/s" if speed is not None and math.isfinite(speed) else "")
+    return f"{facts['simulated']:.6g} s" + (
+        f" at {1e3 * speed:.3g} mm/s" if speed is not None and math.isfinite(speed) else ""
+    )
 
 
 def _robot(facts: Mapping[str, Any]) -> str:
@@ -150,17 +202,27 @@ def _robot(facts: Mapping[str, Any]) -> str:
 
 
 def metric_rows(metrics: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> Rows:
-    """A row per metric that tells something of these runs: name, unit, meaning, and values by control as text."""
+    """A row per metric that tells something of these runs: name, unit, meaning, and values by
+    control as text.
+    """
     empty = {"change": "", "interval": "", "verdict": ""}
     shown = [(name, *METRICS[name]) for name in shown_metrics(metrics, net_slip=net_slip)]
     return [
-        {"name": name, "unit": unit, "meaning": meaning, "values": [_shown(name, run.get(name)) for run in metrics.values()]} | empty
+        {
+            "name": name,
+            "unit": unit,
+            "meaning": meaning,
+            "values": [_shown(name, run.get(name)) for run in metrics.values()],
+        }
+        | empty
         for name, unit, _, meaning in shown
     ]
 
 
 def comparison_rows(comparison: Comparison, *, net_slip: bool = False) -> Rows:
-    """The same of means, with changes from the first control to the second; before them, if of several seeds, how many runs walked."""
+    """The same of means, with changes from the first control to the second; before them, if of
+    several seeds, how many runs walked.
+    """
     rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
         change = comparison.changes[row["name"]]
@@ -169,8 +231,17 @@ def comparison_rows(comparison: Comparison, *, net_slip: bool = False) -> Rows:
     if count == 1:
         return rows
     verdict = SAME if walked[0] == walked[1] else BETTER if walked[1] > walked[0] else WORSE
-    first = {"name": "walked", "unit": "runs", "meaning": "runs in which the robot walked to the end", "change": "", "interval": ""}
-    return [first | {"values": [f"{number} of {count}" for number in walked], "verdict": verdict}, *rows]
+    first = {
+        "name": "walked",
+        "unit": "runs",
+        "meaning": "runs in which the robot walked to the end",
+        "change": "",
+        "interval": "",
+    }
+    return [
+        first | {"values": [f"{number} of {count}" for number in walked], "verdict": verdict},
+        *rows,
+    ]
 
 
 def about(comparison: Comparison) -> str:
@@ -178,7 +249,11 @@ def about(comparison: Comparison) -> str:
     seeds, n = comparison.seeds, len(comparison.seeds)
     judged = max(change.pairs for change in comparison.changes.values())
     told = f" of the {judged} in which both walked to the end" if judged < n else ""
-    return f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){told}, both controls on each; {METHOD}." if n > 1 else ""
+    return (
+        f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){told}, both controls on each; {METHOD}."
+        if n > 1
+        else ""
+    )
 
 
 def _shown(name: str, value: float | None) -> str:
@@ -193,7 +268,9 @@ def number(value: float | None, *, dust: float = 0.0) -> str:
 
 
 def _change(change: Change) -> str:
-    """Relative, where the first value stands clear of the floor; of a single pair, if it means anything."""
+    """Relative, where the first value stands clear of the floor; of a single pair, if it means
+    anything.
+    """
     told = math.isfinite(change.relative) and (change.pairs > 1 or change.verdict != SAME)
     return _share(change.relative) if told else ""
 

@@ -1,1 +1,3 @@
-"""What a run leaves: metrics, warnings, recordings, comparisons and result folders. Imports `common` to `master`."""
+"""What a run leaves: metrics, warnings, recordings, comparisons and result folders. Imports
+`common` to `master`.
+"""

@@ -1,4 +1,6 @@
-"""Units and meanings of a recording's columns, from where its variables are defined: interface.toml of the plant and of the controller."""
+"""Units and meanings of a recording's columns, from where its variables are defined:
+interface.toml of the plant and of the controller.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from hexapod_cosim.cosim.interface.interface import read_table
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
 
 NO_UNIT = "1"
-HEADING = re.compile(r"(?P<name>.*\S) \[(?P<unit>[^\[\]]*)\]")  # an index follows its name without a space
+HEADING = re.compile(
+    r"(?P<name>.*\S) \[(?P<unit>[^\[\]]*)\]"
+)  # an index follows its name without a space
 
 
 @dataclass(frozen=True)
@@ -25,14 +29,30 @@ class Column:
 
 @cache
 def known_columns() -> Mapping[str, Column]:
-    """Everything that a run records, by name: time, the plant's outputs and inputs, `controller.*` and `command.*`."""
-    controller = {f"controller.{name}": column for name, column in _variables(CONTROLLER, "output").items()}
-    commands = {name: column for name, column in _variables(CONTROLLER, "input").items() if name.startswith("command.")}
-    return {"time": Column("s", "Time")} | plant_variables("output") | plant_variables("input") | controller | commands
+    """Everything that a run records, by name: time, the plant's outputs and inputs,
+    `controller.*` and `command.*`.
+    """
+    controller = {
+        f"controller.{name}": column for name, column in _variables(CONTROLLER, "output").items()
+    }
+    commands = {
+        name: column
+        for name, column in _variables(CONTROLLER, "input").items()
+        if name.startswith("command.")
+    }
+    return (
+        {"time": Column("s", "Time")}
+        | plant_variables("output")
+        | plant_variables("input")
+        | controller
+        | commands
+    )
 
 
 def plant_variables(causality: str) -> dict[str, Column]:
-    """The variables of any plant's FMU of one causality, by name, in the order of its model description."""
+    """The variables of any plant's FMU of one causality, by name, in the order of its model
+    description.
+    """
     return _variables(PLANT, causality)
 
 
@@ -41,12 +61,16 @@ def _variables(component: Component, causality: str) -> dict[str, Column]:
     for pattern in table[causality]:
         for entry, place in expand(pattern, table["axis"]):
             labels = {axis: label for axis, (_, label) in place.items()}
-            found[labelled(entry["name"], labels)] = Column(entry.get("unit", NO_UNIT), entry["description"].format(**labels))
+            found[labelled(entry["name"], labels)] = Column(
+                entry.get("unit", NO_UNIT), entry["description"].format(**labels)
+            )
     return found
 
 
 def heading(name: str) -> str:
-    """A column's name with its unit behind it, "torso.position[1] [m]"; the bare name of what we do not know."""
+    """A column's name with its unit behind it, "torso.position[1] [m]"; the bare name of what we
+    do not know.
+    """
     column = known_columns().get(name)
     return f"{name} [{column.unit}]" if column else name
 

@@ -3,7 +3,8 @@
 Work, heat, slip and peaks are the plant's own integrals and maxima, so they do not depend on how
 often it is read. What is a distribution over time (forces, the friction cone, posture, feet) is of
 the rows given: a run gives one per macro-step, whatever it keeps. A figure that the recording
-cannot give (per metre for a robot that stands, anything for a run shorter than three cycles) is NaN.
+cannot give (per metre for a robot that stands, anything for a run shorter than three cycles) is
+NaN.
 """
 
 from __future__ import annotations
@@ -13,7 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, joint_names, vector_names
+from hexapod_cosim.cosim.interface.names import (
+    foot_names,
+    foot_vector_names,
+    joint_names,
+    vector_names,
+)
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.support import stability_margins
 from hexapod_cosim.cosim.results.walk import (
@@ -50,42 +56,89 @@ class Metric(NamedTuple):
 
 
 _TABLE: dict[str, Metric] = {
-    "slip_per_metre": Metric("m/m", True, "way slipped by all feet under load, per metre walked", 1e-4),
-    "slip_net_per_metre": Metric("m/m", True, "the same, less the creep of the tanh friction law or what bristles give back", 1e-4),
-    "cone_use_p50": Metric("1", True, "share of the friction cone that loaded feet use, median over time", 5e-3),
+    "slip_per_metre": Metric(
+        "m/m", True, "way slipped by all feet under load, per metre walked", 1e-4
+    ),
+    "slip_net_per_metre": Metric(
+        "m/m",
+        True,
+        "the same, less the creep of the tanh friction law or what bristles give back",
+        1e-4,
+    ),
+    "cone_use_p50": Metric(
+        "1", True, "share of the friction cone that loaded feet use, median over time", 5e-3
+    ),
     "cone_use_p95": Metric("1", True, "the same, 95th percentile", 5e-3),
-    "cone_use_over_90": Metric("1", True, "share of the time in which loaded feet use over 90 % of the cone", 5e-3),
-    "foot_error_stance": Metric("m", True, "feet on the ground from where the plan has them, torso frame, RMS", 1e-4),
-    "foot_error_swing": Metric("m", True, "feet in the air from where the plan has them, torso frame, RMS", 1e-4),
-    "path_error": Metric("m/m", True, "distance from the end of the commanded path, per metre walked", 1e-3),
-    "yaw_drift": Metric("rad/m", True, "heading lost against the commanded one, per metre walked", 1e-3),
+    "cone_use_over_90": Metric(
+        "1", True, "share of the time in which loaded feet use over 90 % of the cone", 5e-3
+    ),
+    "foot_error_stance": Metric(
+        "m", True, "feet on the ground from where the plan has them, torso frame, RMS", 1e-4
+    ),
+    "foot_error_swing": Metric(
+        "m", True, "feet in the air from where the plan has them, torso frame, RMS", 1e-4
+    ),
+    "path_error": Metric(
+        "m/m", True, "distance from the end of the commanded path, per metre walked", 1e-3
+    ),
+    "yaw_drift": Metric(
+        "rad/m", True, "heading lost against the commanded one, per metre walked", 1e-3
+    ),
     "height_rms": Metric("m", True, "torso height above the ground, about its mean", 1e-4),
     "roll_rms": Metric("rad", True, "roll, about its mean", 1e-4),
     "pitch_rms": Metric("rad", True, "pitch, about its mean", 1e-4),
     "peak_force": Metric("BW", True, "largest foot normal force, in body weights", 5e-3),
     "force_p95": Metric("BW", True, "95th percentile of the normal force of feet under load", 5e-3),
-    "loading_rate": Metric("BW/s", True, "steepest rise of the force in 20 ms after touch-down, 95th percentile", 5e-2),
+    "loading_rate": Metric(
+        "BW/s", True, "steepest rise of the force in 20 ms after touch-down, 95th percentile", 5e-2
+    ),
     "torque_rms": Metric("N m", True, "motor torque over all joints and time", 5e-3),
-    "servo_load_max": Metric("1", True, "largest RMS torque of a servo over its continuous rating", 5e-3),
-    "heat": Metric("N2 m2 s/m", True, "integral of the sum of squared motor torques, per metre walked", 0.5),
+    "servo_load_max": Metric(
+        "1", True, "largest RMS torque of a servo over its continuous rating", 5e-3
+    ),
+    "heat": Metric(
+        "N2 m2 s/m", True, "integral of the sum of squared motor torques, per metre walked", 0.5
+    ),
     "cost_of_transport": Metric("1", True, "positive motor work per weight and distance", 1e-3),
-    "electrical_cost": Metric("1", True, "positive motor work and copper loss per weight and distance", 5e-3),
-    "slip_per_radian": Metric("m/rad", True, "way slipped by all feet under load, per radian turned", 1e-4),
-    "path_error_per_radian": Metric("m/rad", True, "distance from the commanded place, per radian turned", 1e-3),
-    "yaw_drift_per_radian": Metric("rad/rad", True, "heading lost against the commanded one, per radian turned", 1e-3),
-    "heat_per_radian": Metric("N2 m2 s/rad", True, "integral of the sum of squared motor torques, per radian turned", 0.5),
-    "cost_per_radian": Metric("m/rad", True, "positive motor work per weight and angle turned", 1e-3),
-    "electrical_cost_per_radian": Metric("m/rad", True, "positive motor work and copper loss per weight and angle", 5e-3),
-    "stability_margin": Metric("m", False, "least distance of the centre of mass from the support polygon's edge", 1e-4),
-    "energy_residual": Metric("1", None, "what the energy books do not explain, in shares of the motors' work", 0.0),
+    "electrical_cost": Metric(
+        "1", True, "positive motor work and copper loss per weight and distance", 5e-3
+    ),
+    "slip_per_radian": Metric(
+        "m/rad", True, "way slipped by all feet under load, per radian turned", 1e-4
+    ),
+    "path_error_per_radian": Metric(
+        "m/rad", True, "distance from the commanded place, per radian turned", 1e-3
+    ),
+    "yaw_drift_per_radian": Metric(
+        "rad/rad", True, "heading lost against the commanded one, per radian turned", 1e-3
+    ),
+    "heat_per_radian": Metric(
+        "N2 m2 s/rad", True, "integral of the sum of squared motor torques, per radian turned", 0.5
+    ),
+    "cost_per_radian": Metric(
+        "m/rad", True, "positive motor work per weight and angle turned", 1e-3
+    ),
+    "electrical_cost_per_radian": Metric(
+        "m/rad", True, "positive motor work and copper loss per weight and angle", 5e-3
+    ),
+    "stability_margin": Metric(
+        "m", False, "least distance of the centre of mass from the support polygon's edge", 1e-4
+    ),
+    "energy_residual": Metric(
+        "1", None, "what the energy books do not explain, in shares of the motors' work", 0.0
+    ),
     "realtime_factor": Metric("1", None, "simulated over wall time of the whole loop", 0.0),
 }
 OF_THE_RUN = ("energy_residual", "realtime_factor")  # of any run, however short
 # of a robot that turns on the spot, in the place of what is per metre
 PER_RADIAN = {
-    "slip_per_metre": "slip_per_radian", "path_error": "path_error_per_radian", "yaw_drift": "yaw_drift_per_radian",
-    "heat": "heat_per_radian", "cost_of_transport": "cost_per_radian", "electrical_cost": "electrical_cost_per_radian",
-}  # fmt: skip
+    "slip_per_metre": "slip_per_radian",
+    "path_error": "path_error_per_radian",
+    "yaw_drift": "yaw_drift_per_radian",
+    "heat": "heat_per_radian",
+    "cost_of_transport": "cost_per_radian",
+    "electrical_cost": "electrical_cost_per_radian",
+}
 # name -> unit, whether less is better (None: neither), meaning
 METRICS = {name: (each.unit, each.less_is_better, each.meaning) for name, each in _TABLE.items()}
 FLOORS = {name: each.floor for name, each in _TABLE.items()}
@@ -94,24 +147,49 @@ DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
 PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
 # what the plant integrates or tracks for the metrics
 MEASURED_BY_PLANT = (
-    *(name for quantity in ("positive_work", "negative_work", "torque_squared") for name in joint_names(quantity)),
-    *(name for quantity in ("slip_distance", "peak_force", "landing_rate", "landings") for name in foot_names(quantity)),
+    *(
+        name
+        for quantity in ("positive_work", "negative_work", "torque_squared")
+        for name in joint_names(quantity)
+    ),
+    *(
+        name
+        for quantity in ("slip_distance", "peak_force", "landing_rate", "landings")
+        for name in foot_names(quantity)
+    ),
     "energy.residual",
 )
 # what metrics and the warnings of a run look at; of controllers, those that tell
 _JUDGED = (
-    *vector_names("torso.position"), *vector_names("torso.quaternion", 4), "torso.roll", "torso.pitch", "torso.yaw",
-    *joint_names("angle"), *MEASURED_BY_PLANT,
-    *(name for quantity in ("normal_force", "tangential_force", "slip_speed", "contact") for name in foot_names(quantity)),
+    *vector_names("torso.position"),
+    *vector_names("torso.quaternion", 4),
+    "torso.roll",
+    "torso.pitch",
+    "torso.yaw",
+    *joint_names("angle"),
+    *MEASURED_BY_PLANT,
+    *(
+        name
+        for quantity in ("normal_force", "tangential_force", "slip_speed", "contact")
+        for name in foot_names(quantity)
+    ),
     *foot_vector_names("position"),
-    *(f"controller.{leg}.{flag}" for flag in ("swinging", "unreachable", "fallback") for leg in LEG_NAMES),
+    *(
+        f"controller.{leg}.{flag}"
+        for flag in ("swinging", "unreachable", "fallback")
+        for leg in LEG_NAMES
+    ),
     *PLANNED,
-)  # fmt: skip
-_JUDGED_BRISTLES = tuple(name for quantity in ("velocity", "bristle") for name in foot_vector_names(quantity))
+)
+_JUDGED_BRISTLES = tuple(
+    name for quantity in ("velocity", "bristle") for name in foot_vector_names(quantity)
+)
 
 
 def judged_columns(*, bristles: bool) -> tuple[str, ...]:
-    """What has to be recorded of a robot for its metrics and warnings; `bristles`: whether its friction has them."""
+    """What has to be recorded of a robot for its metrics and warnings; `bristles`: whether its
+    friction has them.
+    """
     return (*_JUDGED, *_JUDGED_BRISTLES) if bristles else _JUDGED
 
 
@@ -125,7 +203,9 @@ def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict
     figures = _slip(walk, parameters) | _cone(walk, parameters) | _feet(walk, parameters)
     figures |= _path(walk) | _posture(walk, parameters) | _force(walk) | _effort(walk, servo)
     margins = stability_margins(walk.recording, parameters)
-    figures["stability_margin"] = float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
+    figures["stability_margin"] = (
+        float(np.nanmin(margins)) if np.isfinite(margins).any() else np.nan
+    )
     figures |= of_the_run
     return {name: float(figures[name]) for name in METRICS}
 
@@ -133,7 +213,8 @@ def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict
 def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> list[str]:
     """Metrics for a table of runs: per radian what a run turned on the spot, else per metre.
 
-    `net_slip`: whether that means anything, which it does not under the tanh law, whose own creep it inverts.
+    `net_slip`: whether that means anything, which it does not under the tanh law, whose own creep
+    it inverts.
     """
 
     def given(name: str) -> bool:
@@ -153,7 +234,9 @@ def has_net_slip(parameters: Mapping[str, float]) -> bool:
 
 
 def energy_residual(view: View) -> float:
-    """Largest |energy.residual| of a run, over the work that its motors did or took; NaN without a row."""
+    """Largest |energy.residual| of a run, over the work that its motors did or took; NaN without
+    a row.
+    """
     recording = view.recording
     if not len(recording.time):
         return np.nan
@@ -165,7 +248,9 @@ def energy_residual(view: View) -> float:
 
 
 def _per(walk: Walk, amount: float, name: str) -> dict[str, float]:
-    """An amount per metre, under its name, and its twin per radian; what the robot does not do is NaN."""
+    """An amount per metre, under its name, and its twin per radian; what the robot does not do
+    is NaN.
+    """
     return {name: amount / walk.distance, PER_RADIAN[name]: amount / walk.angle}
 
 
@@ -177,19 +262,32 @@ def _slip(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
 
 
 def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6) slip speed less what the friction law makes of sticking: the tanh law's creep, a bristle's stretching and its return."""
+    """(rows, 6) slip speed less what the friction law makes of sticking: the tanh law's creep, a
+    bristle's stretching and its return.
+    """
     if parameters.get("friction.law", TANH) == BRISTLE:
-        sliding = sliding_velocity(parameters["friction.presliding"], part.foot_vectors("velocity"), part.foot_vectors("bristle"))
+        sliding = sliding_velocity(
+            parameters["friction.presliding"],
+            part.foot_vectors("velocity"),
+            part.foot_vectors("bristle"),
+        )
         return np.asarray(np.linalg.norm(sliding, axis=-1))
-    creep = np.arctanh(np.minimum(cone_use(part, parameters), TANH_LIMIT)) / parameters["friction.slope"]
+    creep = (
+        np.arctanh(np.minimum(cone_use(part, parameters), TANH_LIMIT))
+        / parameters["friction.slope"]
+    )
     return np.maximum(part.feet("slip_speed") - creep, 0.0)
 
 
 def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6) tangential force in shares of the largest, mu f_n; 0 of feet without load, and without friction."""
+    """(rows, 6) tangential force in shares of the largest, mu f_n; 0 of feet without load, and
+    without friction.
+    """
     largest = parameters["friction.mu"] * part.feet("normal_force")
     loaded = bearing_load(part, parameters) & (largest > 0.0)
-    return np.divide(part.feet("tangential_force"), largest, out=np.zeros_like(largest), where=loaded)
+    return np.divide(
+        part.feet("tangential_force"), largest, out=np.zeros_like(largest), where=loaded
+    )
 
 
 def _cone(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -223,7 +321,10 @@ def _feet(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
         return dict.fromkeys(names, np.nan)
     swinging = part.columns([f"controller.{leg}.swinging" for leg in LEG_NAMES]) > 0.5
     square, weights = np.sum(error * error, axis=-1), _spread(walk)
-    return {name: _rms_of(square, np.where(those, weights, 0.0)) for name, those in zip(names, (~swinging, swinging), strict=True)}
+    return {
+        name: _rms_of(square, np.where(those, weights, 0.0))
+        for name, those in zip(names, (~swinging, swinging), strict=True)
+    }
 
 
 def _rms_of(square: Array, weights: Array) -> float:
@@ -231,14 +332,18 @@ def _rms_of(square: Array, weights: Array) -> float:
 
 
 def foot_errors(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6, 3) real less planned place of each foot's centre, torso frame [m]; no rows when the controller does not tell."""
+    """(rows, 6, 3) real less planned place of each foot's centre, torso frame [m]; no rows when
+    the controller does not tell.
+    """
     if not set(PLANNED) <= set(recording.names):
         return np.zeros((0, len(LEG_NAMES), 3))
     return real_feet(recording, parameters) - planned_feet(recording)
 
 
 def planned_feet(recording: Recording) -> Array:
-    """(rows, 6, 3) each foot's centre as the command plans it, torso frame [m]. Raises ColumnError when the controller does not tell."""
+    """(rows, 6, 3) each foot's centre as the command plans it, torso frame [m]. Raises
+    ColumnError when the controller does not tell.
+    """
     return recording.columns(PLANNED).reshape(-1, len(LEG_NAMES), 3)
 
 
@@ -252,7 +357,10 @@ def _path(walk: Walk) -> dict[str, float]:
 
 def _posture(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
     part = walk.recording
-    angles = {f"{name}_rms": walk.rms(np.unwrap(part.column(f"torso.{name}"))) for name in ("roll", "pitch")}
+    angles = {
+        f"{name}_rms": walk.rms(np.unwrap(part.column(f"torso.{name}")))
+        for name in ("roll", "pitch")
+    }
     return {"height_rms": walk.rms(body_height(part, parameters))} | angles
 
 
@@ -262,25 +370,36 @@ def _force(walk: Walk) -> dict[str, float]:
     rates = landing_rates(walk) / walk.weight
     return {
         "peak_force": float(walk.whole.rows(walk.steps()).feet("peak_force").max()) / walk.weight,
-        "force_p95": _percentiles(normal[loaded], _spread(walk)[loaded], (95.0,))[0] if loaded.any() else np.nan,
+        "force_p95": _percentiles(normal[loaded], _spread(walk)[loaded], (95.0,))[0]
+        if loaded.any()
+        else np.nan,
         "loading_rate": float(np.percentile(rates, 95)) if len(rates) else np.nan,
     }
 
 
 def landing_rates(walk: Walk) -> Array:
-    """(landings,) steepest rise of the force [N/s] in the 20 ms after touch-down, of all feet's landings between begin and end.
+    """(landings,) steepest rise of the force [N/s] in the 20 ms after touch-down, of all feet's
+    landings between begin and end.
 
-    A foot that touches down again within half a gait cycle has bounced: both are one landing, and the steeper rise counts.
+    A foot that touches down again within half a gait cycle has bounced: both are one landing, and
+    the steeper rise counts.
     """
     found: list[float] = []
     steps = walk.steps()
-    time, counts, rates = walk.whole.time, walk.whole.feet("landings"), walk.whole.feet("landing_rate")
+    time, counts, rates = (
+        walk.whole.time,
+        walk.whole.feet("landings"),
+        walk.whole.feet("landing_rate"),
+    )
     for count, rate in zip(counts.T, rates.T, strict=True):
         touched = 1 + np.flatnonzero(np.diff(count) > 0.0)
         begins = touched[np.diff(time[touched], prepend=-np.inf) > 0.5 * walk.period]
         ends = np.append(begins[1:], len(time))
         judged = (begins >= steps.start) & (begins < steps.stop)
-        found += [float(rate[first:last].max()) for first, last in zip(begins[judged], ends[judged], strict=True)]
+        found += [
+            float(rate[first:last].max())
+            for first, last in zip(begins[judged], ends[judged], strict=True)
+        ]
     return np.array(found)
 
 

@@ -1,7 +1,9 @@
-"""Recordings as files: Parquet, which this package reads back, CSV for people and spreadsheets, and the commands alone for importers.
+"""Recordings as files: Parquet, which this package reads back, CSV for people and spreadsheets, and
+the commands alone for importers.
 
-A Parquet file has the variables' names as columns, doubles, with unit and description as metadata of each field; what was run is metadata
-of the schema. A CSV file has "name [unit]" above each column. Numbers are the same bits in both.
+A Parquet file has the variables' names as columns, doubles, with unit and description as metadata
+of each field; what was run is metadata of the schema. A CSV file has "name [unit]" above each
+column. Numbers are the same bits in both.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ def write_recording(
     columns: Sequence[str] = ("*",),
     about: Mapping[str, Any] | None = None,
 ) -> list[Path]:
-    """Writes STEM.parquet, with all columns, and STEM.csv, or those of them that are wanted. Returns the files.
+    """Writes STEM.parquet, with all columns, and STEM.csv, or those of them that are wanted.
+    Returns the files.
 
     Args:
         columns: patterns of the columns that the CSV file has.
@@ -50,19 +53,28 @@ def write_recording(
 
 
 def write_commands(recording: Recording, path: Path) -> None:
-    """The plant's inputs over time under their bare names, as importers of FMUs take them; each row holds until the next."""
+    """The plant's inputs over time under their bare names, as importers of FMUs take them; each
+    row holds until the next.
+    """
     names = set(recording.names)
     inputs = ["time", *(name for name in plant_variables("input") if name in names)]
     write_csv(Recording(tuple(inputs), recording.columns(inputs)), path)
 
 
 def read_recording(folder: Path, stem: str) -> Recording:
-    """A run's recording from its folder, whichever file is there. Raises HexapodError when there is none."""
+    """A run's recording from its folder, whichever file is there. Raises HexapodError when there
+    is none.
+    """
     for kind, read in READERS.items():
         if (folder / f"{stem}.{kind}").is_file():
             return read(folder / f"{stem}.{kind}")
     expected = " or ".join(f"{stem}.{kind}" for kind in READERS)
-    raise HexapodError("no recording", got=str(folder), expected=f"a folder with {expected}", fix="run `hexapod simulate` again")
+    raise HexapodError(
+        "no recording",
+        got=str(folder),
+        expected=f"a folder with {expected}",
+        fix="run `hexapod simulate` again",
+    )
 
 
 def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any]) -> None:
@@ -70,16 +82,28 @@ def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any])
     import pyarrow as pa  # noqa: PLC0415  slow to import
     import pyarrow.parquet as pq  # noqa: PLC0415
 
-    facts = {key: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for key, value in about.items()}
+    facts = {
+        key: value if isinstance(value, str) else json.dumps(value, sort_keys=True)
+        for key, value in about.items()
+    }
     known = known_columns()
     fields = [
-        pa.field(name, pa.float64(), nullable=False, metadata=vars(known[name]) if name in known else None) for name in recording.names
+        pa.field(
+            name,
+            pa.float64(),
+            nullable=False,
+            metadata=vars(known[name]) if name in known else None,
+        )
+        for name in recording.names
     ]
     columns = [pa.array(values) for values in np.ascontiguousarray(recording.data.T)]
     table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=facts))
     with atomic_path(path) as temporary:
-        # bytes of the same weight beside each other: half the size of a dictionary's, in a quarter of its time
-        pq.write_table(table, temporary, compression="zstd", use_dictionary=False, use_byte_stream_split=True)
+        # bytes of the same weight beside each other: half the size of a dictionary's, in a quarter
+        # of its time
+        pq.write_table(
+            table, temporary, compression="zstd", use_dictionary=False, use_byte_stream_split=True
+        )
 
 
 def read_parquet(path: Path) -> Recording:
@@ -89,31 +113,41 @@ def read_parquet(path: Path) -> Recording:
 
     try:
         table = pq.read_table(path)
-        return _recording(table.cast(pa.schema([(name, pa.float64()) for name in table.column_names])), path)
+        return _recording(
+            table.cast(pa.schema([(name, pa.float64()) for name in table.column_names])), path
+        )
     except (OSError, ValueError, NotImplementedError) as error:
         raise _not_a_recording(path, error, "Parquet with columns of numbers") from error
 
 
 def write_csv(recording: Recording, path: Path, *, units: bool = False) -> None:
-    """Header of quoted names, then one line per row; every number reads back the same. Appears under `path` whole or not at all."""
+    """Header of quoted names, then one line per row; every number reads back the same. Appears
+    under `path` whole or not at all.
+    """
     import pyarrow as pa  # noqa: PLC0415  slow to import
     from pyarrow.csv import write_csv as write  # noqa: PLC0415
 
     names = [heading(name) if units else name for name in recording.names]
-    table = pa.Table.from_arrays([pa.array(values) for values in np.ascontiguousarray(recording.data.T)], names=names)
+    table = pa.Table.from_arrays(
+        [pa.array(values) for values in np.ascontiguousarray(recording.data.T)], names=names
+    )
     with atomic_path(path) as temporary:
         write(table, temporary)
 
 
 def read_csv(path: Path) -> Recording:
-    """A recording from its CSV file, with or without units in the header. Raises HexapodError when it is missing or none."""
+    """A recording from its CSV file, with or without units in the header. Raises HexapodError
+    when it is missing or none.
+    """
     import pyarrow as pa  # noqa: PLC0415  slow to import
     from pyarrow import csv as arrow  # noqa: PLC0415
 
     try:
         with path.open(encoding="utf-8", newline="") as file:
             names = next(csv.reader(file))
-        convert = arrow.ConvertOptions(column_types={str(k): pa.float64() for k in range(len(names))}, null_values=NONE)
+        convert = arrow.ConvertOptions(
+            column_types={str(k): pa.float64() for k in range(len(names))}, null_values=NONE
+        )
         read = arrow.ReadOptions(column_names=[str(k) for k in range(len(names))], skip_rows=1)
         table = arrow.read_csv(path, read_options=read, convert_options=convert)
         return _recording(table.rename_columns([bare_name(name) for name in names]), path)
@@ -124,7 +158,12 @@ def read_csv(path: Path) -> Recording:
 def _recording(table: Any, path: Path) -> Recording:
     names = tuple(table.column_names)
     if not names or names[0] != "time":
-        raise HexapodError("not a recording", got=f"first column {names[0] if names else ''!r}", expected="time first", where=str(path))
+        raise HexapodError(
+            "not a recording",
+            got=f"first column {names[0] if names else ''!r}",
+            expected="time first",
+            where=str(path),
+        )
     data = np.empty((len(names), table.num_rows))
     for row, column in zip(data, table.columns, strict=True):
         row[:] = column.to_numpy()
@@ -135,9 +174,18 @@ def _not_a_recording(path: Path, error: Exception, expected: str) -> HexapodErro
     fix = "run `hexapod simulate` again"
     if isinstance(error, FileNotFoundError | IsADirectoryError | PermissionError):
         got = os.strerror(error.errno) if error.errno else type(error).__name__
-        return HexapodError("no recording", got=got, expected=f"a file {path.name} of a run", fix=fix, where=str(path))
+        return HexapodError(
+            "no recording",
+            got=got,
+            expected=f"a file {path.name} of a run",
+            fix=fix,
+            where=str(path),
+        )
     said = " ".join(str(error).split()) or "an empty file"
     return HexapodError("not a recording", got=said, expected=expected, fix=fix, where=str(path))
 
 
-READERS: Mapping[str, Callable[[Path], Recording]] = {"parquet": read_parquet, "csv": read_csv}  # the faster first
+READERS: Mapping[str, Callable[[Path], Recording]] = {
+    "parquet": read_parquet,
+    "csv": read_csv,
+}  # the faster first

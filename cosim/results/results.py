@@ -1,4 +1,6 @@
-"""A run on disk: what is written when it completes, what when it does not, and how it is read again."""
+"""A run on disk: what is written when it completes, what when it does not, and how it is read
+again.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +10,50 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hexapod_cosim.cosim.common.files import RUN_FILE, RUNNING, claim_folder, clear_folder, read_json, write_json, write_text
+from hexapod_cosim.cosim.common.files import (
+    RUN_FILE,
+    RUNNING,
+    claim_folder,
+    clear_folder,
+    read_json,
+    write_json,
+    write_text,
+)
 from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
 from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_of_table
-from hexapod_cosim.cosim.results.recordings import COMMANDS, read_recording, write_commands, write_recording
+from hexapod_cosim.cosim.results.recordings import (
+    COMMANDS,
+    read_recording,
+    write_commands,
+    write_recording,
+)
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.models import HexapodError
 
-RESULTS, PARTIAL, METRICS_FILE, SCENARIO = "results", "results.partial", "metrics.json", "scenario.toml"
+RESULTS, PARTIAL, METRICS_FILE, SCENARIO = (
+    "results",
+    "results.partial",
+    "metrics.json",
+    "scenario.toml",
+)
 ACCURACY = "accuracy"  # of metrics.json, where it was checked
-NEEDED = ("title", "control", "simulated", "wall", "realtime_factor", "finished", "gait_period", "parameters", "robot", "fmu", "versions",
-          "platform", "warnings")  # of the facts, for a report  # fmt: skip
+NEEDED = (
+    "title",
+    "control",
+    "simulated",
+    "wall",
+    "realtime_factor",
+    "finished",
+    "gait_period",
+    "parameters",
+    "robot",
+    "fmu",
+    "versions",
+    "platform",
+    "warnings",
+)  # of the facts, for a report
 ABOUT = ("title", "control", "robot", "fmu", "versions")  # of the facts, in Parquet
 
 
@@ -51,14 +84,20 @@ class Folder:
 
 @contextmanager
 def results_folder(path: Path) -> Iterator[Folder]:
-    """A folder whose run.json says so when a run began and the block does not come to its end. Raises HexapodError when it cannot be."""
+    """A folder whose run.json says so when a run began and the block does not come to its end.
+    Raises HexapodError when it cannot be.
+    """
     made = claim_folder(path)
     folder = Folder(path)
     try:
         yield folder
     except BaseException as error:
         if folder.begun and read_json(path / RUN_FILE)["status"] == RUNNING:
-            status, reason = (INTERRUPTED, "interrupted") if isinstance(error, KeyboardInterrupt) else (FAILED, str(error))
+            status, reason = (
+                (INTERRUPTED, "interrupted")
+                if isinstance(error, KeyboardInterrupt)
+                else (FAILED, str(error))
+            )
             write_json(path / RUN_FILE, {"status": status, "reason": reason})
         raise
     finally:
@@ -68,16 +107,26 @@ def results_folder(path: Path) -> Iterator[Folder]:
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
-    """Writes a run into a prepared folder; one that did not complete leaves `results.partial.*` and no figures. Returns the files, the
-    scenario first and the recording next. Parquet, from which reports are made again, holds all columns; CSV those that outputs.csv names.
-    Commands are written where every macro-step is recorded: they hold from row to row.
+    """Writes a run into a prepared folder; one that did not complete leaves `results.partial.*` and
+    no figures. Returns the files, the scenario first and the recording next. Parquet, from which
+    reports are made again, holds all columns; CSV those that outputs.csv names. Commands are
+    written where every macro-step is recorded: they hold from row to row.
     """
-    facts, outputs, scenario = run_facts(result), result.scenario.outputs, to_toml(result.scenario.to_table())
+    facts, outputs, scenario = (
+        run_facts(result),
+        result.scenario.outputs,
+        to_toml(result.scenario.to_table()),
+    )
     whole = result.outcome.recording
     write_text(folder / SCENARIO, scenario)
     about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
     columns, stem = (outputs.csv, RESULTS) if result.completed else (("*",), PARTIAL)
-    files = [folder / SCENARIO, *write_recording(whole, folder, stem, formats=outputs.formats, columns=columns, about=about)]
+    files = [
+        folder / SCENARIO,
+        *write_recording(
+            whole, folder, stem, formats=outputs.formats, columns=columns, about=about
+        ),
+    ]
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)
         write_commands(whole, files[-1])
@@ -107,11 +156,19 @@ def run_facts(result: Result) -> dict[str, Any]:
 
 
 def read_result(folder: Path) -> Stored:
-    """A completed run from its folder. Raises HexapodError when there is none, or it did not complete."""
+    """A completed run from its folder. Raises HexapodError when there is none, or it did not
+    complete.
+    """
     facts = read_facts(folder)
     if facts["status"] != COMPLETED:
         got = f"{facts['status']}: {facts['reason']}" if facts.get("reason") else facts["status"]
-        raise HexapodError("the run did not complete", got=got, expected="a completed run", fix="run it again", where=str(folder))
+        raise HexapodError(
+            "the run did not complete",
+            got=got,
+            expected="a completed run",
+            fix="run it again",
+            where=str(folder),
+        )
     missing = [name for name in NEEDED if name not in facts]
     if missing:
         raise _damaged(folder / RUN_FILE, f"no {', '.join(missing)}", "all facts of a run")
@@ -120,12 +177,16 @@ def read_result(folder: Path) -> Stored:
         raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
     view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
     checked = metrics.pop(ACCURACY, None)
-    accuracy = None if checked is None else accuracy_of_table(checked, where=str(folder / METRICS_FILE))
+    accuracy = (
+        None if checked is None else accuracy_of_table(checked, where=str(folder / METRICS_FILE))
+    )
     return Stored(view, metrics, facts, read_scenario(folder), accuracy)
 
 
 def read_facts(folder: Path) -> Mapping[str, Any]:
-    """What run.json says, its "status" at least. Raises HexapodError when it is missing, damaged or of something else."""
+    """What run.json says, its "status" at least. Raises HexapodError when it is missing, damaged
+    or of something else.
+    """
     facts = read_json(folder / RUN_FILE)
     if not isinstance(facts, dict) or not isinstance(facts.get("status"), str):
         raise _damaged(folder / RUN_FILE, "no status", 'a table with "status"')
@@ -141,14 +202,23 @@ def read_scenario(folder: Path) -> str:
 
 
 def _damaged(path: Path, got: str, expected: str) -> HexapodError:
-    return HexapodError("damaged or foreign results", got=got, expected=expected, fix="run the scenario again", where=str(path))
+    return HexapodError(
+        "damaged or foreign results",
+        got=got,
+        expected=expected,
+        fix="run the scenario again",
+        where=str(path),
+    )
 
 
 def stored(result: Result) -> Stored:
     """The same, straight from a run."""
     facts = run_facts(result)
     return Stored(
-        View(result.outcome.recording, result.parameters, facts["gait_period"]), result.metrics, facts, to_toml(result.scenario.to_table())
+        View(result.outcome.recording, result.parameters, facts["gait_period"]),
+        result.metrics,
+        facts,
+        to_toml(result.scenario.to_table()),
     )
 
 
@@ -158,7 +228,9 @@ def write_accuracy(folder: Path, metrics: Mapping[str, Any], accuracy: Mapping[s
 
 
 def read_accuracies(folder: Path) -> dict[str, Accuracy]:
-    """By control, of a comparison's folder; empty where accuracy was not checked. Raises HexapodError."""
+    """By control, of a comparison's folder; empty where accuracy was not checked. Raises
+    HexapodError.
+    """
     path = folder / METRICS_FILE
     table = read_json(path)
     checked = table.get(ACCURACY, {}) if isinstance(table, dict) else {}

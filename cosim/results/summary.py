@@ -25,7 +25,11 @@ class Summary:
     status: str  # COMPLETED, FAILED or REFUSED
     reason: str = ""  # in words, "" when completed
     upright: bool = False  # to the end
-    fallback: float | None = None  # share of time in which the controller fell back to kinematic control; None: it does not say
+    fallback: float | None = (
+        # share of time in which the controller fell back to kinematic control; None: it does not
+        # say
+        None
+    )
     warnings: tuple[str, ...] = ()
     metrics: Mapping[str, float]  # NaN where there is none; all of them unless completed
 
@@ -39,12 +43,23 @@ def summarise(result: Result) -> Summary:
     """A run without its recording."""
     scenario, walk = result.scenario, result.facts["walk"]
     return Summary(
-        control=scenario.control, seed=scenario.seed, status=result.outcome.status, reason=result.outcome.reason, upright=walk["upright"],
-        fallback=walk.get("fallback"), warnings=tuple(result.facts["warnings"]),
+        control=scenario.control,
+        seed=scenario.seed,
+        status=result.outcome.status,
+        reason=result.outcome.reason,
+        upright=walk["upright"],
+        fallback=walk.get("fallback"),
+        warnings=tuple(result.facts["warnings"]),
         metrics=dict(result.metrics) if result.completed else NO_FIGURES,
-    )  # fmt: skip
+    )
 
 
 def refused(scenario: Scenario, error: HexapodError) -> Summary:
     """A run that could not begin, and why."""
-    return Summary(control=scenario.control, seed=scenario.seed, status=REFUSED, reason=str(error), metrics=NO_FIGURES)
+    return Summary(
+        control=scenario.control,
+        seed=scenario.seed,
+        status=REFUSED,
+        reason=str(error),
+        metrics=NO_FIGURES,
+    )

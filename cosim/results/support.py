@@ -1,4 +1,6 @@
-"""How far the robot is from tipping: its centre of mass over the polygon of its standing feet, for all rows of a recording at once."""
+"""How far the robot is from tipping: its centre of mass over the polygon of its standing feet,
+for all rows of a recording at once.
+"""
 
 from __future__ import annotations
 
@@ -20,30 +22,45 @@ COINCIDENT = 1e-9  # m    feet closer than this make no edge
 
 
 def stability_margins(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows,) distance [m] of the centre of mass' projection along gravity from the support polygon's nearest edge.
+    """(rows,) distance [m] of the centre of mass' projection along gravity from the support
+    polygon's nearest edge.
 
     Negative outside, and for a line of two feet; NaN with fewer than two feet on the ground.
     """
     plane = _plane_axes(np.array([parameters[name] for name in vector_names("gravity")]))
-    feet = np.ascontiguousarray(plane @ recording.foot_vectors("position").transpose(1, 2, 0))  # (6, 2, rows)
+    feet = np.ascontiguousarray(
+        plane @ recording.foot_vectors("position").transpose(1, 2, 0)
+    )  # (6, 2, rows)
     centre = plane @ centre_of_mass(recording, parameters).T
     standing = recording.feet("contact") > 0.5
     parts = [slice(begin, begin + ROWS_AT_ONCE) for begin in range(0, len(standing), ROWS_AT_ONCE)]
-    return np.concatenate([polygon_margins(feet[..., part], standing[part], centre[:, part]) for part in parts])
+    return np.concatenate(
+        [polygon_margins(feet[..., part], standing[part], centre[:, part]) for part in parts]
+    )
 
 
 def _plane_axes(gravity: Array) -> Array:
-    """(2, 3) two axes that make a right-handed frame with the upward direction; x and y where gravity is along -z."""
+    """(2, 3) two axes that make a right-handed frame with the upward direction; x and y where
+    gravity is along -z.
+    """
     up = -gravity / np.linalg.norm(gravity) if np.any(gravity) else np.array([0.0, 0.0, 1.0])
-    first = np.array([1.0, 0.0, 0.0]) - up[0] * up if abs(up[0]) < 0.9 else np.array([0.0, 1.0, 0.0]) - up[1] * up
+    first = (
+        np.array([1.0, 0.0, 0.0]) - up[0] * up
+        if abs(up[0]) < 0.9
+        else np.array([0.0, 1.0, 0.0]) - up[1] * up
+    )
     first /= np.linalg.norm(first)
     return np.array([first, np.cross(up, first)])
 
 
 def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
-    """(rows,) signed distances of points (2, rows) from the hulls of those feet (6, 2, rows) that stand (rows, 6); positive inside."""
+    """(rows,) signed distances of points (2, rows) from the hulls of those feet (6, 2, rows)
+    that stand (rows, 6); positive inside.
+    """
     margin = np.full(len(standing), np.nan)
-    patterns, pattern_of = np.unique(standing @ (1 << np.arange(standing.shape[1])), return_inverse=True)
+    patterns, pattern_of = np.unique(
+        standing @ (1 << np.arange(standing.shape[1])), return_inverse=True
+    )
     for number, pattern in enumerate(patterns.tolist()):
         legs = [leg for leg in range(standing.shape[1]) if pattern >> leg & 1]
         if len(legs) > 1:
@@ -67,19 +84,31 @@ def _hull_margins(feet: Array, centre: Array) -> Array:
         np.minimum(right, beside, out=right)
         np.maximum(left, beside, out=left)
     inside = x * centre[0] + y * centre[1] - offset
-    # a line is one of the hull's edges, seen from the side where all feet are; for two feet from both
-    margin = np.minimum(np.where(right >= -COINCIDENT, inside, np.inf), np.where(left <= COINCIDENT, -inside, np.inf))
+    # a line is one of the hull's edges, seen from the side where all feet are; for two feet from
+    # both
+    margin = np.minimum(
+        np.where(right >= -COINCIDENT, inside, np.inf),
+        np.where(left <= COINCIDENT, -inside, np.inf),
+    )
     margin = np.where(length > COINCIDENT, margin, np.inf).min(axis=0)
     return np.where(np.isfinite(margin), margin, np.nan)
 
 
 def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 3) centre of mass of the whole robot [m], world axes, from joint angles, torso pose and the FMU's own parameters."""
+    """(rows, 3) centre of mass of the whole robot [m], world axes, from joint angles, torso pose
+    and the FMU's own parameters.
+    """
     angle = np.ascontiguousarray(recording.joints("angle").transpose(2, 1, 0))  # (3, 6, rows)
-    borne, moment = np.zeros(len(LEG_NAMES)), np.zeros((len(LEG_NAMES), 3, 1))  # kg, kg m  of the links from here on, about their joint
+    borne, moment = (
+        np.zeros(len(LEG_NAMES)),
+        np.zeros((len(LEG_NAMES), 3, 1)),
+    )  # kg, kg m  of the links from here on, about their joint
     for k, joint in reversed(list(enumerate(JOINT_NAMES))):
         links = [f"{leg}.{joint}" for leg in LEG_NAMES]
-        mass, com, axis = (_of_links(parameters, links, part) for part in (("mass",), vector_names("com"), vector_names("axis")))
+        mass, com, axis = (
+            _of_links(parameters, links, part)
+            for part in (("mass",), vector_names("com"), vector_names("axis"))
+        )
         tip = _of_links(parameters, links, ("length", "offset_y", "offset_z"))
         moment = _turned(axis, angle[k], moment + (mass * com + borne[:, None] * tip)[..., None])
         borne = borne + mass[:, 0]
@@ -88,7 +117,10 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
     yaws = _about_z(np.array([parameters[f"{leg}.hip_yaw"] for leg in LEG_NAMES]))
     total = parameters["torso.mass"] + borne.sum()
     # (3, rows) torso axes, from its centre of mass
-    own = (np.concatenate(yaws, axis=1) @ moment.reshape(3 * len(LEG_NAMES), -1) + (borne @ hips)[:, None]) / total
+    own = (
+        np.concatenate(yaws, axis=1) @ moment.reshape(3 * len(LEG_NAMES), -1)
+        + (borne @ hips)[:, None]
+    ) / total
     rotation = rotation_matrices(recording.vector("torso.quaternion", 4))
     return np.asarray(recording.vector("torso.position") + np.einsum("ijr,jr->ri", rotation, own))
 
@@ -111,7 +143,12 @@ def _turned(axis: Array, angle: Array, vector: Array) -> Array:
 
 def _about_z(angle: Array) -> Array:
     """(legs, 3, 3) rotations by angles (legs,)."""
-    return np.array([[[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]] for a in angle.tolist()])
+    return np.array(
+        [
+            [[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]]
+            for a in angle.tolist()
+        ]
+    )
 
 
 def _vector(parameters: Mapping[str, float], stem: str) -> Array:

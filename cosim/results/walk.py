@@ -1,4 +1,6 @@
-"""The part of a run that is judged: whole gait cycles after the first two, and means, paths and heights over it."""
+"""The part of a run that is judged: whole gait cycles after the first two, and means, paths and
+heights over it.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ LEAST_TURN = 0.05  # rad    less is standing, not turning
 SHOWN_CYCLES = 3  # in figures of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
 FLAT = TERRAINS.index("flat") + 1  # the FMU's number of it
-NONE, TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle"))  # the same
+NONE, TANH, BRISTLE = (
+    FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle")
+)  # the same
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,9 @@ class Walk:
     def gained(self, names: list[str]) -> Array:
         """(names,) by how much cumulative outputs grew from begin to end, rows there or not."""
         columns, time = self.whole.columns(names), self.whole.time
-        return np.array([np.diff(np.interp([self.begin, self.end], time, each))[0] for each in columns.T])
+        return np.array(
+            [np.diff(np.interp([self.begin, self.end], time, each))[0] for each in columns.T]
+        )
 
     def rms(self, values: Array) -> float:
         """Of values (rows,) about their mean over time."""
@@ -104,7 +110,8 @@ def _cut_walk(view: View) -> Walk | None:
     yaw = np.unwrap(part.column("torso.yaw"))
     marks = begin + period * np.arange(cycles - SKIPPED_CYCLES + 1)
     distance, angle = _ways(part, yaw, marks)
-    # the torso's yaw swings within a cycle: the commanded path sets out along its mean over the first one
+    # the torso's yaw swings within a cycle: the commanded path sets out along its mean over the
+    # first one
     first = part.time <= begin + period + ROUND_OFF
     heading = float(time_shares(part.time[first]) @ (yaw - turned)[first])
     weight = robot_weight(view.parameters)
@@ -112,7 +119,9 @@ def _cut_walk(view: View) -> Walk | None:
 
 
 def _between(recording: Recording, begin: float, end: float) -> Recording:
-    """The rows from begin to end; where there is none at these times, one between its neighbours."""
+    """The rows from begin to end; where there is none at these times, one between its
+    neighbours.
+    """
     time = recording.time
     first, last = np.searchsorted(time, [begin - ROUND_OFF, end + ROUND_OFF])
     ends = [t for t, row in ((begin, first), (end, last - 1)) if abs(time[row] - t) > ROUND_OFF]
@@ -168,7 +177,9 @@ def running_integral(time: Array, values: Array) -> Array:
 
 
 def bearing_load(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.bool_]:
-    """(rows, 6) whether a foot bears more than CONTACT_SHARE of the weight: only then can it slip."""
+    """(rows, 6) whether a foot bears more than CONTACT_SHARE of the weight: only then can it
+    slip.
+    """
     return np.asarray(recording.feet("normal_force") > CONTACT_SHARE * robot_weight(parameters))
 
 
@@ -213,14 +224,18 @@ def _incline(parameters: Mapping[str, float]) -> float:
 
 
 def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6, 3) the feet's centres in the torso's frame [m], from what the plant gives in the world's."""
+    """(rows, 6, 3) the feet's centres in the torso's frame [m], from what the plant gives in the
+    world's.
+    """
     w, x, y, z = recording.vector("torso.quaternion", 4).T
     turn = np.array([
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
         [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ])  # fmt: skip
-    centres = recording.foot_vectors("position") + parameters["foot.radius"] * ground_normal(parameters)
+    centres = recording.foot_vectors("position") + parameters["foot.radius"] * ground_normal(
+        parameters
+    )
     arms = centres - recording.vector("torso.position")[:, None, :]
     com = np.array([parameters[name] for name in vector_names("torso.com")])
     return np.asarray(np.einsum("jir,rlj->rli", turn, arms) + com)

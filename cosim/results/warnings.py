@@ -9,7 +9,8 @@ Whether it fell, what it did not use, where its controller gave up. A robot has 
   the commanded change of height; or
 - its torso is lower than half its own thickness, at any time: then it lies on the ground.
 
-Heights are above the ground. So a robot that begins in the air has not fallen unless it lands badly.
+Heights are above the ground. So a robot that begins in the air has not fallen unless it lands
+badly.
 """
 
 from __future__ import annotations
@@ -39,21 +40,32 @@ UNBALANCED = 0.01  # of the motors' work: books that miss more are told
 
 
 def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
-    """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), whether the robot stayed upright, and the
-    share of time in which the controller fell back to kinematic control, if it tells.
+    """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), whether
+    the robot stayed upright, and the share of time in which the controller fell back to kinematic
+    control, if it tells.
     """
     walk = view.walk
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
     doubted = fallback_columns(view.recording)
     fallback = {"fallback": float(np.mean(doubted.any(axis=1)))} if len(doubted) else {}
-    return {"distance": distance, "mean_speed": distance / lasted, "upright": not fall(view, robot)} | fallback
+    return {
+        "distance": distance,
+        "mean_speed": distance / lasted,
+        "upright": not fall(view, robot),
+    } | fallback
 
 
 def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
-    """(rows, 6) when each leg walked without feedback; no rows when the controller does not tell."""
+    """(rows, 6) when each leg walked without feedback; no rows when the controller does not
+    tell.
+    """
     names = [f"controller.{leg}.fallback" for leg in LEG_NAMES]
-    return recording.columns(names) > 0.5 if set(names) <= set(recording.names) else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
+    return (
+        recording.columns(names) > 0.5
+        if set(names) <= set(recording.names)
+        else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
+    )
 
 
 def fallen_back(recording: Recording) -> list[str]:
@@ -62,9 +74,15 @@ def fallen_back(recording: Recording) -> list[str]:
     if not doubted.any():
         return []
     together = float(doubted.all(axis=1).mean())
-    legs = {leg: float(share) - together for leg, share in zip(LEG_NAMES, doubted.mean(axis=0), strict=True)}
-    found = [f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan"
-             for leg, share in legs.items() if share]  # fmt: skip
+    legs = {
+        leg: float(share) - together
+        for leg, share in zip(LEG_NAMES, doubted.mean(axis=0), strict=True)
+    }
+    found = [
+        f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan"
+        for leg, share in legs.items()
+        if share
+    ]
     slid = (
         f"all legs walked without feedback for {together:.0%} of the time: "
         "the robot slid, its joints could not follow, or too many sensors failed"
@@ -87,7 +105,11 @@ def fall(view: View, robot: Robot) -> str:
     if not fallen.any():
         return ""
     k = int(np.argmax(fallen))
-    how = f"its torso leaned by more than {UPRIGHT} rad" if leaning[k] else f"its torso was only {height[k]:.3g} m above the ground"
+    how = (
+        f"its torso leaned by more than {UPRIGHT} rad"
+        if leaning[k]
+        else f"its torso was only {height[k]:.3g} m above the ground"
+    )
     return f"the robot fell at {recording.time[k]:.3f} s: {how}"
 
 
@@ -103,14 +125,19 @@ def _lasting(time: NDArray[np.float64], low: NDArray[np.bool_]) -> NDArray[np.bo
 def _lean(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.float64]:
     """(rows,) angle [rad] between the torso's upward axis and the ground's normal."""
     w, x, y, z = recording.vector("torso.quaternion", 4).T
-    up = np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+    up = np.column_stack(
+        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
+    )
     return np.asarray(np.arccos(np.clip(up @ _normal(parameters), -1.0, 1.0)))
 
 
 def _normal(parameters: Mapping[str, float]) -> NDArray[np.float64]:
     """(3,) the ground's normal."""
     kind = TERRAINS[round(parameters.get("terrain.kind", 1.0)) - 1]
-    heading, incline = parameters.get("terrain.heading", 0.0), parameters.get("terrain.incline", 0.0)
+    heading, incline = (
+        parameters.get("terrain.heading", 0.0),
+        parameters.get("terrain.incline", 0.0),
+    )
     return ground_normal(Terrain(kind=kind, height=0.0, incline=incline, heading=heading))
 
 
@@ -123,26 +150,44 @@ def slipping_ground(parameters: Mapping[str, float]) -> list[str]:
     slide = float(np.linalg.norm(sliding(gravity, _normal(parameters), mu, static)))
     if slide:
         why = "without friction" if mu == 0.0 else f"which friction (mu = {mu:g}) does not hold"
-        return [f"the robot slides: the ground's slope pulls it downhill at {slide:.3g} m/s2, {why}"]
-    return ["the ground has no friction: feet cannot push, and the robot does not get ahead"] if max(mu, static) == 0.0 else []
+        return [
+            f"the robot slides: the ground's slope pulls it downhill at {slide:.3g} m/s2, {why}"
+        ]
+    return (
+        ["the ground has no friction: feet cannot push, and the robot does not get ahead"]
+        if max(mu, static) == 0.0
+        else []
+    )
 
 
 def idle_settings(scenario: Scenario, robot: Robot) -> list[str]:
     """Settings that this run does not use."""
     late = [event.time for event in scenario.events if event.time >= scenario.duration]
-    found = [f"the event at {time:g} s does nothing: the run ends at {scenario.duration:g} s" for time in late]
+    found = [
+        f"the event at {time:g} s does nothing: the run ends at {scenario.duration:g} s"
+        for time in late
+    ]
     late = [command.time for command in scenario.commands if command.time >= scenario.duration]
-    found += [f"the command at {time:g} s does nothing: the run ends at {scenario.duration:g} s" for time in late]
+    found += [
+        f"the command at {time:g} s does nothing: the run ends at {scenario.duration:g} s"
+        for time in late
+    ]
     terrain = replace(robot.terrain, **scenario.settings.get("terrain", {}))
     given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
-    sloped = [key for key in ("incline", "heading") if given.get(key) or given.get(f"terrain.{key}")]
+    sloped = [
+        key for key in ("incline", "heading") if given.get(key) or given.get(f"terrain.{key}")
+    ]
     if terrain.kind == "flat":
-        found += [f"terrain.{key} does nothing on flat ground; set terrain.kind=slope" for key in sloped]
+        found += [
+            f"terrain.{key} does nothing on flat ground; set terrain.kind=slope" for key in sloped
+        ]
     return found
 
 
 def doubts(view: View, robot: Robot) -> list[str]:
-    """What a reader of the results should know: a fall, legs out of reach, servos hotter than they may be for long."""
+    """What a reader of the results should know: a fall, legs out of reach, servos hotter than
+    they may be for long.
+    """
     recording, fell = view.recording, fall(view, robot)
     found = [*([fell] if fell else []), *slipping_ground(view.parameters)]
     unreachable = [f"controller.{leg}.unreachable" for leg in LEG_NAMES]
@@ -180,4 +225,6 @@ def too_short(view: View) -> list[str]:
         return []
     lasted, cycles = float(time[-1] - time[0]), f"{SKIPPED_CYCLES + 1} whole gait cycles"
     reason = f"metrics are of what comes after the first {SKIPPED_CYCLES}, and a cycle takes {view.period:g} s"
-    return [f"too short for metrics: got {lasted:.6g} s, expected {needed:.6g} s, which is {cycles} ({reason}); set duration={needed:.6g}"]
+    return [
+        f"too short for metrics: got {lasted:.6g} s, expected {needed:.6g} s, which is {cycles} ({reason}); set duration={needed:.6g}"
+    ]

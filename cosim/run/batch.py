@@ -1,4 +1,6 @@
-"""Many runs at once: scenarios in processes of their own, of which only what they come to is sent back, not their recordings."""
+"""Many runs at once: scenarios in processes of their own, of which only what they come to is
+sent back, not their recordings.
+"""
 
 from __future__ import annotations
 
@@ -46,19 +48,26 @@ def run_batch(
 ) -> Generator[Summary, None, None]:
     """Runs scenarios and yields what each came to, in their order.
 
-    The figures do not depend on `workers`, but for the wall time. Close the iterator (contextlib.closing) where the loop over it may
-    be left early, by an interrupt for one: it ends the runs under way. More than one worker needs a main module that can be imported.
+    The figures do not depend on `workers`, but for the wall time. Close the iterator
+    (contextlib.closing) where the loop over it may be left early, by an interrupt for one: it ends
+    the runs under way. More than one worker needs a main module that can be imported.
 
     Args:
-        fmu: the FMU of all runs; by default one is exported for each robot, and holds for every setting.
+        fmu: the FMU of all runs; by default one is exported for each robot, and holds for every
+            setting.
         gains: of all compliant runs; by default designed, once for each robot and macro-step.
         workers: processes; by default one for each processor, and 1 runs everything in this one.
-        compiled: with the controller's FMU instead of the Python controller: some ten times as fast, figures equal to its last digits.
+        compiled: with the controller's FMU instead of the Python controller: some ten times as
+            fast, figures equal to its last digits.
     """
     with TemporaryDirectory(prefix="hexapod-batch-") as folder:
         tasks = _prepare(scenarios, Path(folder), fmu=fmu, gains=gains)
         count = min(processors() if workers is None else workers, len(tasks))
-        yield from _run_here(tasks, compiled=compiled) if count <= 1 else _run_in_processes(tasks, count, compiled=compiled)
+        yield from (
+            _run_here(tasks, compiled=compiled)
+            if count <= 1
+            else _run_in_processes(tasks, count, compiled=compiled)
+        )
 
 
 def processors() -> int:
@@ -66,7 +75,9 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _prepare(scenarios: Sequence[Scenario], folder: Path, *, fmu: Path | None, gains: Gains | None) -> list[_Task | Summary]:
+def _prepare(
+    scenarios: Sequence[Scenario], folder: Path, *, fmu: Path | None, gains: Gains | None
+) -> list[_Task | Summary]:
     """What the runs share, made once; a scenario for which it cannot be made is refused at once."""
     fmus: dict[str, Path] = {}
     designs: dict[tuple[str, str, float], Gains | None] = {}
@@ -77,11 +88,15 @@ def _prepare(scenarios: Sequence[Scenario], folder: Path, *, fmu: Path | None, g
             if key not in designs:
                 designs[key] = chosen_gains(scenario, gains)
             if fmu is None and scenario.robot not in fmus:
-                fmus[scenario.robot] = export_fmu(load_robot(scenario.robot), folder / f"{len(fmus)}.fmu")
+                fmus[scenario.robot] = export_fmu(
+                    load_robot(scenario.robot), folder / f"{len(fmus)}.fmu"
+                )
         except HexapodError as error:
             tasks.append(refused(scenario, error))
         else:
-            tasks.append(_Task(scenario, fmus[scenario.robot] if fmu is None else fmu, designs[key]))
+            tasks.append(
+                _Task(scenario, fmus[scenario.robot] if fmu is None else fmu, designs[key])
+            )
     return tasks
 
 
@@ -92,7 +107,9 @@ def _run(task: _Task | Summary, walker: Walker | None) -> Summary:
     if walker is not None:
         return walker.summary(task.scenario, fmu=task.fmu, gains=task.gains, progress=stop_if_told)
     try:
-        return summarise(simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=stop_if_told))
+        return summarise(
+            simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=stop_if_told)
+        )
     except HexapodError as error:
         return refused(task.scenario, error)
 
@@ -106,11 +123,15 @@ def _run_here(tasks: Sequence[_Task | Summary], *, compiled: bool) -> Iterator[S
             yield summary
 
 
-def _run_in_processes(tasks: Sequence[_Task | Summary], count: int, *, compiled: bool) -> Iterator[Summary]:
+def _run_in_processes(
+    tasks: Sequence[_Task | Summary], count: int, *, compiled: bool
+) -> Iterator[Summary]:
     with _pool(count) as pool:
         waiting: deque[Future[Summary]] = deque()
         for task in tasks:
-            with deaf_to_interrupts():  # the workers; they are told by us, and begin when a run is handed in
+            with (
+                deaf_to_interrupts()
+            ):  # the workers; they are told by us, and begin when a run is handed in
                 waiting.append(pool.submit(_work, task, compiled))
             if len(waiting) > QUEUED * count:
                 yield _result(waiting.popleft())
@@ -136,7 +157,9 @@ def _pool(count: int) -> Iterator[ProcessPoolExecutor]:
     """Worker processes that are gone when the block ends, however it ends."""
     context = multiprocessing.get_context(METHOD)
     stop = context.Event()
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=begin_worker, initargs=(stop,))
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=begin_worker, initargs=(stop,)
+    )
     try:
         yield pool
     finally:

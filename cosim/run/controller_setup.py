@@ -10,10 +10,19 @@ from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.models import Robot, unknown_name
 
 
-def make_setup(robot: Robot, *, control: str, period: float, gait: str | None = None, gains: Gains | None = None) -> ControllerSetup:
-    """What `simulate` would walk a robot with: its gait or one by name; under compliant control gains designed for it, if none are given.
+def make_setup(
+    robot: Robot,
+    *,
+    control: str,
+    period: float,
+    gait: str | None = None,
+    gains: Gains | None = None,
+) -> ControllerSetup:
+    """What `simulate` would walk a robot with: its gait or one by name; under compliant control
+    gains designed for it, if none are given.
 
-    Raises HexapodError for an unknown control or gait, GainsError for gains without compliant control or without a design.
+    Raises HexapodError for an unknown control or gait, GainsError for gains without compliant
+    control or without a design.
     """
     if control not in CONTROLS:
         raise unknown_name("control", control, CONTROLS)
@@ -21,10 +30,16 @@ def make_setup(robot: Robot, *, control: str, period: float, gait: str | None = 
     setup.build()  # refused before anything is designed
     if control == "kinematic":
         if gains is not None:
-            raise GainsError("gains without compliant control", got=control, expected="compliant", fix="leave out the gains")
+            raise GainsError(
+                "gains without compliant control",
+                got=control,
+                expected="compliant",
+                fix="leave out the gains",
+            )
         return setup
     if gains is None:
-        from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415  python-control takes a second to import
+        # python-control takes a second to import
+        from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
 
         gains = design_for(robot, period)
     return replace(setup, gains=gains)

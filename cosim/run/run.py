@@ -38,7 +38,11 @@ from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw, initial
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
 from hexapod_cosim.models.records import Vector3
 
-BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))  # these make the robot; the rest are settings
+BODY_PARAMETERS = (
+    "torso.",
+    "foot.",
+    *(f"{leg}." for leg in LEG_NAMES),
+)  # these make the robot; the rest are settings
 WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
 SAME = 1e-9  # relative, of a parameter printed and read again
 
@@ -51,25 +55,43 @@ def simulate(
     progress: Progress | None = None,
     begin: Callable[[], None] | None = None,
 ) -> Result:
-    """Runs a scenario on the robot's own FMU, exported for it, or on a given one; compliant gains are designed when not given.
+    """Runs a scenario on the robot's own FMU, exported for it, or on a given one; compliant gains
+    are designed when not given.
 
-    `begin` is called once nothing can be refused any more, before the first step. Raises HexapodError for anything that keeps the run
-    from starting; how a run that started ended is in the result.
+    `begin` is called once nothing can be refused any more, before the first step. Raises
+    HexapodError for anything that keeps the run from starting; how a run that started ended is in
+    the result.
     """
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
-    controller = Controller(setup.robot, period=setup.period, gait=setup.gait, gains=setup.gains, parts=setup.parts)
+    controller = Controller(
+        setup.robot, period=setup.period, gait=setup.gait, gains=setup.gains, parts=setup.parts
+    )
     with open_plant(scenario, fmu) as plant:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
         recorder = Recorder(
-            signals, plan.schedule.times, plan.schedule.rows, extra=insides(controller), every=scenario.every,
+            signals,
+            plan.schedule.times,
+            plan.schedule.rows,
+            extra=insides(controller),
+            every=scenario.every,
             judged=judged_columns(bristles=True),
-        )  # fmt: skip
-        chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")  # told before the run, not after it
+        )
+        chosen_columns(
+            recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv"
+        )  # told before the run, not after it
         if begin is not None:
             begin()
-        outcome = run(plant, signals, controller, plan.schedule, recorder, h=scenario.macro_step, progress=progress)
+        outcome = run(
+            plant,
+            signals,
+            controller,
+            plan.schedule,
+            recorder,
+            h=scenario.macro_step,
+            progress=progress,
+        )
         facts = describe(setup.robot, plant, setup.gait.period)
     return judge(plan, outcome, parameters, facts | {"warnings": controller.warnings})
 
@@ -86,21 +108,33 @@ class Plan:
 
 
 def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
-    """The plan of a scenario. Raises HexapodError for commands that the legs do not reach, and where no gains can be designed."""
+    """The plan of a scenario. Raises HexapodError for commands that the legs do not reach, and
+    where no gains can be designed.
+    """
     own = scenario_robot(scenario)
     robot = known_robot(scenario, own)
     gait = make_gait(robot, **dict(scenario.settings.get("gait", {})))
     check_commands(scenario.commands, robot, gait, where=f"{scenario.where}: command")
     setup = ControllerSetup(
-        robot=robot, gait=gait, period=scenario.macro_step, gains=chosen_gains(scenario, gains), parts=scenario.compliance
+        robot=robot,
+        gait=gait,
+        period=scenario.macro_step,
+        gains=chosen_gains(scenario, gains),
+        parts=scenario.compliance,
     )
     drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
-    schedule = make_schedule(scenario if drawn is None else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay)))
+    schedule = make_schedule(
+        scenario
+        if drawn is None
+        else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay))
+    )
     return Plan(scenario=scenario, robot=own, controller=setup, schedule=schedule, drawn=drawn)
 
 
 def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
-    """Puts the scenario's parameters and what was drawn over those of its robot; returns all of them, as they hold."""
+    """Puts the scenario's parameters and what was drawn over those of its robot; returns all of
+    them, as they hold.
+    """
     scenario = plan.scenario
     _refuse_unmeasured(plant)
     plant.set_parameters(scenario.parameters)
@@ -115,30 +149,54 @@ def _refuse_unmeasured(plant: Fmu) -> None:
     missing = sorted(set(MEASURED_BY_PLANT) - set(plant.names("output")))
     if missing:
         fix = "export it again with `hexapod export`"
-        expected = "the outputs that metrics are made of, which FMUs of earlier versions do not have"
-        raise FmuError("an FMU without measurements", got=f"no {missing[0]}", expected=expected, fix=fix, where=str(plant.path))
+        expected = (
+            "the outputs that metrics are made of, which FMUs of earlier versions do not have"
+        )
+        raise FmuError(
+            "an FMU without measurements",
+            got=f"no {missing[0]}",
+            expected=expected,
+            fix=fix,
+            where=str(plant.path),
+        )
 
 
-def judge(plan: Plan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]) -> Result:
+def judge(
+    plan: Plan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]
+) -> Result:
     """What came of a run; `facts` are those of `describe` and the controller's warnings."""
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
     short = too_short(view) if outcome.status == COMPLETED else []
     found = {
-        "warnings": [*facts["warnings"], *idle_settings(scenario, setup.robot), *doubts(view, setup.robot), *short],
+        "warnings": [
+            *facts["warnings"],
+            *idle_settings(scenario, setup.robot),
+            *doubts(view, setup.robot),
+            *short,
+        ],
         "gains": None if setup.gains is None else asdict(setup.gains),
         "walk": describe_walk(view, setup.robot),
         "drawn": None if drawn is None else drawn.as_facts(),
     }
     metrics = compute_metrics(view, servo=plan.robot.servo, realtime_factor=outcome.realtime_factor)
-    return Result(scenario=scenario, outcome=outcome, metrics=metrics, parameters=parameters, facts={**facts, **found})
+    return Result(
+        scenario=scenario,
+        outcome=outcome,
+        metrics=metrics,
+        parameters=parameters,
+        facts={**facts, **found},
+    )
 
 
 def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None:
-    """The gains a scenario runs with: none under kinematic control, else those given, or designed for its robot and macro-step."""
+    """The gains a scenario runs with: none under kinematic control, else those given, or
+    designed for its robot and macro-step.
+    """
     if scenario.control == "kinematic" or gains is not None:
         return None if scenario.control == "kinematic" else gains
-    from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415  python-control takes a second to import
+    # python-control takes a second to import
+    from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
 
     return design_for(known_robot(scenario), scenario.macro_step)
 
@@ -156,12 +214,19 @@ def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
 
 @lru_cache(maxsize=64)
 def _told(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
-    return robot if (robot.servo, robot.gravity) == (servo, gravity) else replace(robot, servo=servo, gravity=gravity)
+    return (
+        robot
+        if (robot.servo, robot.gravity) == (servo, gravity)
+        else replace(robot, servo=servo, gravity=gravity)
+    )
 
 
 def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
     """What is wrong with the feet's force sensors; None when nothing is."""
-    noise, delay = scenario.sensors.foot_force_noise, math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - WHOLE)
+    noise, delay = (
+        scenario.sensors.foot_force_noise,
+        math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - WHOLE),
+    )
     if not noise and not delay and schedule.faults is None:
         return None
     return SensorSettings(noise=noise, seed=scenario.seed, delay=delay, faults=schedule.faults)
@@ -175,7 +240,9 @@ def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
 
 @contextmanager
 def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
-    """The FMU of a scenario, its settings in place: exported for the occasion, or a given one that must hold the same robot."""
+    """The FMU of a scenario, its settings in place: exported for the occasion, or a given one
+    that must hold the same robot.
+    """
     robot = scenario_robot(scenario)
     if path is not None:
         with Fmu(path) as plant:
@@ -190,12 +257,16 @@ def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
 
 
 def adopt_settings(plant: Fmu, robot: Robot) -> None:
-    """Sets the laws and settings of a given FMU to those of the robot. Raises FmuError when the FMU holds another robot."""
+    """Sets the laws and settings of a given FMU to those of the robot. Raises FmuError when the
+    FMU holds another robot.
+    """
     plant.set_parameters(foreign_settings(plant, robot))
 
 
 def foreign_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
-    """The laws and settings of a robot that an FMU does not have. Raises FmuError when the FMU holds another robot."""
+    """The laws and settings of a robot that an FMU does not have. Raises FmuError when the FMU
+    holds another robot.
+    """
     wanted = parameter_values(PLANT, plant_roots(robot))
     present = plant.parameters()
     changes = {
@@ -207,7 +278,13 @@ def foreign_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
         if name.startswith(BODY_PARAMETERS):
             fix = "export one of this robot with `hexapod export --robot`, or name the FMU's robot in the scenario"
             expected = f"{value:g}, as robot {robot.name!r} has"
-            raise FmuError(f"the FMU holds another robot: {name}", got=present[name], expected=expected, fix=fix, where=str(plant.path))
+            raise FmuError(
+                f"the FMU holds another robot: {name}",
+                got=present[name],
+                expected=expected,
+                fix=fix,
+                where=str(plant.path),
+            )
     return changes
 
 
@@ -225,4 +302,8 @@ def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
 @cache
 def _versions() -> Mapping[str, str]:
     names = ("fmpy", "numpy", "scipy", "control")
-    return {"hexapod-cosim": package_version(), "python": platform.python_version(), **{name: version(name) for name in names}}
+    return {
+        "hexapod-cosim": package_version(),
+        "python": platform.python_version(),
+        **{name: version(name) for name in names},
+    }

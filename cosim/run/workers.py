@@ -1,4 +1,6 @@
-"""Processes that work for this one: begun anew rather than forked, told when to stop, gone when this one is."""
+"""Processes that work for this one: begun anew rather than forked, told when to stop, gone when
+this one is.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,12 @@ _stop: Event | None = None  # of this process, when it is a worker
 
 
 def begin_worker(stop: Event, scratch: Path | None = None) -> None:
-    """Makes this process a worker that ends its run when `stop` is set, and itself when its parent is gone, with the folder of both."""
+    """Makes this process a worker that ends its run when `stop` is set, and itself when its
+    parent is gone, with the folder of both.
+    """
     global _stop  # noqa: PLW0603  the one thing a worker is told beside its tasks
-    from threadpoolctl import threadpool_limits  # noqa: PLC0415  commands without workers begin sooner without it
+    # commands without workers begin sooner without it
+    from threadpoolctl import threadpool_limits  # noqa: PLC0415
 
     _stop = stop
     threadpool_limits(1)  # there is a worker for each processor

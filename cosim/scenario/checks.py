@@ -1,4 +1,6 @@
-"""What must fit together in a scenario, beyond key by key: steps and duration, names of FMU parameters."""
+"""What must fit together in a scenario, beyond key by key: steps and duration, names of FMU
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,16 @@ from dataclasses import fields
 
 from hexapod_cosim.controller import Parts
 from hexapod_cosim.cosim.interface.interface import load_interface
-from hexapod_cosim.cosim.scenario.records import MAX_STEPS, SETTINGS, UNUSED, Command, Outputs, Scenario, Sensors, Variation
+from hexapod_cosim.cosim.scenario.records import (
+    MAX_STEPS,
+    SETTINGS,
+    UNUSED,
+    Command,
+    Outputs,
+    Scenario,
+    Sensors,
+    Variation,
+)
 from hexapod_cosim.models import ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.schema import specs
 
@@ -15,16 +26,33 @@ WHOLE_STEPS_TOLERANCE = 1e-6  # of a macro-step: round-off of a decimal duration
 
 
 def check_steps(scenario: Scenario) -> None:
-    """Whole macro-steps, at least one and no more than a recording may have rows. Raises ScenarioError."""
-    h, ratio, where = scenario.macro_step, scenario.duration / scenario.macro_step, f"{scenario.where}: duration"
+    """Whole macro-steps, at least one and no more than a recording may have rows. Raises
+    ScenarioError.
+    """
+    h, ratio, where = (
+        scenario.macro_step,
+        scenario.duration / scenario.macro_step,
+        f"{scenario.where}: duration",
+    )
     if ratio > MAX_STEPS * (1.0 + WHOLE_STEPS_TOLERANCE):
         expected = f"at most {MAX_STEPS} macro-steps, {MAX_STEPS * h:g} s with macro_step = {h:g} s"
         fix = "shorten the duration or lengthen macro_step"
-        raise ScenarioError("too many macro-steps", got=scenario.duration, expected=expected, fix=fix, where=where)
+        raise ScenarioError(
+            "too many macro-steps", got=scenario.duration, expected=expected, fix=fix, where=where
+        )
     steps = scenario.steps
     if steps < 1 or abs(ratio - steps) > WHOLE_STEPS_TOLERANCE * steps:
-        expected, fix = f"a multiple of macro_step = {h:g} s", f"{max(steps, 1) * h:g} is the nearest"
-        raise ScenarioError("not a whole number of macro-steps", got=scenario.duration, expected=expected, fix=fix, where=where)
+        expected, fix = (
+            f"a multiple of macro_step = {h:g} s",
+            f"{max(steps, 1) * h:g} is the nearest",
+        )
+        raise ScenarioError(
+            "not a whole number of macro-steps",
+            got=scenario.duration,
+            expected=expected,
+            fix=fix,
+            where=where,
+        )
 
 
 def check_interval(scenario: Scenario) -> None:
@@ -33,18 +61,27 @@ def check_interval(scenario: Scenario) -> None:
     every = scenario.every
     if interval and abs(interval / h - every) > WHOLE_STEPS_TOLERANCE * every:
         raise ScenarioError(
-            "not a whole number of macro-steps", got=interval, expected=f"a multiple of macro_step = {h:g} s",
-            fix=f"{every * h:g} is the nearest; 0 keeps every macro-step", where=f"{scenario.where}: outputs.interval",
-        )  # fmt: skip
+            "not a whole number of macro-steps",
+            got=interval,
+            expected=f"a multiple of macro_step = {h:g} s",
+            fix=f"{every * h:g} is the nearest; 0 keeps every macro-step",
+            where=f"{scenario.where}: outputs.interval",
+        )
 
 
 def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
-    """Names in `parameters` are parameters of the robot's FMU; those in `given` were written as --set. Raises ScenarioError."""
+    """Names in `parameters` are parameters of the robot's FMU; those in `given` were written as
+    --set. Raises ScenarioError.
+    """
     if not scenario.parameters:
         return
     interface = load_interface(load_robot(scenario.robot))
     known = [entry.name for entry in interface.of_causality("parameter")]
-    others = {entry.name: entry.causality for entry in interface.variables if entry.causality in {"input", "output"}}
+    others = {
+        entry.name: entry.causality
+        for entry in interface.variables
+        if entry.causality in {"input", "output"}
+    }
     for name, value in scenario.parameters.items():
         if name in known:
             continue
@@ -53,13 +90,31 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
             if name.startswith("torso.push"):
                 fix = "use [[events]]: --set 'events=[{time=1, duration=0.1, force=[0, 40, 0]}]'"
             expected = f"a parameter of the FMU; this is an {others[name]}"
-            raise ScenarioError("not a parameter", got=name, expected=expected, fix=fix, where=f"--set {name}" if name in given else where)
+            raise ScenarioError(
+                "not a parameter",
+                got=name,
+                expected=expected,
+                fix=fix,
+                where=f"--set {name}" if name in given else where,
+            )
         if name in given:
-            raise _unknown("setting", name, [*setting_names(), *known], "a key of the scenario or a parameter", where=f"--set {name}")
+            raise _unknown(
+                "setting",
+                name,
+                [*setting_names(), *known],
+                "a key of the scenario or a parameter",
+                where=f"--set {name}",
+            )
         where = f"{scenario.where}: parameters"
         if isinstance(value, Mapping):
             fix = 'write names with dots in quotes: "torso.mass" = 2.7'
-            raise ScenarioError("a table where a parameter should be", got=name, expected="NAME = VALUE", fix=fix, where=where)
+            raise ScenarioError(
+                "a table where a parameter should be",
+                got=name,
+                expected="NAME = VALUE",
+                fix=fix,
+                where=where,
+            )
         raise _unknown("parameter", name, known, "a parameter", where=where)
 
 
@@ -67,13 +122,20 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
     """As `unknown_name`, without listing the hundreds that are valid."""
     near = nearest_name(name, valid)
     fix = f"did you mean {near!r}?" if near else "the FMU's documentation lists the parameters"
-    return ScenarioError(f"unknown {kind}", got=name, expected=f"{expected} of the FMU", fix=fix, where=where)
+    return ScenarioError(
+        f"unknown {kind}", got=name, expected=f"{expected} of the FMU", fix=fix, where=where
+    )
 
 
 def setting_names() -> list[str]:
     """The scenario's dotted keys."""
     records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
-    keys = [(section, key) for section, record in records.items() for key in specs(record) if key not in UNUSED.get(section, ())]
+    keys = [
+        (section, key)
+        for section, record in records.items()
+        for key in specs(record)
+        if key not in UNUSED.get(section, ())
+    ]
     plain = {"outputs": Outputs, "compliance": Parts}
     keys += [(section, item.name) for section, record in plain.items() for item in fields(record)]
     return [f"{section}.{key}" for section, key in keys]

@@ -1,4 +1,6 @@
-"""Numbers with units in scenario files: `duration = 10` is SI, `macro_step = "5 ms"` is the same with its unit said and checked."""
+"""Numbers with units in scenario files: `duration = 10` is SI, `macro_step = "5 ms"` is the same
+with its unit said and checked.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,9 @@ QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)
 
 
 def to_si(value: Any, spec: Spec, where: str) -> Any:
-    """The value with a quantity in a string turned into SI; anything else is left for the spec to judge. Raises ScenarioError."""
+    """The value with a quantity in a string turned into SI; anything else is left for the spec
+    to judge. Raises ScenarioError.
+    """
     if isinstance(spec, Vector) and isinstance(value, list | tuple):
         return [to_si(item, Number(spec.unit), f"{where}[{k}]") for k, item in enumerate(value)]
     if not isinstance(spec, Number | Vector) or not isinstance(value, str):
@@ -35,9 +39,15 @@ def to_si(value: Any, spec: Spec, where: str) -> Any:
     if match is None:
         return value
     scales = SCALES.get(spec.unit, {spec.unit: 1.0})
-    unit = " ".join((match[2] or "").replace("*", " ").replace("N.m", "N m").replace("Nm", "N m").split())
+    unit = " ".join(
+        (match[2] or "").replace("*", " ").replace("N.m", "N m").replace("Nm", "N m").split()
+    )
     if unit not in scales:
         raise ScenarioError(
-            "wrong unit", got=value, expected=f"a value in {' or '.join(scales)}", fix=f"a plain number is in {spec.unit}", where=where
+            "wrong unit",
+            got=value,
+            expected=f"a value in {' or '.join(scales)}",
+            fix=f"a plain number is in {spec.unit}",
+            where=where,
         )
     return float(match[1]) * scales[unit]

@@ -18,21 +18,34 @@ Array = NDArray[np.float64]
 
 NAMES = tuple(item.name for item in fields(BodyCommand))
 UNITS = ("m/s", "m/s", "rad/s", "m", "rad", "rad")
-MOTION = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)  # which of them move the body on; the others are its posture
+MOTION = (
+    1.0,
+    1.0,
+    1.0,
+    0.0,
+    0.0,
+    0.0,
+)  # which of them move the body on; the others are its posture
 TRIED_STEPS = 50  # of the controller in a gait period: enough to see every phase
 SETTLING_CYCLES = 2  # one to ramp the command up, one until every foot has landed under it
 RESOLUTION = 0.005  # relative, of the limit that is told
 
 
 def check_commands(commands: Sequence[Command], robot: Robot, gait: Gait, *, where: str) -> None:
-    """Raises ScenarioError for a command that needs strides, or a posture, with standing feet beyond their legs' reach.
+    """Raises ScenarioError for a command that needs strides, or a posture, with standing feet
+    beyond their legs' reach.
 
     A foot beyond reach only in the air shortens the step's arc, not the walk, and is let pass.
     """
     for command in commands:
         wanted = np.array(astuple(command)[1:])
         if not _walks_once(tuple(wanted.tolist()), robot, gait):
-            raise _refusal(wanted, robot, gait, f"{where} at time = {command.time:g} s" if len(commands) > 1 else where)
+            raise _refusal(
+                wanted,
+                robot,
+                gait,
+                f"{where} at time = {command.time:g} s" if len(commands) > 1 else where,
+            )
 
 
 @lru_cache(maxsize=256)
@@ -46,7 +59,11 @@ def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     """Whether all standing feet are within reach throughout a settled cycle of the command (6,)."""
     count = max(TRIED_STEPS, math.ceil(4.0 / min(gait.duty, 1.0 - gait.duty)))
     period = gait.period / count
-    controller, measurement, command = Controller(robot, period=period, gait=gait), Measurement(), BodyCommand(*values.tolist())
+    controller, measurement, command = (
+        Controller(robot, period=period, gait=gait),
+        Measurement(),
+        BodyCommand(*values.tolist()),
+    )
     diagnostics = controller.diagnostics
     for k in range((SETTLING_CYCLES + 1) * count):
         controller.step(k * period, command, measurement)
@@ -63,7 +80,11 @@ def _refusal(wanted: Array, robot: Robot, gait: Gait, where: str) -> ScenarioErr
         fix = "slow the command down, or shorten gait.period"
     else:
         limit = wanted * _largest_share(wanted - motion, np.zeros(6), robot, gait)
-        what, shown, fix = "the legs do not reach this posture", (wanted - motion) != 0.0, "move the body less"
+        what, shown, fix = (
+            "the legs do not reach this posture",
+            (wanted - motion) != 0.0,
+            "move the body less",
+        )
     expected = f"at most {_text(limit, shown)} with gait {gait.name}, period {gait.period:g} s and duty factor {gait.duty:.3g}"
     return ScenarioError(what, got=_text(wanted, shown), expected=expected, fix=fix, where=where)
 
@@ -82,4 +103,6 @@ def _largest_share(part: Array, rest: Array, robot: Robot, gait: Gait) -> float:
 
 def _text(values: Array, shown: Array) -> str:
     entries = zip(NAMES, values.tolist(), UNITS, shown.tolist(), strict=True)
-    return " and ".join(f"{name} = {value:.3g} {unit}" for name, value, unit, chosen in entries if chosen)
+    return " and ".join(
+        f"{name} = {value:.3g} {unit}" for name, value, unit, chosen in entries if chosen
+    )

@@ -8,15 +8,30 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.models import LEG_NAMES, Baumgarte, Contact, Friction, Gait, Servo, Solver, Terrain
+from hexapod_cosim.models import (
+    LEG_NAMES,
+    Baumgarte,
+    Contact,
+    Friction,
+    Gait,
+    Servo,
+    Solver,
+    Terrain,
+)
 from hexapod_cosim.models.schema import Choice, Number, Vector, specs
 
 CONTROLS = ("kinematic", "compliant")
 FAULTS = ("dead", "stuck")
 FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
-    "gait": Gait, "terrain": Terrain, "contact": Contact, "friction": Friction, "servo": Servo, "solver": Solver, "baumgarte": Baumgarte,
-}  # fmt: skip
+    "gait": Gait,
+    "terrain": Terrain,
+    "contact": Contact,
+    "friction": Friction,
+    "servo": Servo,
+    "solver": Solver,
+    "baumgarte": Baumgarte,
+}
 UNUSED = {"gait": ("stride",)}  # the body velocity of the command says it
 GRAVITY = Number("m/s2", above=0.0)  # along -z; three numbers are a vector in world axes
 GRAVITY_VECTOR = Vector("m/s2", 3)
@@ -41,7 +56,9 @@ class Command:
 
 @dataclass(frozen=True, kw_only=True)
 class Push:
-    """A force and torque on the torso, world axes, from `time` (counted from the start of the run) for `duration`."""
+    """A force and torque on the torso, world axes, from `time` (counted from the start of the
+    run) for `duration`.
+    """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     duration: Annotated[float, Number("s", above=0.0)]
@@ -51,7 +68,9 @@ class Push:
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """A foot's force sensor that fails at `time`, counted from the start of the run: dead it reads nothing, stuck its last reading."""
+    """A foot's force sensor that fails at `time`, counted from the start of the run: dead it
+    reads nothing, stuck its last reading.
+    """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
@@ -61,27 +80,45 @@ class Fault:
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What is wrong with what the controller is told of all feet: forces, and the contacts that are derived from them."""
+    """What is wrong with what the controller is told of all feet: forces, and the contacts that
+    are derived from them.
+    """
 
-    foot_force_noise: Annotated[float, Number("1", at_least=0.0, below=1.0, default=0.0)] = 0.0  # standard deviation, share of the force
-    foot_force_delay: Annotated[float, Number("s", at_least=0.0, at_most=1.0, default=0.0)] = 0.0  # rounded up to whole macro-steps
+    foot_force_noise: Annotated[float, Number("1", at_least=0.0, below=1.0, default=0.0)] = (
+        0.0  # standard deviation, share of the force
+    )
+    foot_force_delay: Annotated[float, Number("s", at_least=0.0, at_most=1.0, default=0.0)] = (
+        0.0  # rounded up to whole macro-steps
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """Sizes of small changes to a run, drawn from its seed: how far apart runs lie that are meant to be the same."""
+    """Sizes of small changes to a run, drawn from its seed: how far apart runs lie that are
+    meant to be the same.
+    """
 
-    attitude: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = 0.0  # of the torso at the start, deviation per axis
-    height: Annotated[float, Number("m", at_least=0.0, at_most=0.1, default=0.0)] = 0.0  # it drops from, at most: even from 0 on
-    joint_angle: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = 0.0  # at the start, standard deviation
-    command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0  # of all commands, at most: even from 0 on
+    attitude: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = (
+        0.0  # of the torso at the start, deviation per axis
+    )
+    height: Annotated[float, Number("m", at_least=0.0, at_most=0.1, default=0.0)] = (
+        0.0  # it drops from, at most: even from 0 on
+    )
+    joint_angle: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = (
+        0.0  # at the start, standard deviation
+    )
+    command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = (
+        0.0  # of all commands, at most: even from 0 on
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
     """What is written."""
 
-    csv: tuple[str, ...] = ("*",)  # patterns of variable names: the columns of results.csv; Parquet has all
+    csv: tuple[str, ...] = (
+        "*",
+    )  # patterns of variable names: the columns of results.csv; Parquet has all
     formats: tuple[str, ...] = FORMATS
     plots: bool = True
     # between two rows of the recording; 0: every macro-step. Figures are of all macro-steps
@@ -135,11 +172,19 @@ class Scenario:
         plain = {key: getattr(self, key) for key in ("title", "robot", *PLAIN_KEYS, "seed")}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
-        lists = {"command": [_as_table(entry) for entry in self.commands], "events": [_as_table(entry) for entry in self.events]}
+        lists = {
+            "command": [_as_table(entry) for entry in self.commands],
+            "events": [_as_table(entry) for entry in self.events],
+        }
         tail = {"sensors": _as_table(self.sensors), "compliance": _as_table(self.compliance)}
         tail |= {"variation": {} if self.variation is None else _as_table(self.variation)}
         tail |= {"outputs": _as_table(self.outputs), "parameters": dict(self.parameters)}
-        return plain | tables | {key: value for key, value in lists.items() if value} | {key: value for key, value in tail.items() if value}
+        return (
+            plain
+            | tables
+            | {key: value for key, value in lists.items() if value}
+            | {key: value for key, value in tail.items() if value}
+        )
 
 
 PLAIN_KEYS = tuple(specs(Scenario))  # control, start, duration, macro_step
@@ -149,4 +194,8 @@ KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
 
 def _as_table(record: Any) -> dict[str, Any]:
     """Its fields; an endless duration is what a file says by saying nothing."""
-    return {item.name: value for item in fields(record) if (value := getattr(record, item.name)) != math.inf}
+    return {
+        item.name: value
+        for item in fields(record)
+        if (value := getattr(record, item.name)) != math.inf
+    }

@@ -1,7 +1,9 @@
-"""What is run: robot, walk, laws, disturbances and outputs, read from a TOML file and judged key by key.
+"""What is run: robot, walk, laws, disturbances and outputs, read from a TOML file and judged key by
+key.
 
-A value is a number in SI or a quantity with its unit ("5 ms"). The settings of gait, terrain, contact, friction, servo, solver and
-baumgarte are those of robot files; a scenario gives only what differs from the robot's own.
+A value is a number in SI or a quantity with its unit ("5 ms"). The settings of gait, terrain,
+contact, friction, servo, solver and baumgarte are those of robot files; a scenario gives only what
+differs from the robot's own.
 
 `gravity` is a number, along -z, or a vector in world axes, [m/s2]. Plant and controller both know
 it: the pose of rest, the gains' design, the planned loads and the weight in the metrics follow from
@@ -43,7 +45,14 @@ from hexapod_cosim.cosim.scenario.records import (
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
 from hexapod_cosim.models.records import STATIC_LAWS
-from hexapod_cosim.models.schema import Number, expect_table, read_given, refuse_unknown_keys, require, specs
+from hexapod_cosim.models.schema import (
+    Number,
+    expect_table,
+    read_given,
+    refuse_unknown_keys,
+    require,
+    specs,
+)
 from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.validation import check_settings
 
@@ -52,30 +61,44 @@ NUMBER = Number(GRAVITY.unit)
 
 def list_scenarios() -> dict[str, Path]:
     """The scenarios that come with the package, by name."""
-    return {path.stem: path for path in sorted((Path(__file__).parent / "scenarios").glob("*.toml"))}
+    return {
+        path.stem: path for path in sorted((Path(__file__).parent / "scenarios").glob("*.toml"))
+    }
 
 
 def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:
-    """Reads a scenario file, or a bundled one by name, with `overrides` "NAME=VALUE" put over it. Raises ScenarioError."""
+    """Reads a scenario file, or a bundled one by name, with `overrides` "NAME=VALUE" put over
+    it. Raises ScenarioError.
+    """
     table, where = read_tables(path_or_name)
     given = [text.partition("=")[0].strip() for text in overrides]
     return scenario_from_table(with_overrides(table, overrides), where=where, given=given)
 
 
 def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
-    """The tables of a scenario file, or of a bundled one by name, not yet judged; what messages call it. Raises ScenarioError."""
+    """The tables of a scenario file, or of a bundled one by name, not yet judged; what messages
+    call it. Raises ScenarioError.
+    """
     path = _scenario_path(path_or_name)
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         fix = "give the path of a scenario file, or one of: " + ", ".join(list_scenarios())
-        raise ScenarioError("cannot read the scenario", got=error.strerror, fix=fix, where=str(path)) from error
+        raise ScenarioError(
+            "cannot read the scenario", got=error.strerror, fix=fix, where=str(path)
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ScenarioError(
-            "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
+            "not a TOML file",
+            got=str(error),
+            expected="TOML 1.0 in UTF-8",
+            fix="correct that line",
+            where=str(path),
         ) from error
     if "robot" in table and (path.parent / str(table["robot"])).is_file():
-        table["robot"] = str((path.parent / table["robot"]).resolve())  # a robot file beside the scenario
+        table["robot"] = str(
+            (path.parent / table["robot"]).resolve()
+        )  # a robot file beside the scenario
     return table, path.name if path in list_scenarios().values() else str(path)
 
 
@@ -89,13 +112,17 @@ def _scenario_path(path_or_name: str | Path) -> Path:
 
 
 def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """A copy of the tables with each "NAME=VALUE" set: a scenario's key, or else an FMU parameter. Raises ScenarioError."""
+    """A copy of the tables with each "NAME=VALUE" set: a scenario's key, or else an FMU
+    parameter. Raises ScenarioError.
+    """
     values: dict[str, Any] = {}
     for text in overrides:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not name or not value:
             fix = "write --set gait.period=0.8"
-            raise ScenarioError("not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set")
+            raise ScenarioError(
+                "not a setting", got=text, expected="NAME=VALUE", fix=fix, where="--set"
+            )
         values[name] = _parse(value)
     return with_values(table, values)
 
@@ -109,7 +136,9 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
 
 
 def _parse(value: str) -> Any:
-    """The value as TOML reads it; what TOML does not know is a string, so names and quantities need no quotes."""
+    """The value as TOML reads it; what TOML does not know is a string, so names and quantities
+    need no quotes.
+    """
     try:
         return tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -122,7 +151,13 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         inner = table.setdefault(section, {})
         if not isinstance(inner, dict):
             fix = f"set the whole list: --set '{section}=[...]'"
-            raise ScenarioError("the scenario has a list here", got=name, expected=f"a table [{section}]", fix=fix, where="--set")
+            raise ScenarioError(
+                "the scenario has a list here",
+                got=name,
+                expected=f"a table [{section}]",
+                fix=fix,
+                where="--set",
+            )
         inner[key] = value
     elif dot or "[" in name:
         table.setdefault("parameters", {})[name] = value
@@ -132,22 +167,37 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
         raise unknown_name("setting", name, KEYS, where="--set", error=ScenarioError)
 
 
-def scenario_from_table(table: Mapping[str, Any], *, where: str, given: Collection[str] = ()) -> Scenario:
-    """A checked scenario from the tables of a file; `where` names the file in messages, `given` what --set set. Raises ScenarioError."""
+def scenario_from_table(
+    table: Mapping[str, Any], *, where: str, given: Collection[str] = ()
+) -> Scenario:
+    """A checked scenario from the tables of a file; `where` names the file in messages, `given`
+    what --set set. Raises ScenarioError.
+    """
     with _errors_of(where):
         refuse_unknown_keys(table, list(KEYS), "")
-        plain = require(Scenario, _read(Scenario, {key: value for key, value in table.items() if key in PLAIN_KEYS}, ""), "")
+        plain = require(
+            Scenario,
+            _read(Scenario, {key: value for key, value in table.items() if key in PLAIN_KEYS}, ""),
+            "",
+        )
         scenario = Scenario(
             title=_text(table, "title", Path(where).stem),
             robot=_text(table, "robot", "athena"),
             seed=_seed(table.get("seed", 0)),
             gravity=_read_gravity(table["gravity"], "gravity") if "gravity" in table else None,
-            settings={name: _read_setting(name, table[name], name) for name in SETTINGS if name in table},
+            settings={
+                name: _read_setting(name, table[name], name) for name in SETTINGS if name in table
+            },
             commands=_read_commands(table.get("command", {}), "command"),
-            events=tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(_list(table.get("events", []), "events"))),
+            events=tuple(
+                _read_event(entry, f"events[{k}]")
+                for k, entry in enumerate(_list(table.get("events", []), "events"))
+            ),
             sensors=_record(Sensors, table.get("sensors", {}), "sensors"),
             compliance=_read_parts(table.get("compliance", {}), "compliance"),
-            variation=_record(Variation, table["variation"], "variation") if "variation" in table else None,
+            variation=_record(Variation, table["variation"], "variation")
+            if "variation" in table
+            else None,
             outputs=_read_outputs(table.get("outputs", {}), "outputs"),
             parameters=dict(expect_table(table.get("parameters", {}), "parameters")),
             where=where,
@@ -173,7 +223,9 @@ def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:
     names = [name for name in GRAVITY_NAMES if name in scenario.parameters]
     if not names:
         return scenario
-    gravity = list(load_robot(scenario.robot).gravity if scenario.gravity is None else scenario.gravity)
+    gravity = list(
+        load_robot(scenario.robot).gravity if scenario.gravity is None else scenario.gravity
+    )
     with _errors_of(scenario.where):
         for name in names:
             value = to_si(scenario.parameters[name], NUMBER, f"parameters.{name}")
@@ -184,20 +236,29 @@ def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:
 
 @contextmanager
 def _errors_of(file: str) -> Iterator[None]:
-    """The readers name a key, and the shared schema speaks of robots; a scenario's message says "file: key"."""
+    """The readers name a key, and the shared schema speaks of robots; a scenario's message says
+    "file: key".
+    """
     try:
         yield
     except (RobotError, ScenarioError) as error:
         key = (error.where or "").removeprefix(".")  # of a key in no section
         where = f"{file}: {key}" if key else file
-        raise ScenarioError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
+        raise ScenarioError(
+            error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
+        ) from error
 
 
 def _read(record: type[Any], table: Any, where: str) -> dict[str, Any]:
     known = specs(record)
     table = expect_table(table, where)
     return read_given(
-        record, {key: to_si(value, known[key], f"{where}.{key}") if key in known else value for key, value in table.items()}, where
+        record,
+        {
+            key: to_si(value, known[key], f"{where}.{key}") if key in known else value
+            for key, value in table.items()
+        },
+        where,
     )
 
 
@@ -207,17 +268,28 @@ def _record(record: type[Any], table: Any, where: str) -> Any:
 
 def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     record = SETTINGS[name]
-    refuse_unknown_keys(expect_table(table, where), [key for key in specs(record) if key not in UNUSED.get(name, ())], where)
+    refuse_unknown_keys(
+        expect_table(table, where),
+        [key for key in specs(record) if key not in UNUSED.get(name, ())],
+        where,
+    )
     return _read(record, table, where)
 
 
 def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
     entries = value if isinstance(value, list | tuple) else [value]
-    commands = [_record(Command, entry, f"{where}[{k}]" if len(entries) > 1 else where) for k, entry in enumerate(entries)]
+    commands = [
+        _record(Command, entry, f"{where}[{k}]" if len(entries) > 1 else where)
+        for k, entry in enumerate(entries)
+    ]
     times = [command.time for command in commands]
     if times != sorted(set(times)):
         raise ScenarioError(
-            "commands out of order", got=times, expected="times that grow", fix="sort the [[command]] entries by time", where=where
+            "commands out of order",
+            got=times,
+            expected="times that grow",
+            fix="sort the [[command]] entries by time",
+            where=where,
         )
     return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
 
@@ -239,16 +311,44 @@ def _read_parts(table: Any, where: str) -> Parts:
 
 def _read_outputs(table: Any, where: str) -> Outputs:
     refuse_unknown_keys(expect_table(table, where), [item.name for item in fields(Outputs)], where)
-    patterns, plots, formats = table.get("csv", ["*"]), table.get("plots", True), table.get("formats", FORMATS)
-    if not isinstance(patterns, list | tuple) or not all(isinstance(item, str) for item in patterns):
+    patterns, plots, formats = (
+        table.get("csv", ["*"]),
+        table.get("plots", True),
+        table.get("formats", FORMATS),
+    )
+    if not isinstance(patterns, list | tuple) or not all(
+        isinstance(item, str) for item in patterns
+    ):
         fix = 'write csv = ["torso.*", "*.foot.normal_force"]'
-        raise ScenarioError("wrong type", got=patterns, expected="a list of name patterns", fix=fix, where=f"{where}.csv")
-    if not isinstance(formats, list | tuple) or not formats or not all(item in FORMATS for item in formats):
-        fix, expected = 'write formats = ["parquet"]', "a list of one or both of " + ", ".join(FORMATS)
-        raise ScenarioError("value not allowed", got=formats, expected=expected, fix=fix, where=f"{where}.formats")
+        raise ScenarioError(
+            "wrong type",
+            got=patterns,
+            expected="a list of name patterns",
+            fix=fix,
+            where=f"{where}.csv",
+        )
+    if (
+        not isinstance(formats, list | tuple)
+        or not formats
+        or not all(item in FORMATS for item in formats)
+    ):
+        fix, expected = (
+            'write formats = ["parquet"]',
+            "a list of one or both of " + ", ".join(FORMATS),
+        )
+        raise ScenarioError(
+            "value not allowed", got=formats, expected=expected, fix=fix, where=f"{where}.formats"
+        )
     chosen = tuple(item for item in FORMATS if item in formats)
-    interval = _record(Outputs, {key: table[key] for key in specs(Outputs) if key in table}, where).interval
-    return Outputs(csv=tuple(patterns), formats=chosen, plots=_truth(plots, f"{where}.plots"), interval=interval)
+    interval = _record(
+        Outputs, {key: table[key] for key in specs(Outputs) if key in table}, where
+    ).interval
+    return Outputs(
+        csv=tuple(patterns),
+        formats=chosen,
+        plots=_truth(plots, f"{where}.plots"),
+        interval=interval,
+    )
 
 
 def _truth(value: Any, where: str) -> bool:
@@ -267,28 +367,41 @@ def _text(table: Mapping[str, Any], key: str, default: str) -> str:
 def _list(value: Any, key: str) -> Sequence[Any]:
     if not isinstance(value, list | tuple):
         fix = f"write [[{key}]] with two brackets"
-        raise ScenarioError("wrong type", got=value, expected=f"entries [[{key}]]", fix=fix, where=key)
+        raise ScenarioError(
+            "wrong type", got=value, expected=f"entries [[{key}]]", fix=fix, where=key
+        )
     return value
 
 
 def _seed(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ScenarioError("value not allowed", got=value, expected="a whole number >= 0", where="seed")
+        raise ScenarioError(
+            "value not allowed", got=value, expected="a whole number >= 0", where="seed"
+        )
     return value
 
 
 def scenario_robot(scenario: Scenario) -> Robot:
-    """The robot with the scenario's settings put over its own, but for the gait, which the controller makes.
+    """The robot with the scenario's settings put over its own, but for the gait, which the
+    controller makes.
 
     Raises RobotError when they do not fit together.
     """
     own = load_robot(scenario.robot)
-    changes = {name: replace(getattr(own, name), **dict(values)) for name, values in scenario.settings.items() if name != "gait"}
+    changes = {
+        name: replace(getattr(own, name), **dict(values))
+        for name, values in scenario.settings.items()
+        if name != "gait"
+    }
     friction = changes.get("friction", own.friction)
-    if "mu_static" not in scenario.settings.get("friction", {}) and (friction.law not in STATIC_LAWS or friction.mu_static < friction.mu):
+    if "mu_static" not in scenario.settings.get("friction", {}) and (
+        friction.law not in STATIC_LAWS or friction.mu_static < friction.mu
+    ):
         # the file's belongs to another law, or to less friction
         changes["friction"] = replace(friction, mu_static=0.0)
-    robot = replace(own, **changes, gravity=own.gravity if scenario.gravity is None else scenario.gravity)
+    robot = replace(
+        own, **changes, gravity=own.gravity if scenario.gravity is None else scenario.gravity
+    )
     if robot == own:
         return own
     if scenario.gravity is not None:
@@ -303,4 +416,10 @@ def _check_gravity(robot: Robot, *, where: str) -> None:
         return
     fix = "write gravity = 1.62, or a vector that points down: [0, 0, -1.62]"
     expected = "gravity that presses the robot onto the ground [m/s2]"
-    raise ScenarioError("nothing stands under this gravity", got=list(robot.gravity), expected=expected, fix=fix, where=where)
+    raise ScenarioError(
+        "nothing stands under this gravity",
+        got=list(robot.gravity),
+        expected=expected,
+        fix=fix,
+        where=where,
+    )

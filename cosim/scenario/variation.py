@@ -1,4 +1,6 @@
-"""Small changes to a run, drawn from its seed: attitude, height and joint angles at the start, and when commands come."""
+"""Small changes to a run, drawn from its seed: attitude, height and joint angles at the start,
+and when commands come.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,9 @@ STREAM = 1  # of the seed's random numbers; the noise of sensors has the seed's 
 POSITION, QUATERNION = vector_names("initial.position"), vector_names("initial.quaternion", 4)
 ANGLE = [f"initial.{name}" for name in joint_names("angle")]
 
-# what no one sets up better by hand: a tenth of a degree of attitude and of joint angles (a step of the servos' encoders is 1.5 mrad),
-# the height of a sheet of cardboard, and a command that comes when it comes within a tenth of a gait period
+# what no one sets up better by hand: a tenth of a degree of attitude and of joint angles (a step of
+# the servos' encoders is 1.5 mrad), the height of a sheet of cardboard, and a command that comes
+# when it comes within a tenth of a gait period
 STANDARD = Variation(attitude=2e-3, height=1e-3, joint_angle=2e-3, command_delay=0.1)
 
 
@@ -39,19 +42,26 @@ class Drawn:
     def as_facts(self) -> dict[str, Any]:
         """The same as plain numbers."""
         return {
-            "rotation": self.rotation.tolist(), "height": self.height, "angle": self.angle.tolist(), "command_delay": self.command_delay,
-        }  # fmt: skip
+            "rotation": self.rotation.tolist(),
+            "height": self.height,
+            "angle": self.angle.tolist(),
+            "command_delay": self.command_delay,
+        }
 
 
 def draw(variation: Variation, *, seed: int) -> Drawn:
-    """The changes of a seed: the same numbers whatever their sizes, so that a size scales what is drawn."""
+    """The changes of a seed: the same numbers whatever their sizes, so that a size scales what
+    is drawn.
+    """
     generator = np.random.default_rng([seed, STREAM])
     rotation, angle = generator.standard_normal(3), generator.standard_normal((LEGS, JOINTS))
     height, delay = generator.random(2).tolist()
     return Drawn(
-        rotation=variation.attitude * rotation, height=variation.height * height, angle=variation.joint_angle * angle,
+        rotation=variation.attitude * rotation,
+        height=variation.height * height,
+        angle=variation.joint_angle * angle,
         command_delay=variation.command_delay * delay,
-    )  # fmt: skip
+    )
 
 
 def delayed(commands: Sequence[Command], delay: float) -> tuple[Command, ...]:
@@ -64,16 +74,25 @@ def delayed(commands: Sequence[Command], delay: float) -> tuple[Command, ...]:
 def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) -> dict[str, float]:
     """The FMU's parameters initial.*, changed as drawn.
 
-    The torso goes up by as much as keeps every foot from being deeper in the ground than it was, and by the height drawn.
+    The torso goes up by as much as keeps every foot from being deeper in the ground than it was,
+    and by the height drawn.
     """
-    position, quaternion, angle = (np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE))
+    position, quaternion, angle = (
+        np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE)
+    )
     turn = np.array([1.0, *(0.5 * drawn.rotation)])
     turned = quaternion_product(turn / np.linalg.norm(turn), quaternion)
     bent = angle + drawn.angle.ravel()
-    deeper = _depths(robot, position, turned, bent) - _depths_at_rest(robot, tuple(position), tuple(quaternion), tuple(angle))
+    deeper = _depths(robot, position, turned, bent) - _depths_at_rest(
+        robot, tuple(position), tuple(quaternion), tuple(angle)
+    )
     raised = position + np.array([0.0, 0.0, max(float(deeper.max()), 0.0) + drawn.height])
     pairs = ((POSITION, raised), (QUATERNION, turned), (ANGLE, bent))
-    return {name: value for names, values in pairs for name, value in zip(names, values.tolist(), strict=True)}
+    return {
+        name: value
+        for names, values in pairs
+        for name, value in zip(names, values.tolist(), strict=True)
+    }
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,6 @@
-"""Is an FMU's archive whole? Its ZIP, sources, binaries, terminals, licence: what checkers of modelDescription.xml do not look at."""
+"""Is an FMU's archive whole? Its ZIP, sources, binaries, terminals, licence: what checkers of
+modelDescription.xml do not look at.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +17,18 @@ import fmpy
 
 from hexapod_cosim.cosim.export.extras import LICENCE, PICTURES
 from hexapod_cosim.cosim.interface.terminals import FOLDER, ICON
-from hexapod_cosim.cosim.validate.description import description_problems, schema_problems, variables
+from hexapod_cosim.cosim.validate.description import (
+    description_problems,
+    schema_problems,
+    variables,
+)
 from hexapod_cosim.cosim.validate.variable import INTERFACES
 
-DESCRIPTION, TERMINALS, PAGE = "modelDescription.xml", f"{FOLDER}/terminalsAndIcons.xml", "documentation/index.html"
+DESCRIPTION, TERMINALS, PAGE = (
+    "modelDescription.xml",
+    f"{FOLDER}/terminalsAndIcons.xml",
+    "documentation/index.html",
+)
 BUILD_DESCRIPTION = "sources/buildDescription.xml"
 # the importer's own headers, by version of the standard; the first declares all functions
 HEADERS = {
@@ -40,14 +50,21 @@ PLATFORMS = {
     "x86_64-darwin": (".dylib", MACH, 4, b"\x07\x00\x00\x01"),
     "aarch64-darwin": (".dylib", MACH, 4, b"\x0c\x00\x00\x01"),
 }
-FAT, FAT_ENTRIES = b"\xca\xfe\xba\xbe", 8  # libraries of several machines in one Mach-O file; where the list of them begins, big-endian
+FAT, FAT_ENTRIES = (
+    b"\xca\xfe\xba\xbe",
+    8,
+)  # libraries of several machines in one Mach-O file; where the list of them begins, big-endian
 PE_HEADER = 0x3C  # where a PE file says where its header is
 # paths that only the machine where it was made has
-ABSOLUTE = re.compile(rb"(?:/home/|/root/|/Users/|/tmp/|/work/|[A-Z]:[\\/](?:Users|Windows|Program Files|build|work|src)[\\/])[\w.+-]+")
+ABSOLUTE = re.compile(
+    rb"(?:/home/|/root/|/Users/|/tmp/|/work/|[A-Z]:[\\/](?:Users|Windows|Program Files|build|work|src)[\\/])[\w.+-]+"
+)
 
 
 def archive_problems(path: Path) -> list[str]:
-    """What is wrong with the archive and its documents, one sentence each. Raises KeyError without a modelDescription.xml."""
+    """What is wrong with the archive and its documents, one sentence each. Raises KeyError
+    without a modelDescription.xml.
+    """
     found, problems = read_members(path)
     if found is None:
         return problems
@@ -56,7 +73,9 @@ def archive_problems(path: Path) -> list[str]:
         return problems
     root = ElementTree.fromstring(found[DESCRIPTION])
     problems += [*description_problems(root), *_source_problems(root, found)]
-    return problems + member_problems(root, found, [variable.name for variable in variables(root)], fmi=2)
+    return problems + member_problems(
+        root, found, [variable.name for variable in variables(root)], fmi=2
+    )
 
 
 def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
@@ -69,7 +88,9 @@ def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
         return found, list(zip_problems(archive))
 
 
-def member_problems(root: Element, found: dict[str, bytes], names: Iterable[str], *, fmi: int) -> list[str]:
+def member_problems(
+    root: Element, found: dict[str, bytes], names: Iterable[str], *, fmi: int
+) -> list[str]:
     """What is wrong with an archive's members, for either version of the standard.
 
     Args:
@@ -94,11 +115,19 @@ def zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
         yield f"{name} is there more than once"
     for info in archive.infolist():
         name = info.filename
-        if name.startswith("/") or "\\" in info.orig_filename or ".." in PurePosixPath(name).parts or ":" in name:
+        if (
+            name.startswith("/")
+            or "\\" in info.orig_filename
+            or ".." in PurePosixPath(name).parts
+            or ":" in name
+        ):
             yield f"{name!r} is no path inside the archive"
         if not name.isascii():
             yield f"{name!r} is not ASCII: unpackers disagree about its encoding"
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or info.extract_version > DEFLATE_VERSION:
+        if (
+            info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+            or info.extract_version > DEFLATE_VERSION
+        ):
             yield f"{name} is packed by method {info.compress_type}, version {info.extract_version}; expected store or deflate, 2.0"
         if info.flag_bits & DESCRIPTOR and info.compress_type == zipfile.ZIP_STORED:
             yield f"{name} is stored with its size behind it"
@@ -127,14 +156,21 @@ def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
     for name in sorted(present):
         if PurePosixPath(name).name in HEADERS[fmi]:
             yield f"sources/{name} is the standard's, which importers have themselves"
-        includes = [include for include in _includes(found[f"sources/{name}"]) if include not in HEADERS[fmi]]
+        includes = [
+            include
+            for include in _includes(found[f"sources/{name}"])
+            if include not in HEADERS[fmi]
+        ]
         missing = [include for include in includes if not _is_there(include, name, present)]
         for include in missing:
             yield f'sources/{name} includes "{include}", which is not in the archive'
 
 
 def _includes(text: bytes) -> list[str]:
-    return [include.decode() for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)]
+    return [
+        include.decode()
+        for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
+    ]
 
 
 def _is_there(include: str, name: str, present: Iterable[str]) -> bool:
@@ -150,8 +186,12 @@ def standard_functions(fmi: int = 2) -> list[str]:
 def binary_problems(root: Element, found: dict[str, bytes], fmi: int) -> Iterator[str]:
     """A library for every interface in each platform's folder."""
     elements = [root.find(name) for name in INTERFACES]
-    identifiers = {str(element.get("modelIdentifier")) for element in elements if element is not None}
-    platforms = sorted({PurePosixPath(name).parts[1] for name in found if name.startswith("binaries/")})
+    identifiers = {
+        str(element.get("modelIdentifier")) for element in elements if element is not None
+    }
+    platforms = sorted(
+        {PurePosixPath(name).parts[1] for name in found if name.startswith("binaries/")}
+    )
     if not platforms and not any(name.startswith("sources/") for name in found):
         yield "neither binaries nor sources are there"
     for platform in platforms:
@@ -171,15 +211,25 @@ def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> 
     _, magic, place, machine = PLATFORMS[platform]
     if magic == MACH and data.startswith(FAT):
         magic, entries = FAT, int.from_bytes(data[4:8], "big")
-        machines = [data[at : at + 4][::-1] for at in range(FAT_ENTRIES, FAT_ENTRIES + 20 * entries, 20)]
+        machines = [
+            data[at : at + 4][::-1] for at in range(FAT_ENTRIES, FAT_ENTRIES + 20 * entries, 20)
+        ]
     else:
-        at = int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4 if place is None else place
+        at = (
+            int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4
+            if place is None
+            else place
+        )
         machines = [data[at : at + len(machine)]]
     if not data.startswith(magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
     start = b"\0_" if magic in (MACH, FAT) else b"\0"
-    missing = [function for function in standard_functions(fmi) if start + function.encode() + b"\0" not in data]
+    missing = [
+        function
+        for function in standard_functions(fmi)
+        if start + function.encode() + b"\0" not in data
+    ]
     if missing:
         yield f"{name} lacks {len(missing)} functions of the standard: {', '.join(missing)}"
 
@@ -218,7 +268,11 @@ def _group_problems(parent: Element, path: str, known: set[str]) -> Iterator[str
 
 def document_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
     """Licence, page and pictures there; nothing that tells of the machine where they were made."""
-    for name, use in ((LICENCE, "the licence"), (PAGE, "the documentation"), (PICTURES[fmi], "the robot's picture")):
+    for name, use in (
+        (LICENCE, "the licence"),
+        (PAGE, "the documentation"),
+        (PICTURES[fmi], "the robot's picture"),
+    ):
         if not found.get(name, b"").strip():
             yield f"{name}, {use}, is missing"
     for name in (PICTURES[fmi], f"{FOLDER}/{ICON}"):

@@ -1,4 +1,6 @@
-"""Is a modelDescription.xml of FMI 2.0 what the standard means? What its schema and fmpy's validation do not see."""
+"""Is a modelDescription.xml of FMI 2.0 what the standard means? What its schema and fmpy's
+validation do not see.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ KINDS = {"Real", "Integer", "Boolean", "String", "Enumeration"}
 
 
 def schema_problems(member: str, data: bytes, schema: str) -> list[str]:
-    """Where a document breaks one of the standard's schemas, such as fmi3/fmi3TerminalsAndIcons.xsd."""
+    """Where a document breaks one of the standard's schemas, such as
+    fmi3/fmi3TerminalsAndIcons.xsd.
+    """
     try:
         document = etree.fromstring(data)
     except etree.XMLSyntaxError as error:
@@ -29,7 +33,12 @@ def schema_problems(member: str, data: bytes, schema: str) -> list[str]:
 def description_problems(root: Element) -> list[str]:
     """Everything below, of a document that its schema accepts."""
     types = [
-        Entry(entry.get("name", ""), kind.tag, kind.attrib, items=tuple(item.get("value", "") for item in kind.iterfind("Item")))
+        Entry(
+            entry.get("name", ""),
+            kind.tag,
+            kind.attrib,
+            items=tuple(item.get("value", "") for item in kind.iterfind("Item")),
+        )
         for entry in root.iterfind("TypeDefinitions/SimpleType")
         for kind in entry
         if kind.tag in KINDS

@@ -1,4 +1,6 @@
-"""Is a modelDescription.xml of FMI 3.0 what the standard means? What its schema and fmpy's validation do not see."""
+"""Is a modelDescription.xml of FMI 3.0 what the standard means? What its schema and fmpy's
+validation do not see.
+"""
 
 from __future__ import annotations
 
@@ -8,23 +10,38 @@ from xml.etree.ElementTree import Element
 
 from hexapod_cosim.cosim.validate.variable import Entry, declaration_problems, dependency_problems
 
-SECTIONS = ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
+SECTIONS = (
+    "Output",
+    "ContinuousStateDerivative",
+    "ClockedState",
+    "InitialUnknown",
+    "EventIndicator",
+)
 DERIVATIVES = "ContinuousStateDerivative"  # in the states' order; all others ascending
 
 
 def description_problems3(root: Element) -> list[str]:
     """Everything below, of a document that its schema accepts."""
     types = [
-        Entry(entry.get("name", ""), entry.tag.removesuffix("Type"), entry.attrib, items=_items(entry))
+        Entry(
+            entry.get("name", ""), entry.tag.removesuffix("Type"), entry.attrib, items=_items(entry)
+        )
         for entry in root.iterfind("TypeDefinitions/*")
     ]
-    return [*declaration_problems(root, variables3(root), types), *_size_problems(root), *_structure_problems(root)]
+    return [
+        *declaration_problems(root, variables3(root), types),
+        *_size_problems(root),
+        *_structure_problems(root),
+    ]
 
 
 def variables3(root: Element) -> list[Entry]:
     """Each variable; arrays are one."""
     found = root.iterfind("ModelVariables/*")
-    return [Entry(entry.get("name", ""), entry.tag, entry.attrib, entry.get("description", "")) for entry in found]
+    return [
+        Entry(entry.get("name", ""), entry.tag, entry.attrib, entry.get("description", ""))
+        for entry in found
+    ]
 
 
 def _items(entry: Element) -> tuple[str, ...]:
@@ -34,7 +51,9 @@ def _items(entry: Element) -> tuple[str, ...]:
 def _size_problems(root: Element) -> Iterator[str]:
     """As many start values as elements; one stands for all."""
     for variable in root.iterfind("ModelVariables/*"):
-        size = math.prod(int(dimension.get("start", "1")) for dimension in variable.iterfind("Dimension"))
+        size = math.prod(
+            int(dimension.get("start", "1")) for dimension in variable.iterfind("Dimension")
+        )
         count = len(variable.get("start", "").split())
         if variable.get("start") is not None and count not in (1, size):
             yield f"{variable.get('name')}: {count} start values, expected {size}"
@@ -42,7 +61,10 @@ def _size_problems(root: Element) -> Iterator[str]:
 
 def _structure_problems(root: Element) -> Iterator[str]:
     """Value references of ModelStructure and what they may refer to."""
-    known = {int(variable.get("valueReference", "-1")): variable for variable in root.iterfind("ModelVariables/*")}
+    known = {
+        int(variable.get("valueReference", "-1")): variable
+        for variable in root.iterfind("ModelVariables/*")
+    }
     if len(known) != len(root.findall("ModelVariables/*")):
         yield "variables share a value reference"
     for section in SECTIONS:
@@ -52,12 +74,21 @@ def _structure_problems(root: Element) -> Iterator[str]:
             yield f"ModelStructure/{section}: value references are not ascending, each once"
         for unknown in unknowns:
             yield from _unknown_problems(section, unknown, known)
-    stated = sorted(unknown.get("valueReference", "") for unknown in root.iterfind(f"ModelStructure/{DERIVATIVES}"))
-    if stated != sorted(variable.get("valueReference", "") for variable in known.values() if variable.get("derivative") is not None):
+    stated = sorted(
+        unknown.get("valueReference", "")
+        for unknown in root.iterfind(f"ModelStructure/{DERIVATIVES}")
+    )
+    if stated != sorted(
+        variable.get("valueReference", "")
+        for variable in known.values()
+        if variable.get("derivative") is not None
+    ):
         yield f"ModelStructure/{DERIVATIVES} does not name each derivative of a state once"
 
 
-def _unknown_problems(section: str, unknown: Element, known: Mapping[int, Element]) -> Iterator[str]:
+def _unknown_problems(
+    section: str, unknown: Element, known: Mapping[int, Element]
+) -> Iterator[str]:
     where = f"ModelStructure/{section} {unknown.get('valueReference')}"
     variable = known.get(int(unknown.get("valueReference", "-1")))
     if variable is None:

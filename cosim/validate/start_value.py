@@ -1,4 +1,6 @@
-"""The binary takes its robot from start_values.txt, importers see modelDescription.xml: do both say the same?"""
+"""The binary takes its robot from start_values.txt, importers see modelDescription.xml: do both
+say the same?
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ def start_value_problems(data: bytes | None, token: str, description: Any) -> It
     Args:
         data: its bytes; None without one.
         token: the GUID or instantiation token of modelDescription.xml.
-        description: the rest of modelDescription.xml, as fmpy reads it; arrays stand for consecutive value references.
+        description: the rest of modelDescription.xml, as fmpy reads it; arrays stand for
+            consecutive value references.
     """
     if data is None:
         yield f"{START_VALUES} is missing: the binary takes the robot from it"
@@ -31,10 +34,18 @@ def start_value_problems(data: bytes | None, token: str, description: Any) -> It
             continue
         seen.add(words[0])
         yield from _line_problems(f"{START_VALUES} line {number}", words, stated)
-    yield from _missing_problems([f"{reference} ({name})" for reference, (name, _) in stated.items() if str(reference) not in seen])
+    yield from _missing_problems(
+        [
+            f"{reference} ({name})"
+            for reference, (name, _) in stated.items()
+            if str(reference) not in seen
+        ]
+    )
 
 
-def _line_problems(where: str, words: list[str], stated: dict[int, tuple[str, float]]) -> Iterator[str]:
+def _line_problems(
+    where: str, words: list[str], stated: dict[int, tuple[str, float]]
+) -> Iterator[str]:
     if len(words) < 2 or not words[0].isdecimal() or math.isnan(_number(words[1])):
         yield f"{where}: got {' '.join(words)!r}, expected a value reference and a value"
         return
@@ -55,7 +66,9 @@ def _missing_problems(missing: list[str]) -> Iterator[str]:
 
 
 def _stated(description: Any) -> dict[int, tuple[str, float]]:
-    """Names and start values by the references of elements: an array's own, and those that follow."""
+    """Names and start values by the references of elements: an array's own, and those that
+    follow.
+    """
     return {
         int(variable.valueReference) + place: (str(variable.name), _number(word))
         for variable in description.modelVariables

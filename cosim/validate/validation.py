@@ -30,7 +30,9 @@ FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
 
 
 def find_problems(path: Path) -> list[str]:
-    """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when it is no FMU at all."""
+    """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when
+    it is no FMU at all.
+    """
     try:
         description = open_description(path)
     except FmuError:
@@ -45,7 +47,9 @@ def find_problems(path: Path) -> list[str]:
 
 
 def _unread_problems(path: Path) -> list[str]:
-    """Of a modelDescription.xml that fmpy makes no sense of: it refers to what is not there, say. Empty if it cannot be parsed at all."""
+    """Of a modelDescription.xml that fmpy makes no sense of: it refers to what is not there,
+    say. Empty if it cannot be parsed at all.
+    """
     try:
         with zipfile.ZipFile(path) as archive:
             data = archive.read(DESCRIPTION)
@@ -53,12 +57,18 @@ def _unread_problems(path: Path) -> list[str]:
     except (OSError, zipfile.BadZipFile, KeyError, ElementTree.ParseError):
         return []
     fmi3 = root.get("fmiVersion", "").startswith("3.")
-    broken = schema_problems(DESCRIPTION, data, "fmi3/fmi3ModelDescription.xsd" if fmi3 else "fmi2/fmi2ModelDescription.xsd")
+    broken = schema_problems(
+        DESCRIPTION,
+        data,
+        "fmi3/fmi3ModelDescription.xsd" if fmi3 else "fmi2/fmi2ModelDescription.xsd",
+    )
     return broken or (description_problems3 if fmi3 else description_problems)(root)
 
 
 def find_own_problems(path: Path) -> list[str]:
-    """The same without fmpy's checks; what was packed for other machines alone is not run. Raises FmuError when it is no FMU at all."""
+    """The same without fmpy's checks; what was packed for other machines alone is not run.
+    Raises FmuError when it is no FMU at all.
+    """
     description, problems = read_description(path), archive_problems(path)
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
@@ -90,10 +100,18 @@ def _guid_problems(path: Path, description: Any) -> list[str]:
         extract(path, folder)
         identifier = description.coSimulation.modelIdentifier
         try:
-            with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
-                facts = {"guid": FOREIGN_GUID, "modelIdentifier": identifier, "libraryPath": packed_binary(folder, identifier)}
+            with chdir(
+                Path.cwd()
+            ):  # fmpy leaves the working folder changed when the library does not load
+                facts = {
+                    "guid": FOREIGN_GUID,
+                    "modelIdentifier": identifier,
+                    "libraryPath": packed_binary(folder, identifier),
+                }
                 slave = FMU2Slave(unzipDirectory=folder, instanceName="validate", **facts)
-        except Exception:  # fmpy's errors have no common type; that it does not load is told elsewhere
+        except (
+            Exception
+        ):  # fmpy's errors have no common type; that it does not load is told elsewhere
             return []
         try:
             slave.instantiate(callbacks=callbacks)
@@ -101,4 +119,6 @@ def _guid_problems(path: Path, description: Any) -> list[str]:
             slave.freeLibrary()
             return []
         slave.freeInstance()
-    return [f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of modelDescription.xml alone"]
+    return [
+        f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of modelDescription.xml alone"
+    ]

@@ -1,4 +1,6 @@
-"""Are a model description's variables what the standard means? What FMI 2.0 and 3.0 ask alike, however they write it down."""
+"""Are a model description's variables what the standard means? What FMI 2.0 and 3.0 ask alike,
+however they write it down.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ class Entry:
         return self.attributes.get("start", "").split()
 
 
-def declaration_problems(root: Element, variables: Sequence[Entry], types: Sequence[Entry]) -> Iterator[str]:
+def declaration_problems(
+    root: Element, variables: Sequence[Entry], types: Sequence[Entry]
+) -> Iterator[str]:
     """Everything below, of a model description that its schema accepts."""
     by_name = {entry.name: entry for entry in types}
     yield from _identity_problems(root, variables)
@@ -53,9 +57,14 @@ def _identity_problems(root: Element, variables: Sequence[Entry]) -> Iterator[st
             yield f"{name} stands for {count} variables, expected one"
 
 
-def _unit_problems(root: Element, users: Sequence[Entry], types: Mapping[str, Entry]) -> Iterator[str]:
+def _unit_problems(
+    root: Element, users: Sequence[Entry], types: Mapping[str, Entry]
+) -> Iterator[str]:
     """Units defined and used, display units and types known."""
-    displays = {unit.get("name"): {entry.get("name") for entry in unit.iterfind("DisplayUnit")} for unit in root.iterfind(".//Unit")}
+    displays = {
+        unit.get("name"): {entry.get("name") for entry in unit.iterfind("DisplayUnit")}
+        for unit in root.iterfind(".//Unit")
+    }
     for user in users:
         unit, display = user.attributes.get("unit"), user.attributes.get("displayUnit")
         if unit is not None and unit not in displays:
@@ -112,14 +121,18 @@ def _number_problems(variable: Entry, inherited: Mapping[str, str]) -> Iterator[
 
 
 def dependency_problems(where: str, unknown: Element, known: Collection[int]) -> Iterator[str]:
-    """Of an entry of ModelStructure, whose dependencies are to be among known indices or value references."""
+    """Of an entry of ModelStructure, whose dependencies are to be among known indices or value
+    references.
+    """
     dependencies = [int(word) for word in unknown.get("dependencies", "").split()]
     if any(dependency not in known for dependency in dependencies):
         yield f"{where}: a dependency is not one of the {len(known)} variables"
     if dependencies != sorted(set(dependencies)):
         yield f"{where}: dependencies are not ascending, each once"
     kinds = unknown.get("dependenciesKind")
-    if kinds is not None and (len(kinds.split()) != len(dependencies) or not set(kinds.split()) <= DEPENDENCY_KINDS):
+    if kinds is not None and (
+        len(kinds.split()) != len(dependencies) or not set(kinds.split()) <= DEPENDENCY_KINDS
+    ):
         yield f"{where}: dependenciesKind does not tell one kind for each of {len(dependencies)} dependencies"
 
 
@@ -127,6 +140,9 @@ def _experiment_problems(root: Element) -> Iterator[str]:
     experiment = root.find("DefaultExperiment")
     if experiment is None:
         return
-    start, stop, step = (float(experiment.get(key, default)) for key, default in (("startTime", "0"), ("stopTime", "1"), ("stepSize", "1")))
+    start, stop, step = (
+        float(experiment.get(key, default))
+        for key, default in (("startTime", "0"), ("stopTime", "1"), ("stepSize", "1"))
+    )
     if not (start < stop and 0.0 < step <= stop - start):
         yield f"DefaultExperiment: steps of {step} s from {start} s to {stop} s make no experiment"

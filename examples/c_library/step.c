@@ -26,9 +26,10 @@ static void tell(hxPlant *plant, const hxInput *input, const char *what) {
   double sum = 0.0;
   int feet = 0;
   hx_plant_output(plant, input, &seen);
-  for (int leg = 0; leg < HX_LEGS; ++leg) sum += seen.foot.normal_force[leg], feet += seen.foot.contact[leg];
-  printf("%.2f s  %-8s %d feet on the ground carry %.3f N, torso %.1f mm ahead, %.1f mm high\n", seen.time, what, feet, sum,
-         1e3 * seen.torso.position[0], 1e3 * seen.torso.position[2]);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    sum += seen.foot.normal_force[leg], feet += seen.foot.contact[leg];
+  printf("%.2f s  %-8s %d feet on the ground carry %.3f N, torso %.1f mm ahead, %.1f mm high\n",
+         seen.time, what, feet, sum, 1e3 * seen.torso.position[0], 1e3 * seen.torso.position[2]);
 }
 
 int main(void) {

@@ -10,25 +10,33 @@ static int accept(hxMaster *master, hxMasterCall call, fmi2Status status) {
   return 0;
 }
 
-/* ---------------------------------------------------------------------------------------------- values */
+/* ----------------------------------------------------------------------------------------------
+ * values */
 
-static int get_reals(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlock *block, hxMasterCall call) {
+static int get_reals(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlock *block,
+                     hxMasterCall call) {
   double *value = master->value + block->place;
-  return !block->count || accept(master, call, fmu->get_real(fmu->instance, block->reference, block->count, value));
+  return !block->count ||
+         accept(master, call, fmu->get_real(fmu->instance, block->reference, block->count, value));
 }
 
-static int get_flags(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlock *block, hxMasterCall call) {
+static int get_flags(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlock *block,
+                     hxMasterCall call) {
   double *value = master->value + block->place;
   if (!block->count) return 1;
-  if (!accept(master, call, fmu->get_boolean(fmu->instance, block->reference, block->count, master->flag))) return 0;
+  if (!accept(master, call,
+              fmu->get_boolean(fmu->instance, block->reference, block->count, master->flag)))
+    return 0;
   for (size_t i = 0; i < block->count; ++i) value[i] = master->flag[i] ? 1.0 : 0.0;
   return 1;
 }
 
-/* ---------------------------------------------------------------------------------------------- sensors */
+/* ----------------------------------------------------------------------------------------------
+ * sensors */
 
 /* of one foot: what is shown instead of its delayed reading, or that */
-static void show_foot(const hxMasterSensor *sensor, int fault, size_t moment, const double *delayed, double *reading) {
+static void show_foot(const hxMasterSensor *sensor, int fault, size_t moment, const double *delayed,
+                      double *reading) {
   const size_t size = sensor->forces / sensor->feet * sizeof *reading;
   if (fault == HX_FAULT_DEAD)
     memset(reading, 0, size);
@@ -45,14 +53,16 @@ static void read_sensor(const hxMasterSensor *sensor, size_t moment, double *val
   if (sensor->factor)
     for (size_t i = 0; i < n; ++i) newest[i] *= sensor->factor[moment * n + i];
   /* before there is a reading so old, the first one holds */
-  for (size_t slot = 1; slot < slots && moment == 0; ++slot) memcpy(sensor->memory + slot * n, newest, n * sizeof *newest);
+  for (size_t slot = 1; slot < slots && moment == 0; ++slot)
+    memcpy(sensor->memory + slot * n, newest, n * sizeof *newest);
   for (size_t foot = 0; foot < sensor->feet; ++foot) {
     const int fault = sensor->fault ? sensor->fault[moment * sensor->feet + foot] : HX_FAULT_NONE;
     show_foot(sensor, fault, moment, oldest + foot * each, value + sensor->reading + foot * each);
   }
 }
 
-/* ---------------------------------------------------------------------------------------------- a macro-step */
+/* ---------------------------------------------------------------------------------------------- a
+ * macro-step */
 
 static int read_plant(hxMaster *master, size_t moment) {
   const hxMasterFmu *plant = &master->plant;
@@ -64,7 +74,8 @@ static int read_plant(hxMaster *master, size_t moment) {
 
 /* the controller's inputs: the command in force and what the robot senses */
 static void sense(const hxMaster *master, double *input) {
-  memcpy(input, master->command + master->step * master->command_count, master->command_count * sizeof *input);
+  memcpy(input, master->command + master->step * master->command_count,
+         master->command_count * sizeof *input);
   input += master->command_count;
   for (size_t i = 0; i < master->sensed_count; ++i) input[i] = master->value[master->sensed[i]];
 }
@@ -75,21 +86,26 @@ static int control(hxMaster *master) {
   const size_t inputs = master->command_count + master->sensed_count;
   sense(master, master->controller_value);
   return accept(master, HX_CALL_CONTROLLER_SET,
-                controller->set_real(controller->instance, master->controller_input, inputs, master->controller_value)) &&
+                controller->set_real(controller->instance, master->controller_input, inputs,
+                                     master->controller_value)) &&
          get_reals(master, controller, &master->controller_output, HX_CALL_CONTROLLER_GET) &&
          get_flags(master, controller, &master->controller_flag, HX_CALL_CONTROLLER_GET) &&
          accept(master, HX_CALL_CONTROLLER_STEP,
-                controller->do_step(controller->instance, master->time[master->step], master->h, fmi2True));
+                controller->do_step(controller->instance, master->time[master->step], master->h,
+                                    fmi2True));
 }
 
 static int write_plant(hxMaster *master) {
   const hxMasterBlock *input = &master->plant_input;
   return accept(master, HX_CALL_PLANT_SET,
-                master->plant.set_real(master->plant.instance, input->reference, input->count, master->value + input->place));
+                master->plant.set_real(master->plant.instance, input->reference, input->count,
+                                       master->value + input->place));
 }
 
 static int step_plant(hxMaster *master) {
-  return accept(master, HX_CALL_PLANT_STEP, master->plant.do_step(master->plant.instance, master->time[master->step], master->h, fmi2True));
+  return accept(master, HX_CALL_PLANT_STEP,
+                master->plant.do_step(master->plant.instance, master->time[master->step], master->h,
+                                      fmi2True));
 }
 
 static void write_row(hxMasterTable *table, const double *value) {
@@ -136,7 +152,8 @@ void hx_master_record(hxMaster *master) { record(master, 1); }
 
 static int macro_step(hxMaster *master) {
   if (master->push)
-    memcpy(master->value + master->push_place, master->push + master->step * master->push_count, master->push_count * sizeof(double));
+    memcpy(master->value + master->push_place, master->push + master->step * master->push_count,
+           master->push_count * sizeof(double));
   if (!control(master) || !write_plant(master)) return 0;
   record(master, master->step % master->every == 0);
   if (!step_plant(master)) return 0;
@@ -144,7 +161,8 @@ static int macro_step(hxMaster *master) {
   return read_plant(master, master->step);
 }
 
-/* ---------------------------------------------------------------------------------------------- runs */
+/* ----------------------------------------------------------------------------------------------
+ * runs */
 
 size_t hx_master_size(void) { return sizeof(hxMaster); }
 

@@ -1,4 +1,6 @@
-"""What a URDF cannot say and nobody gave: scaled from the ATHENA-like robot, as assumed.toml is copied from it."""
+"""What a URDF cannot say and nobody gave: scaled from the ATHENA-like robot, as assumed.toml is
+copied from it.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,10 @@ TORQUE_ANGLE = 0.15  # rad    error at which the servo gives all it has: kp
 DAMPING_TIME = 0.02  # s    kd / kp
 ROTOR_TIME = math.sqrt(0.01 / 40.0)  # s    sqrt(rotor inertia / kp)
 CONTINUOUS = 0.2  # 1    of the stall torque
-FEMUR_RISE, TIBIA_RISE = 0.386, -1.399  # rad    directions of both above the horizontal when standing
+FEMUR_RISE, TIBIA_RISE = (
+    0.386,
+    -1.399,
+)  # rad    directions of both above the horizontal when standing
 STRIDE, STEP_HEIGHT = 2.0 / 3.0, 1.0 / 3.0  # 1    of the height of the hips above the feet
 # s, m    of the ATHENA-like robot; robots of other heights walk at the same Froude number
 GAIT_PERIOD, HIP_HEIGHT = 1.0, 0.12
@@ -29,7 +34,12 @@ def assume_servo(servo: Table) -> list[str]:
     kp = servo.get("kp", servo["torque_max"] / TORQUE_ANGLE)
     if not isinstance(kp, int | float):
         return []  # the reader refuses it
-    scaled = {"kp": kp, "kd": DAMPING_TIME * kp, "rotor_inertia": ROTOR_TIME**2 * kp, "torque_continuous": CONTINUOUS * servo["torque_max"]}
+    scaled = {
+        "kp": kp,
+        "kd": DAMPING_TIME * kp,
+        "rotor_inertia": ROTOR_TIME**2 * kp,
+        "torque_continuous": CONTINUOUS * servo["torque_max"],
+    }
     return _fill(servo, scaled)
 
 
@@ -49,14 +59,27 @@ def _fill(table: Table, values: Mapping[str, float]) -> list[str]:
 def equivalent_box(mass: float, inertia: list[float]) -> list[float]:
     """Edges [m] of the homogeneous box of these moments about its centre."""
     xx, yy, zz = inertia[:3]
-    return [math.sqrt(max(6.0 * square / mass, 1e-8)) for square in (yy + zz - xx, xx + zz - yy, xx + yy - zz)]
+    return [
+        math.sqrt(max(6.0 * square / mass, 1e-8))
+        for square in (yy + zz - xx, xx + zz - yy, xx + yy - zz)
+    ]
 
 
 def assume_stances(legs: Mapping[str, Table]) -> list[str]:
-    """Joint angles for legs that have none: femur a little up, tibia steeply down, all feet at one height. Returns those legs' names."""
-    missing = [name for name, leg in legs.items() if any("stance" not in leg[joint] for joint in JOINT_NAMES)]
+    """Joint angles for legs that have none: femur a little up, tibia steeply down, all feet at
+    one height. Returns those legs' names.
+    """
+    missing = [
+        name
+        for name, leg in legs.items()
+        if any("stance" not in leg[joint] for joint in JOINT_NAMES)
+    ]
     planes = {name: _Plane(legs[name]) for name in missing}
-    height = float(np.mean([plane.foot_height(FEMUR_RISE) for plane in planes.values()])) if planes else 0.0
+    height = (
+        float(np.mean([plane.foot_height(FEMUR_RISE) for plane in planes.values()]))
+        if planes
+        else 0.0
+    )
     for name, plane in planes.items():
         for joint, angle in zip(JOINT_NAMES, plane.stance(height), strict=True):
             leg = legs[name][joint]
@@ -65,17 +88,23 @@ def assume_stances(legs: Mapping[str, Table]) -> list[str]:
 
 
 class _Plane:
-    """A leg of the controller's pattern in its own plane (controller/kinematics.py has the equations)."""
+    """A leg of the controller's pattern in its own plane (controller/kinematics.py has the
+    equations).
+    """
 
     def __init__(self, leg: Table) -> None:
-        tips = [complex(leg[joint]["length"], leg[joint].get("offset_z", 0.0)) for joint in JOINT_NAMES]
+        tips = [
+            complex(leg[joint]["length"], leg[joint].get("offset_z", 0.0)) for joint in JOINT_NAMES
+        ]
         self.base = leg["hip_position"][2] + tips[0].imag
         self.size = [abs(tip) for tip in tips[1:]]
         self.tilt = [math.atan2(tip.imag, tip.real) for tip in tips[1:]]
 
     def foot_height(self, rise: float) -> float:
         """z of the foot [m] in the torso's frame with the femur at `rise`."""
-        return float(self.base + self.size[0] * math.sin(rise) + self.size[1] * math.sin(TIBIA_RISE))
+        return float(
+            self.base + self.size[0] * math.sin(rise) + self.size[1] * math.sin(TIBIA_RISE)
+        )
 
     def stance(self, height: float) -> Array:
         """(3,) angles [rad] that put the foot at a height [m]."""

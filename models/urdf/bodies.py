@@ -46,20 +46,35 @@ class Body:
     @property
     def spheres(self) -> list[Sphere]:
         """Collision spheres in the body's frame."""
-        return [Sphere(member.point(sphere.centre), sphere.radius) for member in self.members for sphere in member.link.spheres]
+        return [
+            Sphere(member.point(sphere.centre), sphere.radius)
+            for member in self.members
+            for sphere in member.link.spheres
+        ]
 
     def inertial(self, where: str) -> Inertial:
-        """Mass, centre of mass and inertia of all members together, in the body's frame. Raises RobotError when there is no mass."""
+        """Mass, centre of mass and inertia of all members together, in the body's frame. Raises
+        RobotError when there is no mass.
+        """
         parts = [_moved(member) for member in self.members if member.link.inertial is not None]
         if not parts:
             fix = "give it <inertial> with its mass and inertia"
-            raise RobotError("a moving body without mass", expected="<inertial>", fix=fix, where=f"{where}: link {self.name!r}")
+            raise RobotError(
+                "a moving body without mass",
+                expected="<inertial>",
+                fix=fix,
+                where=f"{where}: link {self.name!r}",
+            )
         return parts[0] if len(parts) == 1 else _together(parts)
 
     @property
     def problem(self) -> RobotError | None:
         """Why its inertia is none of a possible body."""
-        found = (member.link.inertial.problem for member in self.members if member.link.inertial is not None)
+        found = (
+            member.link.inertial.problem
+            for member in self.members
+            if member.link.inertial is not None
+        )
         return next((problem for problem in found if problem is not None), None)
 
 
@@ -75,12 +90,16 @@ def _together(parts: list[Inertial]) -> Inertial:
     inertia = np.zeros((3, 3))
     for part in parts:
         d = part.com - com
-        inertia = inertia + part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))  # parallel axes
+        inertia = (
+            inertia + part.inertia + part.mass * (d @ d * np.eye(3) - np.outer(d, d))
+        )  # parallel axes
     return Inertial(mass, com, inertia)
 
 
 def root_body(urdf: Urdf) -> Body:
-    """The torso with everything behind it. Raises RobotError for what is no tree, or stands bolted to the world."""
+    """The torso with everything behind it. Raises RobotError for what is no tree, or stands
+    bolted to the world.
+    """
     leaving = _leaving(urdf)
     root = _unworldly(_root(urdf), leaving, urdf)
     torso = Body(root)
@@ -91,7 +110,13 @@ def root_body(urdf: Urdf) -> Body:
         reached |= {member.link.name for member in body.members}
     if len(reached) < len(urdf.links):
         got = sorted(set(urdf.links) - reached)[0]
-        raise RobotError("links in a ring of their own", got=got, expected="a tree", fix="connect them to the root", where=urdf.where)
+        raise RobotError(
+            "links in a ring of their own",
+            got=got,
+            expected="a tree",
+            fix="connect them to the root",
+            where=urdf.where,
+        )
     return torso
 
 
@@ -106,7 +131,13 @@ def _leaving(urdf: Urdf) -> dict[str, list[UrdfJoint]]:
                 raise unknown_name("link", name, list(urdf.links), where=where, error=RobotError)
         if joint.child in parents:
             got = f"link {joint.child!r} also hangs on {parents[joint.child]!r}"
-            raise RobotError("a closed loop", got=got, expected="a tree", fix="remove one of the joints", where=where)
+            raise RobotError(
+                "a closed loop",
+                got=got,
+                expected="a tree",
+                fix="remove one of the joints",
+                where=where,
+            )
         parents[joint.child] = joint.parent
         leaving[joint.parent].append(joint)
     return leaving
@@ -117,7 +148,11 @@ def _root(urdf: Urdf) -> str:
     roots = [name for name in urdf.links if name not in children]
     if len(roots) != 1:
         raise RobotError(
-            "not one root link", got=roots, expected="one link that is no joint's child", fix="connect the links", where=urdf.where
+            "not one root link",
+            got=roots,
+            expected="one link that is no joint's child",
+            fix="connect the links",
+            where=urdf.where,
         )
     return roots[0]
 
@@ -129,7 +164,13 @@ def _unworldly(root: str, leaving: dict[str, list[UrdfJoint]], urdf: Urdf) -> st
         return joints[0].child
     if root == "world" and any(joint.kind == "fixed" for joint in joints):
         fix = "remove the link world and its joint, or make that floating"
-        raise RobotError("a robot fixed to the world", got=joints[0].name, expected="a torso that moves", fix=fix, where=urdf.where)
+        raise RobotError(
+            "a robot fixed to the world",
+            got=joints[0].name,
+            expected="a torso that moves",
+            fix=fix,
+            where=urdf.where,
+        )
     return root
 
 
@@ -143,10 +184,16 @@ def _collect(body: Body, urdf: Urdf, leaving: dict[str, list[UrdfJoint]]) -> Non
             if joint.kind == "floating":
                 fix = "only the torso may float: make it fixed"
                 raise RobotError(
-                    "a link that floats", got=joint.child, expected="joints", fix=fix, where=f"{urdf.where}: joint {joint.name!r}"
+                    "a link that floats",
+                    got=joint.child,
+                    expected="joints",
+                    fix=fix,
+                    where=f"{urdf.where}: joint {joint.name!r}",
                 )
             R, p = member.rotation @ joint.rotation, member.point(joint.position)
             if joint.kind == "fixed":
                 waiting.append(Member(urdf.links[joint.child], R, p))
             else:
-                body.branches.append(Branch(joint, R, p, member is body.members[0], Body(joint.child)))
+                body.branches.append(
+                    Branch(joint, R, p, member is body.members[0], Body(joint.child))
+                )

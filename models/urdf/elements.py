@@ -1,6 +1,8 @@
-"""What a URDF says, link by link and joint by joint, checked where a single element can be. Raises RobotError, naming the element.
+"""What a URDF says, link by link and joint by joint, checked where a single element can be. Raises
+RobotError, naming the element.
 
-The format: wiki.ros.org/urdf/XML. Rotations are matrices that turn the element's components into its parent's.
+The format: wiki.ros.org/urdf/XML. Rotations are matrices that turn the element's components into
+its parent's.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ class Inertial:
     mass: float
     com: Array  # (3,)
     inertia: Array  # (3, 3)
-    problem: RobotError | None = None  # why no body can be so; to be raised unless someone else gives the inertia
+    problem: RobotError | None = (
+        None  # why no body can be so; to be raised unless someone else gives the inertia
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +53,11 @@ class UrdfLink:
     name: str
     inertial: Inertial | None
     spheres: tuple[Sphere, ...]
-    box: Array | None  # (3,) m    extents along the link's axes of its first collision box, else of its first visual one
+    box: (
+        Array | None
+        # (3,) m    extents along the link's axes of its first collision box, else of its first
+        # visual one
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,18 +91,37 @@ def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -
     """Reads a URDF; `ignore` may hold "damping"."""
     root = read_root(text, where)
     ignored: Counter[str] = Counter()
-    links = [_link(element, f"{where}: link {name_of(element, where)!r}", ignored) for element in root.findall("link")]
-    joints = [_joint(element, f"{where}: joint {name_of(element, where)!r}", ignore, ignored) for element in root.findall("joint")]
+    links = [
+        _link(element, f"{where}: link {name_of(element, where)!r}", ignored)
+        for element in root.findall("link")
+    ]
+    joints = [
+        _joint(element, f"{where}: joint {name_of(element, where)!r}", ignore, ignored)
+        for element in root.findall("joint")
+    ]
     ignored.update(element.tag for element in root if element.tag not in SILENT)
     _refuse_twins([link.name for link in links], "link", where)
     _refuse_twins([joint.name for joint in joints], "joint", where)
-    return Urdf(root.get("name") or "robot", where, {link.name: link for link in links}, tuple(joints), root.find(EXTENSION), ignored)
+    return Urdf(
+        root.get("name") or "robot",
+        where,
+        {link.name: link for link in links},
+        tuple(joints),
+        root.find(EXTENSION),
+        ignored,
+    )
 
 
 def _refuse_twins(names: list[str], kind: str, where: str) -> None:
     twins = [name for name, count in Counter(names).items() if count > 1]
     if twins:
-        raise RobotError(f"a {kind} twice", got=twins[0], expected="different names", fix="rename one", where=where)
+        raise RobotError(
+            f"a {kind} twice",
+            got=twins[0],
+            expected="different names",
+            fix="rename one",
+            where=where,
+        )
 
 
 def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
@@ -108,7 +135,12 @@ def _link(element: ET.Element, where: str, ignored: Counter[str]) -> UrdfLink:
                 spheres.append(Sphere(p, number(sphere, "radius", None, f"{where}: {tag}")))
             if box is not None:
                 boxes.append(np.abs(R) @ numbers(box, "size", None, f"{where}: {tag}"))
-    return UrdfLink(element.get("name", ""), _inertial(element, where), tuple(spheres), boxes[0] if boxes else None)
+    return UrdfLink(
+        element.get("name", ""),
+        _inertial(element, where),
+        tuple(spheres),
+        boxes[0] if boxes else None,
+    )
 
 
 def _inertial(link: ET.Element, where: str) -> Inertial | None:
@@ -122,12 +154,16 @@ def _inertial(link: ET.Element, where: str) -> Inertial | None:
     R, p, _ = origin(element, at)
     table = element.find("inertia")
     moments = tuple(
-        number(table, key, None if key in ("ixx", "iyy", "izz") else 0.0, at) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        number(table, key, None if key in ("ixx", "iyy", "izz") else 0.0, at)
+        for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     )
     if mass == 0.0:
         return None
     return Inertial(
-        mass, p, R @ inertia_matrix(moments) @ R.T + 0.0, _problem(mass, moments, at) if any(moments) else None
+        mass,
+        p,
+        R @ inertia_matrix(moments) @ R.T + 0.0,
+        _problem(mass, moments, at) if any(moments) else None,
     )  # none: a point mass
 
 
@@ -139,38 +175,62 @@ def _problem(mass: float, moments: tuple[float, ...], where: str) -> RobotError 
     return None
 
 
-def _joint(element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]) -> UrdfJoint:
+def _joint(
+    element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]
+) -> UrdfJoint:
     kind = element.get("type", "")
     if kind not in KINDS:
         raise unknown_name("joint type", kind, KINDS, where=where, error=RobotError)
     if kind in ("prismatic", "planar"):
-        raise RobotError("a joint that slides", got=kind, expected="revolute, continuous or fixed", fix="make it fixed", where=where)
+        raise RobotError(
+            "a joint that slides",
+            got=kind,
+            expected="revolute, continuous or fixed",
+            fix="make it fixed",
+            where=where,
+        )
     moves = kind in MOVING
     if moves:
         _refuse_mimic(element, where)
     R, p, angles = origin(element, where)
     limit, lower, upper = _limits(element, kind, where, ignored)
     return UrdfJoint(
-        name=element.get("name", ""), kind=kind, parent=_end(element, "parent", where), child=_end(element, "child", where),
-        rotation=R, position=p, yaw=angles[2] if angles[:2] == [0.0, 0.0] else None,
-        axis=_axis(element, where) if moves else np.zeros(3), lower=lower, upper=upper,
-        effort=_optional(limit, "effort", where), velocity=_optional(limit, "velocity", where),
+        name=element.get("name", ""),
+        kind=kind,
+        parent=_end(element, "parent", where),
+        child=_end(element, "child", where),
+        rotation=R,
+        position=p,
+        yaw=angles[2] if angles[:2] == [0.0, 0.0] else None,
+        axis=_axis(element, where) if moves else np.zeros(3),
+        lower=lower,
+        upper=upper,
+        effort=_optional(limit, "effort", where),
+        velocity=_optional(limit, "velocity", where),
         friction=_friction(element, where, ignore, ignored) if moves else 0.0,
-    )  # fmt: skip
+    )
 
 
 def _refuse_mimic(element: ET.Element, where: str) -> None:
     mimic = element.find("mimic")
     if mimic is not None:
         got = f"mimics {mimic.get('joint')!r}"
-        raise RobotError("a joint that follows another", got=got, expected="joints of their own", fix="remove <mimic>", where=where)
+        raise RobotError(
+            "a joint that follows another",
+            got=got,
+            expected="joints of their own",
+            fix="remove <mimic>",
+            where=where,
+        )
 
 
 def _end(element: ET.Element, tag: str, where: str) -> str:
     end = element.find(tag)
     name = None if end is None else end.get("link")
     if not name:
-        raise RobotError(f"a joint without {tag}", expected=f'<{tag} link="..."/>', fix="add it", where=where)
+        raise RobotError(
+            f"a joint without {tag}", expected=f'<{tag} link="..."/>', fix="add it", where=where
+        )
     return name
 
 
@@ -178,7 +238,13 @@ def _axis(element: ET.Element, where: str) -> Array:
     axis = numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0), where)
     length = float(np.linalg.norm(axis))
     if length == 0.0:
-        raise RobotError("an axis without direction", got=axis.tolist(), expected="a direction", fix="correct it", where=f"{where}: axis")
+        raise RobotError(
+            "an axis without direction",
+            got=axis.tolist(),
+            expected="a direction",
+            fix="correct it",
+            where=f"{where}: axis",
+        )
     return axis if abs(length - 1.0) <= AXIS_TOLERANCE else axis / length
 
 
@@ -188,29 +254,45 @@ def _optional(limit: ET.Element | None, key: str, where: str) -> float | None:
     return abs(value) or None
 
 
-def _limits(element: ET.Element, kind: str, where: str, ignored: Counter[str]) -> tuple[ET.Element | None, float, float]:
+def _limits(
+    element: ET.Element, kind: str, where: str, ignored: Counter[str]
+) -> tuple[ET.Element | None, float, float]:
     limit = element.find("limit")
     if kind == "revolute" and limit is None:
         fix = 'add <limit lower="..." upper="..." effort="..." velocity="..."/>, or make it continuous'
-        raise RobotError("a revolute joint without limits", expected="<limit>", fix=fix, where=where)
+        raise RobotError(
+            "a revolute joint without limits", expected="<limit>", fix=fix, where=where
+        )
     if kind != "revolute":
         return limit, -math.pi, math.pi
     lower, upper = number(limit, "lower", 0.0, where), number(limit, "upper", 0.0, where)
     if not lower < upper:
         raise RobotError(
-            "limits not ordered", got=[lower, upper], expected="lower < upper [rad]", fix="correct them", where=f"{where}: limit"
+            "limits not ordered",
+            got=[lower, upper],
+            expected="lower < upper [rad]",
+            fix="correct them",
+            where=f"{where}: limit",
         )
     if lower < -math.pi or upper > math.pi:
         ignored["limits beyond half a turn"] += 1
     return limit, max(lower, -math.pi), min(upper, math.pi)
 
 
-def _friction(element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]) -> float:
+def _friction(
+    element: ET.Element, where: str, ignore: tuple[str, ...], ignored: Counter[str]
+) -> float:
     dynamics = element.find("dynamics")
     damping = number(dynamics, "damping", 0.0, where)
     if damping != 0.0 and DAMPING not in ignore:
         fix = 'put it into servo.kd and write `ignore = ["damping"]` under [urdf] of a robot file with file = "..."'
-        raise RobotError("viscous damping in a joint", got=damping, expected="0 N m s/rad", fix=fix, where=f"{where}: dynamics")
+        raise RobotError(
+            "viscous damping in a joint",
+            got=damping,
+            expected="0 N m s/rad",
+            fix=fix,
+            where=f"{where}: dynamics",
+        )
     ignored[DAMPING] += damping != 0.0
     return number(dynamics, "friction", 0.0, where)
 

@@ -1,4 +1,6 @@
-"""Our own element of a URDF, <hexapod>: what URDF has no words for, one child a section of robot files."""
+"""Our own element of a URDF, <hexapod>: what URDF has no words for, one child a section of robot
+files.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +13,23 @@ from hexapod_cosim.models.urdf.values import number, numbers
 
 
 def extension_tables(urdf: Urdf, fields: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """The tables of our own element: one child a section, its attributes as the fields' types say."""
+    """The tables of our own element: one child a section, its attributes as the fields' types
+    say.
+    """
     tables: dict[str, Any] = {}
     for child in urdf.extension if urdf.extension is not None else ():
         where = f"{urdf.where}: {EXTENSION}: {child.tag}"
         if child.tag not in fields:
-            raise unknown_name("element", child.tag, list(fields), where=f"{urdf.where}: {EXTENSION}", error=RobotError)
-        tables[child.tag] = {key: _value(child, key, fields[child.tag], where) for key in child.attrib}
+            raise unknown_name(
+                "element",
+                child.tag,
+                list(fields),
+                where=f"{urdf.where}: {EXTENSION}",
+                error=RobotError,
+            )
+        tables[child.tag] = {
+            key: _value(child, key, fields[child.tag], where) for key in child.attrib
+        }
     return tables
 
 
@@ -27,4 +39,8 @@ def _value(element: ET.Element, key: str, fields: dict[str, Any], where: str) ->
     kind = type(fields[key]).__name__
     if kind == "Choice":
         return element.get(key)
-    return numbers(element, key, None, where, fields[key].size).tolist() if kind == "Vector" else number(element, key, None, where)
+    return (
+        numbers(element, key, None, where, fields[key].size).tolist()
+        if kind == "Vector"
+        else number(element, key, None, where)
+    )

@@ -1,5 +1,5 @@
-"""A URDF as the tables of a robot file, with what it does not say taken, in this order, from a side file, from the URDF's own
-<hexapod> element, or assumed.
+"""A URDF as the tables of a robot file, with what it does not say taken, in this order, from a side
+file, from the URDF's own <hexapod> element, or assumed.
 """
 
 from __future__ import annotations
@@ -31,8 +31,20 @@ from hexapod_cosim.models.records import (
     Terrain,
     Torso,
 )
-from hexapod_cosim.models.schema import Number, Vector, expect_table, read_given, refuse_unknown_keys, specs
-from hexapod_cosim.models.urdf.assumed import assume_gait, assume_servo, assume_stances, equivalent_box
+from hexapod_cosim.models.schema import (
+    Number,
+    Vector,
+    expect_table,
+    read_given,
+    refuse_unknown_keys,
+    specs,
+)
+from hexapod_cosim.models.urdf.assumed import (
+    assume_gait,
+    assume_servo,
+    assume_stances,
+    equivalent_box,
+)
 from hexapod_cosim.models.urdf.bodies import Body, root_body
 from hexapod_cosim.models.urdf.elements import DAMPING, Urdf, describe, parse_urdf
 from hexapod_cosim.models.urdf.extension import extension_tables
@@ -42,13 +54,29 @@ Table = dict[str, Any]
 
 JOINTS = "read: joints "  # a leg's, in source
 
-FORWARD = {"x": 0.0, "y": 0.5 * np.pi, "-x": np.pi, "-y": -0.5 * np.pi}  # the torso's yaw in the root link
-SIZES = {"torque_max": "effort", "speed_max": "velocity", "coulomb_friction": "friction"}  # servo's, and a joint's in the URDF
+FORWARD = {
+    "x": 0.0,
+    "y": 0.5 * np.pi,
+    "-x": np.pi,
+    "-y": -0.5 * np.pi,
+}  # the torso's yaw in the root link
+SIZES = {
+    "torque_max": "effort",
+    "speed_max": "velocity",
+    "coulomb_friction": "friction",
+}  # servo's, and a joint's in the URDF
 WHOLE = ("contact", "friction", "baumgarte", "solver", "terrain")  # sections a URDF says nothing of
 SECTIONS: dict[str, type[Any]] = {
-    "torso": Torso, "foot": Foot, "contact": Contact, "friction": Friction, "servo": Servo, "baumgarte": Baumgarte,
-    "solver": Solver, "terrain": Terrain, "gait": Gait,
-}  # fmt: skip
+    "torso": Torso,
+    "foot": Foot,
+    "contact": Contact,
+    "friction": Friction,
+    "servo": Servo,
+    "baumgarte": Baumgarte,
+    "solver": Solver,
+    "terrain": Terrain,
+    "gait": Gait,
+}
 EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
     **{name: dict(specs(record)) for name, record in SECTIONS.items()},
     "world": {"gravity": Vector("m/s2", 3)},
@@ -68,39 +96,79 @@ class Options:
     def read(cls, table: Mapping[str, Any], where: str) -> Options:
         """Checked. Raises RobotError."""
         refuse_unknown_keys(table, ["file", "forward", "ignore", "keep_frames"], where)
-        forward, ignore, keep = table.get("forward", "x"), table.get("ignore", []), table.get("keep_frames", False)
+        forward, ignore, keep = (
+            table.get("forward", "x"),
+            table.get("ignore", []),
+            table.get("keep_frames", False),
+        )
         if forward not in FORWARD:
-            raise unknown_name("direction", str(forward), FORWARD, where=f"{where}.forward", error=RobotError)
+            raise unknown_name(
+                "direction", str(forward), FORWARD, where=f"{where}.forward", error=RobotError
+            )
         if not isinstance(ignore, list) or any(name != DAMPING for name in ignore):
-            raise RobotError("cannot be ignored", got=ignore, expected=f'["{DAMPING}"]', fix="correct it", where=f"{where}.ignore")
+            raise RobotError(
+                "cannot be ignored",
+                got=ignore,
+                expected=f'["{DAMPING}"]',
+                fix="correct it",
+                where=f"{where}.ignore",
+            )
         if not isinstance(keep, bool):
-            raise RobotError("wrong type", got=keep, expected="true or false", fix="correct it", where=f"{where}.keep_frames")
+            raise RobotError(
+                "wrong type",
+                got=keep,
+                expected="true or false",
+                fix="correct it",
+                where=f"{where}.keep_frames",
+            )
         return cls(forward, tuple(ignore), keep)
 
 
 def side_table(side: Mapping[str, Any], folder: Path, where: str) -> Table:
-    """The whole table of a robot file that names a URDF under [urdf], relative to its folder. Raises RobotError."""
+    """The whole table of a robot file that names a URDF under [urdf], relative to its folder.
+    Raises RobotError.
+    """
     given = expect_table(side["urdf"], f"{where}: urdf")
     file = given.get("file")
     if not isinstance(file, str) or not file:
-        raise RobotError("no URDF named", got=file, expected="a path", fix='write file = "my.urdf"', where=f"{where}: urdf.file")
+        raise RobotError(
+            "no URDF named",
+            got=file,
+            expected="a path",
+            fix='write file = "my.urdf"',
+            where=f"{where}: urdf.file",
+        )
     rest = {key: value for key, value in side.items() if key != "urdf"}
-    return urdf_table(folder / file, side=rest, options=Options.read(given, f"{where}: urdf"), where=where)
+    return urdf_table(
+        folder / file, side=rest, options=Options.read(given, f"{where}: urdf"), where=where
+    )
 
 
-def urdf_table(path: Path, *, side: Mapping[str, Any] | None = None, options: Options | None = None, where: str | None = None) -> Table:
-    """The tables of a robot file, from a URDF and what is put over it; `where` names the side file. Raises RobotError."""
+def urdf_table(
+    path: Path,
+    *,
+    side: Mapping[str, Any] | None = None,
+    options: Options | None = None,
+    where: str | None = None,
+) -> Table:
+    """The tables of a robot file, from a URDF and what is put over it; `where` names the side
+    file. Raises RobotError.
+    """
     options, side = options or Options(), {} if side is None else side
     urdf = parse_urdf(_read(path), where=str(path), ignore=options.ignore)
     own = extension_tables(urdf, EXTENSION_FIELDS)
-    keep = options.keep_frames or (urdf.extension is not None and urdf.extension.get("frames") == "ours")
+    keep = options.keep_frames or (
+        urdf.extension is not None and urdf.extension.get("frames") == "ours"
+    )
     root = root_body(urdf)
     torso, legs = _found(root, urdf, options.forward, keep_frames=keep)
     above = _merged(_shaped(own), _spread(side, where or str(path)))
     _refuse_impossible(root, legs, above)
     _refuse_footless(legs, above)
     table = _merged(_merged(_assumed(), _measured(urdf, torso, legs)), above)
-    assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(table, legs, urdf)
+    assumed = [name for name in WHOLE if name not in own and name not in side] + _complete(
+        table, legs, urdf
+    )
     table["source"] = _source(urdf, legs, assumed) | dict(side.get("source", {}))
     return table
 
@@ -109,18 +177,32 @@ def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise RobotError("cannot read the URDF", got=error.strerror, fix="give the path of a URDF", where=str(path)) from error
+        raise RobotError(
+            "cannot read the URDF",
+            got=error.strerror,
+            fix="give the path of a URDF",
+            where=str(path),
+        ) from error
 
 
 def _assumed() -> Table:
     return tomllib.loads((Path(__file__).parent / "assumed.toml").read_text(encoding="utf-8"))
 
 
-def _found(root: Body, urdf: Urdf, forward: str, *, keep_frames: bool) -> tuple[Table, list[FoundLeg]]:
-    """The torso's table and the legs. The torso's frame is its heaviest link's place, in the root link's axes turned forward."""
+def _found(
+    root: Body, urdf: Urdf, forward: str, *, keep_frames: bool
+) -> tuple[Table, list[FoundLeg]]:
+    """The torso's table and the legs. The torso's frame is its heaviest link's place, in the
+    root link's axes turned forward.
+    """
     inertial = root.inertial(urdf.where)
-    heaviest = max(root.members, key=lambda member: member.link.inertial.mass if member.link.inertial else 0.0)
-    origin, axes = heaviest.position, np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0
+    heaviest = max(
+        root.members, key=lambda member: member.link.inertial.mass if member.link.inertial else 0.0
+    )
+    origin, axes = (
+        heaviest.position,
+        np.round(axis_rotation(np.array([0.0, 0.0, 1.0]), FORWARD[forward])) + 0.0,
+    )
     torso = {
         "mass": inertial.mass,
         "com": (axes.T @ (inertial.com - origin) + 0.0).tolist(),
@@ -131,27 +213,44 @@ def _found(root: Body, urdf: Urdf, forward: str, *, keep_frames: bool) -> tuple[
 
 
 def _refuse_impossible(torso: Body, legs: list[FoundLeg], above: Table) -> None:
-    """Raises RobotError for the first body whose inertia is impossible and is not given by someone else."""
+    """Raises RobotError for the first body whose inertia is impossible and is not given by
+    someone else.
+    """
     bodies = [("[torso]", torso, above.get("torso", {}))]
     for leg in legs:
         given = above.get("legs", {}).get(leg.name, {})
-        bodies += [(f"[links.{joint}]", branch.body, given.get(joint, {})) for joint, branch in zip(JOINT_NAMES, leg.servo, strict=True)]
+        bodies += [
+            (f"[links.{joint}]", branch.body, given.get(joint, {}))
+            for joint, branch in zip(JOINT_NAMES, leg.servo, strict=True)
+        ]
     for section, body, given in bodies:
         problem = None if "inertia" in given else body.problem
         if problem is not None:
             fix = f"{problem.fix}; or give the right one, `inertia = [...]` under {section} of a robot file with [urdf] file"
-            raise RobotError(problem.what, got=problem.got, expected=problem.expected, fix=fix, where=problem.where)
+            raise RobotError(
+                problem.what,
+                got=problem.got,
+                expected=problem.expected,
+                fix=fix,
+                where=problem.where,
+            )
 
 
 def _refuse_footless(legs: list[FoundLeg], above: Table) -> None:
     for leg in legs:
-        if leg.footless is not None and "length" not in above.get("legs", {}).get(leg.name, {}).get("tibia", {}):
+        if leg.footless is not None and "length" not in above.get("legs", {}).get(leg.name, {}).get(
+            "tibia", {}
+        ):
             raise leg.footless
 
 
 def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
     """Extents [m] of the torso's largest box, if it can hold its matter."""
-    boxes = [np.abs(axes.T @ member.rotation) @ member.link.box for member in root.members if member.link.box is not None]
+    boxes = [
+        np.abs(axes.T @ member.rotation) @ member.link.box
+        for member in root.members
+        if member.link.box is not None
+    ]
     largest = max(boxes, key=lambda size: float(np.prod(size)), default=np.zeros(3))
     gyration = np.sqrt(sum(torso["inertia"][:3]) / (2.0 * torso["mass"]))
     return [float(edge) for edge in largest] if np.linalg.norm(largest) > gyration else None
@@ -159,7 +258,13 @@ def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
 
 def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
     """What the URDF says."""
-    table: Table = {"name": urdf.name, "torso": torso, "legs": {leg.name: leg.table for leg in legs}, "servo": {}, "foot": {}}
+    table: Table = {
+        "name": urdf.name,
+        "torso": torso,
+        "legs": {leg.name: leg.table for leg in legs},
+        "servo": {},
+        "foot": {},
+    }
     if all(leg.radius is not None for leg in legs):
         table["foot"]["radius"] = [leg.radius for leg in legs]
     for key, name in SIZES.items():
@@ -169,10 +274,15 @@ def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
 
 def _shaped(own: Table) -> Table:
     """The tables of the <hexapod> element as a robot file has them."""
-    table: Table = {key: value for key, value in own.items() if key not in ("world", *LEG_NAMES)} | own.get("world", {})
+    table: Table = {
+        key: value for key, value in own.items() if key not in ("world", *LEG_NAMES)
+    } | own.get("world", {})
     for name in LEG_NAMES:
         if "stance" in own.get(name, {}):
-            stance = {joint: {"stance": angle} for joint, angle in zip(JOINT_NAMES, own[name]["stance"], strict=True)}
+            stance = {
+                joint: {"stance": angle}
+                for joint, angle in zip(JOINT_NAMES, own[name]["stance"], strict=True)
+            }
             table.setdefault("legs", {})[name] = stance
     return table
 
@@ -194,8 +304,16 @@ def _check_side(side: Mapping[str, Any], where: str) -> None:
     legs = expect_table(side.get("legs", {}), f"{where}: legs")
     refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")
     for name, leg in legs.items():
-        read_given(Leg, expect_table(leg, f"{where}: legs.{name}"), f"{where}: legs.{name}", extra=JOINT_NAMES)
-        _check_links({key: value for key, value in leg.items() if key in JOINT_NAMES}, f"{where}: legs.{name}")
+        read_given(
+            Leg,
+            expect_table(leg, f"{where}: legs.{name}"),
+            f"{where}: legs.{name}",
+            extra=JOINT_NAMES,
+        )
+        _check_links(
+            {key: value for key, value in leg.items() if key in JOINT_NAMES},
+            f"{where}: legs.{name}",
+        )
     _check_links(expect_table(side.get("links", {}), f"{where}: links"), f"{where}: links")
     expect_table(side.get("source", {}), f"{where}: source")
 
@@ -203,13 +321,19 @@ def _check_side(side: Mapping[str, Any], where: str) -> None:
 def _check_links(links: Mapping[str, Any], where: str) -> None:
     refuse_unknown_keys(links, list(JOINT_NAMES), where)
     for joint, link in links.items():
-        read_given(Link, expect_table(link, f"{where}.{joint}"), f"{where}.{joint}", extra=("stance",))
+        read_given(
+            Link, expect_table(link, f"{where}.{joint}"), f"{where}.{joint}", extra=("stance",)
+        )
         Number("rad").read(link.get("stance", 0.0), f"{where}.{joint}.stance")
 
 
 def _merged(low: Mapping[str, Any], high: Mapping[str, Any]) -> Table:
     """The tables of both; where both have a value, the higher one's."""
-    both = {key: _merged(low[key], high[key]) for key in low if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)}
+    both = {
+        key: _merged(low[key], high[key])
+        for key in low
+        if isinstance(low[key], Mapping) and isinstance(high.get(key), Mapping)
+    }
     merged: Table = deepcopy({**low, **high, **both})
     return merged
 
@@ -227,7 +351,10 @@ def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
 def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:
     """Every joint has the same servo, every foot the same radius: one number for a list of them."""
     names = [name for leg in legs for name in leg.joints]
-    for section, keys, owners in (("servo", SIZES, names), ("foot", {"radius": "radius"}, [leg.joints[2] for leg in legs])):
+    for section, keys, owners in (
+        ("servo", SIZES, names),
+        ("foot", {"radius": "radius"}, [leg.joints[2] for leg in legs]),
+    ):
         for key, name in keys.items():
             values = table[section].get(key)
             if isinstance(values, list) and len(values) == len(owners):
@@ -240,10 +367,15 @@ def _same(values: list[float | None], owners: list[str], key: str, name: str, wh
     if odd is None and first is not None:
         return first
     odd = odd or 0
-    at, fix = f"{where}: joint {owners[odd]!r}", f"give {key} for all in a robot file with [urdf] file"
+    at, fix = (
+        f"{where}: joint {owners[odd]!r}",
+        f"give {key} for all in a robot file with [urdf] file",
+    )
     if values[odd] is None:
         raise RobotError(f"no {name}", expected=f"what {key} is", fix=fix, where=at)
-    expected = f"{first!r} as at {owners[0]!r}: all joints have the same servo, all feet the same radius"
+    expected = (
+        f"{first!r} as at {owners[0]!r}: all joints have the same servo, all feet the same radius"
+    )
     raise RobotError(f"another {name}", got=values[odd], expected=expected, fix=fix, where=at)
 
 
@@ -258,7 +390,11 @@ def _drop(leg: Table) -> float:
     for joint in JOINT_NAMES:
         link = leg[joint]
         R = R @ axis_rotation(np.array(link["axis"]), link["stance"])
-        z -= float((R @ np.array([link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)]))[2])
+        z -= float(
+            (R @ np.array([link["length"], link.get("offset_y", 0.0), link.get("offset_z", 0.0)]))[
+                2
+            ]
+        )
     return max(z, 1e-3)
 
 
@@ -271,7 +407,9 @@ def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str]) -> Table:
     if assumed:
         source["URDF, assumed"] = f"the URDF does not say, so assumed: {', '.join(assumed)}"
     ignored = describe(urdf.ignored)
-    return source | ({"URDF, ignored": f"in the URDF, without effect here: {ignored}"} if ignored else {})
+    return source | (
+        {"URDF, ignored": f"in the URDF, without effect here: {ignored}"} if ignored else {}
+    )
 
 
 def element_named(error: RobotError, table: Mapping[str, Any]) -> RobotError:

@@ -1,4 +1,6 @@
-"""What stands in a URDF's attributes: numbers, turns, places; and the file as a whole. Raises RobotError, naming the element."""
+"""What stands in a URDF's attributes: numbers, turns, places; and the file as a whole. Raises
+RobotError, naming the element.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,12 @@ class _Builder(ET.TreeBuilder):
     """Refuses document types, and with them entities, external or expanding."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise RobotError("a document type in a URDF", got=f"<!DOCTYPE {name}>", expected="plain XML without entities", fix="remove it")
+        raise RobotError(
+            "a document type in a URDF",
+            got=f"<!DOCTYPE {name}>",
+            expected="plain XML without entities",
+            fix="remove it",
+        )
 
 
 def read_root(text: str | bytes, where: str) -> ET.Element:
@@ -26,13 +33,28 @@ def read_root(text: str | bytes, where: str) -> ET.Element:
     try:
         root = ET.fromstring(text, parser=ET.XMLParser(target=_Builder()))
     except (ET.ParseError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
-        raise RobotError("not XML", got=str(error), expected="a URDF", fix="correct that place", where=where) from error
+        raise RobotError(
+            "not XML", got=str(error), expected="a URDF", fix="correct that place", where=where
+        ) from error
     except RobotError as error:
-        raise RobotError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
+        raise RobotError(
+            error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
+        ) from error
     if any("xacro" in element.tag for element in root.iter()):
-        raise RobotError("xacro macros", expected="a URDF", fix="expand them first: xacro my.urdf.xacro > my.urdf", where=where)
+        raise RobotError(
+            "xacro macros",
+            expected="a URDF",
+            fix="expand them first: xacro my.urdf.xacro > my.urdf",
+            where=where,
+        )
     if root.tag != "robot":
-        raise RobotError("no URDF", got=f"<{root.tag}>", expected="<robot>", fix="give a URDF of a six-legged robot", where=where)
+        raise RobotError(
+            "no URDF",
+            got=f"<{root.tag}>",
+            expected="<robot>",
+            fix="give a URDF of a six-legged robot",
+            where=where,
+        )
     return root
 
 
@@ -40,12 +62,22 @@ def name_of(element: ET.Element, where: str) -> str:
     """The element's name, which it must have."""
     name = element.get("name")
     if not name:
-        raise RobotError(f"a {element.tag} without a name", expected="name=...", fix="name it", where=where)
+        raise RobotError(
+            f"a {element.tag} without a name", expected="name=...", fix="name it", where=where
+        )
     return name
 
 
-def numbers(element: ET.Element | None, key: str, default: tuple[float, ...] | None, where: str, count: int = 3) -> Array:
-    """(count,) finite numbers of an attribute; the default, if there is one, where the attribute or the element is missing."""
+def numbers(
+    element: ET.Element | None,
+    key: str,
+    default: tuple[float, ...] | None,
+    where: str,
+    count: int = 3,
+) -> Array:
+    """(count,) finite numbers of an attribute; the default, if there is one, where the attribute
+    or the element is missing.
+    """
     text = None if element is None else element.get(key)
     if text is None and default is not None:
         return np.array(default)
@@ -56,7 +88,9 @@ def numbers(element: ET.Element | None, key: str, default: tuple[float, ...] | N
     if len(values) != count or not np.isfinite(values).all():
         expected = "a finite number" if count == 1 else f"{count} finite numbers"
         at = f"{where}: {element.tag}" if element is not None else where
-        raise RobotError(f"no good {key}", got=text, expected=expected, fix=f"correct {key}", where=at)
+        raise RobotError(
+            f"no good {key}", got=text, expected=expected, fix=f"correct {key}", where=at
+        )
     return values
 
 
@@ -86,7 +120,9 @@ def _cos_sin(angle: float) -> tuple[float, float]:
 
 
 def _angles(element: ET.Element | None, where: str) -> list[float]:
-    """Roll, pitch, yaw; a number that is a quarter turn to all its printed digits (1.57, 3.1416) is one."""
+    """Roll, pitch, yaw; a number that is a quarter turn to all its printed digits (1.57, 3.1416)
+    is one.
+    """
     values = numbers(element, "rpy", (0.0, 0.0, 0.0), where)
     words = (element.get("rpy", "0 0 0") if element is not None else "0 0 0").split()
     return [_quarter_turn(value, word) for value, word in zip(values.tolist(), words, strict=True)]
@@ -106,6 +142,11 @@ def origin(element: ET.Element, where: str) -> tuple[Array, Array, list[float]]:
     """Rotation (3, 3), place (3,) [m] and roll, pitch, yaw [rad] of the element's frame."""
     origin = element.find("origin")
     if origin is not None and origin.get("quat_xyzw"):
-        raise RobotError("a quaternion as origin", expected="rpy", fix="write it as roll, pitch and yaw", where=where)
+        raise RobotError(
+            "a quaternion as origin",
+            expected="rpy",
+            fix="write it as roll, pitch and yaw",
+            where=where,
+        )
     angles = _angles(origin, where)
     return rpy_matrix(*angles), numbers(origin, "xyz", (0.0, 0.0, 0.0), where), angles

@@ -1,7 +1,8 @@
 """A robot as a URDF: what is read back from it is the same robot, to the last bit.
 
-Links and joints in this project's frames; every number in full. What URDF has no words for stands in one element of ours, <hexapod>, which
-other readers skip; <mujoco> keeps MuJoCo from welding the torso, and its mass, to the world.
+Links and joints in this project's frames; every number in full. What URDF has no words for stands
+in one element of ours, <hexapod>, which other readers skip; <mujoco> keeps MuJoCo from welding the
+torso, and its mass, to the world.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ COLOURS = {"body": "0.30 0.33 0.38 1", "limb": "0.72 0.74 0.78 1", "rubber": "0.
 def robot_to_urdf(robot: Robot) -> str:
     """The text of a URDF."""
     root = ET.Element("robot", name=robot.name)
-    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", fusestatic="false", discardvisual="false")
+    compiler = ET.SubElement(
+        ET.SubElement(root, "mujoco"), "compiler", fusestatic="false", discardvisual="false"
+    )
     compiler.set("inertiafromgeom", "false")  # the feet's spheres weigh nothing
     for name, colour in COLOURS.items():
         ET.SubElement(ET.SubElement(root, "material", name=name), "color", rgba=colour)
@@ -55,8 +58,13 @@ def _leg(root: ET.Element, leg: Leg, robot: Robot) -> None:
         joint = _joint(root, f"{child}_joint", "revolute", parent, child)
         ET.SubElement(joint, "origin", xyz=numbers(place), rpy=numbers((0.0, 0.0, yaw)))
         ET.SubElement(joint, "axis", xyz=numbers(link.axis))
-        limit = ET.SubElement(joint, "limit", lower=repr(link.angle_min), upper=repr(link.angle_max))
-        limit.attrib |= {"effort": repr(robot.servo.torque_max), "velocity": repr(robot.servo.speed_max)}
+        limit = ET.SubElement(
+            joint, "limit", lower=repr(link.angle_min), upper=repr(link.angle_max)
+        )
+        limit.attrib |= {
+            "effort": repr(robot.servo.torque_max),
+            "velocity": repr(robot.servo.speed_max),
+        }
         ET.SubElement(joint, "dynamics", damping="0.0", friction=repr(robot.servo.coulomb_friction))
         parent, place, yaw = child, link.tip, 0.0
     _foot(root, f"{leg.name}_foot", parent, place, robot.foot.radius)
@@ -93,7 +101,13 @@ def direction_rpy(way: Vector3) -> Vector3:
     return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
 
 
-def _shape(link: ET.Element, tag: str, place: Iterable[float], material: str | None, rpy: Vector3 = (0.0, 0.0, 0.0)) -> ET.Element:
+def _shape(
+    link: ET.Element,
+    tag: str,
+    place: Iterable[float],
+    material: str | None,
+    rpy: Vector3 = (0.0, 0.0, 0.0),
+) -> ET.Element:
     shape = ET.SubElement(link, tag)
     ET.SubElement(shape, "origin", xyz=numbers(place), rpy=numbers(rpy))
     geometry = ET.SubElement(shape, "geometry")
@@ -107,7 +121,9 @@ def _inertial(link: ET.Element, mass: float, com: Vector3, inertia: tuple[float,
     ET.SubElement(element, "origin", xyz=numbers(com), rpy="0 0 0")
     ET.SubElement(element, "mass", value=repr(mass))
     names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    ET.SubElement(element, "inertia", {name: repr(value) for name, value in zip(names, inertia, strict=True)})
+    ET.SubElement(
+        element, "inertia", {name: repr(value) for name, value in zip(names, inertia, strict=True)}
+    )
 
 
 def _extension(root: ET.Element, robot: Robot) -> None:

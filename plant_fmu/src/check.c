@@ -5,22 +5,28 @@
 #include "hexapod/checker.h"
 #include "method.h"
 
-/* A body can have inertia I when I and (tr I / 2) 1 - I, its second moments of mass, are positive (semi-)definite:
- * that is the triangle inequality of the principal moments, whatever the axes. */
+/* A body can have inertia I when I and (tr I / 2) 1 - I, its second moments of mass, are positive
+ * (semi-)definite: that is the triangle inequality of the principal moments, whatever the axes. */
 static int is_inertia(const double I[6]) {
   const double half = 0.5 * (I[0] + I[1] + I[2]), slack = 1e-9 * half;
-  const double p[6] = {half - I[0] + slack, half - I[1] + slack, half - I[2] + slack, -I[3], -I[4], -I[5]};
+  const double p[6] = {
+      half - I[0] + slack, half - I[1] + slack, half - I[2] + slack, -I[3], -I[4], -I[5]};
   const double minor = p[0] * p[1] - p[3] * p[3];
-  const double det = p[0] * (p[1] * p[2] - p[5] * p[5]) - p[3] * (p[3] * p[2] - p[5] * p[4]) + p[4] * (p[3] * p[5] - p[1] * p[4]);
-  return half > 0.0 && I[0] > 0.0 && I[1] > 0.0 && I[2] > 0.0 && p[0] >= 0.0 && p[1] >= 0.0 && p[2] >= 0.0 && minor >= 0.0 && det >= 0.0;
+  const double det = p[0] * (p[1] * p[2] - p[5] * p[5]) - p[3] * (p[3] * p[2] - p[5] * p[4]) +
+                     p[4] * (p[3] * p[5] - p[1] * p[4]);
+  return half > 0.0 && I[0] > 0.0 && I[1] > 0.0 && I[2] > 0.0 && p[0] >= 0.0 && p[1] >= 0.0 &&
+         p[2] >= 0.0 && minor >= 0.0 && det >= 0.0;
 }
 
 static void body(hxChecker *c, const char *name, const double inertia[6]) {
   if (!is_inertia(inertia))
-    hx_check_fail(c, name, inertia[0], "an inertia that a body can have: positive, each principal moment at most the sum of the others");
+    hx_check_fail(c, name, inertia[0],
+                  "an inertia that a body can have: positive, each principal moment at most the "
+                  "sum of the others");
 }
 
-static void length_not_zero(hxChecker *c, const char *name, const double *x, int n, const char *expected) {
+static void length_not_zero(hxChecker *c, const char *name, const double *x, int n,
+                            const char *expected) {
   double square = 0.0;
   for (int i = 0; i < n; ++i) square += x[i] * x[i];
   if (!(square > 1e-12)) hx_check_fail(c, name, sqrt(square), expected);
@@ -47,15 +53,20 @@ static void legs(hxChecker *c, const hxDefinition *d) {
 static void relations(hxChecker *c, const hxDefinition *d) {
   body(c, "torso.inertia_xx", d->torso.inertia);
   legs(c, d);
-  if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) && d->contact.restitution < 1e-3)
-    hx_check_fail(c, "contact.restitution", d->contact.restitution, "0.001 to 1 with this contact.law, which divides by it");
+  if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) &&
+      d->contact.restitution < 1e-3)
+    hx_check_fail(c, "contact.restitution", d->contact.restitution,
+                  "0.001 to 1 with this contact.law, which divides by it");
   if (d->friction.mu_static != 0.0 && d->friction.mu_static < d->friction.mu)
-    hx_check_fail(c, "friction.mu_static", d->friction.mu_static, "at least friction.mu, or 0, which means the same");
+    hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
+                  "at least friction.mu, or 0, which means the same");
   else if (d->friction.mu_static > d->friction.mu && d->friction.law != HX_FRICTION_BRISTLE)
     hx_check_fail(c, "friction.mu_static", d->friction.mu_static,
-                  "0 or friction.mu with this friction.law; the bristle law alone tells static from kinetic friction");
+                  "0 or friction.mu with this friction.law; the bristle law alone tells static "
+                  "from kinetic friction");
   if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
-    hx_check_fail(c, "solver.step", d->solver.step, "a fixed step > 0 with this solver.method, which has no error estimate");
+    hx_check_fail(c, "solver.step", d->solver.step,
+                  "a fixed step > 0 with this solver.method, which has no error estimate");
   length_not_zero(c, "initial.quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");
 }
 

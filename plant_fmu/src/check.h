@@ -1,4 +1,5 @@
-/* check.h - what an input must satisfy before it reaches the physics (hx_definition_check is public) */
+/* check.h - what an input must satisfy before it reaches the physics (hx_definition_check is
+ * public) */
 #ifndef HX_CHECK_H
 #define HX_CHECK_H
 

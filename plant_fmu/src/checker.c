@@ -6,7 +6,8 @@
 void hx_check_fail(hxChecker *checker, const char *name, double got, const char *expected) {
   if (checker->status != HX_OK) return;
   checker->status = HX_INVALID_MODEL;
-  if (checker->message) snprintf(checker->message, HX_MESSAGE_SIZE, "%s: got %.9g, expected %s", name, got, expected);
+  if (checker->message)
+    snprintf(checker->message, HX_MESSAGE_SIZE, "%s: got %.9g, expected %s", name, got, expected);
 }
 
 static double number_at(const void *structure, const hxRange *range) {
@@ -26,7 +27,8 @@ void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *r
   for (size_t i = 0; i < n; ++i) {
     const double x = number_at(structure, &range[i]);
     if (x >= range[i].min && x <= range[i].max) continue;
-    snprintf(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max, range[i].unit);
+    snprintf(expected, sizeof expected, "%.9g to %.9g %s", range[i].min, range[i].max,
+             range[i].unit);
     hx_check_fail(checker, range[i].name, x, expected);
     return;
   }

@@ -6,7 +6,8 @@
 
 double hx_exact_restitution_chi(double e) {
   if (e >= 1.0) return 0.0;
-  /* g(chi) = ln(1 + chi) - ln(1 - chi e) - chi (1 + e) falls from 0, then rises to infinity at 1/e: one root in between */
+  /* g(chi) = ln(1 + chi) - ln(1 - chi e) - chi (1 + e) falls from 0, then rises to infinity at 1/e:
+   * one root in between */
   double low = 0.0, high = 1.0 / e;
   for (int i = 0; i < 200; ++i) {
     const double chi = 0.5 * (low + high);
@@ -19,9 +20,15 @@ double hx_exact_restitution_chi(double e) {
   return 0.5 * (low + high);
 }
 
-static double exact(const hxDefinition *d) { return hx_exact_restitution_chi(d->contact.restitution); }
-static double flores(const hxDefinition *d) { return 8.0 * (1.0 - d->contact.restitution) / (5.0 * d->contact.restitution); }
-static double lankarani_nikravesh(const hxDefinition *d) { return 0.75 * (1.0 - d->contact.restitution * d->contact.restitution); }
+static double exact(const hxDefinition *d) {
+  return hx_exact_restitution_chi(d->contact.restitution);
+}
+static double flores(const hxDefinition *d) {
+  return 8.0 * (1.0 - d->contact.restitution) / (5.0 * d->contact.restitution);
+}
+static double lankarani_nikravesh(const hxDefinition *d) {
+  return 0.75 * (1.0 - d->contact.restitution * d->contact.restitution);
+}
 static double hunt_crossley(const hxDefinition *d) { return 1.5 * (1.0 - d->contact.restitution); }
 static double constant(const hxDefinition *d) { return 1.5 * d->contact.damping_factor; }
 static double hertz(const hxDefinition *d) {
@@ -49,10 +56,12 @@ static const hxContactRow contact_rows[] = {
 };
 
 const hxContactRow *hx_contact(int law) {
-  return law >= 1 && law < (int)(sizeof contact_rows / sizeof contact_rows[0]) ? &contact_rows[law] : NULL;
+  return law >= 1 && law < (int)(sizeof contact_rows / sizeof contact_rows[0]) ? &contact_rows[law]
+                                                                               : NULL;
 }
 
-static void close_foot(const hxModel *model, hxContactState *contact, int leg, double impact_speed) {
+static void close_foot(const hxModel *model, hxContactState *contact, int leg,
+                       double impact_speed) {
   contact->closed[leg] = 1.0;
   contact->impact_speed[leg] = impact_speed;
   contact->damping[leg] = hx_contact(model->contact_law)->damping(model, impact_speed);
@@ -86,7 +95,8 @@ void hx_contact_slacken(const hxContactState *contact, hxMotion *motion) {
   }
 }
 
-int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact) {
+int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS],
+                      const double ddelta[HX_SLOTS], hxContactState *contact) {
   int touchdowns = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (contact->closed[leg] == 0.0 && delta[leg] > 0.0) {

@@ -2,7 +2,8 @@
 
 #include <math.h>
 
-/* 1 - z/(n(n+1)) (1 - z/((n+2)(n+3)) (1 - ...)): sin(r)/r from n = 2, cos(r) from n = 1, z = r^2; nine terms for |r| <= pi/4 */
+/* 1 - z/(n(n+1)) (1 - z/((n+2)(n+3)) (1 - ...)): sin(r)/r from n = 2, cos(r) from n = 1, z = r^2;
+ * nine terms for |r| <= pi/4 */
 static double alternating_series(double z, int first) {
   double sum = 1.0;
   for (int n = first + 16; n >= first; n -= 2) sum = 1.0 - z * sum / (n * (n + 1.0));

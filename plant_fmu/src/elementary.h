@@ -1,4 +1,5 @@
-/* elementary.h - sine, cosine and logarithm without libm, whose last bits differ between systems and between processors */
+/* elementary.h - sine, cosine and logarithm without libm, whose last bits differ between systems
+ * and between processors */
 #ifndef HX_ELEMENTARY_H
 #define HX_ELEMENTARY_H
 

@@ -1,7 +1,7 @@
 /* kernel.h - the physics of one instruction set behind a table of functions
  *
- * The headers in lanes/ are compiled once for each kernel_*.c, at its width. All kernels give the same bits (lanes/lanes.h), so a state
- * saved under one goes on under another.
+ * The headers in lanes/ are compiled once for each kernel_*.c, at its width. All kernels give the
+ * same bits (lanes/lanes.h), so a state saved under one goes on under another.
  */
 #ifndef HX_KERNEL_H
 #define HX_KERNEL_H
@@ -22,34 +22,45 @@ typedef struct hxKernel {
   /* Sets contacts, energy, counters and time of a motion that starts here and now. */
   void (*start)(const hxModel *model, double t, hxState *state);
 
-  /* Advances the state to t_end exactly, or to an event; the command changes by the ramp per second, or is held (NULL). A command older than
-   * the state is that of a call which an event broke off. On failure the state is somewhere on the way and the message says why. */
-  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
-                        hxState *state, char *message);
+  /* Advances the state to t_end exactly, or to an event; the command changes by the ramp per
+   * second, or is held (NULL). A command older than the state is that of a call which an event
+   * broke off. On failure the state is somewhere on the way and the message says why. */
+  hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
+                        double t_end, hxEvents *events, hxState *state, char *message);
 
   /* dy/dt, with or without the multipliers on the way. */
-  void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate);
+  void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command,
+                     int multipliers, hxMotion *rate);
 
-  /* A motion on its joints at coordinates; coordinates of a motion and their rates, either of which may be NULL. */
+  /* A motion on its joints at coordinates; coordinates of a motion and their rates, either of which
+   * may be NULL. */
   void (*place)(const hxModel *model, const hxCoordinates *x, hxMotion *motion);
-  void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command, hxCoordinates *x, hxCoordinates *rate);
+  void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command,
+                      hxCoordinates *x, hxCoordinates *rate);
 
   /* All feet: penetration, approach speed; m, m/s. */
-  void (*feet)(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]);
+  void (*feet)(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS],
+               double ddelta[HX_SLOTS]);
 
   /* Touch-downs and lift-offs that are due at the state's time by these penetrations. */
-  void (*switch_contacts)(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxState *state);
+  void (*switch_contacts)(const hxModel *model, const double delta[HX_SLOTS],
+                          const double ddelta[HX_SLOTS], hxState *state);
 
-  /* Measures the path since the last moment, for solvers of others whose step to here is completed. */
+  /* Measures the path since the last moment, for solvers of others whose step to here is completed.
+   */
   void (*measure)(const hxModel *model, const hxCommand *command, hxState *state);
 
-  void (*output)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output);
+  void (*output)(const hxModel *model, const hxState *state, const hxCommand *command,
+                 hxOutput *output);
 
   /* Rates of the outputs that are integrals since the start. */
-  void (*integral_rates)(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *rate);
+  void (*integral_rates)(const hxModel *model, const hxState *state, const hxCommand *command,
+                         hxOutput *rate);
 
-  void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],
-                        double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]);
+  void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command,
+                        double acceleration[HX_BODIES][6],
+                        double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
+                        double drive_torque[HX_BODIES - 1]);
 } hxKernel;
 
 /* All kernels of this build, fastest first, ended by NULL. */

@@ -3,7 +3,8 @@
 
 #if HX_HAS_X86_KERNELS
 
-/* what follows is compiled for AVX2 without the build knowing, so that an importer's plain compiler call does it too */
+/* what follows is compiled for AVX2 without the build knowing, so that an importer's plain compiler
+ * call does it too */
 #include <immintrin.h>
 #include <math.h>
 #include <stdint.h>

@@ -3,7 +3,8 @@
 
 #if HX_HAS_X86_KERNELS
 
-/* what follows is compiled for AVX-512 without the build knowing, so that an importer's plain compiler call does it too */
+/* what follows is compiled for AVX-512 without the build knowing, so that an importer's plain
+ * compiler call does it too */
 #include <immintrin.h>
 #include <math.h>
 #include <stdint.h>
@@ -11,7 +12,8 @@
 #include <string.h>
 
 #if defined(__clang__)
-#pragma clang attribute push(__attribute__((target("avx512f,avx512dq,avx512vl"))), apply_to = function)
+#pragma clang attribute push(__attribute__((target("avx512f,avx512dq,avx512vl"))),                 \
+                             apply_to = function)
 #else
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512dq,avx512vl")
@@ -28,7 +30,8 @@
 #endif
 
 static int has_avx512(void) {
-  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+         __builtin_cpu_supports("avx512vl");
 }
 
 const hxKernel hx_kernel_avx512 = HX_KERNEL_TABLE("avx512", has_avx512);

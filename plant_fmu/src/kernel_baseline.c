@@ -1,4 +1,5 @@
-/* kernel_baseline.c - the physics on lanes for any processor: two legs at a time, or one where the compiler has no vectors */
+/* kernel_baseline.c - the physics on lanes for any processor: two legs at a time, or one where the
+ * compiler has no vectors */
 #include "kernels.h"
 
 #include "kernel_functions.h"

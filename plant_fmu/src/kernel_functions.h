@@ -1,4 +1,5 @@
-/* kernel_functions.h - a kernel's functions from the physics on lanes: included once in each kernel's file, at its width */
+/* kernel_functions.h - a kernel's functions from the physics on lanes: included once in each
+ * kernel's file, at its width */
 #include "kernel.h"
 #include "lanes/coordinates.h"
 #include "lanes/dynamics.h"
@@ -22,41 +23,50 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   hx_moment_here(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
-  for (int pack = 0; pack < HX_PACKS; ++pack) hx_store(&state->measured.peak_force[pack * HX_LANES], work.pack[pack].foot.normal.force);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    hx_store(&state->measured.peak_force[pack * HX_LANES], work.pack[pack].foot.normal.force);
   for (int slot = 0; slot < HX_SLOTS; ++slot) state->measured.landed_at[slot] = -HUGE_VAL;
   hx_fill_measured_slots(state);
-  state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) + hx_potential_energy(model, &state->motion, &work);
+  state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) +
+                           hx_potential_energy(model, &state->motion, &work);
 }
 
-static void kernel_derivative(const hxModel *model, const hxState *state, const hxCommand *command, int multipliers, hxMotion *rate) {
+static void kernel_derivative(const hxModel *model, const hxState *state, const hxCommand *command,
+                              int multipliers, hxMotion *rate) {
   hxRate all;
   hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, multipliers, &work, &all);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL,
+                       multipliers, &work, &all);
   *rate = all.motion;
 }
 
-static void kernel_coordinates(const hxModel *model, const hxState *state, const hxCommand *command, hxCoordinates *x,
-                               hxCoordinates *rate) {
+static void kernel_coordinates(const hxModel *model, const hxState *state, const hxCommand *command,
+                               hxCoordinates *x, hxCoordinates *rate) {
   hxRate all;
   hxWork work;
   memset(all.motion.bristle, 0, sizeof all.motion.bristle);
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 0, &work, &all);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 0, &work,
+                       &all);
   if (x) hx_coordinates_of(&state->motion, &work, x);
   if (rate) hx_coordinates_rate(&all.motion, &work, rate);
 }
 
-static void kernel_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
+static void kernel_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS],
+                        double ddelta[HX_SLOTS]) {
   const hxFeet feet = feet_of(model, motion);
   memcpy(delta, feet.delta, sizeof feet.delta);
   memcpy(ddelta, feet.ddelta, sizeof feet.ddelta);
 }
 
-static void kernel_switch_contacts(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxState *state) {
+static void kernel_switch_contacts(const hxModel *model, const double delta[HX_SLOTS],
+                                   const double ddelta[HX_SLOTS], hxState *state) {
   hx_switch_contacts(model, delta, ddelta, state->time, state);
 }
 
-/* Adds h/2 of the forces at the present and of those kept from the last completed step; keeps the present ones. */
-static void halve_impulses(const hxWork *work, double h, hxCompleted *completed, hxImpulses *impulses) {
+/* Adds h/2 of the forces at the present and of those kept from the last completed step; keeps the
+ * present ones. */
+static void halve_impulses(const hxWork *work, double h, hxCompleted *completed,
+                           hxImpulses *impulses) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
     const int slot = pack * HX_LANES;
@@ -69,7 +79,9 @@ static void halve_impulses(const hxWork *work, double h, hxCompleted *completed,
       hx_store(motor, servo->torque);
       hx_store(gear, servo->friction);
     }
-    impulses->foot[pack] = hx_scale(half, hx_add(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot), leg->foot.force));
+    impulses->foot[pack] =
+        hx_scale(half, hx_add(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot),
+                              leg->foot.force));
     hx_store_vec3(completed->foot, slot, leg->foot.force);
   }
   completed->known = 1.0;
@@ -83,14 +95,21 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   hxStepWorks works;
   const int known = state->completed.known != 0.0;
   const double h = state->time - state->moment.time;
-  hxPath path = {.model = model, .contact = &state->contact, .t = state->moment.time, .h = h, .from = &state->moment, .to = &end};
+  hxPath path = {.model = model,
+                 .contact = &state->contact,
+                 .t = state->moment.time,
+                 .h = h,
+                 .from = &state->moment,
+                 .to = &end};
   for (int node = 0; node <= INTERVALS; ++node) path.command[node] = command;
   memset(&end, 0, sizeof end);
   hx_moment_of(model, &state->motion, &end);
   end.time = state->time;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
+                       &rate);
   halve_impulses(&work, h, &state->completed, &impulses);
-  if (!known) halve_impulses(&work, h, &state->completed, &impulses); /* the first step: as at its end */
+  if (!known)
+    halve_impulses(&work, h, &state->completed, &impulses); /* the first step: as at its end */
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
     hx_step_works(&path, &impulses, &works);
@@ -105,39 +124,46 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   for (int i = 0; i < 3; ++i) hx_fill_slots(state->completed.foot[i]);
 }
 
-static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *output) {
+static void kernel_output(const hxModel *model, const hxState *state, const hxCommand *command,
+                          hxOutput *output) {
   hxRate rate;
   hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
+                       &rate);
   hx_output_fill(model, state, &work, output);
 }
 
-static void kernel_integral_rates(const hxModel *model, const hxState *state, const hxCommand *command, hxOutput *rate) {
+static void kernel_integral_rates(const hxModel *model, const hxState *state,
+                                  const hxCommand *command, hxOutput *rate) {
   hxRate all;
   hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &all);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
+                       &all);
   hx_integral_rates_fill(model, &work, rate);
 }
 
-static void kernel_accelerations(const hxModel *model, const hxState *state, const hxCommand *command, double acceleration[HX_BODIES][6],
-                                 double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
+static void kernel_accelerations(const hxModel *model, const hxState *state,
+                                 const hxCommand *command, double acceleration[HX_BODIES][6],
+                                 double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
+                                 double drive_torque[HX_BODIES - 1]) {
   hxRate rate;
   hxWork work;
-  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work, &rate);
+  hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
+                       &rate);
   hx_accelerations_fill(&work, &rate.motion, acceleration, multiplier, drive_torque);
 }
 
-#define HX_KERNEL_TABLE(title, test)                                                                                                       \
-  {.name = title,                                                                                                                          \
-   .runs_here = test,                                                                                                                      \
-   .start = kernel_start,                                                                                                                  \
-   .integrate = hx_integrate,                                                                                                              \
-   .derivative = kernel_derivative,                                                                                                        \
-   .place = hx_motion_from_coordinates,                                                                                                    \
-   .coordinates = kernel_coordinates,                                                                                                      \
-   .feet = kernel_feet,                                                                                                                    \
-   .switch_contacts = kernel_switch_contacts,                                                                                              \
-   .measure = kernel_measure,                                                                                                              \
-   .output = kernel_output,                                                                                                                \
-   .integral_rates = kernel_integral_rates,                                                                                                \
+#define HX_KERNEL_TABLE(title, test)                                                               \
+  {.name = title,                                                                                  \
+   .runs_here = test,                                                                              \
+   .start = kernel_start,                                                                          \
+   .integrate = hx_integrate,                                                                      \
+   .derivative = kernel_derivative,                                                                \
+   .place = hx_motion_from_coordinates,                                                            \
+   .coordinates = kernel_coordinates,                                                              \
+   .feet = kernel_feet,                                                                            \
+   .switch_contacts = kernel_switch_contacts,                                                      \
+   .measure = kernel_measure,                                                                      \
+   .output = kernel_output,                                                                        \
+   .integral_rates = kernel_integral_rates,                                                        \
    .accelerations = kernel_accelerations}

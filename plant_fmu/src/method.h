@@ -1,4 +1,5 @@
-/* method.h - integration methods as coefficients: explicit Runge-Kutta and linearly implicit Rosenbrock-W (eq. 15) */
+/* method.h - integration methods as coefficients: explicit Runge-Kutta and linearly implicit
+ * Rosenbrock-W (eq. 15) */
 #ifndef HX_METHOD_H
 #define HX_METHOD_H
 
@@ -10,10 +11,11 @@ enum { HX_STAGES = 7 };
 
 /*   y_i = y_0 + sum_{j<i} a_ij k_j
  *   (1 - h gamma A_i) k_i = h f(t_0 + c_i h, y_i) + h A_i sum_{j<i} g_ij k_j    gamma = 0: explicit
- *   y_1 = y_0 + sum b_i k_i,   error estimate sum e_i k_i                       e = b - b of the embedded method
+ *   y_1 = y_0 + sum b_i k_i,   error estimate sum e_i k_i                       e = b - b of the
+ * embedded method
  *
- * A_i may be anything that changes by O(h) from stage to stage: order 3 then asks for one condition more than a W-method's,
- * sum b_i c_i (gamma + sum_j g_ij) = 0. */
+ * A_i may be anything that changes by O(h) from stage to stage: order 3 then asks for one condition
+ * more than a W-method's, sum b_i c_i (gamma + sum_j g_ij) = 0. */
 typedef struct hxMethodRow {
   int stages;
   int order;

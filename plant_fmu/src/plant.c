@@ -21,7 +21,9 @@ typedef struct {
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
 static const uint64_t saved_version = 6;
 
-static uint64_t checksum(const hxSaved *saved) { return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model)); }
+static uint64_t checksum(const hxSaved *saved) {
+  return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model));
+}
 
 static hxStatus refuse(hxPlant *plant, hxStatus status, const char *text) {
   snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);
@@ -45,7 +47,9 @@ void hx_plant_destroy(hxPlant *plant) { free(plant); }
 hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t) {
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
-  if (!isfinite(t)) return refuse(plant, HX_INVALID_ARGUMENT, "start time: got a number that is not finite, expected seconds");
+  if (!isfinite(t))
+    return refuse(plant, HX_INVALID_ARGUMENT,
+                  "start time: got a number that is not finite, expected seconds");
   const hxStatus status = hx_definition_check(definition, message);
   if (status != HX_OK) return refuse(plant, status, message);
   memset(&plant->model, 0, sizeof plant->model);
@@ -76,26 +80,36 @@ static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *fi
 }
 
 /* tells inputs apart: 52 bits of a checksum, never 0 */
-static double fingerprint_of(const hxInput *input) { return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12); }
+static double fingerprint_of(const hxInput *input) {
+  return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12);
+}
 
-/* An event breaks a call off; what goes on under the same held input is the same call, so that the motion does not depend on it. */
-static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end, hxEvents *events) {
+/* An event breaks a call off; what goes on under the same held input is the same call, so that the
+ * motion does not depend on it. */
+static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
+                    hxEvents *events) {
   const hxState before = plant->state;
   hxCommand command, change;
   int finite;
   const hxCommand *ramp = ramp_of(rate, &change, &finite);
-  if (!finite) return refuse(plant, HX_INVALID_ARGUMENT, "rates of inputs: got a number that is not finite, expected units per second");
+  if (!finite)
+    return refuse(plant, HX_INVALID_ARGUMENT,
+                  "rates of inputs: got a number that is not finite, expected units per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
-    snprintf(plant->message, HX_MESSAGE_SIZE, "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
+    snprintf(plant->message, HX_MESSAGE_SIZE,
+             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
              plant->state.time);
     return HX_INVALID_ARGUMENT;
   }
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
-  const double fingerprint = !ramp && (events->stop || before.call_input != 0.0) ? fingerprint_of(input) : 0.0;
-  const int goes_on = before.call_input != 0.0 && before.call_input == fingerprint && before.call_start < before.time;
+  const double fingerprint =
+      !ramp && (events->stop || before.call_input != 0.0) ? fingerprint_of(input) : 0.0;
+  const int goes_on = before.call_input != 0.0 && before.call_input == fingerprint &&
+                      before.call_start < before.time;
   hx_command_from_input(&command, input, goes_on ? before.call_start : before.time);
-  status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state, plant->message);
+  status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
+                                  plant->message);
   if (status != HX_OK) {
     plant->state = before;
     return status;
@@ -106,13 +120,17 @@ static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, d
   return HX_OK;
 }
 
-hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) { return hx_plant_step_ramp(plant, input, NULL, t_end); }
+hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
+  return hx_plant_step_ramp(plant, input, NULL, t_end);
+}
 
-hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end) {
+hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate,
+                            double t_end) {
   return run(plant, input, rate, t_end, &(hxEvents){.stop = 0});
 }
 
-hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop, int *event) {
+hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop,
+                                int *event) {
   hxEvents events = {.stop = stop};
   const hxStatus status = run(plant, input, NULL, t_end, &events);
   *event = events.found && status == HX_OK;
@@ -128,19 +146,27 @@ void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
 size_t hx_plant_state_size(void) { return sizeof(hxSaved); }
 
 void hx_plant_get_state(const hxPlant *plant, void *bytes) {
-  hxSaved saved = {.magic = magic, .version = saved_version, .size = sizeof saved, .model = plant->model, .state = plant->state};
+  hxSaved saved = {.magic = magic,
+                   .version = saved_version,
+                   .size = sizeof saved,
+                   .model = plant->model,
+                   .state = plant->state};
   saved.checksum = checksum(&saved);
   memcpy(bytes, &saved, sizeof saved);
 }
 
 hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   hxSaved saved;
-  if (size != sizeof saved) return refuse(plant, HX_BAD_STATE, "saved state: its size is not that of this version's states; save it again");
+  if (size != sizeof saved)
+    return refuse(plant, HX_BAD_STATE,
+                  "saved state: its size is not that of this version's states; save it again");
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse(plant, HX_BAD_STATE, "saved state: not one of this version; save it again with this version");
+    return refuse(plant, HX_BAD_STATE,
+                  "saved state: not one of this version; save it again with this version");
   if (saved.checksum != checksum(&saved))
-    return refuse(plant, HX_BAD_STATE, "saved state: damaged, its checksum does not match; save it again");
+    return refuse(plant, HX_BAD_STATE,
+                  "saved state: damaged, its checksum does not match; save it again");
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;
@@ -157,14 +183,16 @@ static const double largest_coordinate = 1e9, largest_angle = 1e5;
 
 static int are_coordinates(const hxCoordinates *x) {
   const double *p = x->quaternion;
-  return largest(0.0, x, HX_COORDINATES) <= largest_coordinate && largest(0.0, x->angle, HX_LEGS * HX_JOINTS) <= largest_angle &&
+  return largest(0.0, x, HX_COORDINATES) <= largest_coordinate &&
+         largest(0.0, x->angle, HX_LEGS * HX_JOINTS) <= largest_angle &&
          p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3] > 1e-6;
 }
 
 hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x) {
   if (!isfinite(t) || !are_coordinates(x))
     return refuse(plant, HX_NOT_FINITE,
-                  "coordinates: got numbers that are not finite, angles beyond 1e5 rad, others beyond 1e9 SI units or a "
+                  "coordinates: got numbers that are not finite, angles beyond 1e5 rad, others "
+                  "beyond 1e9 SI units or a "
                   "quaternion near 0, expected a state of the robot");
   hx_kernel()->place(&plant->model, x, &plant->state.motion);
   plant->state.time = t;
@@ -185,8 +213,9 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, NULL, rate);
 }
 
-/* m  Solvers that find one foot's sign change lose another's that comes within their rounding. So a foot touches the ground from this deep, and
- * leaves it from this high; in between it does so when it is on its way there as another one switches (docs/equations.md). */
+/* m  Solvers that find one foot's sign change lose another's that comes within their rounding. So a
+ * foot touches the ground from this deep, and leaves it from this high; in between it does so when
+ * it is on its way there as another one switches (docs/equations.md). */
 static const double switch_band = 1e-10;
 
 static void all_feet(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
@@ -197,7 +226,8 @@ void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
   all_feet(plant, delta, ddelta);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    indicator[leg] = delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
+    indicator[leg] =
+        delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
 }
 
 /* the penetration by which a foot switches, or stays as it is */
@@ -211,18 +241,22 @@ int hx_plant_update_contacts(hxPlant *plant) {
   const hxMotion before = plant->state.motion;
   all_feet(plant, delta, ddelta);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
-    delta[slot] = switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
+    delta[slot] =
+        switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
   hx_kernel()->switch_contacts(&plant->model, delta, ddelta, &plant->state);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
 }
 
-hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx, hxCoordinates *d_rate,
-                          hxOutput *d_output) {
+hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
+                          const hxCoordinates *dx, hxCoordinates *d_rate, hxOutput *d_output) {
   static const hxInput no_input;
   static const hxCoordinates no_change;
   hxTangentPoint point;
-  const double scale = largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
-  if (!isfinite(scale)) return refuse(plant, HX_INVALID_ARGUMENT, "derivatives: got a direction that is not finite, expected numbers");
+  const double scale =
+      largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
+  if (!isfinite(scale))
+    return refuse(plant, HX_INVALID_ARGUMENT,
+                  "derivatives: got a direction that is not finite, expected numbers");
   hx_command_from_input(&point.command, input, plant->state.time);
   hx_command_from_input(&point.d_command, d_input ? d_input : &no_input, 0.0);
   hx_plant_get_coordinates(plant, &point.x);
@@ -234,7 +268,8 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   hx_tangent(&point, d_rate, d_output);
   return HX_OK;
 #else
-  return refuse(plant, HX_INVALID_ARGUMENT, "derivatives: this binary's compiler has no complex numbers; use another");
+  return refuse(plant, HX_INVALID_ARGUMENT,
+                "derivatives: this binary's compiler has no complex numbers; use another");
 #endif
 }
 
@@ -251,15 +286,18 @@ void hx_plant_get_bodies(const hxPlant *plant, double body[HX_BODIES][HX_BODY_ST
 hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BODY_STATE]) {
   for (int b = 0; b < HX_BODIES; ++b)
     for (int i = 0; i < HX_BODY_STATE; ++i)
-      if (!isfinite(body[b][i])) return refuse(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
+      if (!isfinite(body[b][i]))
+        return refuse(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
   return HX_OK;
 }
 
 void hx_plant_accelerations(hxPlant *plant, const hxInput *input, double acceleration[HX_BODIES][6],
-                            double multiplier[HX_BODIES - 1][HX_MULTIPLIERS], double drive_torque[HX_BODIES - 1]) {
+                            double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
+                            double drive_torque[HX_BODIES - 1]) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
-  hx_kernel()->accelerations(&plant->model, &plant->state, &command, acceleration, multiplier, drive_torque);
+  hx_kernel()->accelerations(&plant->model, &plant->state, &command, acceleration, multiplier,
+                             drive_torque);
 }

@@ -63,16 +63,19 @@ static void joint_on_parent(const hxDefinition *d, int leg, int joint, double sP
   }
 }
 
-/* The turn from the parent's axes to the child's at angle 0: the hip's yaw for the coxa, none for the others. */
+/* The turn from the parent's axes to the child's at angle 0: the hip's yaw for the coxa, none for
+ * the others. */
 static void zero_turn(const hxDefinition *d, int leg, int joint, double p[4]) {
   const double half = joint == 0 ? 0.5 * d->leg[leg].hip_yaw : 0.0;
   hx_sin_cos(half, &p[3], &p[0]);
   p[1] = p[2] = 0.0;
 }
 
-/* The quaternion of a right-handed frame given by its axes, by the largest of its components (Shepperd). */
+/* The quaternion of a right-handed frame given by its axes, by the largest of its components
+ * (Shepperd). */
 static void quat_from_axes(const double x[3], const double y[3], const double z[3], double p[4]) {
-  const double squares[4] = {1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2], 1.0 - x[0] + y[1] - z[2], 1.0 - x[0] - y[1] + z[2]};
+  const double squares[4] = {1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2],
+                             1.0 - x[0] + y[1] - z[2], 1.0 - x[0] - y[1] + z[2]};
   int largest = 0;
   for (int i = 1; i < 4; ++i)
     if (squares[i] > squares[largest]) largest = i;
@@ -118,7 +121,8 @@ static void inertia_in_frame(const double S[6], const double p[4], double out[6]
 
 static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int joint, int slot) {
   const hxLink *link = &d->leg[leg].link[joint];
-  double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], s[3], s_i[3], sP[3], sP_i[3], sP_j[3], inertia[6];
+  double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], s[3], s_i[3],
+      sP[3], sP_i[3], sP_j[3], inertia[6];
   joint_frame(d, leg, joint - 1, frame_i);
   joint_frame(d, leg, joint, frame_j);
   conjugate(frame_i, to_i);
@@ -136,7 +140,8 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   inertia_in_frame(link->inertia, frame_j, inertia);
   m->mass[slot] = link->mass;
   for (int i = 0; i < 6; ++i) m->inertia[i][slot] = inertia[i];
-  for (int i = 0; i < 3; ++i) m->s_i[i][slot] = s_i[i], m->sP_i[i][slot] = sP_i[i], m->sP_j[i][slot] = sP_j[i];
+  for (int i = 0; i < 3; ++i)
+    m->s_i[i][slot] = s_i[i], m->sP_i[i][slot] = sP_i[i], m->sP_j[i][slot] = sP_j[i];
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
 }
 
@@ -152,14 +157,16 @@ static void compile_ground(hxModel *model, const hxDefinition *d) {
   model->ground_normal[2] = level;
 }
 
-static const double load_share = 0.01; /* of the robot's weight: a foot that bears more can slip under load */
+static const double load_share =
+    0.01; /* of the robot's weight: a foot that bears more can slip under load */
 
 /* N  all bodies' */
 static double weight_of(const hxDefinition *d) {
   double mass = d->torso.mass;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) mass += d->leg[leg].link[joint].mass;
-  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] + d->gravity[2] * d->gravity[2]);
+  return mass * sqrt(d->gravity[0] * d->gravity[0] + d->gravity[1] * d->gravity[1] +
+                     d->gravity[2] * d->gravity[2]);
 }
 
 static void compile_settings(hxModel *model, const hxDefinition *d) {
@@ -169,17 +176,21 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->impact_speed_floor = d->contact.impact_speed_floor;
   for (int i = 0; i < 3; ++i) model->gravity[i] = d->gravity[i];
   model->alpha = d->baumgarte.alpha, model->beta = d->baumgarte.beta;
-  model->friction_law = d->friction.law, model->mu = d->friction.mu, model->slope = d->friction.slope;
+  model->friction_law = d->friction.law, model->mu = d->friction.mu,
+  model->slope = d->friction.slope;
   model->presliding = d->friction.presliding, model->bristle_damping = d->friction.bristle_damping;
-  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0), model->per_stribeck = 1.0 / d->friction.stribeck_speed;
+  model->static_rise = fmax(d->friction.mu_static - d->friction.mu, 0.0),
+  model->per_stribeck = 1.0 / d->friction.stribeck_speed;
   model->servo_mode = d->servo.mode;
   model->kp = d->servo.mode == HX_SERVO_POSITION ? d->servo.kp : 0.0;
   model->kd = d->servo.mode == HX_SERVO_POSITION ? d->servo.kd : 0.0;
   model->torque_max = d->servo.torque_max, model->speed_max = d->servo.speed_max;
-  model->rotor_inertia = d->servo.rotor_inertia, model->coulomb_friction = d->servo.coulomb_friction;
+  model->rotor_inertia = d->servo.rotor_inertia,
+  model->coulomb_friction = d->servo.coulomb_friction;
   model->terrain_kind = d->terrain.kind;
   model->method = d->solver.method, model->step = d->solver.step;
-  model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max, model->projection = d->solver.projection;
+  model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,
+  model->projection = d->solver.projection;
   model->load_threshold = load_share * weight_of(d);
 }
 
@@ -188,7 +199,8 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
   for (int i = 0; i < 6; ++i) model->torso_inertia[i] = d->torso.inertia[i];
   for (int slot = 0; slot < HX_SLOTS; ++slot) {
     const int leg = slot < HX_LEGS ? slot : 0;
-    for (int joint = 0; joint < HX_JOINTS; ++joint) compile_joint(&model->joint[joint], d, leg, joint, slot);
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      compile_joint(&model->joint[joint], d, leg, joint, slot);
     const hxLink *tibia = &d->leg[leg].link[HX_JOINTS - 1];
     double tip[3], frame[4], to_joint[4], foot[3];
     link_tip(tibia, tip);
@@ -202,11 +214,14 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
   compile_settings(model, d);
 }
 
-/* Child from parent through a joint at an angle and speed: p_j = p_i zero turn(angle), velocities by rigid-body motion. */
-static void place_child(const hxDefinition *d, int leg, int joint, const double parent[HX_BODY_STATE], double child[HX_BODY_STATE]) {
+/* Child from parent through a joint at an angle and speed: p_j = p_i zero turn(angle), velocities
+ * by rigid-body motion. */
+static void place_child(const hxDefinition *d, int leg, int joint,
+                        const double parent[HX_BODY_STATE], double child[HX_BODY_STATE]) {
   const hxLink *link = &d->leg[leg].link[joint];
   const double half = 0.5 * d->initial.angle[leg][joint], speed = d->initial.speed[leg][joint];
-  double axis[3], zero[4], turned[4], p[4], s[3], sP_i[3], sP_j[3], com[3], arm[3], w_arm[3], sine, cosine;
+  double axis[3], zero[4], turned[4], p[4], s[3], sP_i[3], sP_j[3], com[3], arm[3], w_arm[3], sine,
+      cosine;
   normalise(link->axis, 3, axis);
   hx_sin_cos(half, &sine, &cosine);
   const double turn[4] = {cosine, sine * axis[0], sine * axis[1], sine * axis[2]};
@@ -250,7 +265,8 @@ static void frame_of(const hxModel *model, int leg, int joint, double p[4]) {
   for (int i = 0; i < 4; ++i) p[i] = model->joint[joint].frame[i][leg];
 }
 
-void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE], hxMotion *motion) {
+void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE],
+                           hxMotion *motion) {
   memcpy(motion->torso, body[0], sizeof motion->torso);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     double (*to)[HX_SLOTS] = motion->link[joint];
@@ -266,7 +282,8 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
   }
 }
 
-void hx_bodies_from_motion(const hxModel *model, const hxMotion *motion, double body[HX_BODIES][HX_BODY_STATE]) {
+void hx_bodies_from_motion(const hxModel *model, const hxMotion *motion,
+                           double body[HX_BODIES][HX_BODY_STATE]) {
   memcpy(body[0], motion->torso, sizeof motion->torso);
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int leg = 0; leg < HX_LEGS; ++leg) {

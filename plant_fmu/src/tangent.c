@@ -1,4 +1,5 @@
-/* tangent.c - the physics once more, on complex numbers: the imaginary part of all that it stores is a derivative */
+/* tangent.c - the physics once more, on complex numbers: the imaginary part of all that it stores
+ * is a derivative */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -13,7 +14,8 @@
 #pragma GCC optimize("cx-limited-range")
 #endif
 
-/* In this file alone every number of the structures is complex: a point is made such from the real one's bytes. */
+/* In this file alone every number of the structures is complex: a point is made such from the real
+ * one's bytes. */
 typedef double _Complex hxComplex;
 #define double hxComplex
 #include "tangent.h"
@@ -26,17 +28,20 @@ typedef double _Complex hxComplex;
 #include "lanes/dynamics.h"
 #include "lanes/output.h"
 
-/* Real or complex, a point is some numbers, the model's choices, and more numbers; an output is numbers, contacts, and more numbers. */
+/* Real or complex, a point is some numbers, the model's choices, and more numbers; an output is
+ * numbers, contacts, and more numbers. */
 #define NUMBERS(bytes) ((bytes) / sizeof(hxComplex))
 enum {
   POINT_FIRST = NUMBERS(offsetof(hxTangentPoint, model.contact_law)),
-  POINT_CHOICES = offsetof(hxTangentPoint, model.stiffness) - offsetof(hxTangentPoint, model.contact_law),
+  POINT_CHOICES = offsetof(hxTangentPoint, model.stiffness) -
+      offsetof(hxTangentPoint, model.contact_law),
   POINT_LAST = NUMBERS(sizeof(hxTangentPoint) - offsetof(hxTangentPoint, model.stiffness)),
   OUTPUT_FIRST = NUMBERS(offsetof(hxOutput, foot.contact)),
   OUTPUT_CONTACT = offsetof(hxOutput, torso) - offsetof(hxOutput, foot.contact),
   OUTPUT_LAST = NUMBERS(sizeof(hxOutput) - offsetof(hxOutput, torso))
 };
-_Static_assert(POINT_CHOICES % sizeof(double) == 0 && OUTPUT_CONTACT % sizeof(double) == 0, "no padding, whatever numbers are");
+_Static_assert(POINT_CHOICES % sizeof(double) == 0 && OUTPUT_CONTACT % sizeof(double) == 0,
+               "no padding, whatever numbers are");
 
 static const double *widen(const double *from, size_t n, hxComplex *to) {
   for (size_t i = 0; i < n; ++i) to[i] = hx_complex(from[i], 0.0);
@@ -51,7 +56,8 @@ static void widen_point(const void *real, hxTangentPoint *point) {
 
 /* numbers with a change of them in the imaginary part */
 static void turn(hxComplex *numbers, const hxComplex *change, size_t n, double scale) {
-  for (size_t i = 0; i < n; ++i) numbers[i] = hx_complex(hx_re(numbers[i]), hx_tangent_step * (hx_re(change[i]) / scale));
+  for (size_t i = 0; i < n; ++i)
+    numbers[i] = hx_complex(hx_re(numbers[i]), hx_tangent_step * (hx_re(change[i]) / scale));
 }
 
 static double *narrow(const hxComplex *from, size_t n, double scale, double *to) {
@@ -62,7 +68,8 @@ static double *narrow(const hxComplex *from, size_t n, double scale, double *to)
 static void narrow_output(const hxOutput *output, double scale, void *real) {
   double *to = narrow((const hxComplex *)output, OUTPUT_FIRST, scale, real);
   memset(to, 0, OUTPUT_CONTACT);
-  narrow((const hxComplex *)&output->torso, OUTPUT_LAST, scale, to + OUTPUT_CONTACT / sizeof(double));
+  narrow((const hxComplex *)&output->torso, OUTPUT_LAST, scale,
+         to + OUTPUT_CONTACT / sizeof(double));
 }
 
 void hx_tangent(const hxTangentPoint *real, hxCoordinates *d_rate, hxOutput *d_output) {
@@ -74,11 +81,12 @@ void hx_tangent(const hxTangentPoint *real, hxCoordinates *d_rate, hxOutput *d_o
   widen_point(real, &point);
   const double scale = hx_re(point.scale);
   turn((hxComplex *)&point.x, (const hxComplex *)&point.dx, NUMBERS(sizeof point.x), scale);
-  turn((hxComplex *)&point.command, (const hxComplex *)&point.d_command, NUMBERS(sizeof point.command), scale);
+  turn((hxComplex *)&point.command, (const hxComplex *)&point.d_command,
+       NUMBERS(sizeof point.command), scale);
   hx_motion_from_coordinates(&point.model, &point.x, &point.state.motion);
   memset(&all, 0, sizeof all);
-  hx_dynamics_evaluate(&point.model, &point.state.contact, &point.command, hx_re(point.state.time), &point.state.motion, NULL, 1, &work,
-                       &all);
+  hx_dynamics_evaluate(&point.model, &point.state.contact, &point.command, hx_re(point.state.time),
+                       &point.state.motion, NULL, 1, &work, &all);
   hx_coordinates_rate(&all.motion, &work, &rate);
   hx_output_fill(&point.model, &point.state, &work, &output);
   if (d_rate) narrow((const hxComplex *)&rate, NUMBERS(sizeof rate), scale, (double *)d_rate);

@@ -20,18 +20,42 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
 CYCLES = ["--set", "duration=3", "--set", "gait.period=0.8"]  # the shortest walk with figures
-RUN = {"commands.csv", "metrics.json", "results.csv", "results.parquet", "run.json", "scenario.toml"}
+RUN = {
+    "commands.csv",
+    "metrics.json",
+    "results.csv",
+    "results.parquet",
+    "run.json",
+    "scenario.toml",
+}
 TWINS = {
-    "slip_per_radian", "path_error_per_radian", "yaw_drift_per_radian", "heat_per_radian", "cost_per_radian", "electrical_cost_per_radian",
-}  # of robots that turn on the spot  # fmt: skip
+    "slip_per_radian",
+    "path_error_per_radian",
+    "yaw_drift_per_radian",
+    "heat_per_radian",
+    "cost_per_radian",
+    "electrical_cost_per_radian",
+}  # of robots that turn on the spot
 SHOWN = set(METRICS) - TWINS - {"slip_net_per_metre"}
 FIGURES = {"foot_forces", "slip", "feet", "posture", "path", "torques", "energy", "footfall"}
 
 
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory: pytest.TempPathFactory, plant_build: Path) -> tuple[Path, dict[str, Any]]:
+def compared(
+    tmp_path_factory: pytest.TempPathFactory, plant_build: Path
+) -> tuple[Path, dict[str, Any]]:
     folder = tmp_path_factory.mktemp("compare") / "out"
-    command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "2", "--json", *CYCLES]
+    command = [
+        *COMMAND,
+        "compare",
+        "walk_flat",
+        "-o",
+        str(folder),
+        "--seeds",
+        "2",
+        "--json",
+        *CYCLES,
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return folder, json.loads(done.stdout)
 
@@ -42,26 +66,32 @@ def test_compare_prints_the_shape_of_the_contract(compared: tuple[Path, dict[str
     for control in ("kinematic", "compliant"):
         assert list(printed[control]) == list(METRICS)
         assert {name for name, value in printed[control].items() if value is None} == TWINS
-        assert all(isinstance(printed[control][name], float) for name in METRICS if name not in TWINS)
+        assert all(
+            isinstance(printed[control][name], float) for name in METRICS if name not in TWINS
+        )
     assert list(printed["change"]) == list(METRICS)
     assert (printed["seeds"], printed["walked"]) == (2, {"kinematic": 2, "compliant": 2})
     for name in METRICS:
         change = printed["change"][name]
         assert change["pairs"] == (0 if name in TWINS else 2)
         if name not in TWINS:
-            assert change["difference"] == pytest.approx(printed["compliant"][name] - printed["kinematic"][name])
+            assert change["difference"] == pytest.approx(
+                printed["compliant"][name] - printed["kinematic"][name]
+            )
     assert Path(printed["report"]) == folder / "report.html"
 
 
-def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_seed(compared: tuple[Path, dict[str, Any]]) -> None:
+def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_seed(
+    compared: tuple[Path, dict[str, Any]],
+) -> None:
     folder, printed = compared
     runs = read_seeds(folder / "seeds.csv")
     for control in ("kinematic", "compliant"):
         assert [run.seed for run in runs[control]] == [0, 1]
         told = json.loads((folder / control / "metrics.json").read_text())
-        assert {name: value for name, value in runs[control][0].metrics.items() if name not in TWINS} == {
-            name: value for name, value in told.items() if name not in TWINS
-        }
+        assert {
+            name: value for name, value in runs[control][0].metrics.items() if name not in TWINS
+        } == {name: value for name, value in told.items() if name not in TWINS}
         assert all(told[name] is None for name in TWINS)
         slips = [run.metrics["slip_per_metre"] for run in runs[control]]
         assert slips[0] != slips[1]
@@ -69,19 +99,39 @@ def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_s
         assert load_scenario(folder / control / "scenario.toml").variation == STANDARD
 
 
-def test_compare_with_one_seed_is_the_plain_walk_without_intervals(call: Call, tmp_path: Path) -> None:
-    code, out, _ = call("compare", "walk_flat", "-o", tmp_path / "one", "--seeds", "1", "--json", *QUICK)
+def test_compare_with_one_seed_is_the_plain_walk_without_intervals(
+    call: Call, tmp_path: Path
+) -> None:
+    code, out, _ = call(
+        "compare", "walk_flat", "-o", tmp_path / "one", "--seeds", "1", "--json", *QUICK
+    )
     printed = json.loads(out)
     assert (code, printed["seeds"]) == (0, 1)
     assert printed["change"]["realtime_factor"]["low"] is None
     assert load_scenario(tmp_path / "one" / "scenario.toml").variation is None
     assert call("simulate", "walk_flat", "-o", tmp_path / "plain", *QUICK)[0] == 0
-    assert (tmp_path / "one" / "kinematic" / "results.csv").read_bytes() == (tmp_path / "plain" / "results.csv").read_bytes()
+    assert (tmp_path / "one" / "kinematic" / "results.csv").read_bytes() == (
+        tmp_path / "plain" / "results.csv"
+    ).read_bytes()
     assert "95 %" not in metric_table(tmp_path / "one")
 
 
-def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(call: Call, tmp_path: Path) -> None:
-    code, out, _ = call("compare", "walk_flat", "-o", tmp_path, "--seeds", "2", *QUICK, "--set", "variation.height=2 mm", "--set", "seed=5")
+def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(
+    call: Call, tmp_path: Path
+) -> None:
+    code, out, _ = call(
+        "compare",
+        "walk_flat",
+        "-o",
+        tmp_path,
+        "--seeds",
+        "2",
+        *QUICK,
+        "--set",
+        "variation.height=2 mm",
+        "--set",
+        "seed=5",
+    )
     assert code == 0
     assert "95 % interval" in out
     assert "2 of 2" in out
@@ -89,24 +139,40 @@ def test_compare_shows_intervals_and_keeps_the_scenarios_own_variation(call: Cal
     assert load_scenario(tmp_path / "scenario.toml").variation == Variation(height=0.002)
 
 
-def test_compare_leaves_results_figures_report_and_the_scenario_as_run(compared: tuple[Path, dict[str, Any]]) -> None:
+def test_compare_leaves_results_figures_report_and_the_scenario_as_run(
+    compared: tuple[Path, dict[str, Any]],
+) -> None:
     folder, printed = compared
     assert {path.name for path in folder.iterdir()} == {
-        "kinematic", "compliant", "plots", "metrics.json", "report.html", "run.json", "scenario.toml", "seeds.csv",
-    }  # fmt: skip
-    assert {path.name for path in (folder / "plots").iterdir()} == {f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
+        "kinematic",
+        "compliant",
+        "plots",
+        "metrics.json",
+        "report.html",
+        "run.json",
+        "scenario.toml",
+        "seeds.csv",
+    }
+    assert {path.name for path in (folder / "plots").iterdir()} == {
+        f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")
+    }
     for control in ("kinematic", "compliant"):
         assert {path.name for path in (folder / control).iterdir()} == RUN
         assert load_scenario(folder / control / "scenario.toml").control == control
     assert json.loads((folder / "run.json").read_text())["status"] == "completed"
-    assert json.loads((folder / "metrics.json").read_text()) == {key: value for key, value in printed.items() if key != "report"}
+    assert json.loads((folder / "metrics.json").read_text()) == {
+        key: value for key, value in printed.items() if key != "report"
+    }
 
 
 def test_the_report_needs_no_other_file(compared: tuple[Path, dict[str, Any]]) -> None:
     page = (compared[0] / "report.html").read_text(encoding="utf-8")
     assert "default-src 'none'" in page
     assert not re.findall(r'(?:src|href)="(?!plots/)', page.partition("<script")[0])
-    assert all((compared[0] / "plots" / f"{name}.svg").is_file() and f'href="plots/{name}.svg"' in page for name in FIGURES)
+    assert all(
+        (compared[0] / "plots" / f"{name}.svg").is_file() and f'href="plots/{name}.svg"' in page
+        for name in FIGURES
+    )
     assert all(f"<code>{name}</code>" in page for name in SHOWN)
     assert "sha256" in page
     assert "95 % interval" in page
@@ -114,10 +180,17 @@ def test_the_report_needs_no_other_file(compared: tuple[Path, dict[str, Any]]) -
 
 
 def metric_table(folder: Path) -> str:
-    return (folder / "report.html").read_text(encoding="utf-8").partition("<h2>Metrics</h2>")[2].partition("</table>")[0]
+    return (
+        (folder / "report.html")
+        .read_text(encoding="utf-8")
+        .partition("<h2>Metrics</h2>")[2]
+        .partition("</table>")[0]
+    )
 
 
-def test_report_makes_figures_and_page_again(compared: tuple[Path, dict[str, Any]], call: Call) -> None:
+def test_report_makes_figures_and_page_again(
+    compared: tuple[Path, dict[str, Any]], call: Call
+) -> None:
     folder, _ = compared
     before = {path.name: path.read_bytes() for path in (folder / "plots").glob("*.svg")}
     rows = metric_table(folder)
@@ -151,7 +224,11 @@ def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path
 @pytest.mark.parametrize(
     ("duration", "period", "told"),
     [
-        ("2.3", "0.8", "too short for metrics: got 2.3 s, expected 2.4 s, which is 3 whole gait cycles"),
+        (
+            "2.3",
+            "0.8",
+            "too short for metrics: got 2.3 s, expected 2.4 s, which is 3 whole gait cycles",
+        ),
         ("2.4", "0.8", ""),
     ],
 )
@@ -169,10 +246,22 @@ def test_a_walk_too_short_for_metrics_says_why_and_how_long_is_enough(
 
 
 def test_recorded_columns_can_be_chosen(call: Call, tmp_path: Path) -> None:
-    code, _, _ = call("simulate", "stand", "-o", tmp_path / "out", *QUICK, "--set", "outputs.csv=['torso.roll', '*.contact']")
+    code, _, _ = call(
+        "simulate",
+        "stand",
+        "-o",
+        tmp_path / "out",
+        *QUICK,
+        "--set",
+        "outputs.csv=['torso.roll', '*.contact']",
+    )
     assert code == 0
     names = read_csv(tmp_path / "out" / "results.csv").names
-    assert names == ("time", "torso.roll", *(f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")))
+    assert names == (
+        "time",
+        "torso.roll",
+        *(f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")),
+    )
 
 
 def test_a_folder_of_an_earlier_run_is_written_anew(call: Call, tmp_path: Path) -> None:
@@ -208,10 +297,30 @@ def test_design_writes_gains_that_simulate_takes(call: Call, tmp_path: Path) -> 
     assert code == 0
     assert all(Path(file).is_file() for file in json.loads(out)["files"])
     gains = tmp_path / "design" / "gains.toml"
-    code, _, err = call("simulate", "stand", "--control", "compliant", "--gains", gains, "-o", tmp_path / "out", *QUICK)
+    code, _, err = call(
+        "simulate",
+        "stand",
+        "--control",
+        "compliant",
+        "--gains",
+        gains,
+        "-o",
+        tmp_path / "out",
+        *QUICK,
+    )
     assert code == 0
     assert "designed for" not in err
-    code, _, err = call("simulate", "phantomx_walk", "--control", "compliant", "--gains", gains, "-o", tmp_path / "out", *QUICK)
+    code, _, err = call(
+        "simulate",
+        "phantomx_walk",
+        "--control",
+        "compliant",
+        "--gains",
+        gains,
+        "-o",
+        tmp_path / "out",
+        *QUICK,
+    )
     assert code == 0
     assert "warning: compliant: the gains were designed for robot 'athena'" in err
 

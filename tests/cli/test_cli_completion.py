@@ -40,7 +40,11 @@ def test_names_are_offered_where_they_go(offered: Ask) -> None:
     assert set(offered("simulate", "")) == set(offered("compare", "")) == set(list_scenarios())
     assert offered("simulate", "walk_f") == ["walk_flat"]
     assert offered("export", "--robot", "") == offered("design", "--robot", "") == list_robots()
-    assert offered("simulate", "--control", "c") == offered("export", "--controller", "c") == ["compliant"]
+    assert (
+        offered("simulate", "--control", "c")
+        == offered("export", "--controller", "c")
+        == ["compliant"]
+    )
     assert offered("export", "--gait", "w") == ["wave"]
     assert offered("list", "sc") == ["scenarios"]
     assert "simulate" in offered("")
@@ -50,7 +54,12 @@ def test_names_are_offered_where_they_go(offered: Ask) -> None:
 def test_keys_of_set_are_those_of_the_scenario_and_of_the_fmu(offered: Ask) -> None:
     assert offered("simulate", "--set", "dura") == ["duration="]
     assert {"gait.name=", "gait.period="} <= set(offered("compare", "--set", "gait."))
-    assert offered("simulate", "--set", "gravity") == ["gravity=", "gravity[1]=", "gravity[2]=", "gravity[3]="]
+    assert offered("simulate", "--set", "gravity") == [
+        "gravity=",
+        "gravity[1]=",
+        "gravity[2]=",
+        "gravity[3]=",
+    ]
     assert offered("simulate", "--set", "LF.coxa.m") == ["LF.coxa.mass="]
     assert offered("simulate", "--set", "torso.push") == []  # an input
     assert offered("design", "--set", "phase") == ["phase_margin="]
@@ -75,10 +84,15 @@ def refusal(setting: str) -> str:
 
 def ask_shell(shell: str, typed: str) -> list[str]:
     environment = os.environ | {
-        "_HEXAPOD_COMPLETE": f"complete_{shell}", "_TYPER_COMPLETE_ARGS": typed, "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-        "COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split(" ")) - 1),
-    }  # fmt: skip
-    return subprocess.run(COMMAND, env=environment, capture_output=True, text=True, check=True).stdout.splitlines()
+        "_HEXAPOD_COMPLETE": f"complete_{shell}",
+        "_TYPER_COMPLETE_ARGS": typed,
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        "COMP_WORDS": typed,
+        "COMP_CWORD": str(len(typed.split(" ")) - 1),
+    }
+    return subprocess.run(
+        COMMAND, env=environment, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
 
 
 @pytest.mark.parametrize("shell", SHELLS)
@@ -90,13 +104,26 @@ def test_every_shells_protocol_is_answered(shell: str) -> None:
 
 @pytest.mark.parametrize(("shell", "file"), SHELLS.items(), ids=list(SHELLS))
 def test_completion_is_installed_for_every_shell(tmp_path: Path, shell: str, file: str) -> None:
-    environment = os.environ | {"HOME": str(tmp_path), "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
-    subprocess.run([*COMMAND, "--install-completion", shell], env=environment, capture_output=True, text=True, check=True)
+    environment = os.environ | {
+        "HOME": str(tmp_path),
+        "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
+    }
+    subprocess.run(
+        [*COMMAND, "--install-completion", shell],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert (tmp_path / file).is_file()
-    assert any("_HEXAPOD_COMPLETE" in path.read_text() for path in tmp_path.rglob("*") if path.is_file())
+    assert any(
+        "_HEXAPOD_COMPLETE" in path.read_text() for path in tmp_path.rglob("*") if path.is_file()
+    )
 
 
 def test_completion_imports_nothing_slow() -> None:
     script = "import sys, hexapod_cosim.cosim.cli.app; print(*{name.partition('.')[0] for name in sys.modules})"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     assert not SLOW & set(done.stdout.split())

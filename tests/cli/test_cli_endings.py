@@ -1,4 +1,6 @@
-"""Runs of the hexapod command that do not complete: what was recorded is kept, under another name."""
+"""Runs of the hexapod command that do not complete: what was recorded is kept, under another
+name.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +27,16 @@ from hexapod_cosim.models import HexapodError
 
 PARTIAL = {"results.partial.csv", "results.partial.parquet", "run.json", "scenario.toml"}
 # an explicit method of fixed step without error control has nowhere to go under an endless force
-REFUSED = ["solver.method=rk4", "solver.step=0.005", "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"]
+REFUSED = [
+    "solver.method=rk4",
+    "solver.step=0.005",
+    "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]",
+]
 
 
-def test_a_run_that_ends_early_keeps_what_was_recorded_under_another_name(call: Call, tmp_path: Path) -> None:
+def test_a_run_that_ends_early_keeps_what_was_recorded_under_another_name(
+    call: Call, tmp_path: Path
+) -> None:
     folder = tmp_path / "out"
     assert call("simulate", "walk_flat", "-o", folder, *QUICK)[0] == 0
     code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK, *settings(*REFUSED))
@@ -48,13 +56,30 @@ def test_a_comparison_that_ends_early_says_so_in_both_folders(call: Call, tmp_pa
     assert call("compare", "walk_flat", "-o", folder, *QUICK, *settings(*REFUSED))[0] == 1
     assert {path.name for path in folder.iterdir()} == {"kinematic", "run.json"}
     assert {path.name for path in (folder / "kinematic").iterdir()} == PARTIAL
-    assert all(json.loads((place / "run.json").read_text())["status"] == "failed" for place in (folder, folder / "kinematic"))
+    assert all(
+        json.loads((place / "run.json").read_text())["status"] == "failed"
+        for place in (folder, folder / "kinematic")
+    )
 
 
-def test_ctrl_c_keeps_what_was_recorded_under_another_name(plant_build: Path, tmp_path: Path) -> None:
+def test_ctrl_c_keeps_what_was_recorded_under_another_name(
+    plant_build: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "out"
-    command = [*COMMAND, "simulate", "walk_flat", "-o", str(folder), "--set", "duration=900", "--set", "outputs.csv=['torso.*']"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    command = [
+        *COMMAND,
+        "simulate",
+        "walk_flat",
+        "-o",
+        str(folder),
+        "--set",
+        "duration=900",
+        "--set",
+        "outputs.csv=['torso.*']",
+    ]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     try:
         deadline = time.monotonic() + 60.0
         while not (folder / "run.json").exists() and time.monotonic() < deadline:
@@ -73,16 +98,22 @@ def test_ctrl_c_keeps_what_was_recorded_under_another_name(plant_build: Path, tm
     assert json.loads((folder / "run.json").read_text())["status"] == "interrupted"
 
 
-def test_a_controller_that_raises_keeps_the_recording_and_fails(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_controller_that_raises_keeps_the_recording_and_fails(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     step = Controller.step
 
-    def broken(self: Controller, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+    def broken(
+        self: Controller, t: float, command: BodyCommand, measurement: Measurement
+    ) -> JointCommand:
         if t > 0.1:
             raise ValueError("shapes differ")
         return step(self, t, command, measurement)
 
     monkeypatch.setattr(Controller, "step", broken)
-    monkeypatch.setattr("hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None)  # it tries the controller out
+    monkeypatch.setattr(
+        "hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None
+    )  # it tries the controller out
     folder = tmp_path / "out"
     code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK)
     assert (code, out) == (1, "")
@@ -117,7 +148,9 @@ def test_an_interrupt_while_figures_are_drawn_says_what_is_there(
         return []
 
     monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.write_report", struck)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background starts with it ignored
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a test run in the background starts with it ignored
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     code, _, err = call("simulate", "stand", "-o", tmp_path / "out", "--set", "duration=0.2")
     assert code == 130
@@ -138,26 +171,57 @@ def test_a_refused_run_leaves_the_earlier_results(call: Call, tmp_path: Path) ->
 
 
 def test_a_torso_that_sinks_has_fallen(call: Call, tmp_path: Path) -> None:
-    arguments = ["simulate", "stand", "-o", tmp_path / "out", "--json", *settings("servo.mode=torque", "duration=2", "outputs.plots=false")]
+    arguments = [
+        "simulate",
+        "stand",
+        "-o",
+        tmp_path / "out",
+        "--json",
+        *settings("servo.mode=torque", "duration=2", "outputs.plots=false"),
+    ]
     code, out, err = call(*arguments)
     assert code == 3  # falls have an exit code of their own
     assert "warning: kinematic: the robot fell at" in err
     assert json.loads(out)["walk"]["upright"] is False
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
-    assert {"metrics.json", "results.parquet"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"metrics.json", "results.parquet"} <= {
+        path.name for path in (tmp_path / "out").iterdir()
+    }
 
 
-@pytest.mark.parametrize(("upright", "code"), [((True, True), 0), ((False, True), 3), ((True, False), 3), ((False, False), 3)])
+@pytest.mark.parametrize(
+    ("upright", "code"),
+    [((True, True), 0), ((False, True), 3), ((True, False), 3), ((False, False), 3)],
+)
 def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, upright: tuple[bool, bool], code: int
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    upright: tuple[bool, bool],
+    code: int,
 ) -> None:
     def others(scenarios: Sequence[Scenario], **_: object) -> Generator[Summary, None, None]:
         for scenario in scenarios:
             stands = upright[("kinematic", "compliant").index(scenario.control)]
-            yield replace(refused(scenario, HexapodError("")), status="completed", upright=stands, warnings=() if stands else ("it fell",))
+            yield replace(
+                refused(scenario, HexapodError("")),
+                status="completed",
+                upright=stands,
+                warnings=() if stands else ("it fell",),
+            )
 
     monkeypatch.setattr("hexapod_cosim.cosim.cli.compare_command.run_batch", others)
-    returned, out, _ = call("compare", "stand", "-o", tmp_path / "out", "--seeds", "2", "--json", "--set", "duration=0.2")
+    returned, out, _ = call(
+        "compare",
+        "stand",
+        "-o",
+        tmp_path / "out",
+        "--seeds",
+        "2",
+        "--json",
+        "--set",
+        "duration=0.2",
+    )
     assert returned == code
     assert json.loads(out)["walked"] == {"kinematic": 1 + upright[0], "compliant": 1 + upright[1]}
     assert (tmp_path / "out" / "report.html").is_file()
@@ -169,7 +233,9 @@ def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
 ) -> None:
     text = f'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n[factors]\nservo.mode = {json.dumps(modes)}\n'
     (tmp_path / "sinks.toml").write_text(text)
-    returned, out, _ = call("study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json")
+    returned, out, _ = call(
+        "study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json"
+    )
     assert returned == code, out
 
 
@@ -190,7 +256,20 @@ def test_what_has_no_effect_is_told(call: Call, tmp_path: Path) -> None:
 
 def test_report_skips_figures_whose_columns_were_not_kept(call: Call, tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, *QUICK, "--set", "outputs.csv=['torso.*']", "--set", "outputs.formats=['csv']")[0] == 0
+    assert (
+        call(
+            "simulate",
+            "stand",
+            "-o",
+            folder,
+            *QUICK,
+            "--set",
+            "outputs.csv=['torso.*']",
+            "--set",
+            "outputs.formats=['csv']",
+        )[0]
+        == 0
+    )
     code, _, err = call("report", folder)
     assert code == 0
     assert "Slip is not drawn: " in err

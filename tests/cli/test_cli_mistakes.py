@@ -15,35 +15,74 @@ from hexapod_cosim.cosim.cli import main
     ("arguments", "parts"),
     [
         (["simulate", "walk_flt"], ["unknown scenario", "did you mean 'walk_flat'"]),
-        (["simulate", "--set", "gait.periode=1"], ["walk_flat.toml", "'periode'", "did you mean 'period'"]),
+        (
+            ["simulate", "--set", "gait.periode=1"],
+            ["walk_flat.toml", "'periode'", "did you mean 'period'"],
+        ),
         (["simulate", "--set", "macro_step=0"], ["macro_step", "got 0", "> 0"]),
         (["simulate", "--set", "macro_step=-0.005"], ["macro_step", "got -0.005", "> 0"]),
         (["simulate", "--control", "complaint"], ["'complaint'", "did you mean 'compliant'"]),
         (["simulate", "--set", "torso.mas=3"], ["'torso.mas'", "did you mean 'torso.mass'"]),
         (["simulate", "--set", "torso.mass=-3"], ["torso.mass", "-3"]),
-        (["simulate", "--set", "torso.push_force[1]=100"], ["--set torso.push_force[1]: not a parameter", "an input", "[[events]]"]),
+        (
+            ["simulate", "--set", "torso.push_force[1]=100"],
+            ["--set torso.push_force[1]: not a parameter", "an input", "[[events]]"],
+        ),
         (["simulate", "--set", "robot=atena"], ["unknown robot", "did you mean 'athena'"]),
         (["simulate", "--set", "gait.period=0.005"], ["period"]),
-        (["simulate", "--set", "outputs.csv=['torso.rol']"], ["outputs.csv", "did you mean 'torso.roll'"]),
+        (
+            ["simulate", "--set", "outputs.csv=['torso.rol']"],
+            ["outputs.csv", "did you mean 'torso.roll'"],
+        ),
         (["simulate", "--set", "friction.mu=-1"], ["friction.mu", "got -1"]),
         (["simulate", "--gains", "missing.toml"], ["cannot read the gains", "missing.toml"]),
         (["simulate", "--fmu", "missing.fmu"], ["no such FMU", "missing.fmu", "hexapod export"]),
         (["compare", "walk_flt"], ["unknown scenario"]),
         (["compare", "--seeds", "0"], ["--seeds: ", "got 0", "1 to"]),
-        (["report", "."], ["not a results folder", "got '.'", "`hexapod simulate`, `hexapod compare` or `hexapod study`"]),
+        (
+            ["report", "."],
+            [
+                "not a results folder",
+                "got '.'",
+                "`hexapod simulate`, `hexapod compare` or `hexapod study`",
+            ],
+        ),
         (["validate", "missing.fmu"], ["no such FMU"]),
         (["export", "--robot", "atena"], ["unknown robot", "did you mean 'athena'"]),
         (["simulate", "--set", "fricton.mu=1"], ["--set fricton.mu", "did you mean 'friction.mu'"]),
-        (["simulate", "--set", "command.vx=10 m/s"], ["walk_flat.toml: command: ", "got 'vx = 10 m/s'", "at most vx = 0.6", "tripod"]),
+        (
+            ["simulate", "--set", "command.vx=10 m/s"],
+            ["walk_flat.toml: command: ", "got 'vx = 10 m/s'", "at most vx = 0.6", "tripod"],
+        ),
         (["compare", "--set", "command.vx=10"], ["do not reach"]),
         (["simulate", "--set", "duration=1e9"], ["too many macro-steps", "5000 s"]),
         (
-            ["export", "--urdf", "--fmi", "3", "--platforms", "all", "--controller", "compliant", "-o", "a.urdf"],
-            ["options that do nothing for a robot's description", "got '--fmi --platforms --controller'"],
+            [
+                "export",
+                "--urdf",
+                "--fmi",
+                "3",
+                "--platforms",
+                "all",
+                "--controller",
+                "compliant",
+                "-o",
+                "a.urdf",
+            ],
+            [
+                "options that do nothing for a robot's description",
+                "got '--fmi --platforms --controller'",
+            ],
         ),
-        (["export", "-o", "a.xml", "--fmi", "2", "--gait", "ripple", "--period", "0.005"], ["got '--fmi --gait --period'"]),
+        (
+            ["export", "-o", "a.xml", "--fmi", "2", "--gait", "ripple", "--period", "0.005"],
+            ["got '--fmi --gait --period'"],
+        ),
         (["export", "--mjcf", "--gains", "gains.toml"], ["got '--gains'"]),
-        (["export", "--period", "0.005"], ["do nothing for the plant's FMU", "got '--period'", "--controller kinematic"]),
+        (
+            ["export", "--period", "0.005"],
+            ["do nothing for the plant's FMU", "got '--period'", "--controller kinematic"],
+        ),
         (["export", "--gait", "wave", "--fmi", "3"], ["got '--gait'"]),
         (["export", "-o", "athena.zip"], [".fmu"]),
         (["export", "-o", "."], ["got '.'", "not a folder", "write -o athena.fmu"]),
@@ -55,7 +94,11 @@ from hexapod_cosim.cosim.cli import main
     ],
 )
 def test_a_mistake_gets_one_clear_paragraph(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    parts: list[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert_refused(call(*arguments), *parts)
@@ -86,9 +129,15 @@ def test_a_folder_of_someone_elses_files_is_left_alone(call: Call, tmp_path: Pat
 
 def test_a_foreign_fmu_is_refused(call: Call, tmp_path: Path, athena_fmu: Path) -> None:
     arguments = ["simulate", "phantomx_walk", "--fmu", athena_fmu, "-o", tmp_path / "out"]
-    assert_refused(call(*arguments), "the FMU holds another robot: torso.mass", "got 2.6", "hexapod export")
+    assert_refused(
+        call(*arguments), "the FMU holds another robot: torso.mass", "got 2.6", "hexapod export"
+    )
     (tmp_path / "plain.fmu").write_text("no archive")
-    assert_refused(call("simulate", "--fmu", tmp_path / "plain.fmu", "-o", tmp_path / "out"), "not an FMU", "plain.fmu")
+    assert_refused(
+        call("simulate", "--fmu", tmp_path / "plain.fmu", "-o", tmp_path / "out"),
+        "not an FMU",
+        "plain.fmu",
+    )
 
 
 def test_an_unknown_option_is_told_and_not_zero(call: Call) -> None:
@@ -97,7 +146,9 @@ def test_an_unknown_option_is_told_and_not_zero(call: Call) -> None:
     assert "No such option: --speed" in err
 
 
-def test_an_unexpected_error_is_one_line_with_a_hint(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unexpected_error_is_one_line_with_a_hint(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by nought")
 
@@ -114,24 +165,55 @@ def test_an_unexpected_error_is_one_line_with_a_hint(call: Call, monkeypatch: py
     ("arguments", "code", "expected"),
     [
         (
-            ["simulate", "walk_flt"], 1,
-            {"what": "unknown scenario", "got": "walk_flt", "fix": "did you mean 'walk_flat'?", "where": None},
+            ["simulate", "walk_flt"],
+            1,
+            {
+                "what": "unknown scenario",
+                "got": "walk_flt",
+                "fix": "did you mean 'walk_flat'?",
+                "where": None,
+            },
         ),
-        (["simulate", "--set", "macro_step=0"], 1, {"got": 0, "expected": "a finite number > 0 and <= 0.1 [s]"}),
-        (["simulate", "--speed", "3"], 2, {"what": "not understood", "got": "No such option: --speed (Possible options: --set)"}),
-        (["compare", "--seeds", "0"], 1, {"got": 0, "expected": "1 to 10000", "fix": "write --seeds 10", "where": "--seeds"}),
+        (
+            ["simulate", "--set", "macro_step=0"],
+            1,
+            {"got": 0, "expected": "a finite number > 0 and <= 0.1 [s]"},
+        ),
+        (
+            ["simulate", "--speed", "3"],
+            2,
+            {"what": "not understood", "got": "No such option: --speed (Possible options: --set)"},
+        ),
+        (
+            ["compare", "--seeds", "0"],
+            1,
+            {"got": 0, "expected": "1 to 10000", "fix": "write --seeds 10", "where": "--seeds"},
+        ),
         (["study", "nothing.toml"], 1, {"where": "nothing.toml"}),
         (["report", "."], 1, {"what": "not a results folder", "got": "."}),
         (["design", "--robot", "atena"], 1, {"what": "unknown robot", "got": "atena"}),
         (["export", "--fmi", "7"], 1, {"got": 7}),
-        (["list", "robot"], 1, {"what": "unknown list", "got": "robot", "fix": "did you mean 'robots'?"}),
-        (["validate", "missing.fmu"], 1, {"fmu": "missing.fmu", "valid": False, "what": "no such FMU"}),
+        (
+            ["list", "robot"],
+            1,
+            {"what": "unknown list", "got": "robot", "fix": "did you mean 'robots'?"},
+        ),
+        (
+            ["validate", "missing.fmu"],
+            1,
+            {"fmu": "missing.fmu", "valid": False, "what": "no such FMU"},
+        ),
         (["simulat"], 2, {"what": "not understood"}),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)  # fmt: skip
+)
 def test_with_json_an_error_is_an_object_on_stdout_and_the_paragraph_on_stderr(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, expected: dict[str, object]
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    expected: dict[str, object],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     returned, out, err = call(*arguments, "--json")
@@ -140,11 +222,15 @@ def test_with_json_an_error_is_an_object_on_stdout_and_the_paragraph_on_stderr(
     assert {"error", "what", "got", "expected", "fix", "where", "exit_code"} <= told.keys()
     assert told["exit_code"] == code
     assert err == f"hexapod: {told['error']}\n"
-    assert all(part in told["error"] for part in (told["what"], told["expected"] or "", told["fix"] or ""))
+    assert all(
+        part in told["error"] for part in (told["what"], told["expected"] or "", told["fix"] or "")
+    )
     assert {key: told[key] for key in expected} == expected
 
 
-def test_with_json_an_unexpected_error_is_an_object_too(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_json_an_unexpected_error_is_an_object_too(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def burst(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by nought")
 
@@ -155,7 +241,9 @@ def test_with_json_an_unexpected_error_is_an_object_too(call: Call, monkeypatch:
     assert told["error"].startswith("unexpected ZeroDivisionError: by nought")
 
 
-def test_with_json_an_interrupt_is_an_object_too(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_json_an_interrupt_is_an_object_too(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -165,7 +253,9 @@ def test_with_json_an_interrupt_is_an_object_too(call: Call, monkeypatch: pytest
     assert json.loads(out)["exit_code"] == 130
 
 
-def test_with_json_an_unsound_fmu_is_one_object_with_its_problems_and_the_error(call: Call, tmp_path: Path) -> None:
+def test_with_json_an_unsound_fmu_is_one_object_with_its_problems_and_the_error(
+    call: Call, tmp_path: Path
+) -> None:
     (tmp_path / "plain.fmu").write_text("no archive")
     code, out, _ = call("validate", tmp_path / "plain.fmu", "--json")
     told = json.loads(out)

@@ -1,4 +1,6 @@
-"""What is on a terminal and what is not: progress there, nothing but results in pipes, JSON from every command."""
+"""What is on a terminal and what is not: progress there, nothing but results in pipes, JSON from
+every command.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
 from hexapod_cosim.cosim.results.results import NEEDED
 
 ESCAPE = "\x1b"
-COMMANDS = {name: command for name, command in get_command(app).commands.items() if not command.hidden}  # type: ignore[attr-defined]
+COMMANDS = {
+    name: command for name, command in get_command(app).commands.items() if not command.hidden
+}  # type: ignore[attr-defined]
 
 
 class Terminal(io.StringIO):
@@ -33,7 +37,9 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[[], Terminal]:
-    """Puts one in the place of stderr, from within a test: pytest's own takes its place again before."""
+    """Puts one in the place of stderr, from within a test: pytest's own takes its place again
+    before.
+    """
 
     def install() -> Terminal:
         terminal = Terminal()
@@ -44,7 +50,9 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[[], Terminal]:
     return install
 
 
-def test_a_run_shows_simulated_time_its_speed_and_what_is_left(terminal: Callable[[], Terminal]) -> None:
+def test_a_run_shows_simulated_time_its_speed_and_what_is_left(
+    terminal: Callable[[], Terminal],
+) -> None:
     screen = terminal()
     with progress_bar("kinematic", 8.0) as tell:
         assert tell is not None
@@ -56,7 +64,9 @@ def test_a_run_shows_simulated_time_its_speed_and_what_is_left(terminal: Callabl
     assert "left" in shown
 
 
-def test_runs_are_counted_with_their_rate_and_in_the_end_their_time(terminal: Callable[[], Terminal]) -> None:
+def test_runs_are_counted_with_their_rate_and_in_the_end_their_time(
+    terminal: Callable[[], Terminal],
+) -> None:
     screen = terminal()
     with counting_bar("seeds", 6) as tell:
         tell(2)
@@ -75,7 +85,12 @@ def test_a_terminal_sees_progress(plant_build: Path, tmp_path: Path) -> None:
 
     ours, theirs = pty.openpty()
     command = [*COMMAND, "simulate", "stand", "-o", str(tmp_path / "out"), *QUICK]
-    done = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env=os.environ | {"TERM": "xterm", "COLUMNS": "120"})
+    done = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        env=os.environ | {"TERM": "xterm", "COLUMNS": "120"},
+    )
     os.close(theirs)
     shown = b""
     while chunk := _read(ours):
@@ -107,7 +122,11 @@ def test_pipes_get_results_and_nothing_else(plant_build: Path, tmp_path: Path) -
 def test_pipes_get_no_progress(monkeypatch: pytest.MonkeyPatch) -> None:
     pipe = io.StringIO()
     monkeypatch.setattr(sys, "stderr", pipe)
-    with counting_bar("seeds", 2) as tell, progress_bar("kinematic", 1.0) as none, waiting("drawing"):
+    with (
+        counting_bar("seeds", 2) as tell,
+        progress_bar("kinematic", 1.0) as none,
+        waiting("drawing"),
+    ):
         tell(2)
         assert none is None
     assert pipe.getvalue() == ""
@@ -161,7 +180,9 @@ def lines_of(screen: Terminal) -> list[str]:
 
 
 @pytest.mark.parametrize("what", ["robots", "scenarios", "studies", "gaits", "terrains", "laws"])
-def test_every_list_fits_sixty_columns_and_loses_nothing(call: Call, narrow: Callable[[str], Terminal], what: str) -> None:
+def test_every_list_fits_sixty_columns_and_loses_nothing(
+    call: Call, narrow: Callable[[str], Terminal], what: str
+) -> None:
     _, wide, _ = call("list", what)
     screen = narrow("stdout")
     main(["list", what])
@@ -189,7 +210,9 @@ def test_a_table_too_wide_goes_on_below_its_first_column(narrow: Callable[[str],
 
 @pytest.mark.parametrize("say", [terminal_module.warn, terminal_module.show_text])
 def test_sentences_are_broken_between_words_on_a_terminal_and_not_in_a_pipe(
-    capsys: pytest.CaptureFixture[str], narrow: Callable[[str], Terminal], say: Callable[[str], None]
+    capsys: pytest.CaptureFixture[str],
+    narrow: Callable[[str], Terminal],
+    say: Callable[[str], None],
 ) -> None:
     text = "kinematic: servo LM.femur works at 1.24 N m RMS, above the limit; see /a/path/that/no/one/may/break/for/it/is/one/word/and/long"
     say(text)
@@ -229,7 +252,9 @@ def test_a_table_fits_a_real_terminal_of_sixty_columns() -> None:
 
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 60, 0, 0))
-    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {"TERM": "xterm"}
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {
+        "TERM": "xterm"
+    }
     done = subprocess.Popen([*COMMAND, "list", "gaits"], stdout=theirs, env=environment)
     os.close(theirs)
     shown = b""
@@ -249,13 +274,21 @@ def test_every_command_speaks_json(name: str) -> None:
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["export", "-o", "athena.fmu"], ["export", "--fmi", "3", "-o", "athena.fmu"], ["export", "--urdf"], ["export", "--mjcf"],
-        ["export", "--controller", "kinematic"], ["export", "--ssp", "--controller", "kinematic"], ["list", "laws"], ["list", "robots"],
+        ["export", "-o", "athena.fmu"],
+        ["export", "--fmi", "3", "-o", "athena.fmu"],
+        ["export", "--urdf"],
+        ["export", "--mjcf"],
+        ["export", "--controller", "kinematic"],
+        ["export", "--ssp", "--controller", "kinematic"],
+        ["list", "laws"],
+        ["list", "robots"],
         ["simulate", "stand", *QUICK],
     ],
     ids=" ".join,
-)  # fmt: skip
-def test_json_is_all_that_is_printed(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]) -> None:
+)
+def test_json_is_all_that_is_printed(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     code, out, _ = call(*arguments, "--json")
     assert code == 0
@@ -265,7 +298,10 @@ def test_json_is_all_that_is_printed(call: Call, tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["simulate", "--nope"], ["No such option: --nope", "hexapod simulate [OPTIONS]", "`hexapod simulate --help`"]),
+        (
+            ["simulate", "--nope"],
+            ["No such option: --nope", "hexapod simulate [OPTIONS]", "`hexapod simulate --help`"],
+        ),
         (["simulat"], ["Did you mean 'simulate'", "COMMAND", "--help"]),
         (["export", "--fmi", "two"], ["--fmi", "integer"]),
         (["compare", "--seeds", "1.5"], ["--seeds", "integer"]),
@@ -273,12 +309,32 @@ def test_json_is_all_that_is_printed(call: Call, tmp_path: Path, monkeypatch: py
         (["simulate", "--set"], ["'--set' requires an argument"]),
         (["report"], ["Missing argument 'DIR'"]),
         (["list"], ["Missing argument", "robots|scenarios"]),
-        (["report", "nowhere"], ["not a results folder", "got 'nowhere'", "run.json", "hexapod simulate"]),
+        (
+            ["report", "nowhere"],
+            ["not a results folder", "got 'nowhere'", "run.json", "hexapod simulate"],
+        ),
         (["report", "file"], ["not a results folder", "got 'file'"]),
-        (["report", "broken"], ["run.json: damaged file", "expected JSON", "run the scenario again"]),
-        (["report", "failed"], ["failed: ", "did not complete", "got 'failed: it fell'", "run it again"]),
-        (["report", "foreign"], ["damaged or foreign results", "got 'no title", "all facts of a run", "run the scenario again"]),
-        (["report", "bare"], ["no recording", "got 'bare'", "results.parquet or results.csv", "hexapod simulate"]),
+        (
+            ["report", "broken"],
+            ["run.json: damaged file", "expected JSON", "run the scenario again"],
+        ),
+        (
+            ["report", "failed"],
+            ["failed: ", "did not complete", "got 'failed: it fell'", "run it again"],
+        ),
+        (
+            ["report", "foreign"],
+            [
+                "damaged or foreign results",
+                "got 'no title",
+                "all facts of a run",
+                "run the scenario again",
+            ],
+        ),
+        (
+            ["report", "bare"],
+            ["no recording", "got 'bare'", "results.parquet or results.csv", "hexapod simulate"],
+        ),
         (["validate", "file"], ["not an FMU", "ZIP"]),
         (["simulate", "--gains", "file"], ["not a TOML file", "TOML 1.0"]),
         (["simulate", "file"], ["not a TOML file", "correct that line"]),
@@ -286,12 +342,21 @@ def test_json_is_all_that_is_printed(call: Call, tmp_path: Path, monkeypatch: py
     ],
 )
 def test_a_misuse_is_told_in_one_paragraph_of_what_got_expected_and_fix(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    parts: list[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("root:x:0", encoding="utf-8")
     bare = json.dumps(dict.fromkeys(NEEDED, "") | {"status": "completed"})
-    facts = {"broken": "{", "failed": '{"status": "failed", "reason": "it fell"}', "foreign": '{"status": "completed"}', "bare": bare}
+    facts = {
+        "broken": "{",
+        "failed": '{"status": "failed", "reason": "it fell"}',
+        "foreign": '{"status": "completed"}',
+        "bare": bare,
+    }
     for name, text in facts.items():
         (tmp_path / name).mkdir()
         (tmp_path / name / "run.json").write_text(text, encoding="utf-8")

@@ -1,4 +1,6 @@
-"""A robot heavier than its servos carry: the support asks for less, the arch stays, and far too heavy a robot walks kinematically."""
+"""A robot heavier than its servos carry: the support asks for less, the arch stays, and far too
+heavy a robot walks kinematically.
+"""
 
 from __future__ import annotations
 
@@ -51,8 +53,13 @@ def test_no_servo_is_asked_for_more_than_it_may_and_for_less_where_the_arch_has_
     assert burden.strength * scale * needed <= MOST * (1.0 + 1e-12)
 
 
-@pytest.mark.parametrize(("heft", "freedom"), [(0.6, 1.0), (1.0, 1.0), (1.0 / 0.95, 1.0), (1.0 / 0.875, 0.5), (1.25, 0.0), (2.0, 0.0)])
-def test_the_arch_may_go_as_far_as_servos_carry_the_measured_weight_without_it(heft: float, freedom: float) -> None:
+@pytest.mark.parametrize(
+    ("heft", "freedom"),
+    [(0.6, 1.0), (1.0, 1.0), (1.0 / 0.95, 1.0), (1.0 / 0.875, 0.5), (1.25, 0.0), (2.0, 0.0)],
+)
+def test_the_arch_may_go_as_far_as_servos_carry_the_measured_weight_without_it(
+    heft: float, freedom: float
+) -> None:
     """Wholly down to 95 % of it, not at all from 80 % on; whatever the support believes as yet."""
     burden = of_weight(heft)
     burden.step(MOST, 0.3)
@@ -97,7 +104,9 @@ def test_a_saved_burden_goes_on_the_same() -> None:
 
 
 def test_servos_that_saturate_would_be_asked_for_the_same_part_of_every_share() -> None:
-    """1.9 times the weight on servos that may only give 90 % of what that asks: all torques for the load shrink by the same factor."""
+    """1.9 times the weight on servos that may only give 90 % of what that asks: all torques for
+    the load shrink by the same factor.
+    """
     largest = 0.9 * 1.9 * float(np.abs(carried()).max())
     weak = replace(GAINS, limits=replace(GAINS.limits, torque=largest))
     laws = make_laws(gains=weak, parts=Parts(fallback=False))
@@ -119,10 +128,14 @@ def carried() -> np.ndarray:
 
 
 def test_the_squeeze_of_a_robot_too_heavy_for_its_servos_is_left_to_it() -> None:
-    """Under the same squeeze: where servos carry the weight the feet give way, where they carry 3/4 of it they do not."""
+    """Under the same squeeze: where servos carry the weight the feet give way, where they carry
+    3/4 of it they do not.
+    """
     bends = []
     for share in (1.1, 0.75):
-        weak = replace(GAINS, limits=replace(GAINS.limits, torque=share * float(np.abs(carried()).max())))
+        weak = replace(
+            GAINS, limits=replace(GAINS.limits, torque=share * float(np.abs(carried()).max()))
+        )
         laws = make_laws(gains=weak, parts=Parts(fallback=False, suspension=False, touchdown=False))
         plan(laws, 2000)
         for _ in range(2000):

@@ -19,7 +19,9 @@ from hexapod_cosim.models.kinematics import foot_centres
 ROUND_OFF = 1e-9  # N
 NO_LIMITS = Parts(limits=False)
 ONLY_SLIP = Parts(suspension=False, support=False, touchdown=False, fallback=False, limits=False)
-ONLY_SUSPENSION = Parts(slip_pid=False, support=False, touchdown=False, fallback=False, limits=False)
+ONLY_SUSPENSION = Parts(
+    slip_pid=False, support=False, touchdown=False, fallback=False, limits=False
+)
 
 
 def slip_gains(**changes: float) -> Gains:
@@ -29,7 +31,9 @@ def slip_gains(**changes: float) -> Gains:
 def contact_jacobians(robot: Robot) -> np.ndarray:
     """(6, 3, 3) of the contact points in the stance, by the twin."""
     still = np.zeros((1, 6, 3))
-    motion = Motion(PERIOD, np.zeros(1, dtype=complex), np.zeros(1), np.zeros((1, 3)), robot.stance[None], still)
+    motion = Motion(
+        PERIOD, np.zeros(1, dtype=complex), np.zeros(1), np.zeros((1, 3)), robot.stance[None], still
+    )
     body = motion.bodies(robot, 0)
     reach, found = velocities(robot, body, robot.stance).reshape(19, 6, 24), []
     for leg, centre in enumerate(foot_centres(robot, body)):
@@ -40,9 +44,16 @@ def contact_jacobians(robot: Robot) -> np.ndarray:
 
 
 def stuck_forces(robot: Robot, laws: Compliance) -> np.ndarray:
-    """(6, 3) change of the ground's forces on feet that stick: the joints cannot move, so kp bend = -J^T f."""
+    """(6, 3) change of the ground's forces on feet that stick: the joints cannot move, so kp
+    bend = -J^T f.
+    """
     torque = robot.servo.kp * laws.bend
-    return np.array([np.linalg.solve(jacobian.T, -tau) for jacobian, tau in zip(contact_jacobians(robot), torque, strict=True)])
+    return np.array(
+        [
+            np.linalg.solve(jacobian.T, -tau)
+            for jacobian, tau in zip(contact_jacobians(robot), torque, strict=True)
+        ]
+    )
 
 
 def test_a_common_push_is_left_alone() -> None:
@@ -85,19 +96,27 @@ def test_a_foot_that_measures_nothing_pushes_nothing() -> None:
 
 @pytest.mark.parametrize("direction", [0.0, 0.7, 1.6, 2.5])
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_a_foot_that_sticks_answers_with_exactly_the_pids_force_and_none_upwards(name: str, direction: float) -> None:
+def test_a_foot_that_sticks_answers_with_exactly_the_pids_force_and_none_upwards(
+    name: str, direction: float
+) -> None:
     robot = load_robot(name)
     laws, force = make_laws(robot, parts=ONLY_SLIP), np.zeros((6, 4))
     force[:, 2] = weight(robot) / 6.0
-    force[:, :2] = np.outer([1.0, -1.0, 2.0, 0.5, -3.0, 0.5], [math.cos(direction), math.sin(direction)])
+    force[:, :2] = np.outer(
+        [1.0, -1.0, 2.0, 0.5, -3.0, 0.5], [math.cos(direction), math.sin(direction)]
+    )
     run(laws, force, 15, robot=robot)
     assert np.abs(laws.law.answer).min() > 0.0 or direction == 0.0
     answered = laws.law.answer * laws.law.load[:, None]
-    np.testing.assert_allclose(stuck_forces(robot, laws), np.column_stack([-answered, np.zeros(6)]), atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        stuck_forces(robot, laws), np.column_stack([-answered, np.zeros(6)]), atol=ROUND_OFF
+    )
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_the_suspension_lifts_by_its_deflection_and_pushes_a_foot_that_sticks_downwards_only(name: str) -> None:
+def test_the_suspension_lifts_by_its_deflection_and_pushes_a_foot_that_sticks_downwards_only(
+    name: str,
+) -> None:
     robot = load_robot(name)
     laws = make_laws(robot, parts=ONLY_SUSPENSION)
     plan(laws, 40, robot=robot)
@@ -114,7 +133,9 @@ def test_the_suspension_lifts_by_its_deflection_and_pushes_a_foot_that_sticks_do
     assert stuck[2, 2] < 0.0 < stuck[3, 2]  # the leg carries less where it carried too much
 
 
-def test_at_its_share_the_suspension_rests_and_beyond_it_gives_way_by_force_over_stiffness() -> None:
+def test_at_its_share_the_suspension_rests_and_beyond_it_gives_way_by_force_over_stiffness() -> (
+    None
+):
     laws, payload = make_laws(parts=ONLY_SUSPENSION), 1.2
     plan(laws, 2000)
     laws.scale, force = payload, payload * shared(laws)
@@ -122,7 +143,11 @@ def test_at_its_share_the_suspension_rests_and_beyond_it_gives_way_by_force_over
     force[0, 2] -= 4.0
     for _ in range(2000):
         laws.step(force)
-    np.testing.assert_allclose(laws.law.deflection, np.array([-4.0, 0.0, 4.0, 0.0, 0.0, 0.0]) / GAINS.suspension.stiffness, atol=1e-9)
+    np.testing.assert_allclose(
+        laws.law.deflection,
+        np.array([-4.0, 0.0, 4.0, 0.0, 0.0, 0.0]) / GAINS.suspension.stiffness,
+        atol=1e-9,
+    )
 
 
 def test_feet_without_a_share_have_no_suspension() -> None:
@@ -133,19 +158,34 @@ def test_feet_without_a_share_have_no_suspension() -> None:
 
 
 @pytest.mark.parametrize(("sign", "low", "high"), [(1.0, 0.0, 0.4), (-1.0, 1.1, np.inf)])
-def test_giving_way_takes_the_slip_from_legs_that_squeeze_and_resisting_adds_to_it(sign: float, low: float, high: float) -> None:
-    """Two legs whose paths drift apart: f = -c x', leg f = (x - path - shift)/C, in backward Euler. Slip with the law over without."""
-    compliance = (contact_jacobians(ROBOT)[1] @ contact_jacobians(ROBOT)[1].T / ROBOT.servo.kp)[1, 1]  # m/N
+def test_giving_way_takes_the_slip_from_legs_that_squeeze_and_resisting_adds_to_it(
+    sign: float, low: float, high: float
+) -> None:
+    """Two legs whose paths drift apart: f = -c x', leg f = (x - path - shift)/C, in backward
+    Euler. Slip with the law over without.
+    """
+    compliance = (contact_jacobians(ROBOT)[1] @ contact_jacobians(ROBOT)[1].T / ROBOT.servo.kp)[
+        1, 1
+    ]  # m/N
     creep, drift = ROBOT.friction.mu * ROBOT.friction.slope * WEIGHT / 6.0, 0.01  # N s/m, m/s
     slips = []
     for gain in (0.0, sign):
-        laws, force, f, x, path, slid = make_laws(parts=ONLY_SLIP), squeezing(0.0), 0.0, 0.0, 0.0, 0.0
+        laws, force, f, x, path, slid = (
+            make_laws(parts=ONLY_SLIP),
+            squeezing(0.0),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
         plan(laws, 100)
         for _ in range(100):
             force[1, 1], force[4, 1] = f, -f
             laws.step(force)
             path += drift * PERIOD
-            x_next = (x * creep / PERIOD + (path + gain * laws.shift[1, 1]) / compliance) / (creep / PERIOD + 1.0 / compliance)
+            x_next = (x * creep / PERIOD + (path + gain * laws.shift[1, 1]) / compliance) / (
+                creep / PERIOD + 1.0 / compliance
+            )
             f, slid, x = -creep * (x_next - x) / PERIOD, slid + abs(x_next - x), x_next
         slips.append(slid)
     assert low < slips[1] / slips[0] < high
@@ -180,7 +220,9 @@ def test_a_foot_in_the_air_forgets_and_others_do_not() -> None:
 def test_the_answer_is_clamped_in_length_with_its_direction_kept() -> None:
     laws, force = make_laws(gains=slip_gains(limit=0.1), parts=ONLY_SLIP), squeezing()
     force[:, :2] = 0.0
-    direction = np.array([HOME[0].real, HOME[0].imag]) / abs(HOME[0])  # of two feet that face each other, which squeeze along their line
+    direction = np.array([HOME[0].real, HOME[0].imag]) / abs(
+        HOME[0]
+    )  # of two feet that face each other, which squeeze along their line
     force[0, :2], force[5, :2] = 5.0 * direction, -5.0 * direction
     run(laws, force, 400)
     np.testing.assert_allclose(laws.law.answer[0], 0.1 * WEIGHT / 3.0 * direction, rtol=1e-9)
@@ -197,7 +239,9 @@ def test_back_calculation_frees_the_answer_soon_after_the_force_turns() -> None:
         while laws.law.answer[1, 1] > 0.0 and counts[-1] < 1000:
             laws.step(squeezing(-5.0))
             counts[-1] += 1
-    assert counts[0] < 0.1 / PERIOD  # its limit alone takes 0.02 s to integrate away, the filter another 0.02 s
+    assert (
+        counts[0] < 0.1 / PERIOD
+    )  # its limit alone takes 0.02 s to integrate away, the filter another 0.02 s
     assert counts[1] > 150
 
 
@@ -217,7 +261,9 @@ def test_the_suspension_stops_at_its_limit_and_comes_back_at_once() -> None:
 
 
 @pytest.mark.parametrize("payload", [0.8, 1.0, 1.35])
-def test_the_support_grows_into_the_measured_weight_whatever_the_robot_carries(payload: float) -> None:
+def test_the_support_grows_into_the_measured_weight_whatever_the_robot_carries(
+    payload: float,
+) -> None:
     laws = make_laws()
     plan(laws, 400)
     force = payload * shared(laws)
@@ -240,7 +286,9 @@ def test_no_weight_is_believed_beyond_reason() -> None:
 
 
 def test_the_torques_carry_the_shares_and_the_legs_without_any_bend() -> None:
-    """kp bend aside, the joints of the stance are told all that holds them: gravity of the links and -J^T of the shares."""
+    """kp bend aside, the joints of the stance are told all that holds them: gravity of the links
+    and -J^T of the shares.
+    """
     laws = make_laws(parts=NO_LIMITS)
     plan(laws, 3000)
     force = shared(laws)
@@ -248,7 +296,9 @@ def test_the_torques_carry_the_shares_and_the_legs_without_any_bend() -> None:
         laws.step(force)
     still = np.einsum("lba,lb->la", contact_jacobians(ROBOT), force[:, :3])
     np.testing.assert_allclose(laws.torque, rest(ROBOT).torque[0] - still, atol=1e-4)
-    assert np.abs(laws.bend).max() < 1e-3  # rad    the suspension's, of the time in which the support grew
+    assert (
+        np.abs(laws.bend).max() < 1e-3
+    )  # rad    the suspension's, of the time in which the support grew
 
 
 def test_corrections_keep_their_rate_and_torques_their_limit() -> None:
@@ -269,7 +319,11 @@ def test_corrections_keep_their_rate_and_torques_their_limit() -> None:
 
 
 def test_without_its_parts_nothing_is_corrected() -> None:
-    laws = make_laws(parts=Parts(support=False, slip_pid=False, suspension=False, touchdown=False, fallback=False))
+    laws = make_laws(
+        parts=Parts(
+            support=False, slip_pid=False, suspension=False, touchdown=False, fallback=False
+        )
+    )
     run(laws, squeezing() * [1.0, 1.0, 1.4, 1.0], 50)
     assert not laws.bend.any()
     assert not laws.torque.any()
@@ -282,7 +336,9 @@ def test_a_force_not_believed_is_replaced_by_the_plans_and_from_three_on_all_are
     dead[1] = 0.0
     run(laws, dead, 50)
     assert laws.doubted.tolist() == [False, True, False, False, False, False]
-    assert laws.law.load[1] == pytest.approx(laws.scale * laws._plan.shares.normal[0, 1] * 3.0 / WEIGHT, rel=0.02)
+    assert laws.law.load[1] == pytest.approx(
+        laws.scale * laws._plan.shares.normal[0, 1] * 3.0 / WEIGHT, rel=0.02
+    )
     assert laws.scale == pytest.approx(1.0, abs=0.05)
     dead[[3, 5]] = 0.0
     run(laws, dead, 50)
@@ -293,7 +349,10 @@ def test_a_force_not_believed_is_replaced_by_the_plans_and_from_three_on_all_are
 
 
 def test_saved_laws_go_on_bit_for_bit() -> None:
-    laws, noise = make_laws(), np.random.default_rng(3).normal(size=(120, 6, 4)) * [1.0, 1.0, 3.0, 0.0]
+    laws, noise = (
+        make_laws(),
+        np.random.default_rng(3).normal(size=(120, 6, 4)) * [1.0, 1.0, 3.0, 0.0],
+    )
     dead = squeezing() * np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])[:, None]
     plan(laws, 120)
 
@@ -301,7 +360,9 @@ def test_saved_laws_go_on_bit_for_bit() -> None:
         found = []
         for shake in noise[60:]:
             laws.step(dead + 0.3 * shake)
-            found.append(np.column_stack([laws.bend, laws.torque, laws.law.row, laws.offset, laws.doubted]))
+            found.append(
+                np.column_stack([laws.bend, laws.torque, laws.law.row, laws.offset, laws.doubted])
+            )
         return np.array(found)
 
     for shake in noise[:60]:
@@ -314,7 +375,9 @@ def test_saved_laws_go_on_bit_for_bit() -> None:
 
 
 def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds() -> None:
-    """All feet drag by more than half of what they carry: no share and no answer is told any more, and every leg says so."""
+    """All feet drag by more than half of what they carry: no share and no answer is told any
+    more, and every leg says so.
+    """
     laws, calm, sliding = make_laws(), squeezing(), squeezing()
     sliding[:, 0] = -0.6 * WEIGHT / 6.0
     run(laws, calm, 400)
@@ -336,7 +399,9 @@ def test_a_sliding_robot_goes_over_to_kinematic_control_and_back_once_it_holds()
 
 
 @pytest.mark.parametrize(("carried", "falls_back"), [(0.45, False), (0.55, True)])
-def test_feet_that_carry_less_than_half_the_weight_together_tell_no_slide(carried: float, falls_back: bool) -> None:
+def test_feet_that_carry_less_than_half_the_weight_together_tell_no_slide(
+    carried: float, falls_back: bool
+) -> None:
     """They have only just met the ground, and skid."""
     laws, sliding = make_laws(), squeezing(0.0)
     run(laws, squeezing(0.0), 400)
@@ -347,7 +412,9 @@ def test_feet_that_carry_less_than_half_the_weight_together_tell_no_slide(carrie
 
 
 def steps_until_fallback(drag: float, total: float) -> int:
-    """Feet that drag by this share of what they carry, together so much of the weight: periods until kinematic control, 0 for never."""
+    """Feet that drag by this share of what they carry, together so much of the weight: periods
+    until kinematic control, 0 for never.
+    """
     laws, force = make_laws(), squeezing(0.0)
     run(laws, force, 400)
     force[:, 2] *= total
@@ -360,7 +427,10 @@ def steps_until_fallback(drag: float, total: float) -> int:
     return 0
 
 
-@pytest.mark.parametrize(("drag", "total", "count"), [(0.54, 1.0, 0), (0.56, 1.0, 9), (0.56, 0.51, 9), (0.56, 0.49, 0), (1.0, 1.0, 9)])
+@pytest.mark.parametrize(
+    ("drag", "total", "count"),
+    [(0.54, 1.0, 0), (0.56, 1.0, 9), (0.56, 0.51, 9), (0.56, 0.49, 0), (1.0, 1.0, 9)],
+)
 def test_a_robot_slides_that_drags_by_55_percent_for_40_milliseconds_while_it_carries_half_its_weight(
     drag: float, total: float, count: int
 ) -> None:
@@ -383,11 +453,15 @@ def test_feet_are_trusted_again_half_a_cycle_after_the_last_slide() -> None:
         laws.step(calm)
         count += 1
     # 1 - e^(-t/load_time) to within 1 %, all feet's fallback told from the first of these steps on
-    assert count == pytest.approx(0.5 * ROBOT.gait.period / PERIOD + math.log(100.0) * GAINS.slip.load_time / PERIOD, abs=1)
+    assert count == pytest.approx(
+        0.5 * ROBOT.gait.period / PERIOD + math.log(100.0) * GAINS.slip.load_time / PERIOD, abs=1
+    )
 
 
 @pytest.mark.parametrize(("part", "doubted"), [(0.24, False), (0.26, True)])
-def test_a_force_on_a_foot_is_doubted_from_a_quarter_of_the_step_height_on(part: float, doubted: bool) -> None:
+def test_a_force_on_a_foot_is_doubted_from_a_quarter_of_the_step_height_on(
+    part: float, doubted: bool
+) -> None:
     laws, force = make_laws(), squeezing(0.0)
     run(laws, force, 40, standing="101111", height=part * ROBOT.gait.step_height)
     assert laws.doubted.tolist() == [False, doubted, False, False, False, False]
@@ -408,7 +482,9 @@ def test_a_leg_that_should_stand_and_does_not_is_given_no_share_until_it_does() 
 
 
 def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> None:
-    """By the share of the time in which some joint is asked for too much, smoothed over a gait cycle; and back when it is less."""
+    """By the share of the time in which some joint is asked for too much, smoothed over a gait
+    cycle; and back when it is less.
+    """
     laws, force = make_laws(), squeezing()
     run(laws, force, 400)
     for share, outrun in ((0.4, False), (0.5, True), (0.4, True), (0.3, False)):

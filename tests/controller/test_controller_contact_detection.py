@@ -1,4 +1,6 @@
-"""Touch-down and lift-off without flicker, and sensors that are wrong told from ground that is not there."""
+"""Touch-down and lift-off without flicker, and sensors that are wrong told from ground that is
+not there.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ def but(*legs: int) -> list[bool]:
     return [leg not in legs for leg in range(6)]
 
 
-def test_a_foot_touches_down_above_2_percent_of_the_weight_and_lifts_off_below_half_a_percent() -> None:
+def test_a_foot_touches_down_above_2_percent_of_the_weight_and_lifts_off_below_half_a_percent() -> (
+    None
+):
     detector = ContactDetector(WEIGHT)
     forces = [0.0, 0.6, 0.99, 1.01, 0.6, 0.26, 0.24, 0.6, 0.99, 1.01]  # N
     found = [bool(detector.step(np.full(6, force))[2]) for force in forces]
@@ -31,7 +35,9 @@ def test_a_foot_touches_down_above_2_percent_of_the_weight_and_lifts_off_below_h
 def test_noise_on_a_force_near_a_threshold_makes_no_foot_flicker(level: float) -> None:
     detector, generator = ContactDetector(WEIGHT), np.random.default_rng(0)
     noise = (TOUCHES - LIFTS) / 3.0  # a third of the hysteresis to either side
-    states = np.array([detector.step(level + generator.uniform(-noise, noise, 6)) for _ in range(2000)])
+    states = np.array(
+        [detector.step(level + generator.uniform(-noise, noise, 6)) for _ in range(2000)]
+    )
     assert np.count_nonzero(np.diff(states.astype(int), axis=0), axis=0).max() <= 1
 
 
@@ -70,7 +76,9 @@ def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_60_milliseconds(
 def test_a_missing_foothold_whose_weight_the_others_carry_is_not_a_dead_sensor() -> None:
     watch = SensorWatch(WEIGHT, cycle=CYCLE)
     for _ in range(1000):
-        assert not any(watch.look(but(2), 46.1, ALL, NONE, time=PERIOD))  # N    92 % of the weight are 46
+        assert not any(
+            watch.look(but(2), 46.1, ALL, NONE, time=PERIOD)
+        )  # N    92 % of the weight are 46
     assert not watch.busy
     assert until_doubted(watch, 2, touching=but(2), total=45.9, standing=ALL, high=NONE)
 
@@ -91,7 +99,9 @@ def test_a_foot_that_need_not_carry_or_is_not_high_contradicts_nothing() -> None
     assert not watch.busy
 
 
-def test_a_sensor_is_believed_again_when_it_has_contradicted_nothing_for_one_and_a_half_cycles() -> None:
+def test_a_sensor_is_believed_again_when_it_has_contradicted_nothing_for_one_and_a_half_cycles() -> (
+    None
+):
     watch = SensorWatch(WEIGHT, cycle=CYCLE)
     until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     count = 0
@@ -107,7 +117,13 @@ def test_a_sensor_that_stays_dead_stays_doubted() -> None:
     until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     for k in range(1000):
         stands = k // 100 % 2 == 0  # walking: dead in the stance only
-        assert watch.look(but(2), 0.5 * WEIGHT, ALL if stands else but(2), NONE if stands else only(2), time=PERIOD)[2]
+        assert watch.look(
+            but(2),
+            0.5 * WEIGHT,
+            ALL if stands else but(2),
+            NONE if stands else only(2),
+            time=PERIOD,
+        )[2]
 
 
 def test_what_is_saved_does_not_change() -> None:
@@ -119,4 +135,7 @@ def test_what_is_saved_does_not_change() -> None:
     watch.restore(state)
     assert not any(watch.doubted)
     assert watch.busy
-    assert until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE) == left
+    assert (
+        until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
+        == left
+    )

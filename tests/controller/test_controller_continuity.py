@@ -1,4 +1,6 @@
-"""What the servos are told to carry does not jump when feet touch down or lift off, nor when a walk begins and ends."""
+"""What the servos are told to carry does not jump when feet touch down or lift off, nor when a
+walk begins and ends.
+"""
 
 from __future__ import annotations
 
@@ -12,23 +14,36 @@ from hexapod_cosim.controller import BodyCommand, Controller, Measurement, make_
 from hexapod_cosim.models import load_robot
 
 PERIODS = (0.002, 0.001)  # s
-LARGEST = {"athena": 3.2, "phantomx_mk4": 1.7}  # N m    of 5.4 and 2.7 allowed: what the middle leg of a tripod needs, and gear friction
+LARGEST = {
+    "athena": 3.2,
+    "phantomx_mk4": 1.7,
+}  # N m    of 5.4 and 2.7 allowed: what the middle leg of a tripod needs, and gear friction
 STANDING, WALKING = 0.2, 3.3  # s
 STOPPING = 2.5  # cycles
 
 
 @cache
 def torques(name: str, gait: str, period: float) -> np.ndarray:
-    """(steps, 6, 3) torque_ref [N m] of a robot that does what is planned, its weight known from the start: it stands, walks and stops."""
+    """(steps, 6, 3) torque_ref [N m] of a robot that does what is planned, its weight known from
+    the start: it stands, walks and stops.
+    """
     robot = load_robot(name)
     timing = make_gait(robot, gait)
-    controller = Controller(robot, period=period, gait=timing, gains=make_gains(robot, period=period))
-    compliant, measurement, found = controller.compliant, Measurement(angle=controller.stance.copy()), []
+    controller = Controller(
+        robot, period=period, gait=timing, gains=make_gains(robot, period=period)
+    )
+    compliant, measurement, found = (
+        controller.compliant,
+        Measurement(angle=controller.stance.copy()),
+        [],
+    )
     assert compliant is not None
     compliant.laws.scale = 1.0
     for k in range(round((STANDING + WALKING + STOPPING * timing.period) / period)):
         walks = STANDING <= k * period < STANDING + WALKING
-        out = controller.step(k * period, BodyCommand(vx=0.04, yaw_rate=0.05) if walks else BodyCommand(), measurement)
+        out = controller.step(
+            k * period, BodyCommand(vx=0.04, yaw_rate=0.05) if walks else BodyCommand(), measurement
+        )
         found.append(out.torque_ref.copy())
         measurement.foot_force[:] = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
         measurement.angle[:] = out.angle_ref - compliant.laws.bend
@@ -44,7 +59,9 @@ def steepest(name: str, gait: str, period: float) -> float:
 
 @pytest.mark.parametrize("name", LARGEST)
 @pytest.mark.parametrize("gait", ["tripod", "ripple"])
-def test_the_largest_torque_is_what_the_load_needs_whatever_the_period(name: str, gait: str) -> None:
+def test_the_largest_torque_is_what_the_load_needs_whatever_the_period(
+    name: str, gait: str
+) -> None:
     for period in PERIODS:
         assert np.abs(torques(name, gait, period)).max() < LARGEST[name]
 
@@ -62,5 +79,7 @@ def test_torques_are_continuous_over_touch_downs_and_lift_offs(name: str) -> Non
 
 @pytest.mark.parametrize("gait", ["tripod", "ripple", "wave"])
 def test_no_torque_jumps_when_a_walk_begins_or_ends(gait: str) -> None:
-    """Legs that begin in the time of their swing or stay at home have no hand-over; what is left is how the others begin and end theirs."""
+    """Legs that begin in the time of their swing or stay at home have no hand-over; what is left
+    is how the others begin and end theirs.
+    """
     assert np.abs(np.diff(torques("athena", gait, 0.002), axis=0)).max() < 0.8

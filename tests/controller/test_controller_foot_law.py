@@ -32,7 +32,11 @@ def stepped(law: FootLaw, given: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_each_direction_is_the_pid_by_itself(axis: int) -> None:
-    law, alone, states = FootLaw(GAINS, period=PERIOD), slip_pid.system(GAINS.slip, period=PERIOD), np.zeros((6, 4))
+    law, alone, states = (
+        FootLaw(GAINS, period=PERIOD),
+        slip_pid.system(GAINS.slip, period=PERIOD),
+        np.zeros((6, 4)),
+    )
     for given in inputs():
         stepped(law, given)
         found = np.column_stack([states, given[:, axis]]) @ alone
@@ -42,18 +46,26 @@ def test_each_direction_is_the_pid_by_itself(axis: int) -> None:
 
 
 def test_the_deflection_is_the_suspension_by_itself() -> None:
-    law, (a, b), state = FootLaw(GAINS, period=PERIOD), suspension.discretise(GAINS.suspension, period=PERIOD), np.zeros((6, 2))
+    law, (a, b), state = (
+        FootLaw(GAINS, period=PERIOD),
+        suspension.discretise(GAINS.suspension, period=PERIOD),
+        np.zeros((6, 2)),
+    )
     for given in inputs():
         stepped(law, given)
         state = state @ a.T + given[:, 2:3] * b
-        np.testing.assert_allclose(np.column_stack([law.deflection, law.rate]), state, atol=ROUND_OFF)
+        np.testing.assert_allclose(
+            np.column_stack([law.deflection, law.rate]), state, atol=ROUND_OFF
+        )
 
 
 def test_the_load_follows_with_its_time_constant() -> None:
     law = FootLaw(GAINS, period=PERIOD)
     for k in range(1, STEPS):
         stepped(law, np.full((6, 4), 0.7))
-        np.testing.assert_allclose(law.load, 0.7 * (1.0 - math.exp(-k * PERIOD / GAINS.slip.load_time)), atol=ROUND_OFF)
+        np.testing.assert_allclose(
+            law.load, 0.7 * (1.0 - math.exp(-k * PERIOD / GAINS.slip.load_time)), atol=ROUND_OFF
+        )
 
 
 @pytest.mark.parametrize("leg", range(6))

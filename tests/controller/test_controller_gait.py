@@ -11,7 +11,9 @@ from hexapod_cosim.controller import PATTERNS, LegSolver, make_gait
 from hexapod_cosim.models import GAITS, HexapodError, load_robot
 
 CLOCKS = np.linspace(0.0, 1.0, 240, endpoint=False) + 1e-7  # cycles, off the switching points
-OPENSHC = {  # front right, mid right, rear right, rear left, mid left, front left: multiplier x offset / (stance + swing)
+# front right, mid right, rear right, rear left, mid left, front left: multiplier x offset / (stance
+# + swing)
+OPENSHC = {
     "tripod": np.array([0, 1, 0, 1, 0, 1]) * 2 / 4,
     "ripple": np.array([2, 0, 4, 1, 3, 5]) * 1 / 6,
     "wave": np.array([2, 3, 4, 1, 0, 5]) * 2 / 12,
@@ -20,11 +22,15 @@ OPENSHC = {  # front right, mid right, rear right, rear left, mid left, front le
 
 
 def margin(feet: np.ndarray) -> float:
-    """Distance from the origin to the edge of the convex hull of feet (n, 2) [m]; negative outside."""
+    """Distance from the origin to the edge of the convex hull of feet (n, 2) [m]; negative
+    outside.
+    """
     if len(feet) < 3:
         return -np.inf
     order = feet[np.argsort(np.arctan2(*(feet - feet.mean(axis=0)).T[::-1]))]
-    hull = [p for k, p in enumerate(order) if _turn(order[k - 1], p, order[(k + 1) % len(order)]) > 0.0]
+    hull = [
+        p for k, p in enumerate(order) if _turn(order[k - 1], p, order[(k + 1) % len(order)]) > 0.0
+    ]
     edges = np.roll(hull, -1, axis=0) - hull
     moments = edges[:, 1] * np.array(hull)[:, 0] - edges[:, 0] * np.array(hull)[:, 1]
     return float((moments / np.linalg.norm(edges, axis=1)).min())
@@ -53,7 +59,9 @@ def test_each_leg_stands_for_the_duty_factor(name: str, duty: float | None) -> N
     np.testing.assert_allclose(stands, gait.duty, atol=1.5 / len(CLOCKS))
 
 
-@pytest.mark.parametrize(("name", "legs"), [("tripod", 3), ("ripple", 4), ("wave", 5), ("amble", 4)])
+@pytest.mark.parametrize(
+    ("name", "legs"), [("tripod", 3), ("ripple", 4), ("wave", 5), ("amble", 4)]
+)
 def test_the_natural_duty_factor_keeps_the_number_of_standing_legs(name: str, legs: int) -> None:
     gait = make_gait(load_robot("athena"), name)
     assert {int(gait.stance(clock).sum()) for clock in CLOCKS} == {legs}
@@ -71,16 +79,23 @@ def test_the_standing_feet_carry_the_robot_at_all_times(name: str, robot_name: s
 def test_the_clock_starts_where_legs_are_about_to_lift_off() -> None:
     for name in GAITS:
         gait = make_gait(load_robot("athena"), name)
-        before, after = gait.stance(gait.start_clock() - 1e-6), gait.stance(gait.start_clock() + 1e-6)
+        before, after = (
+            gait.stance(gait.start_clock() - 1e-6),
+            gait.stance(gait.start_clock() + 1e-6),
+        )
         assert (before & ~after).any()
 
 
-def test_another_gait_than_the_robots_gets_its_natural_duty_factor_and_the_robots_swing_time() -> None:
+def test_another_gait_than_the_robots_gets_its_natural_duty_factor_and_the_robots_swing_time() -> (
+    None
+):
     robot = load_robot("athena")
     assert (make_gait(robot).duty, make_gait(robot).period) == (robot.gait.duty, robot.gait.period)
     wave = make_gait(robot, "wave")
     assert wave.duty == pytest.approx(10.0 / 12.0)
-    assert wave.period * (1.0 - wave.duty) == pytest.approx(robot.gait.period * (1.0 - robot.gait.duty))
+    assert wave.period * (1.0 - wave.duty) == pytest.approx(
+        robot.gait.period * (1.0 - robot.gait.duty)
+    )
     assert make_gait(robot, "wave", period=0.7).period == 0.7
 
 
@@ -89,7 +104,16 @@ def test_an_unknown_gait_names_the_nearest() -> None:
         make_gait(load_robot("athena"), "tripd")
 
 
-@pytest.mark.parametrize("change", [{"duty": 0.0}, {"duty": 1.0}, {"period": 0.0}, {"step_height": -0.01}, {"touchdown_speed": -0.1}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"duty": 0.0},
+        {"duty": 1.0},
+        {"period": 0.0},
+        {"step_height": -0.01},
+        {"touchdown_speed": -0.1},
+    ],
+)
 def test_an_impossible_gait_is_refused(change: dict[str, Any]) -> None:
     with pytest.raises(HexapodError, match="impossible gait"):
         make_gait(load_robot("athena"), **change)

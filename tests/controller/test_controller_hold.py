@@ -1,4 +1,6 @@
-"""The slow loops, seen through ideal geometry: feet fixed to the ground under a torso that lies or walks otherwise than planned."""
+"""The slow loops, seen through ideal geometry: feet fixed to the ground under a torso that lies
+or walks otherwise than planned.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,12 @@ def sight(**changes: object) -> Sight:
 
 
 def seen_heights(low: float, roll: float, pitch: float) -> list[float]:
-    """Feet on a plane, seen from a torso that is so much too low and turned against it: to first order."""
-    return [z + low + p.real * pitch - p.imag * roll for z, p in zip(LEVEL, HOME.tolist(), strict=True)]
+    """Feet on a plane, seen from a torso that is so much too low and turned against it: to first
+    order.
+    """
+    return [
+        z + low + p.real * pitch - p.imag * roll for z, p in zip(LEVEL, HOME.tolist(), strict=True)
+    ]
 
 
 def plane(height: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -42,16 +48,23 @@ def plane(height: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def settle(
-    hold: Hold, *, low: float = 0.0, roll: float = 0.0, pitch: float = 0.0, ground: tuple[float, float] = (0.0, 0.0)
+    hold: Hold,
+    *,
+    low: float = 0.0,
+    roll: float = 0.0,
+    pitch: float = 0.0,
+    ground: tuple[float, float] = (0.0, 0.0),
 ) -> Iterator[np.ndarray]:
-    """What is left of a wrong height and tilt [m, rad, rad] against level feet, as the lift of the feet takes effect.
+    """What is left of a wrong height and tilt [m, rad, rad] against level feet, as the lift of the
+    feet takes effect.
 
     Raising the feet by lift = a + b x + c y (torso axes) lowers the torso by a, and turns it.
     """
     base = np.column_stack([np.ones(6), HOME.real, HOME.imag])
     for _ in range(LOOKS):
         a, b, c = np.linalg.lstsq(base, np.array(hold.lift), rcond=None)[0]
-        # with the feet raised by b x in the torso's axes and standing on the ground, the nose comes down: pitch grows by b, roll by -c
+        # with the feet raised by b x in the torso's axes and standing on the ground, the nose comes
+        # down: pitch grows by b, roll by -c
         now = np.add([low, roll, pitch], [a, -c, b])
         tilt = now[1] + ground[0], now[2] + ground[1]
         hold.look(sight(height=seen_heights(*now), tilt=tilt))
@@ -77,22 +90,44 @@ def test_a_plane_near_points_is_the_weighted_least_squares() -> None:
 
 def test_feet_in_the_air_tell_nothing_and_two_or_three_in_a_line_no_plane() -> None:
     height = [5.0, 0.0, 5.0, 0.0, 5.0, 0.0]
-    assert fit_plane(HOME.tolist(), height, [0.29, 1.0, 0.0, 1.0, 0.0, 1.0]) == pytest.approx((0.0, 0.0, 0.0), abs=EXACT)
+    assert fit_plane(HOME.tolist(), height, [0.29, 1.0, 0.0, 1.0, 0.0, 1.0]) == pytest.approx(
+        (0.0, 0.0, 0.0), abs=EXACT
+    )
     assert fit_plane(HOME.tolist(), height, [0.0, 1.0, 0.0, 0.0, 1.0, 0.0]) is None
-    assert fit_plane([0j, 0.1 + 0.1j, 0.2 + 0.2j, 0j, 0j, 0j], height, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) is None
+    assert (
+        fit_plane([0j, 0.1 + 0.1j, 0.2 + 0.2j, 0j, 0j, 0j], height, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        is None
+    )
 
 
 @pytest.mark.parametrize(
-    ("low", "roll", "pitch"), [(0.005, 0.0, 0.0), (-0.005, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, -0.02), (0.004, -0.01, 0.02)]
+    ("low", "roll", "pitch"),
+    [
+        (0.005, 0.0, 0.0),
+        (-0.005, 0.0, 0.0),
+        (0.0, 0.02, 0.0),
+        (0.0, 0.0, -0.02),
+        (0.004, -0.01, 0.02),
+    ],
 )
-def test_a_torso_that_lies_wrong_is_driven_back_at_the_stated_rates(low: float, roll: float, pitch: float) -> None:
+def test_a_torso_that_lies_wrong_is_driven_back_at_the_stated_rates(
+    low: float, roll: float, pitch: float
+) -> None:
     hold = make()
     left = np.array(list(settle(hold, low=low, roll=roll, pitch=pitch)))
     time = hold.every * PERIOD * np.arange(LOOKS)
     # an integral over rate x time steps: (1 - rate h)^k, which is e^(-rate t) but for rate h / 2
-    np.testing.assert_allclose(left[:, 0], low * (1.0 - HOLD.height_rate * hold.every * PERIOD) ** np.arange(LOOKS), atol=1e-9)
+    np.testing.assert_allclose(
+        left[:, 0],
+        low * (1.0 - HOLD.height_rate * hold.every * PERIOD) ** np.arange(LOOKS),
+        atol=1e-9,
+    )
     for column, start in ((1, roll), (2, pitch)):
-        np.testing.assert_allclose(left[:, column], start * np.exp(-HOLD.attitude_rate * time), atol=0.1 * abs(start) + EXACT)
+        np.testing.assert_allclose(
+            left[:, column],
+            start * np.exp(-HOLD.attitude_rate * time),
+            atol=0.1 * abs(start) + EXACT,
+        )
     assert np.abs(left[-1]).max() < 1e-5
 
 
@@ -113,7 +148,9 @@ def test_ground_that_begins_to_slope_is_followed_with_its_time() -> None:
 
 
 def test_commanded_tilts_are_no_errors() -> None:
-    """The tilt given is beyond the command, the feet are where they were planned: nothing is corrected."""
+    """The tilt given is beyond the command, the feet are where they were planned: nothing is
+    corrected.
+    """
     hold = make()
     for _ in range(50):
         hold.look(sight())
@@ -147,28 +184,44 @@ def test_a_foot_counts_from_three_tenths_of_a_third_of_the_weight_on() -> None:
 def test_three_feet_span_a_plane_from_a_determinant_of_a_millionth_on() -> None:
     """m4, of the covariance of three feet at 0, a and i b: a^2 b^2/27."""
     for b, spans in ((0.0515, False), (0.0525, True)):
-        found = fit_plane([0j, 0.1 + 0j, 1j * b, 0j, 0j, 0j], [0.01] * 6, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        found = fit_plane(
+            [0j, 0.1 + 0j, 1j * b, 0j, 0j, 0j], [0.01] * 6, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+        )
         assert (found is not None) is spans
 
 
 def walk(
-    hold: Hold, v: complex, yaw_rate: float, *, legs: tuple[int, ...], told: tuple[complex, float], looks: int = 100
+    hold: Hold,
+    v: complex,
+    yaw_rate: float,
+    *,
+    legs: tuple[int, ...],
+    told: tuple[complex, float],
+    looks: int = 100,
 ) -> tuple[complex, float]:
-    """Feet fixed to the ground under a torso that moves with a steady twist, all but `legs` in the air. The true way and heading."""
+    """Feet fixed to the ground under a torso that moves with a steady twist, all but `legs` in
+    the air. The true way and heading.
+    """
     way, yaw, time = 0j, 0.0, hold.every * PERIOD
     loads = [1.0 if leg in legs else 0.0 for leg in range(6)]
     for k in range(looks + 1):
         yaw = yaw_rate * k * time
         way = v * k * time if yaw_rate == 0.0 else v * (np.exp(1j * yaw) - 1.0) / (1j * yaw_rate)
         feet = np.exp(-1j * yaw) * (HOME - way)
-        shaken = np.where(np.array(loads) > 0.0, feet, feet + 0.1 * np.sin(k))  # feet in the air go anywhere
-        hold.look(sight(plane=shaken.tolist(), load=loads, yaw=yaw, velocity=told[0], yaw_rate=told[1]))
+        shaken = np.where(
+            np.array(loads) > 0.0, feet, feet + 0.1 * np.sin(k)
+        )  # feet in the air go anywhere
+        hold.look(
+            sight(plane=shaken.tolist(), load=loads, yaw=yaw, velocity=told[0], yaw_rate=told[1])
+        )
     return way, yaw
 
 
 @pytest.mark.parametrize("legs", [(0, 2, 4), (1, 3, 5), (0, 1, 2, 3, 4, 5), (2,)])
 @pytest.mark.parametrize("yaw_rate", [0.0, 0.3, -0.2])
-def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever_legs_stand(yaw_rate: float, legs: tuple[int, ...]) -> None:
+def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever_legs_stand(
+    yaw_rate: float, legs: tuple[int, ...]
+) -> None:
     hold, looks = make(), 100
     told = 0.08 + 0.01j, 0.25
     way, yaw = walk(hold, 0.07 - 0.02j, yaw_rate, legs=legs, told=told, looks=looks)
@@ -183,7 +236,9 @@ def test_the_way_and_heading_lost_are_the_commanded_less_the_true_ones_whichever
 def test_a_walk_as_commanded_loses_nothing() -> None:
     hold = make()
     walk(hold, 0.08 - 0.02j, 0.3, legs=(0, 2, 4), told=(0.08 - 0.02j, 0.3))
-    arc = (0.3 * hold.every * PERIOD) ** 2 / 24.0 * 0.08 * 4.0  # m    chord and arc differ by so much of the way
+    arc = (
+        (0.3 * hold.every * PERIOD) ** 2 / 24.0 * 0.08 * 4.0
+    )  # m    chord and arc differ by so much of the way
     assert abs(hold.way) < 1.1 * arc
     assert hold.heading == pytest.approx(0.0, abs=EXACT)
 
@@ -205,7 +260,9 @@ def test_without_a_foot_that_stood_all_the_time_the_way_is_taken_as_commanded() 
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
-def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good(heading: float) -> None:
+def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good(
+    heading: float,
+) -> None:
     """The robot walks 6 mm/s less than it is told, and turns 0.01 rad/s more."""
     hold, time, way, yaw = make(), make().every * PERIOD, 0j, heading
     for _ in range(600):
@@ -213,9 +270,12 @@ def test_steering_drives_a_steady_loss_to_a_steady_correction_that_makes_it_good
         hold.look(sight(plane=feet.tolist(), yaw=yaw, velocity=0.08 + 0j, yaw_rate=0.0))
         way += np.exp(1j * yaw) * (0.08 + hold.velocity - 0.006) * time
         yaw += (hold.yaw_rate + 0.01) * time
-    # the turn leaves a heading behind, so the robot walks a little sideways to keep to the commanded one
+    # the turn leaves a heading behind, so the robot walks a little sideways to keep to the
+    # commanded one
     assert hold.heading == pytest.approx(-0.01 / HOLD.path_rate, rel=1e-3)
-    assert hold.velocity == pytest.approx(0.006 + 0.08 * (np.exp(1j * hold.heading) - 1.0), abs=1e-4)
+    assert hold.velocity == pytest.approx(
+        0.006 + 0.08 * (np.exp(1j * hold.heading) - 1.0), abs=1e-4
+    )
     assert hold.yaw_rate == pytest.approx(-0.01, abs=1e-6)
     assert abs(hold.way) == pytest.approx(abs(hold.velocity) / HOLD.path_rate, rel=0.02)
 

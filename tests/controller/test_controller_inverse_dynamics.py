@@ -20,10 +20,18 @@ from hexapod_cosim.models.dynamics import masses
 from hexapod_cosim.models.kinematics import body_states, foot_centres
 
 ROBOTS = ("athena", "phantomx_mk4")
-POINT = (1e-12, 1e-12, 1e-12, 0.0, 0.0, 0.0)  # kg m2    of a body that is a point as far as anything here can tell
+POINT = (
+    1e-12,
+    1e-12,
+    1e-12,
+    0.0,
+    0.0,
+    0.0,
+)  # kg m2    of a body that is a point as far as anything here can tell
 BALL = (2e-4, 2e-4, 2e-4, 0.0, 0.0, 0.0)  # kg m2    alike about all axes
 ROUND_OFF = 1e-9  # N, N m    second differences of 1 m: 4 eps / h^2 = 4e-11 m/s2, of some kg
-SWEPT = 2e-6  # N m    the twin's axes turn by (h w)^2 = 3e-5 in a period: of rotors of 0.01 kg m2 at 10 rad/s2
+# N m    the twin's axes turn by (h w)^2 = 3e-5 in a period: of rotors of 0.01 kg m2 at 10 rad/s2
+SWEPT = 2e-6
 SWINGING = np.array([True, False, True, False, True, False])
 
 
@@ -32,13 +40,20 @@ def wave(size: float, rate: float, at: float) -> Callable[[np.ndarray], np.ndarr
 
 
 def moving(robot: Robot, *, turning: float, leaning: float, start: float) -> tuple[Motion, Demand]:
-    """Three steps of a torso that sways, turns and leans over three standing feet while three others swing."""
+    """Three steps of a torso that sways, turns and leans over three standing feet while three
+    others swing.
+    """
     t = start + PERIOD * np.arange(-1.0, 2.0)
     legs = LegSolver(robot)
     home = legs.forward(robot.stance)
     way = 0.05 * t + wave(0.01, 6.0, 0.3)(t) + 1j * wave(0.008, 7.0, 1.0)(t)
     yaw = turning * wave(0.05, 5.0, 0.2)(t)
-    posture = np.column_stack([leaning * 0.004 * np.sin(5.0 * t), *(leaning * wave(0.05, rate, rate)(t) for rate in (4.0, 6.0))])
+    posture = np.column_stack(
+        [
+            leaning * 0.004 * np.sin(5.0 * t),
+            *(leaning * wave(0.05, rate, rate)(t) for rate in (4.0, 6.0)),
+        ]
+    )
     ground = home[:, 0] + 1j * home[:, 1] + SWINGING * wave(0.02, 8.0, 0.5)(t)[:, None]
     height = home[:, 2] + SWINGING * (0.02 + wave(0.015, 9.0, 0.1)(t)[:, None])
     plane = np.exp(-1j * yaw[:, None]) * (ground - way[:, None])
@@ -48,22 +63,30 @@ def moving(robot: Robot, *, turning: float, leaning: float, start: float) -> tup
     speed = np.gradient(pose.angles, PERIOD, axis=0)
     rotation = rotations(posture[:, 1], posture[:, 2]) if leaning else None
     frames = Frames(way[:, None], np.exp(1j * yaw[:, None]), posture[:, :1], rotation)
-    return Motion(PERIOD, way, yaw, posture, pose.angles, speed), InverseDynamics(robot, legs, period=PERIOD).demand(pose, speed, frames)
+    return Motion(PERIOD, way, yaw, posture, pose.angles, speed), InverseDynamics(
+        robot, legs, period=PERIOD
+    ).demand(pose, speed, frames)
 
 
 def differences(robot: Robot, motion: Motion, demand: Demand) -> dict[str, float]:
-    """By how much a demand misses what the twin needs: largest errors of push and weight [N], moment and torques [N m]."""
+    """By how much a demand misses what the twin needs: largest errors of push and weight [N],
+    moment and torques [N m].
+    """
     needed, body, _ = twin_needs(robot, motion, 1)
     floor = HIGH + LegSolver(robot).forward(robot.stance)[:, 2].mean() - robot.foot.radius
     below = np.array([motion.way[1].real, motion.way[1].imag, floor])
     moment = needed[3:6] + np.cross(body[0, :3] - below, needed[:3])
     back = np.exp(-1j * motion.yaw[1])
-    torque = needed[6:].reshape(6, 3) + robot.servo.coulomb_friction * np.tanh(motion.speed[1] / GEAR_SPEED)
+    torque = needed[6:].reshape(6, 3) + robot.servo.coulomb_friction * np.tanh(
+        motion.speed[1] / GEAR_SPEED
+    )
     return {
-        "push": abs(demand.push[1] - back * complex(needed[0], needed[1])), "weight": abs(demand.weight[1] - needed[2]),
-        "moment": abs(demand.moment[1] - back * complex(-moment[1], moment[0])), "twist": abs(demand.twist[1] - moment[2]),
+        "push": abs(demand.push[1] - back * complex(needed[0], needed[1])),
+        "weight": abs(demand.weight[1] - needed[2]),
+        "moment": abs(demand.moment[1] - back * complex(-moment[1], moment[0])),
+        "twist": abs(demand.twist[1] - moment[2]),
         "torque": float(np.abs(demand.torque[1] - torque).max()),
-    }  # fmt: skip
+    }
 
 
 def points(robot: Robot, *, link: tuple[float, ...] = POINT) -> Robot:
@@ -80,7 +103,9 @@ STARTS = [0.1, 0.45, 0.77]
 @pytest.mark.parametrize("turning", [0.0, 1.0])
 @pytest.mark.parametrize("leaning", [0.0, 1.0])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_mass_points_need_what_the_twin_says_to_the_last_digit_that_differences_give(name: str, turning: float, leaning: float) -> None:
+def test_mass_points_need_what_the_twin_says_to_the_last_digit_that_differences_give(
+    name: str, turning: float, leaning: float
+) -> None:
     robot = points(load_robot(name))
     for start in STARTS:
         found = differences(robot, *moving(robot, turning=turning, leaning=leaning, start=start))
@@ -89,17 +114,26 @@ def test_mass_points_need_what_the_twin_says_to_the_last_digit_that_differences_
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_turning_links_are_exact_when_alike_about_all_axes_and_the_torso_does_not_turn(name: str) -> None:
+def test_turning_links_are_exact_when_alike_about_all_axes_and_the_torso_does_not_turn(
+    name: str,
+) -> None:
     robot = points(load_robot(name), link=BALL)
     for start in STARTS:
-        assert differences(robot, *moving(robot, turning=0.0, leaning=0.0, start=start))["torque"] < SWEPT
+        assert (
+            differences(robot, *moving(robot, turning=0.0, leaning=0.0, start=start))["torque"]
+            < SWEPT
+        )
 
 
 @pytest.mark.parametrize("turning", [0.0, 1.0])
 @pytest.mark.parametrize("leaning", [0.0, 1.0])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_what_is_left_out_of_the_robots_motion_is_small(name: str, turning: float, leaning: float) -> None:
-    """Angular accelerations here reach 10 rad/s2 of joints and 2 rad/s2 of the torso; inertias 5e-4 and 0.035 kg m2."""
+def test_what_is_left_out_of_the_robots_motion_is_small(
+    name: str, turning: float, leaning: float
+) -> None:
+    """Angular accelerations here reach 10 rad/s2 of joints and 2 rad/s2 of the torso; inertias
+    5e-4 and 0.035 kg m2.
+    """
     robot = load_robot(name)
     for start in STARTS:
         motion, demand = moving(robot, turning=turning, leaning=leaning, start=start)
@@ -116,11 +150,19 @@ def test_the_lever_is_the_twins_virtual_work_of_a_force_on_the_contact_point(nam
     motion, demand = moving(robot, turning=1.0, leaning=0.0, start=0.3)
     body = motion.bodies(robot, 1)
     reach = velocities(robot, body, motion.angle[1]).reshape(19, 6, 24)
-    axes = np.array([[np.cos(motion.yaw[1]), np.sin(motion.yaw[1]), 0.0], [-np.sin(motion.yaw[1]), np.cos(motion.yaw[1]), 0.0], Z])
+    axes = np.array(
+        [
+            [np.cos(motion.yaw[1]), np.sin(motion.yaw[1]), 0.0],
+            [-np.sin(motion.yaw[1]), np.cos(motion.yaw[1]), 0.0],
+            Z,
+        ]
+    )
     for leg, centre in enumerate(foot_centres(robot, body)):
         v, w = np.split(reach[3 * leg + 3, :, 6 + 3 * leg : 9 + 3 * leg], 2)
         arm = centre - robot.foot.radius * Z - body[3 * leg + 3, :3]
-        np.testing.assert_allclose(demand.lever[1, leg], (v + np.cross(w.T, arm).T).T @ axes.T, atol=1e-12)
+        np.testing.assert_allclose(
+            demand.lever[1, leg], (v + np.cross(w.T, arm).T).T @ axes.T, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -130,7 +172,13 @@ def test_standing_needs_the_weight_its_moment_and_nothing_else(name: str) -> Non
     assert demand.weight[0] == pytest.approx(weight(robot), rel=1e-14)
     assert demand.push[0] == 0.0
     body = body_states(
-        robot, np.array(robot.torso.com), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3), np.zeros(3), robot.stance, np.zeros((6, 3))
+        robot,
+        np.array(robot.torso.com),
+        np.array([1.0, 0.0, 0.0, 0.0]),
+        np.zeros(3),
+        np.zeros(3),
+        robot.stance,
+        np.zeros((6, 3)),
     )
     centre = masses(robot) @ body[:, :2] @ [1.0, 1.0j]
     assert demand.moment[0] == pytest.approx(9.81 * centre, abs=1e-12)

@@ -22,7 +22,11 @@ def robots() -> list[Robot]:
     athena = load_robot("athena")
     legs = list(athena.legs)
     coxa, femur, tibia = legs[1].links
-    odd = (replace(coxa, offset_y=0.01, offset_z=-0.02), replace(femur, length=0.13, offset_y=-0.03), replace(tibia, offset_z=0.02))
+    odd = (
+        replace(coxa, offset_y=0.01, offset_z=-0.02),
+        replace(femur, length=0.13, offset_y=-0.03),
+        replace(tibia, offset_z=0.02),
+    )
     legs[1] = replace(legs[1], links=odd)
     return [athena, load_robot("phantomx_mk4"), replace(athena, name="odd", legs=tuple(legs))]
 
@@ -34,7 +38,9 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 
 def reachable_poses(robot: Robot, count: int = POSES) -> np.ndarray:
-    """Random joint angles within the limits, knee up and the foot outside the coxa axis: where the inverse is unique."""
+    """Random joint angles within the limits, knee up and the foot outside the coxa axis: where
+    the inverse is unique.
+    """
     solver, generator = LegSolver(robot), np.random.default_rng(7)
     found: list[np.ndarray] = []
     while len(found) < count:
@@ -60,13 +66,17 @@ def solved(solver: LegSolver, foot: np.ndarray, velocity: np.ndarray) -> Joints:
 
 def test_forward_kinematics_are_the_twins(robot: Robot) -> None:
     for angle in reachable_poses(robot, 20):
-        np.testing.assert_allclose(LegSolver(robot).forward(angle), foot_positions(robot, angle), atol=ROUND_OFF)
+        np.testing.assert_allclose(
+            LegSolver(robot).forward(angle), foot_positions(robot, angle), atol=ROUND_OFF
+        )
 
 
 def test_the_inverse_of_forward_is_the_identity(robot: Robot) -> None:
     solver = LegSolver(robot)
     for angle in reachable_poses(robot):
-        np.testing.assert_allclose(solver.inverse(solver.forward(angle)), angle, atol=1e-9)  # arccos near a straight leg
+        np.testing.assert_allclose(
+            solver.inverse(solver.forward(angle)), angle, atol=1e-9
+        )  # arccos near a straight leg
 
 
 def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
@@ -86,21 +96,29 @@ def test_many_steps_at_once_are_the_same_as_each_by_itself(robot: Robot) -> None
     together = solver.pose(plane(foot), foot[..., 2])
     for k, angle in enumerate(poses):
         np.testing.assert_array_equal(foot[k], solver.forward(angle))
-        np.testing.assert_array_equal(together.angles[k], solver.pose(plane(foot[k : k + 1]), foot[k : k + 1, :, 2]).angles[0])
+        np.testing.assert_array_equal(
+            together.angles[k], solver.pose(plane(foot[k : k + 1]), foot[k : k + 1, :, 2]).angles[0]
+        )
     assert not together.lost.any()
 
 
 def test_a_pose_says_where_the_links_point(robot: Robot) -> None:
-    """Foot and knee put together again from the directions, against forward kinematics of the angles."""
+    """Foot and knee put together again from the directions, against forward kinematics of the
+    angles.
+    """
     solver, foot = LegSolver(robot), LegSolver(robot).forward(reachable_poses(robot, 50))
     pose = solver.pose(plane(foot), foot[..., 2])
     for direction in (pose.heading, pose.femur, pose.tibia):
         np.testing.assert_allclose(np.abs(direction), 1.0, atol=ROUND_OFF)
-    np.testing.assert_allclose(pose.foot, solver.femur * pose.femur + solver.tibia * pose.tibia, atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        pose.foot, solver.femur * pose.femur + solver.tibia * pose.tibia, atol=ROUND_OFF
+    )
     outward = pose.heading * (solver.coxa_length + pose.foot.real + 1j * solver.offset_y)
     np.testing.assert_allclose(outward, pose.point, atol=ROUND_OFF)
     np.testing.assert_allclose(solver.place + pose.point, plane(foot), atol=ROUND_OFF)
-    np.testing.assert_allclose(solver.hip[2] + solver.coxa_height + pose.foot.imag, foot[..., 2], atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        solver.hip[2] + solver.coxa_height + pose.foot.imag, foot[..., 2], atol=ROUND_OFF
+    )
 
 
 def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot) -> None:
@@ -108,7 +126,12 @@ def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot
     poses = reachable_poses(robot, 50)
     velocity = generator.normal(size=(50, 6, 3)) * 0.02
     joints = solved(solver, solver.forward(poses), velocity)
-    expected = np.array([np.linalg.solve(solver.jacobian(q), v[:, :, None])[:, :, 0] for q, v in zip(poses, velocity, strict=True)])
+    expected = np.array(
+        [
+            np.linalg.solve(solver.jacobian(q), v[:, :, None])[:, :, 0]
+            for q, v in zip(poses, velocity, strict=True)
+        ]
+    )
     slow = np.abs(expected).max(axis=-1) < robot.servo.speed_max
     assert slow.sum() > 100
     np.testing.assert_allclose(joints.speed[slow], expected[slow], rtol=1e-7, atol=1e-9)
@@ -118,7 +141,9 @@ def test_joint_speeds_are_the_jacobians_inverse_times_foot_velocity(robot: Robot
 
 def test_the_stance_is_found_again(robot: Robot) -> None:
     solver = LegSolver(robot)
-    np.testing.assert_allclose(solver.inverse(solver.forward(robot.stance)), robot.stance, atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        solver.inverse(solver.forward(robot.stance)), robot.stance, atol=ROUND_OFF
+    )
 
 
 @pytest.mark.parametrize(("leg", "name"), [(0, "LF"), (4, "RM")])
@@ -127,7 +152,9 @@ def test_a_foot_out_of_reach_is_refused_with_leg_target_and_reach(leg: int, name
     solver = LegSolver(robot)
     foot = solver.forward(robot.stance)
     foot[leg] = [0.6, 0.1, 0.0]
-    with pytest.raises(ReachError, match=f"leg {name}.*0\\.6, 0\\.1, 0\\.0.*0\\.0600 to 0\\.2600 m") as caught:
+    with pytest.raises(
+        ReachError, match=f"leg {name}.*0\\.6, 0\\.1, 0\\.0.*0\\.0600 to 0\\.2600 m"
+    ) as caught:
         solver.inverse(foot)
     assert caught.value.got == (0.6, 0.1, 0.0)
 

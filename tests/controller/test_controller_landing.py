@@ -1,4 +1,6 @@
-"""At what height feet are expected to meet the ground: what all have in common, or a foot twice, is no bump."""
+"""At what height feet are expected to meet the ground: what all have in common, or a foot twice,
+is no bump.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,9 @@ def test_feet_are_expected_as_low_as_the_lowest_of_the_others() -> None:
     landings = Landings()
     step(landings, FIRST, [0.012, 0.0, 0.010, 0.0, 0.014, 0.0])
     step(landings, ~FIRST, [0.0, 0.015, 0.0, 0.011, 0.0, 0.013])
-    np.testing.assert_allclose(landings.expected(ALL, LOW, NONE), [0.010, 0.010, 0.011, 0.010, 0.010, 0.010])
+    np.testing.assert_allclose(
+        landings.expected(ALL, LOW, NONE), [0.010, 0.010, 0.011, 0.010, 0.010, 0.010]
+    )
 
 
 def test_feet_still_in_the_air_tell_that_there_is_no_ground_so_high() -> None:
@@ -53,7 +57,9 @@ def test_a_foot_is_expected_where_it_came_down_a_step_before() -> None:
     np.testing.assert_allclose(landings.expected(ALL, LOW, NONE), [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_a_foot_that_comes_down_late_meets_the_ground_at_the_end_of_its_path_and_one_that_never_left_tells_nothing() -> None:
+def test_a_foot_that_comes_down_late_meets_the_ground_at_the_end_of_its_path_and_one_that_never_left_tells_nothing() -> (
+    None
+):
     landings = Landings()
     landings.look(~FIRST, np.full(6, 0.03), FIRST)
     landings.look(~FIRST, LOW, NONE)
@@ -72,7 +78,9 @@ def test_what_is_saved_does_not_change() -> None:
 
 
 def walk(laws: Compliance, ground: np.ndarray, steps: int) -> list[np.ndarray]:
-    """Two tripods in turn, feet that come down from 25 mm at 0.25 m/s onto ground so high [m] (6,). Offsets at the end of each step."""
+    """Two tripods in turn, feet that come down from 25 mm at 0.25 m/s onto ground so high [m]
+    (6,). Offsets at the end of each step.
+    """
     found = []
     for k in range(steps):
         swinging = FIRST if k % 2 == 0 else ~FIRST

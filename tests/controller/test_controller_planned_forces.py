@@ -1,4 +1,6 @@
-"""The plan of a walking controller, given to the multibody twin: its torques and foot forces make the planned motion."""
+"""The plan of a walking controller, given to the multibody twin: its torques and foot forces
+make the planned motion.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +27,14 @@ COMMANDS = {
     "turning": BodyCommand(vx=0.04, yaw_rate=0.2),
     "leaning": BodyCommand(vx=0.05, height=0.01, roll=0.05, pitch=-0.04),
 }
-CARRIED = 0.01  # N    of 55: the feet that touch are so few that RIDGE still shows, and no foot pulls
-ROLLED = 1.2e-3  # m    from the path, along which the shares are reckoned, to the contact point of the foot that rolls on it
-LEGS_SWING = 0.015  # N m    of 12 links of up to 5e-4 kg m2 at some 10 rad/s2, half of them against the others
+CARRIED = (
+    0.01  # N    of 55: the feet that touch are so few that RIDGE still shows, and no foot pulls
+)
+# m    from the path, along which the shares are reckoned, to the contact point of the foot that
+# rolls on it
+ROLLED = 1.2e-3
+# N m    of 12 links of up to 5e-4 kg m2 at some 10 rad/s2, half of them against the others
+LEGS_SWING = 0.015
 SWEPT = 1e-5  # N m    the twin's axes turn by (h w)^2 in a period
 LINK_TURNS = 0.01  # N m    5e-4 kg m2 x 20 rad/s2: what is left out of a joint's torque
 INERTIAS = {"points": SWEPT, "real": LINK_TURNS}
@@ -44,12 +51,23 @@ def planned(robot: Robot, command: BodyCommand, gait: Gait | None = None) -> Con
     return controller
 
 
-def given_and_needed(robot: Robot, controller: Controller, at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(24,) what the plan gives the twin, (24,) what its motion needs, and the mass matrix (24, 24) of torso and joints."""
+def given_and_needed(
+    robot: Robot, controller: Controller, at: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(24,) what the plan gives the twin, (24,) what its motion needs, and the mass matrix (24,
+    24) of torso and joints.
+    """
     compliant, steps = controller.compliant, controller.paths.steps
     assert compliant is not None
     plan, posture = compliant.laws._plan, np.array(compliant._command)[:, 3:]
-    motion = Motion(PERIOD, steps.way[1:, 0], steps.turn[1:, 0], posture, controller._plan.angle, controller._plan.speed)
+    motion = Motion(
+        PERIOD,
+        steps.way[1:, 0],
+        steps.turn[1:, 0],
+        posture,
+        controller._plan.angle,
+        controller._plan.speed,
+    )
     needed, body, reach = twin_needs(robot, motion, at)
     c, s = np.cos(motion.yaw[at]), np.sin(motion.yaw[at])
     force = plan.shares.forces(at)[:, :3] @ np.array([[c, s, 0.0], [-s, c, 0.0], Z])
@@ -66,7 +84,9 @@ def given_and_needed(robot: Robot, controller: Controller, at: int) -> tuple[np.
 @pytest.mark.parametrize("inertias", INERTIAS)
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", ROBOTS)
-def test_planned_torques_and_forces_move_the_twin_as_planned(name: str, command: str, inertias: str) -> None:
+def test_planned_torques_and_forces_move_the_twin_as_planned(
+    name: str, command: str, inertias: str
+) -> None:
     robot, leans = load_robot(name), command == "leaning"
     if inertias == "points":
         robot = changed(robot, torso={"inertia": POINT})
@@ -77,14 +97,18 @@ def test_planned_torques_and_forces_move_the_twin_as_planned(name: str, command:
         given, needed, inertia = given_and_needed(robot, controller, at)
         error = given - needed
         assert np.abs(error[:3]).max() < CARRIED
-        assert np.abs(error[3:5]).max() < weight(robot) * ROLLED + (0.0 if inertias == "points" else LEGS_SWING)
+        assert np.abs(error[3:5]).max() < weight(robot) * ROLLED + (
+            0.0 if inertias == "points" else LEGS_SWING
+        )
         # the contact point is sought below the foot along the torso's axis
         aslant = 0.5 * weight(robot) * robot.foot.radius * 0.07 if leans else 0.0
         assert np.abs(error[6:]).max() < INERTIAS[inertias] + aslant
         assert abs(error[5]) < (CARRIED if inertias == "points" else LEGS_SWING)
         acceleration = np.linalg.solve(inertia, error)
         assert np.abs(acceleration[:3]).max() < 0.01  # m/s2
-        assert np.abs(acceleration[3:6]).max() < 0.7  # rad/s2    unplanned, a leg's swing alone makes 5
+        assert (
+            np.abs(acceleration[3:6]).max() < 0.7
+        )  # rad/s2    unplanned, a leg's swing alone makes 5
         assert leans or np.abs(acceleration[6:]).max() < 0.7  # of up to 30
 
 
@@ -95,7 +119,9 @@ def test_standing_still_is_planned_to_round_off(name: str) -> None:
     for k in range(3):
         controller.step(k * PERIOD, BodyCommand(), Measurement())
     given, needed, _ = given_and_needed(robot, controller, 2)
-    indented = 5e-6  # N m    two hundredths of a millimetre of lowering shift the mass of the legs, and the shares stand on the stance
+    # N m    two hundredths of a millimetre of lowering shift the mass of the legs, and the shares
+    # stand on the stance
+    indented = 5e-6
     np.testing.assert_allclose(given, needed, atol=indented)
 
 

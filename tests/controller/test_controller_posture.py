@@ -1,4 +1,6 @@
-"""The torso over its feet: from the walking frame to the torso's, and the velocities that go with it."""
+"""The torso over its feet: from the walking frame to the torso's, and the velocities that go
+with it.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +27,22 @@ def moving_feet(t: np.ndarray) -> Feet:
 
 def posture(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(n, 3) height, roll and pitch, and their rates."""
-    value = np.column_stack([0.01 * np.sin(2.0 * t), 0.3 * np.sin(3.0 * t + 0.5), 0.2 * np.sin(5.0 * t - 1.0)])
-    return value, np.column_stack([0.02 * np.cos(2.0 * t), 0.9 * np.cos(3.0 * t + 0.5), np.cos(5.0 * t - 1.0)])
+    value = np.column_stack(
+        [0.01 * np.sin(2.0 * t), 0.3 * np.sin(3.0 * t + 0.5), 0.2 * np.sin(5.0 * t - 1.0)]
+    )
+    return value, np.column_stack(
+        [0.02 * np.cos(2.0 * t), 0.9 * np.cos(3.0 * t + 0.5), np.cos(5.0 * t - 1.0)]
+    )
 
 
 @pytest.mark.parametrize(("roll", "pitch"), [(0.3, 0.0), (0.0, -0.4), (0.25, 0.35)])
 def test_the_torso_rolls_about_x_first_and_then_pitches_about_y(roll: float, pitch: float) -> None:
-    expected = axis_rotation(np.array([0.0, 1.0, 0.0]), pitch) @ axis_rotation(np.array([1.0, 0.0, 0.0]), roll)
-    np.testing.assert_allclose(rotations(np.array([roll]), np.array([pitch]))[0], expected, atol=ROUND_OFF)
+    expected = axis_rotation(np.array([0.0, 1.0, 0.0]), pitch) @ axis_rotation(
+        np.array([1.0, 0.0, 0.0]), roll
+    )
+    np.testing.assert_allclose(
+        rotations(np.array([roll]), np.array([pitch]))[0], expected, atol=ROUND_OFF
+    )
 
 
 def test_positive_roll_lowers_the_right_side_and_positive_pitch_the_nose() -> None:
@@ -51,9 +61,15 @@ def test_feet_are_seen_where_the_torso_puts_them_back_on_the_ground() -> None:
 
 
 def test_velocities_are_the_slopes_of_positions_while_feet_and_torso_move() -> None:
-    before, now, after = (in_torso_frame(moving_feet(t), *posture(t)) for t in (TIMES - STEP, TIMES, TIMES + STEP))
-    np.testing.assert_allclose(now.velocity, (after.plane - before.plane) / (2.0 * STEP), atol=DIFFERENCE_ERROR)
-    np.testing.assert_allclose(now.rise, (after.height - before.height) / (2.0 * STEP), atol=DIFFERENCE_ERROR)
+    before, now, after = (
+        in_torso_frame(moving_feet(t), *posture(t)) for t in (TIMES - STEP, TIMES, TIMES + STEP)
+    )
+    np.testing.assert_allclose(
+        now.velocity, (after.plane - before.plane) / (2.0 * STEP), atol=DIFFERENCE_ERROR
+    )
+    np.testing.assert_allclose(
+        now.rise, (after.height - before.height) / (2.0 * STEP), atol=DIFFERENCE_ERROR
+    )
 
 
 def test_one_step_is_turned_as_many_are() -> None:

@@ -1,4 +1,6 @@
-"""What compliant control makes of its sensors: forces in the right axes, feet where they are, sensors that lie."""
+"""What compliant control makes of its sensors: forces in the right axes, feet where they are,
+sensors that lie.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,26 @@ from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product
 def test_the_forces_on_a_torso_that_leans_as_commanded_are_judged_upright() -> None:
     roll, pitch = 0.2, -0.15
     controller, measurement = make(compliant=True), squeezed()
-    pitched, rolled = axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch), axis_quaternion(np.array([1.0, 0.0, 0.0]), roll)
+    pitched, rolled = (
+        axis_quaternion(np.array([0.0, 1.0, 0.0]), pitch),
+        axis_quaternion(np.array([1.0, 0.0, 0.0]), roll),
+    )
     measurement.quaternion[:] = quaternion_product(pitched, rolled)
     run(controller, BodyCommand(roll=roll, pitch=pitch), 300, measurement=measurement)
     assert controller.compliant is not None
-    np.testing.assert_allclose(controller.compliant._force[:, :3], measurement.foot_force, atol=1e-12)
+    np.testing.assert_allclose(
+        controller.compliant._force[:, :3], measurement.foot_force, atol=1e-12
+    )
 
 
-@pytest.mark.parametrize("command", [BodyCommand(), BodyCommand(height=0.01, roll=0.1, pitch=-0.05), BodyCommand(vx=0.05, yaw_rate=0.1)])
+@pytest.mark.parametrize(
+    "command",
+    [
+        BodyCommand(),
+        BodyCommand(height=0.01, roll=0.1, pitch=-0.05),
+        BodyCommand(vx=0.05, yaw_rate=0.1),
+    ],
+)
 def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planned(
     command: BodyCommand, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -32,17 +46,32 @@ def test_the_slow_loops_see_a_robot_that_does_what_is_planned_where_it_is_planne
     monkeypatch.setattr(controller.compliant.hold, "look", seen.append)
     obey(controller, command, 600)
     for sight in seen[-10:]:
-        lag = PERIOD * (0.05 + 0.1 * 0.3) if command.vx else 0.0  # m    the joints are where they were told to be a period ago
+        lag = (
+            PERIOD * (0.05 + 0.1 * 0.3) if command.vx else 0.0
+        )  # m    the joints are where they were told to be a period ago
         standing = np.array(sight.load) > 0.5
-        np.testing.assert_allclose(np.array(sight.plane)[standing], np.array(sight.planned)[standing], atol=lag + 2e-5)
-        np.testing.assert_allclose(np.array(sight.height)[standing], np.array(sight.planned_height)[standing], atol=1e-4)
-        assert sight.tilt == pytest.approx((-command.roll, -command.pitch), abs=1e-9)  # of a torso that is told to lie level
-        assert (sight.velocity, sight.yaw_rate, sight.yaw) == (complex(command.vx, command.vy), command.yaw_rate, 0.0)
+        np.testing.assert_allclose(
+            np.array(sight.plane)[standing], np.array(sight.planned)[standing], atol=lag + 2e-5
+        )
+        np.testing.assert_allclose(
+            np.array(sight.height)[standing], np.array(sight.planned_height)[standing], atol=1e-4
+        )
+        assert sight.tilt == pytest.approx(
+            (-command.roll, -command.pitch), abs=1e-9
+        )  # of a torso that is told to lie level
+        assert (sight.velocity, sight.yaw_rate, sight.yaw) == (
+            complex(command.vx, command.vy),
+            command.yaw_rate,
+            0.0,
+        )
 
 
 def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
     """Foot 1 feels nothing, the others carry its load."""
-    controller = make(compliant=True, parts=Parts(slip_pid=False, suspension=False, support=False, posture=False, path=False))
+    controller = make(
+        compliant=True,
+        parts=Parts(slip_pid=False, suspension=False, support=False, posture=False, path=False),
+    )
     measurement = Measurement(angle=controller.stance.copy())
     measurement.foot_force[:, 2] = 11.0
     measurement.foot_force[1] = 0.0
@@ -57,11 +86,17 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
 
 
 def test_steering_is_led_over_without_a_jump_and_looked_at_afresh_only_when_asked() -> None:
-    compliant, none, ramp = make(compliant=True).compliant, np.zeros(41), np.minimum(np.arange(41) * PERIOD / STEERING_TIME, 1.0)
+    compliant, none, ramp = (
+        make(compliant=True).compliant,
+        np.zeros(41),
+        np.minimum(np.arange(41) * PERIOD / STEERING_TIME, 1.0),
+    )
     assert compliant is not None
 
     def steered(*, moves: bool = True, afresh: bool = False) -> np.ndarray:
-        v, yaw_rate = compliant.steer(np.zeros(41, dtype=np.complex128), none, moves=moves, afresh=afresh)
+        v, yaw_rate = compliant.steer(
+            np.zeros(41, dtype=np.complex128), none, moves=moves, afresh=afresh
+        )
         return np.column_stack([v, yaw_rate])
 
     goal, other = np.array([0.01 + 0.02j, 0.03]), np.array([-0.01 + 0j, 0.05])
@@ -70,8 +105,12 @@ def test_steering_is_led_over_without_a_jump_and_looked_at_afresh_only_when_aske
     compliant.hold.velocity, compliant.hold.yaw_rate = complex(other[0]), float(other[1].real)
     compliant.advance(7)
     np.testing.assert_allclose(steered()[:-7], np.outer(ramp[7:], goal), atol=1e-15)
-    np.testing.assert_allclose(steered(afresh=True), ramp[7] * goal + np.outer(ramp, other - ramp[7] * goal), atol=1e-15)
+    np.testing.assert_allclose(
+        steered(afresh=True), ramp[7] * goal + np.outer(ramp, other - ramp[7] * goal), atol=1e-15
+    )
     compliant.advance(30)
     for past in (0, 4):  # at a stop it fades, however often that is asked
         compliant.advance(past)
-        np.testing.assert_allclose(steered(moves=False)[: 41 - past], np.outer(1.0 - ramp[past:], other), atol=1e-15)
+        np.testing.assert_allclose(
+            steered(moves=False)[: 41 - past], np.outer(1.0 - ramp[past:], other), atol=1e-15
+        )

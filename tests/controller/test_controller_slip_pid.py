@@ -28,7 +28,9 @@ GAINS = {
 
 def continuous(gains: SlipGains) -> control.TransferFunction:
     s = control.tf("s")
-    return (gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)) / (gains.filter_time * s + 1.0)
+    return (gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)) / (
+        gains.filter_time * s + 1.0
+    )
 
 
 def running(gains: SlipGains, *, period: float = PERIOD) -> control.StateSpace:
@@ -55,47 +57,82 @@ def test_the_law_is_tustins_sampling_of_its_transfer_function(name: str, period:
 def test_its_frequency_response_is_the_continuous_one_at_the_warped_frequency(name: str) -> None:
     z = np.exp(1j * FREQUENCIES * PERIOD)
     warped = 2.0 / PERIOD * np.tan(FREQUENCIES * PERIOD / 2.0)
-    np.testing.assert_allclose(response(running(GAINS[name]), z), response(continuous(GAINS[name]), 1j * warped), rtol=RELATIVE)
+    np.testing.assert_allclose(
+        response(running(GAINS[name]), z),
+        response(continuous(GAINS[name]), 1j * warped),
+        rtol=RELATIVE,
+    )
 
 
 def test_a_steady_force_is_answered_by_kp_and_an_integral_that_lacks_the_filters_lag() -> None:
-    """u = kp f + ki f (t - T_f) once the filter has settled: the trapezoid loses nothing of the area."""
+    """u = kp f + ki f (t - T_f) once the filter has settled: the trapezoid loses nothing of the
+    area.
+    """
     matrix, row, force, count = system(SLIP, period=PERIOD), np.zeros(5), 3.0, 400
     for _ in range(count):
         row = np.append(row[STATES], force) @ matrix
-    lasted = (count - 0.5) * PERIOD  # a force first seen at a step counts from half a period before it
-    assert row[ANSWER] == pytest.approx(force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9)
+    lasted = (
+        count - 0.5
+    ) * PERIOD  # a force first seen at a step counts from half a period before it
+    assert row[ANSWER] == pytest.approx(
+        force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9
+    )
 
 
 def test_the_squeeze_is_what_is_left_beside_the_best_push_and_twist_of_the_body() -> None:
-    """Least sum of |e|^2/n over all pushes and twists shared by load, n (D + i w (p - c))/N: by weighted least squares."""
+    """Least sum of |e|^2/n over all pushes and twists shared by load, n (D + i w (p - c))/N: by
+    weighted least squares.
+    """
     generator = np.random.default_rng(5)
     for count in (3, 4, 6):
-        push, feet = (generator.normal(size=count) + 1j * generator.normal(size=count) for _ in range(2))
+        push, feet = (
+            generator.normal(size=count) + 1j * generator.normal(size=count) for _ in range(2)
+        )
         normal = generator.uniform(0.5, 2.0, count)
-        moved = normal * np.stack([np.ones(count), 1j * np.ones(count), 1j * feet])  # by a push along x, along y, and a twist
+        moved = normal * np.stack(
+            [np.ones(count), 1j * np.ones(count), 1j * feet]
+        )  # by a push along x, along y, and a twist
         weighted = moved / np.sqrt(normal)
-        base, target = (np.concatenate([rows.real, rows.imag], axis=-1) for rows in (weighted, push / np.sqrt(normal)))
+        base, target = (
+            np.concatenate([rows.real, rows.imag], axis=-1)
+            for rows in (weighted, push / np.sqrt(normal))
+        )
         expected = push - np.linalg.lstsq(base.T, target, rcond=None)[0] @ moved
         found = squeeze(push, normal, feet)
         np.testing.assert_allclose(found, expected, atol=1e-12)
         assert abs(found.sum()) < 1e-12
         assert abs((feet.conj() * found).imag.sum()) < 1e-12
         np.testing.assert_allclose(squeeze(found, normal, feet), found, atol=1e-12)
-        np.testing.assert_allclose(squeeze(np.asarray(generator.normal(size=3) @ moved), normal, feet), 0.0, atol=1e-12)
+        np.testing.assert_allclose(
+            squeeze(np.asarray(generator.normal(size=3) @ moved), normal, feet), 0.0, atol=1e-12
+        )
 
 
 def test_of_two_feet_only_what_is_along_their_line_is_squeeze_and_of_one_nothing() -> None:
     feet, normal = np.array([0.1 + 0.2j, -0.1 - 0.2j]), np.array([10.0, 20.0])
     line = (1.0 + 2.0j) / np.sqrt(5.0)
-    np.testing.assert_allclose(squeeze(np.array([3.0 * line, -3.0 * line]), normal, feet), [3.0 * line, -3.0 * line], atol=1e-12)
-    np.testing.assert_allclose(squeeze(np.array([1j * line, 2j * line]), normal, feet), 0.0, atol=1e-12)
-    np.testing.assert_allclose(squeeze(np.array([1.0 + 1.0j]), normal[:1], feet[:1]), 0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        squeeze(np.array([3.0 * line, -3.0 * line]), normal, feet),
+        [3.0 * line, -3.0 * line],
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        squeeze(np.array([1j * line, 2j * line]), normal, feet), 0.0, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        squeeze(np.array([1.0 + 1.0j]), normal[:1], feet[:1]), 0.0, atol=1e-12
+    )
 
 
 def test_feet_within_a_centimetre_take_no_moment_and_feet_without_load_keep_their_forces() -> None:
     for reach, left in ((0.0099, 1.0), (0.0101, 0.0)):
         feet = np.array([reach, -reach]) + 0.3j
-        np.testing.assert_allclose(squeeze(np.array([1j, -1j]), np.ones(2), feet), [1j * left, -1j * left], atol=1e-12)
-    np.testing.assert_array_equal(squeeze(np.array([1.0, 2.0j]), np.full(2, 0.4e-6), np.array([1.0, 0.0])), [1.0, 2.0j])
-    np.testing.assert_allclose(squeeze(np.array([1.0, 1.0]), np.full(2, 0.6e-6), np.array([1.0, 0.0])), 0.0, atol=1e-12)
+        np.testing.assert_allclose(
+            squeeze(np.array([1j, -1j]), np.ones(2), feet), [1j * left, -1j * left], atol=1e-12
+        )
+    np.testing.assert_array_equal(
+        squeeze(np.array([1.0, 2.0j]), np.full(2, 0.4e-6), np.array([1.0, 0.0])), [1.0, 2.0j]
+    )
+    np.testing.assert_allclose(
+        squeeze(np.array([1.0, 1.0]), np.full(2, 0.6e-6), np.array([1.0, 0.0])), 0.0, atol=1e-12
+    )

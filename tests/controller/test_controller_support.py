@@ -24,15 +24,35 @@ RIDGED = 1e-8 * WEIGHT  # N, N m    ten times what the ridge of 1e-9 takes from 
 BALANCED = ("111111", "101010", "010101", "110111", "101101", "011110")
 
 
-def make(gait: str | None = None, *, robot: Robot = ROBOT, handover: float | None = None) -> Support:
-    gains = make_gains(robot).support if handover is None else SupportGains(handover_time=handover, weight_time=0.5)
-    return Support(robot, make_gait(robot, gait), gains, rest=InverseDynamics(robot, LegSolver(robot), period=0.005).rest())
+def make(
+    gait: str | None = None, *, robot: Robot = ROBOT, handover: float | None = None
+) -> Support:
+    gains = (
+        make_gains(robot).support
+        if handover is None
+        else SupportGains(handover_time=handover, weight_time=0.5)
+    )
+    return Support(
+        robot,
+        make_gait(robot, gait),
+        gains,
+        rest=InverseDynamics(robot, LegSolver(robot), period=0.005).rest(),
+    )
 
 
-def demand(*, push: complex = 0j, moment: complex = 0j, twist: float = 0.0, load: float = WEIGHT) -> Demand:
+def demand(
+    *, push: complex = 0j, moment: complex = 0j, twist: float = 0.0, load: float = WEIGHT
+) -> Demand:
     """Of one step that asks no torques."""
     none = np.zeros((1, 6, 3))
-    return Demand(none, np.zeros((1, 6, 3, 3)), np.array([push]), np.array([load]), np.array([moment]), np.array([twist]))
+    return Demand(
+        none,
+        np.zeros((1, 6, 3, 3)),
+        np.array([push]),
+        np.array([load]),
+        np.array([moment]),
+        np.array([twist]),
+    )
 
 
 def legs(standing: str) -> np.ndarray:
@@ -62,7 +82,9 @@ def test_a_leg_is_active_in_its_stance_and_hands_over_half_before_and_half_after
 
 def test_what_one_tripod_gives_up_the_other_takes() -> None:
     active = make("tripod").activation(phases("tripod"), NONE, NONE, walking=True)
-    np.testing.assert_allclose(active[:, :3].sum(axis=1) + active[:, 3:].sum(axis=1), 3.0, atol=1e-9)
+    np.testing.assert_allclose(
+        active[:, :3].sum(axis=1) + active[:, 3:].sum(axis=1), 3.0, atol=1e-9
+    )
     np.testing.assert_allclose(active[:, 0] + active[:, 1], 1.0, atol=1e-9)
 
 
@@ -72,7 +94,9 @@ def test_hand_overs_are_smooth(gait: str) -> None:
     width = 0.05 / make_gait(ROBOT, gait).period  # cycles
     slope = np.diff(active, axis=0) * len(CLOCKS)
     assert np.abs(slope).max() < 1.9 / width  # a quintic's steepest is 1.875
-    assert np.abs(np.diff(slope, axis=0)).max() * len(CLOCKS) < 5.8 / width**2  # and its strongest bend 5.77
+    assert (
+        np.abs(np.diff(slope, axis=0)).max() * len(CLOCKS) < 5.8 / width**2
+    )  # and its strongest bend 5.77
 
 
 def test_a_hand_over_is_never_longer_than_stance_or_swing() -> None:
@@ -86,9 +110,14 @@ def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
     support, phase = make(), phases("tripod")
     assert (support.activation(phase, NONE, NONE, walking=False) == 1.0).all()
     assert (support.activation(phase, ALL, ALL, walking=True) == 1.0).all()
-    stayed, stays, steps = (support.activation(phase, *flags, walking=True) for flags in ((ALL, NONE), (NONE, ALL), (NONE, NONE)))
+    stayed, stays, steps = (
+        support.activation(phase, *flags, walking=True)
+        for flags in ((ALL, NONE), (NONE, ALL), (NONE, NONE))
+    )
     early, late = phase < 0.25, (phase > 0.25) & (phase < 0.5)
-    assert (stayed[early | (phase >= 0.5)] == 1.0).all()  # it need not take up what it never gave up
+    assert (
+        stayed[early | (phase >= 0.5)] == 1.0
+    ).all()  # it need not take up what it never gave up
     np.testing.assert_array_equal(stayed[late], steps[late])
     assert (stays[late] == 1.0).all()
     np.testing.assert_array_equal(stays[early], steps[early])
@@ -104,12 +133,16 @@ def test_shares_balance_force_and_moment(standing: str) -> None:
     assert (HOME.conj() * shares.push[0]).imag.sum() == pytest.approx(0.4, abs=1e-9)
     # per load the pushes are those of a body that moves and turns: none squeezes another
     carries = shares.normal[0] > 0.0
-    per, arm = shares.push[0, carries] / shares.normal[0, carries], HOME[carries] - HOME[carries].mean()
+    per, arm = (
+        shares.push[0, carries] / shares.normal[0, carries],
+        HOME[carries] - HOME[carries].mean(),
+    )
     spin = (arm.conj() * per).imag.sum() / (abs(arm) ** 2).sum()
     np.testing.assert_allclose(per, per.mean() + 1j * spin * arm, rtol=1e-6, atol=1e-9)
     assert not shares.normal[legs(standing) == 0.0].any()
     np.testing.assert_array_equal(
-        shares.forces(0), np.column_stack([shares.push[0].real, shares.push[0].imag, shares.normal[0], np.zeros(6)])
+        shares.forces(0),
+        np.column_stack([shares.push[0].real, shares.push[0].imag, shares.normal[0], np.zeros(6)]),
     )
 
 
@@ -123,29 +156,42 @@ def test_of_all_shares_that_balance_the_sum_of_squares_is_least() -> None:
 
 
 def test_shares_follow_activation_without_a_jump_to_nothing() -> None:
-    shares = [make().normal(HOME[None], np.array([[a, 1.0, 1.0, 1.0, 1.0, 1.0]]), demand())[0, 0] for a in (1.0, 0.5, 0.1, 0.01, 0.0)]
+    shares = [
+        make().normal(HOME[None], np.array([[a, 1.0, 1.0, 1.0, 1.0, 1.0]]), demand())[0, 0]
+        for a in (1.0, 0.5, 0.1, 0.01, 0.0)
+    ]
     assert (np.diff(shares) < 0.0).all()
     assert shares[-2] < 0.03 * WEIGHT / 6.0
     assert shares[-1] == 0.0
 
 
-@pytest.mark.parametrize(("standing", "least"), [("010010", 0.999), ("100001", 0.999), ("010000", 0.8)])
-def test_two_feet_or_one_carry_what_they_can_without_their_moment(standing: str, least: float) -> None:
+@pytest.mark.parametrize(
+    ("standing", "least"), [("010010", 0.999), ("100001", 0.999), ("010000", 0.8)]
+)
+def test_two_feet_or_one_carry_what_they_can_without_their_moment(
+    standing: str, least: float
+) -> None:
     normal = make().normal(HOME[None], legs(standing), demand())[0]
     assert least * WEIGHT < normal.sum() < 1.001 * WEIGHT
     assert not normal[legs(standing)[0] == 0.0].any()
     assert normal.min() >= 0.0
 
 
-def test_the_ridge_takes_a_billionth_of_the_weight_from_feet_on_a_line_and_hardly_active_feet_carry_it() -> None:
-    """S = sum a (1, y^2), ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force W S_00/(S_00 + ridge)."""
+def test_the_ridge_takes_a_billionth_of_the_weight_from_feet_on_a_line_and_hardly_active_feet_carry_it() -> (
+    None
+):
+    """S = sum a (1, y^2), ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force W S_00/(S_00 +
+    ridge).
+    """
     feet, y = np.array([[0.1j, -0.1j, 0j, 0j, 0j, 0j]]), 0.1
     for active, lost in ((1.0, 1e-9 * (1.0 + y * y)), (1e-6, 0.5e-6 + 1e-9 * (1.0 + y * y))):
         normal = make().normal(feet, np.array([[active, active, 0.0, 0.0, 0.0, 0.0]]), demand())
         assert 1.0 - normal.sum() / WEIGHT == pytest.approx(lost, rel=1e-3)
 
 
-def test_feet_within_a_centimetre_take_no_moment_about_the_vertical_and_a_millionth_of_a_newton_is_no_load() -> None:
+def test_feet_within_a_centimetre_take_no_moment_about_the_vertical_and_a_millionth_of_a_newton_is_no_load() -> (
+    None
+):
     for reach, turns in ((0.0099, False), (0.0101, True)):
         feet = np.array([[reach * 1j, -reach * 1j, 0j, 0j, 0j, 0j]])
         shares = make().shares(feet, legs("110000"), demand(twist=0.4))
@@ -170,26 +216,41 @@ def test_rows_are_steps() -> None:
     support, active = make(), np.vstack([legs(standing) for standing in BALANCED])
     together = support.normal(np.tile(HOME, (len(active), 1)), active, demand())
     for row, one in zip(together, active, strict=True):
-        np.testing.assert_allclose(row, support.normal(HOME[None], one[None], demand())[0], rtol=1e-12)
+        np.testing.assert_allclose(
+            row, support.normal(HOME[None], one[None], demand())[0], rtol=1e-12
+        )
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
 def test_feet_are_lowered_by_what_they_press_in_beyond_the_stance(name: str) -> None:
     robot = load_robot(name)
-    support, home = make(robot=robot), LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
+    support, home = (
+        make(robot=robot),
+        LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j]),
+    )
     rest = (weight(robot) / 6.0 / robot.contact.stiffness) ** (2.0 / 3.0)
     three = support.lowering(home[None], legs("101010"))[0]
-    load = support.normal(home[None], legs("101010"), InverseDynamics(robot, LegSolver(robot), period=0.005).rest())[0]
-    np.testing.assert_allclose(three, (load / robot.contact.stiffness) ** (2.0 / 3.0) - rest, atol=1e-12)
+    load = support.normal(
+        home[None], legs("101010"), InverseDynamics(robot, LegSolver(robot), period=0.005).rest()
+    )[0]
+    np.testing.assert_allclose(
+        three, (load / robot.contact.stiffness) ** (2.0 / 3.0) - rest, atol=1e-12
+    )
     assert (three[[0, 2, 4]] > 0.0).all()
     np.testing.assert_allclose(three[[1, 3, 5]], -rest, atol=1e-12)
-    np.testing.assert_allclose(support.lowering(home[None], legs("111111")).mean(), 0.0, atol=0.02 * rest)
+    np.testing.assert_allclose(
+        support.lowering(home[None], legs("111111")).mean(), 0.0, atol=0.02 * rest
+    )
 
 
 def test_torques_are_the_levers_against_the_shares() -> None:
     generator = np.random.default_rng(4)
     lever = generator.normal(size=(5, 6, 3, 3))
-    shares = Shares(np.ones((5, 6)), generator.normal(size=(5, 6)), generator.normal(size=(5, 6)) + 1j * generator.normal(size=(5, 6)))
+    shares = Shares(
+        np.ones((5, 6)),
+        generator.normal(size=(5, 6)),
+        generator.normal(size=(5, 6)) + 1j * generator.normal(size=(5, 6)),
+    )
     found = torques(lever, shares)
     force = shares.forces(2)[4, :3]
     np.testing.assert_allclose(found[2, 4], -lever[2, 4] @ force, atol=1e-12)

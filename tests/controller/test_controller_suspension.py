@@ -38,7 +38,9 @@ def test_any_history_of_held_forces_gives_the_solution_of_its_equation(damping: 
         def rate(_: float, x: np.ndarray, force: float = force) -> list[float]:
             return [x[1], (force - damping * x[1] - gains.stiffness * x[0]) / gains.mass]
 
-        state = solve_ivp(rate, (0.0, PERIOD), state, rtol=TOLERANCE, atol=1e-14, method="DOP853").y[:, -1]
+        state = solve_ivp(
+            rate, (0.0, PERIOD), state, rtol=TOLERANCE, atol=1e-14, method="DOP853"
+        ).y[:, -1]
         np.testing.assert_allclose(found, state, rtol=1e-6, atol=1e-11)
 
 
@@ -46,7 +48,9 @@ def test_critically_damped_it_follows_a_step_by_the_closed_form_and_never_passes
     force, omega = 20.0, math.sqrt(GAINS.stiffness / GAINS.mass)
     t = PERIOD * np.arange(1, 201)
     z = responses(GAINS, np.full(200, force))[:, 0]
-    np.testing.assert_allclose(z, force / GAINS.stiffness * (1.0 - (1.0 + omega * t) * np.exp(-omega * t)), atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        z, force / GAINS.stiffness * (1.0 - (1.0 + omega * t) * np.exp(-omega * t)), atol=ROUND_OFF
+    )
     assert (np.diff(z) > 0.0).all()
 
 

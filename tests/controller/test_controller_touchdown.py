@@ -64,7 +64,9 @@ def test_a_foot_is_held_no_higher_than_it_may() -> None:
     assert down.offset[2] == 0.03
 
 
-def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_with_the_speed_and_to_the_limit() -> None:
+def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_with_the_speed_and_to_the_limit() -> (
+    None
+):
     down, missing = Touchdown(period=PERIOD), [leg != 2 for leg in range(6)]
     offsets = []
     for _ in range(100):
@@ -94,7 +96,12 @@ def test_on_flat_ground_nothing_happens() -> None:
     down = Touchdown(period=PERIOD)
     for k in range(400):
         swings = k // 100 % 2 == 0
-        down.step(NO if swings else YES, [0.001] * 6 if swings else STILL, YES if swings else NO, NO if swings else YES)
+        down.step(
+            NO if swings else YES,
+            [0.001] * 6 if swings else STILL,
+            YES if swings else NO,
+            NO if swings else YES,
+        )
         assert not down.busy
         assert not any(down.offset)
 
@@ -117,7 +124,9 @@ def test_a_saved_state_does_not_change() -> None:
 
 
 def descend(laws: Compliance, touching: bool) -> list[float]:
-    """Offsets of foot 1 while it comes down from 20 mm at 0.05 m/s, with a force on it from 8 mm on or not."""
+    """Offsets of foot 1 while it comes down from 20 mm at 0.05 m/s, with a force on it from 8 mm
+    on or not.
+    """
     offsets, height, rise = [], 0.02, -0.05
     while height > 0.0:
         force = squeezing(0.0)

@@ -21,13 +21,17 @@ REST = (0j, 0.0)
 Twist = tuple[complex, float]  # vx + i vy [m/s], yaw rate [rad/s]
 
 
-def make_paths(name: str = "tripod", *, period: float = PERIOD, touchdown_speed: float = 0.0) -> FootPaths:
+def make_paths(
+    name: str = "tripod", *, period: float = PERIOD, touchdown_speed: float = 0.0
+) -> FootPaths:
     robot = load_robot("athena")
     gait = make_gait(robot, name, touchdown_speed=touchdown_speed)
     return FootPaths(gait, LegSolver(robot).forward(robot.stance), period=period)
 
 
-def advance(paths: FootPaths, twist: Twist, steps: int, *, going: bool = True, at_once: int = 64) -> Iterator[FootPaths]:
+def advance(
+    paths: FootPaths, twist: Twist, steps: int, *, going: bool = True, at_once: int = 64
+) -> Iterator[FootPaths]:
     """Steps under a steady twist from now on, so many planned at once."""
     for k in range(steps):
         if k == 0 or not paths.left:
@@ -69,7 +73,9 @@ def test_standing_feet_move_against_the_body_command_exactly(name: str, twist: T
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
 def test_velocity_is_the_slope_of_position_and_nothing_jumps(twist: Twist) -> None:
     log = walk(make_paths("ripple"), twist, 1000)
-    largest = 30.0 * PERIOD  # m/s    a step's change of velocity at 30 m/s2; a jump of velocity would be of order 0.1
+    largest = (
+        30.0 * PERIOD
+    )  # m/s    a step's change of velocity at 30 m/s2; a jump of velocity would be of order 0.1
     for position, velocity in (("plane", "plane_velocity"), ("height", "rise")):
         slope = np.diff(log[position], axis=0) / PERIOD
         mean = 0.5 * (log[velocity][1:] + log[velocity][:-1])
@@ -82,7 +88,9 @@ def test_feet_lift_off_and_touch_down_at_rest_on_the_ground(twist: Twist) -> Non
     log = walk(make_paths(), twist, 1000)
     over_ground = ground_velocity(log, twist)
     ends = log["swinging"] & ((log["progress"] < 0.1) | (log["progress"] > 0.9))
-    assert np.abs(over_ground[ends]).max() < 1e-9  # ds/dt (landing - p)/(1 - s) loses digits as s nears 1
+    assert (
+        np.abs(over_ground[ends]).max() < 1e-9
+    )  # ds/dt (landing - p)/(1 - s) loses digits as s nears 1
     edge = log["swinging"] & ((log["progress"] < 0.005) | (log["progress"] > 0.995))
     assert edge.any()
     assert np.abs(log["rise"][edge]).max() < 2e-3  # 192 H tau^2 / T at tau = 0.005: 0.4 mm/s
@@ -98,7 +106,9 @@ def test_the_optional_touch_down_speed_is_reached() -> None:
 def test_the_foot_rises_by_the_step_height() -> None:
     paths = make_paths()
     log = walk(paths, STRAIGHT, 1000)
-    np.testing.assert_allclose((log["height"] - paths.home_height).max(axis=0), paths.gait.step_height, rtol=1e-4)
+    np.testing.assert_allclose(
+        (log["height"] - paths.home_height).max(axis=0), paths.gait.step_height, rtol=1e-4
+    )
 
 
 @pytest.mark.parametrize("twist", [STRAIGHT, TWIST])
@@ -119,10 +129,15 @@ def test_a_swing_that_ends_within_a_period_still_lands_on_its_point() -> None:
 
 
 @pytest.mark.parametrize(("progress", "follows"), [(0.4, True), (0.74, True), (0.77, False)])
-def test_a_foot_follows_a_new_command_up_to_three_quarters_of_its_swing(progress: float, follows: bool) -> None:
+def test_a_foot_follows_a_new_command_up_to_three_quarters_of_its_swing(
+    progress: float, follows: bool
+) -> None:
     paths = make_paths()
     for _ in advance(paths, STRAIGHT, 2000):
-        if paths.steps.progress[paths.at].max() >= progress and paths.steps.progress[paths.at].max() < progress + 0.01:
+        if (
+            paths.steps.progress[paths.at].max() >= progress
+            and paths.steps.progress[paths.at].max() < progress + 0.01
+        ):
             break
     leg = int(paths.steps.progress[paths.at].argmax())
     before = paths.steps.goal[paths.at, leg]
@@ -131,7 +146,9 @@ def test_a_foot_follows_a_new_command_up_to_three_quarters_of_its_swing(progress
 
 
 @pytest.mark.parametrize(("away", "steps"), [(0.9e-9, False), (1.1e-9, True)])
-def test_a_foot_within_a_nanometre_of_its_stance_position_stays_where_it_is(away: float, steps: bool) -> None:
+def test_a_foot_within_a_nanometre_of_its_stance_position_stays_where_it_is(
+    away: float, steps: bool
+) -> None:
     paths = make_paths()
     for _ in advance(paths, STRAIGHT, 1):
         pass
@@ -146,7 +163,12 @@ def test_steps_do_not_depend_on_how_many_are_planned_at_once(name: str) -> None:
     def planned(at_once: int) -> list[np.ndarray]:
         paths = make_paths(name, period=0.007)
         found: list[np.ndarray] = []
-        for twist, going, steps in ((STRAIGHT, True, 150), (TWIST, True, 333), (REST, False, 700), (TWIST, True, 100)):
+        for twist, going, steps in (
+            (STRAIGHT, True, 150),
+            (TWIST, True, 333),
+            (REST, False, 700),
+            (TWIST, True, 100),
+        ):
             found += record(advance(paths, twist, steps, going=going, at_once=at_once)).values()
         return found
 
@@ -157,7 +179,10 @@ def test_steps_do_not_depend_on_how_many_are_planned_at_once(name: str) -> None:
 
 
 def test_a_ramp_is_smooth_and_ends_on_its_target_exactly() -> None:
-    ramp, target = CommandRamp(1.0, period=PERIOD), BodyCommand(vx=0.08, vy=-0.03, yaw_rate=0.2, height=0.01, roll=0.1, pitch=-0.1)
+    ramp, target = (
+        CommandRamp(1.0, period=PERIOD),
+        BodyCommand(vx=0.08, vy=-0.03, yaw_rate=0.2, height=0.01, roll=0.1, pitch=-0.1),
+    )
     parts = []
     for aim, steps in ((target, 400), (BodyCommand(vx=-0.05), 300), (target, 1100)):
         ramp.aim(aim)
@@ -171,8 +196,12 @@ def test_a_ramp_is_smooth_and_ends_on_its_target_exactly() -> None:
     assert ramp.settled
 
 
-@pytest.mark.parametrize(("duration", "period"), [(1.0, 0.005), (1.2, 0.005), (3.000000000000001, 0.005), (0.7, 0.003)])
-def test_a_ramp_takes_the_least_number_of_periods_that_fill_its_duration(duration: float, period: float) -> None:
+@pytest.mark.parametrize(
+    ("duration", "period"), [(1.0, 0.005), (1.2, 0.005), (3.000000000000001, 0.005), (0.7, 0.003)]
+)
+def test_a_ramp_takes_the_least_number_of_periods_that_fill_its_duration(
+    duration: float, period: float
+) -> None:
     ramp = CommandRamp(duration, period=period)
     ramp.aim(BodyCommand(vx=0.1))
     assert (ramp.remaining - 1) * period < duration <= ramp.remaining * period

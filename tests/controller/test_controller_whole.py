@@ -9,7 +9,14 @@ import pytest
 from controllers import make, obey, run, squeezed
 from gains import PERIOD, make_gains
 
-from hexapod_cosim.controller import BodyCommand, Controller, ControllerError, Measurement, Parts, make_gait
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Controller,
+    ControllerError,
+    Measurement,
+    Parts,
+    make_gait,
+)
 from hexapod_cosim.controller.kinematics import Joints, LegSolver
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
@@ -24,13 +31,19 @@ ROBOTS = ("athena", "phantomx_mk4")
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("compliant", [False, True])
 def test_the_first_command_is_the_stance(name: str, compliant: bool) -> None:
-    """Compliant: but for what the ground gives way, with torques for the legs' own weight; the support grows with the weight felt."""
+    """Compliant: but for what the ground gives way, with torques for the legs' own weight; the
+    support grows with the weight felt.
+    """
     robot, controller = load_robot(name), make(name, compliant=compliant)
     out = controller.step(0.0, BodyCommand(vx=0.08), Measurement(angle=robot.stance))
-    np.testing.assert_allclose(out.angle_ref, robot.stance, atol=LOWERED if compliant else ROUND_OFF)
+    np.testing.assert_allclose(
+        out.angle_ref, robot.stance, atol=LOWERED if compliant else ROUND_OFF
+    )
     assert not out.speed_ref.any()
     assert out.torque_ref.any() == compliant
-    assert np.abs(out.torque_ref).max() < 9.81 * sum(link.mass for link in robot.legs[0].links) * 0.1  # N m    0.1 m: the legs' centres
+    assert (
+        np.abs(out.torque_ref).max() < 9.81 * sum(link.mass for link in robot.legs[0].links) * 0.1
+    )  # N m    0.1 m: the legs' centres
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -46,15 +59,31 @@ def test_a_walk_starts_and_ends_in_the_stance_without_jumps(name: str, gait: str
     np.testing.assert_allclose(angle[-1], angle[-200], atol=0.0)
     assert not controller.paths.walking
     assert np.abs(np.diff(angle, axis=0)).max() < robot.servo.speed_max * PERIOD * 1.3
-    assert np.abs(np.diff(angle, 2, axis=0)).max() < 200.0 * PERIOD**2  # rad/s2; a jump of speed would be of order 1 rad/s
+    assert (
+        np.abs(np.diff(angle, 2, axis=0)).max() < 200.0 * PERIOD**2
+    )  # rad/s2; a jump of speed would be of order 1 rad/s
     again = run(controller, BodyCommand(vx=0.02, yaw_rate=0.03), cycle, first=6 * cycle)
-    np.testing.assert_allclose(again[:, 0], angle[1 : cycle + 1], atol=1e-6)  # the clock starts at the same phase
+    np.testing.assert_allclose(
+        again[:, 0], angle[1 : cycle + 1], atol=1e-6
+    )  # the clock starts at the same phase
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-@pytest.mark.parametrize("command", [BodyCommand(vx=0.05), BodyCommand(vy=0.04), BodyCommand(yaw_rate=0.2), BodyCommand(0.03, -0.02, -0.1)])
-def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, command: BodyCommand) -> None:
-    """FK of the commanded angles: foot centres, plus what their spheres roll, move by minus the body's twist."""
+@pytest.mark.parametrize(
+    "command",
+    [
+        BodyCommand(vx=0.05),
+        BodyCommand(vy=0.04),
+        BodyCommand(yaw_rate=0.2),
+        BodyCommand(0.03, -0.02, -0.1),
+    ],
+)
+def test_the_contact_points_of_standing_feet_rest_on_the_ground(
+    name: str, command: BodyCommand
+) -> None:
+    """FK of the commanded angles: foot centres, plus what their spheres roll, move by minus the
+    body's twist.
+    """
     robot = load_robot(name)
     controller = make(name)
     run(controller, command, 600)
@@ -68,12 +97,20 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
         if before is not None:
             rolled = robot.foot.radius * (pitch - before[1]) * heading
             middle = 0.5 * (foot + before[0])
-            over_ground = (foot - before[0] + rolled) / PERIOD + complex(command.vx, command.vy) + 1j * command.yaw_rate * middle
+            over_ground = (
+                (foot - before[0] + rolled) / PERIOD
+                + complex(command.vx, command.vy)
+                + 1j * command.yaw_rate * middle
+            )
             still = ~swinging & ~controller.diagnostics.swinging
-            worst, compared = max(worst, float(np.abs(over_ground[still]).max(initial=0.0))), compared + int(still.sum())
+            worst, compared = (
+                max(worst, float(np.abs(over_ground[still]).max(initial=0.0))),
+                compared + int(still.sum()),
+            )
         before, swinging = (foot, pitch), controller.diagnostics.swinging.copy()
     assert compared > 600
-    # rolling is solved by one Newton step, chords lack h^2/24 of an arc and headings turn meanwhile; the body moves at 50 mm/s
+    # rolling is solved by one Newton step, chords lack h^2/24 of an arc and headings turn
+    # meanwhile; the body moves at 50 mm/s
     assert worst < 3e-4
 
 
@@ -81,8 +118,8 @@ def test_the_contact_points_of_standing_feet_rest_on_the_ground(name: str, comma
 def test_speed_and_acceleration_lead_from_each_angle_to_the_next(gait: str) -> None:
     """q + qd h + qdd h^2/2 is the next q, but where a leg lifts off or touches down next.
 
-    There qdd is that of the period before, and misses by its change, h^3/3 of up to 4e4 rad/s3 in the
-    quick swings of the wave gait.
+    There qdd is that of the period before, and misses by its change, h^3/3 of up to 4e4 rad/s3 in
+    the quick swings of the wave gait.
     """
     controller, missed, accelerations = make(gait=make_gait(load_robot("athena"), gait)), [], []
     before = None
@@ -98,22 +135,34 @@ def test_speed_and_acceleration_lead_from_each_angle_to_the_next(gait: str) -> N
     assert 5.0 < max(accelerations) < 200.0  # rad/s2
 
 
-def test_a_joint_that_its_limits_hold_has_no_acceleration_and_none_has_more_than_turns_it_round() -> None:
+def test_a_joint_that_its_limits_hold_has_no_acceleration_and_none_has_more_than_turns_it_round() -> (
+    None
+):
     legs = LegSolver(load_robot("athena"))
     angle, speed = np.zeros((3, 6, 3)), np.zeros((3, 6, 3))
     angle[1] = 0.1
-    speed[0, 0, 0], angle[0, 1, 1], angle[0, 2, 2] = legs.speed_max, legs.angle_max[1, 1], legs.angle_min[2, 2]
+    speed[0, 0, 0], angle[0, 1, 1], angle[0, 2, 2] = (
+        legs.speed_max,
+        legs.angle_max[1, 1],
+        legs.angle_min[2, 2],
+    )
     joints = Joints(angle, speed, np.zeros((3, 6), dtype=np.bool_))
     found = legs.accelerations(joints, 0.01)
     assert found[0, 0, 0] == found[0, 1, 1] == found[0, 2, 2] == 0.0
-    assert found[0, 3, 0] == pytest.approx(2.0 * legs.speed_max / 0.01)  # 2 (0.1 rad)/(10 ms)^2 = 2000 rad/s2 would be more
-    assert legs.accelerations(Joints(angle, speed, joints.unreachable), 0.1)[0, 3, 0] == pytest.approx(20.0)
+    assert found[0, 3, 0] == pytest.approx(
+        2.0 * legs.speed_max / 0.01
+    )  # 2 (0.1 rad)/(10 ms)^2 = 2000 rad/s2 would be more
+    assert legs.accelerations(Joints(angle, speed, joints.unreachable), 0.1)[
+        0, 3, 0
+    ] == pytest.approx(20.0)
     assert not legs.accelerations(Joints(angle[:1], speed[:1], joints.unreachable[:1]), 0.01).any()
 
 
 @pytest.mark.parametrize("compliant", [False, True])
 def test_speed_ref_is_the_slope_of_angle_ref(compliant: bool) -> None:
-    controller = make(compliant=compliant, parts=Parts(suspension=False, slip_pid=False))  # what answers to forces has no speed_ref
+    controller = make(
+        compliant=compliant, parts=Parts(suspension=False, slip_pid=False)
+    )  # what answers to forces has no speed_ref
     walk = obey(controller, BodyCommand(vx=0.08, height=0.01), 800)
     slope = np.diff(walk[:, 0], axis=0) / PERIOD
     mean = 0.5 * (walk[1:, 1] + walk[:-1, 1])
@@ -124,8 +173,13 @@ def test_speed_ref_is_the_slope_of_angle_ref(compliant: bool) -> None:
 
 def test_a_robot_that_does_what_is_planned_is_hardly_corrected() -> None:
     controller, kinematic = make(compliant=True), make()
-    corrected, plain = obey(controller, BodyCommand(vx=0.08), 800), obey(kinematic, BodyCommand(vx=0.08), 800)
-    assert np.abs(corrected[:, 0] - plain[:, 0])[600:].max() < 8e-3  # rad    0.8 mm: of that the ground gives way by half
+    corrected, plain = (
+        obey(controller, BodyCommand(vx=0.08), 800),
+        obey(kinematic, BodyCommand(vx=0.08), 800),
+    )
+    assert (
+        np.abs(corrected[:, 0] - plain[:, 0])[600:].max() < 8e-3
+    )  # rad    0.8 mm: of that the ground gives way by half
     shown = controller.diagnostics
     assert not shown.fallback.any()
     assert controller.compliant is not None
@@ -142,7 +196,10 @@ def test_a_mirrored_command_gives_mirrored_joints(compliant: bool) -> None:
     mirrored.foot_force[:] = measurement.foot_force[MIRROR] * [1.0, -1.0, 1.0]
     mirrored.angle[:] = measurement.angle[MIRROR] * MIRRORED_JOINT
     mirrored.quaternion[:] = measurement.quaternion * [1.0, -1.0, 1.0, -1.0]
-    command, other = BodyCommand(0.05, 0.02, 0.1, 0.01, 0.05, 0.03), BodyCommand(0.05, -0.02, -0.1, 0.01, -0.05, 0.03)
+    command, other = (
+        BodyCommand(0.05, 0.02, 0.1, 0.01, 0.05, 0.03),
+        BodyCommand(0.05, -0.02, -0.1, 0.01, -0.05, 0.03),
+    )
     left = run(make(gait=gait, compliant=compliant), command, 500, measurement=measurement)
     right = run(make(gait=mirrored_gait, compliant=compliant), other, 500, measurement=mirrored)
     np.testing.assert_allclose(right, left[:, :, MIRROR] * MIRRORED_JOINT, atol=1e-9)
@@ -153,8 +210,12 @@ def test_the_same_inputs_give_the_same_bits_and_reset_starts_afresh(compliant: b
     controller = make(compliant=compliant)
     first = run(controller, BodyCommand(vx=0.08), 300, measurement=squeezed())
     controller.reset()
-    np.testing.assert_array_equal(run(controller, BodyCommand(vx=0.08), 300, measurement=squeezed()), first)
-    np.testing.assert_array_equal(run(make(compliant=compliant), BodyCommand(vx=0.08), 300, measurement=squeezed()), first)
+    np.testing.assert_array_equal(
+        run(controller, BodyCommand(vx=0.08), 300, measurement=squeezed()), first
+    )
+    np.testing.assert_array_equal(
+        run(make(compliant=compliant), BodyCommand(vx=0.08), 300, measurement=squeezed()), first
+    )
 
 
 @pytest.mark.parametrize("compliant", [False, True])
@@ -162,22 +223,32 @@ def test_a_restored_controller_goes_on_bit_for_bit(compliant: bool) -> None:
     controller, command = make(compliant=compliant), BodyCommand(0.05, 0.02, 0.2, 0.01, 0.05)
     fresh = controller.save()
     start = run(controller, BodyCommand(vx=0.08), 130, measurement=squeezed())
-    run(controller, command, 67, first=130, measurement=squeezed())  # the ramp and a planned swing are under way
+    run(
+        controller, command, 67, first=130, measurement=squeezed()
+    )  # the ramp and a planned swing are under way
     state = controller.save()
     first = run(controller, command, 300, first=197, measurement=squeezed())
     run(controller, BodyCommand(vy=-0.03), 100, first=497, measurement=squeezed())
     controller.restore(state)
-    np.testing.assert_array_equal(run(controller, command, 300, first=197, measurement=squeezed()), first)
+    np.testing.assert_array_equal(
+        run(controller, command, 300, first=197, measurement=squeezed()), first
+    )
     controller.restore(fresh)
-    np.testing.assert_array_equal(run(controller, BodyCommand(vx=0.08), 130, measurement=squeezed()), start)
+    np.testing.assert_array_equal(
+        run(controller, BodyCommand(vx=0.08), 130, measurement=squeezed()), start
+    )
     other = make(compliant=compliant)
     other.restore(state)
-    np.testing.assert_array_equal(run(other, command, 300, first=197, measurement=squeezed()), first)
+    np.testing.assert_array_equal(
+        run(other, command, 300, first=197, measurement=squeezed()), first
+    )
 
 
 def test_a_restored_controller_goes_on_bit_for_bit_amid_doubts_and_missing_ground() -> None:
     controller, measurement, command = make(compliant=True), squeezed(), BodyCommand(vx=0.08)
-    run(controller, command, 250, measurement=measurement)  # feet in mid-swing that feel a force are doubted
+    run(
+        controller, command, 250, measurement=measurement
+    )  # feet in mid-swing that feel a force are doubted
     measurement.foot_force[:, 2] *= [0.0, 2.0, 0.0, 2.0, 0.0, 2.0]
     run(controller, command, 33, first=250, measurement=measurement)
     state, shown = controller.save(), controller.diagnostics
@@ -185,17 +256,25 @@ def test_a_restored_controller_goes_on_bit_for_bit_amid_doubts_and_missing_groun
     first = run(controller, command, 400, first=283, measurement=measurement)
     controller.restore(state)
     np.testing.assert_array_equal(shown.fallback, before)
-    np.testing.assert_array_equal(run(controller, command, 400, first=283, measurement=measurement), first)
+    np.testing.assert_array_equal(
+        run(controller, command, 400, first=283, measurement=measurement), first
+    )
     assert before.any()
 
 
 @pytest.mark.parametrize("compliant", [False, True])
-def test_commands_do_not_depend_on_how_many_steps_are_planned_at_once(compliant: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_do_not_depend_on_how_many_steps_are_planned_at_once(
+    compliant: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     walks = []
     for planned in (1, 11, 1000):
         monkeypatch.setattr("hexapod_cosim.controller.controller.PLANNED", planned)
         controller, parts, first = make(compliant=compliant), [], 0
-        for command, steps in ((BodyCommand(vx=0.08), 233), (BodyCommand(0.03, 0.01, 0.2, roll=0.1), 150), (BodyCommand(), 450)):
+        for command, steps in (
+            (BodyCommand(vx=0.08), 233),
+            (BodyCommand(0.03, 0.01, 0.2, roll=0.1), 150),
+            (BodyCommand(), 450),
+        ):
             parts.append(run(controller, command, steps, first=first, measurement=squeezed()))
             first += steps
         walks.append(np.concatenate(parts))
@@ -205,7 +284,8 @@ def test_commands_do_not_depend_on_how_many_steps_are_planned_at_once(compliant:
 
 def test_kinematic_control_does_not_look_at_the_forces() -> None:
     np.testing.assert_array_equal(
-        run(make(), BodyCommand(vx=0.08), 200, measurement=squeezed()), run(make(), BodyCommand(vx=0.08), 200, measurement=Measurement())
+        run(make(), BodyCommand(vx=0.08), 200, measurement=squeezed()),
+        run(make(), BodyCommand(vx=0.08), 200, measurement=Measurement()),
     )
 
 
@@ -217,7 +297,10 @@ def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
     shown = controller.diagnostics
     moved = foot_positions(robot, out.angle_ref) - foot_positions(robot, robot.stance)
     rolled = (
-        robot.foot.radius * (out.angle_ref - robot.stance) @ [0.0, -1.0, 1.0] * np.exp(1j * (controller.legs.hip_yaw + robot.stance[:, 0]))
+        robot.foot.radius
+        * (out.angle_ref - robot.stance)
+        @ [0.0, -1.0, 1.0]
+        * np.exp(1j * (controller.legs.hip_yaw + robot.stance[:, 0]))
     )
     size = np.abs(shown.shift).max()
     assert size > 2e-4
@@ -226,25 +309,42 @@ def test_the_diagnostics_tell_where_the_corrections_move_the_feet() -> None:
 
 
 def test_the_planned_feet_are_where_kinematic_control_sends_them() -> None:
-    """Walking, turning and leaning: the commanded angles put each foot's centre on the plan, so what compliance adds is not in it."""
+    """Walking, turning and leaning: the commanded angles put each foot's centre on the plan, so
+    what compliance adds is not in it.
+    """
     controller, robot = make(), load_robot("athena")
     stance = foot_positions(robot, robot.stance)
     farthest = 0.0
     for k in range(600):
-        out = controller.step(k * PERIOD, BodyCommand(vx=0.06, yaw_rate=0.1, height=0.01, roll=0.04, pitch=-0.03), Measurement())
-        np.testing.assert_allclose(foot_positions(robot, out.angle_ref), controller.diagnostics.planned, atol=1e-9)
+        out = controller.step(
+            k * PERIOD,
+            BodyCommand(vx=0.06, yaw_rate=0.1, height=0.01, roll=0.04, pitch=-0.03),
+            Measurement(),
+        )
+        np.testing.assert_allclose(
+            foot_positions(robot, out.angle_ref), controller.diagnostics.planned, atol=1e-9
+        )
         farthest = max(farthest, float(np.abs(controller.diagnostics.planned - stance).max()))
     assert farthest > 0.03
 
 
 def test_the_planned_feet_are_the_same_under_both_controls() -> None:
-    """A squeezed, compliant robot moves its feet; the plan of a command that the path is not held to does not move."""
+    """A squeezed, compliant robot moves its feet; the plan of a command that the path is not
+    held to does not move.
+    """
     kinematic, compliant = make(), make(compliant=True)
     for k in range(60):
         for controller in (kinematic, compliant):
             out = controller.step(k * PERIOD, BodyCommand(), squeezed())
-        np.testing.assert_allclose(compliant.diagnostics.planned, kinematic.diagnostics.planned, atol=1e-12)
-    assert np.abs(foot_positions(load_robot("athena"), out.angle_ref) - compliant.diagnostics.planned).max() > 2e-4
+        np.testing.assert_allclose(
+            compliant.diagnostics.planned, kinematic.diagnostics.planned, atol=1e-12
+        )
+    assert (
+        np.abs(
+            foot_positions(load_robot("athena"), out.angle_ref) - compliant.diagnostics.planned
+        ).max()
+        > 2e-4
+    )
 
 
 def test_forces_are_judged_in_the_torsos_axes() -> None:
@@ -252,10 +352,16 @@ def test_forces_are_judged_in_the_torsos_axes() -> None:
     yaw, straight = 0.7, squeezed()
     turned = squeezed()
     c, s = np.cos(yaw), np.sin(yaw)
-    turned.foot_force[:] = straight.foot_force @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    turned.quaternion[:] = quaternion_product(np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)]), straight.quaternion)
+    turned.foot_force[:] = straight.foot_force @ np.array(
+        [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+    )
+    turned.quaternion[:] = quaternion_product(
+        np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)]), straight.quaternion
+    )
     command = BodyCommand(vx=0.05, roll=0.05, pitch=-0.03)
-    plain, rotated = (run(make(compliant=True), command, 200, measurement=m) for m in (straight, turned))
+    plain, rotated = (
+        run(make(compliant=True), command, 200, measurement=m) for m in (straight, turned)
+    )
     np.testing.assert_allclose(rotated, plain, atol=1e-9)
 
 
@@ -264,11 +370,15 @@ def test_posture_and_height_turn_and_lift_the_torso_over_its_feet() -> None:
     command = BodyCommand(height=0.02, roll=0.1, pitch=-0.15)
     angle = run(controller, command, 1200)[-1, 0]
     cr, sr, cp, sp = np.cos(0.1), np.sin(0.1), np.cos(-0.15), np.sin(-0.15)
-    turn = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]]) @ np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    turn = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]]) @ np.array(
+        [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]]
+    )
     on_ground = foot_positions(robot, angle) @ turn.T + [0.0, 0.0, 0.02]
     home = foot_positions(robot, robot.stance)
     np.testing.assert_allclose(on_ground[:, 2], home[:, 2], atol=1e-9)
-    np.testing.assert_allclose(on_ground[:, :2], home[:, :2], atol=0.005)  # they roll by R times the tibias' change of pitch
+    np.testing.assert_allclose(
+        on_ground[:, :2], home[:, :2], atol=0.005
+    )  # they roll by R times the tibias' change of pitch
 
 
 def test_a_leg_that_cannot_follow_is_flagged_and_stays_within_its_limits() -> None:
@@ -289,7 +399,9 @@ def test_what_leads_back_to_the_way_is_led_over_in_a_tenth_of_a_second() -> None
     compliant = make(compliant=True).compliant
     assert compliant is not None
     compliant.hold.velocity, compliant.hold.yaw_rate = 0.01 - 0.004j, 0.02
-    v, yaw_rate = compliant.steer(np.zeros(31, dtype=np.complex128), np.zeros(31), moves=True, afresh=True)
+    v, yaw_rate = compliant.steer(
+        np.zeros(31, dtype=np.complex128), np.zeros(31), moves=True, afresh=True
+    )
     part = np.minimum(np.arange(31) / 20.0, 1.0)  # periods of 5 ms
     np.testing.assert_allclose(v, part * (0.01 - 0.004j), atol=1e-12)
     np.testing.assert_allclose(yaw_rate, part * 0.02, atol=1e-12)
@@ -315,5 +427,10 @@ def test_gains_of_another_robot_or_period_warn() -> None:
     athena, phantom = load_robot("athena"), load_robot("phantomx_mk4")
     gains = make_gains(athena)
     assert Controller(athena, period=PERIOD, gait=make_gait(athena), gains=gains).warnings == ()
-    assert "athena" in Controller(phantom, period=PERIOD, gait=make_gait(phantom), gains=gains).warnings[0]
-    assert "0.004" in Controller(athena, period=0.004, gait=make_gait(athena), gains=gains).warnings[0]
+    assert (
+        "athena"
+        in Controller(phantom, period=PERIOD, gait=make_gait(phantom), gains=gains).warnings[0]
+    )
+    assert (
+        "0.004" in Controller(athena, period=0.004, gait=make_gait(athena), gains=gains).warnings[0]
+    )

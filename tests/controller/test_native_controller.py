@@ -1,4 +1,6 @@
-"""The controller in C is the one in Python, to round-off: the same commands under the same measurements, over whole walks."""
+"""The controller in C is the one in Python, to round-off: the same commands under the same
+measurements, over whole walks.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,15 @@ from gains import PERIOD, make_gains
 from native_controller import COMMANDS, HxControllerInput, NativeController, NativeError, commands
 from scipy.linalg import expm
 
-from hexapod_cosim.controller import BodyCommand, Controller, Gait, LegSolver, Measurement, Parts, make_gait
+from hexapod_cosim.controller import (
+    BodyCommand,
+    Controller,
+    Gait,
+    LegSolver,
+    Measurement,
+    Parts,
+    make_gait,
+)
 from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.slip_pid import squeeze
 from hexapod_cosim.controller.support import Support
@@ -23,25 +33,36 @@ ROBOTS = ("athena", "phantomx_mk4")
 ALL_PARTS, NO_FALLBACK = Parts(), Parts(fallback=False)
 ANGLE = 1e-12  # rad
 SPEED = 1e-12  # 1    of a servo's largest
-# 1    of a servo's largest: accelerations are second differences, which make of the paths' last bits 4e-16 m / h^2 = 2e-11 m/s2; times
-# the robot's mass and the legs' length that is some 1e-12 N m in either controller, of servos of 3 and 6 N m
+# 1    of a servo's largest: accelerations are second differences, which make of the paths' last
+# bits 4e-16 m / h^2 = 2e-11 m/s2; times the robot's mass and the legs' length that is some 1e-12 N
+# m in either controller, of servos of 3 and 6 N m
 TORQUE = 3e-12
-ACCELERATION = 3e-12  # of what turns a servo's largest speed round within a period; a second difference, too
+ACCELERATION = (
+    3e-12  # of what turns a servo's largest speed round within a period; a second difference, too
+)
 STEPS = 2000  # a walk of 10 s
 Sense = Callable[[Controller, int, Measurement], None]
 
 
 def setup_of(
-    name: str = "athena", gait: str | Gait | None = None, *, compliant: bool = True, parts: Parts | None = None
+    name: str = "athena",
+    gait: str | Gait | None = None,
+    *,
+    compliant: bool = True,
+    parts: Parts | None = None,
 ) -> ControllerSetup:
     robot = load_robot(name)
     timing = gait if isinstance(gait, Gait) else make_gait(robot, gait)
     gains = make_gains(robot) if compliant else None
-    return ControllerSetup(robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or Parts())
+    return ControllerSetup(
+        robot=robot, gait=timing, period=PERIOD, gains=gains, parts=parts or Parts()
+    )
 
 
 def program(t: float) -> BodyCommand:
-    """Straight on, all six at once half-way through a ramp and a swing, turning on the spot, and to a stop."""
+    """Straight on, all six at once half-way through a ramp and a swing, turning on the spot, and
+    to a stop.
+    """
     if t < 3.0:
         return BodyCommand(vx=0.04)
     if t < 3.3:
@@ -52,7 +73,9 @@ def program(t: float) -> BodyCommand:
 
 
 class Ground:
-    """Forces and angles as planned but for noise, so that every law has something to do; the same for the same seed."""
+    """Forces and angles as planned but for noise, so that every law has something to do; the
+    same for the same seed.
+    """
 
     def __init__(self, *, noise: float = 0.1) -> None:
         self.generator, self.noise = np.random.default_rng(3), noise
@@ -62,23 +85,29 @@ class Ground:
         if compliant is None:
             return
         planned = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
-        measurement.foot_force[:] = planned * (1.0 + self.noise * draw(size=(6, 1))) + 3.0 * self.noise * draw(size=(6, 3)) * (
-            planned > 0.0
-        )
+        measurement.foot_force[:] = planned * (
+            1.0 + self.noise * draw(size=(6, 1))
+        ) + 3.0 * self.noise * draw(size=(6, 3)) * (planned > 0.0)
         measurement.angle[:] = controller._out.angle_ref + 0.1 * self.noise * draw(size=(6, 3))
         turn = np.array([1.0, *(0.1 * self.noise * draw(size=3))])
         measurement.quaternion[:] = turn / np.linalg.norm(turn)
 
 
-def differences(core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """Largest differences of angle, speed, torque and acceleration over a walk, in rad and of the servo's largest; (steps, 6) fallback.
+def differences(
+    core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: int = STEPS
+) -> tuple[np.ndarray, np.ndarray]:
+    """Largest differences of angle, speed, torque and acceleration over a walk, in rad and of the
+    servo's largest; (steps, 6) fallback.
 
     Diagnostics must be the same at every step.
     """
     reference, native = setup.build(), NativeController(core, setup)
     measurement, worst, fallback = Measurement(angle=setup.robot.stance.copy()), np.zeros(4), []
     speed_max, torque_max = setup.robot.servo.speed_max, setup.robot.servo.torque_max
-    shown, scale = reference.diagnostics, np.array([1.0, speed_max, torque_max, 2.0 * speed_max / setup.period])
+    shown, scale = (
+        reference.diagnostics,
+        np.array([1.0, speed_max, torque_max, 2.0 * speed_max / setup.period]),
+    )
     for k in range(steps):
         t = k * setup.period
         expected = reference.step(t, program(t), measurement)
@@ -86,8 +115,12 @@ def differences(core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: i
         gap = np.abs(commands(out) - [getattr(expected, name) for name in COMMANDS])
         worst = np.maximum(worst, gap.max(axis=(1, 2)) / scale)
         for flag in ("swinging", "unreachable", "fallback"):
-            assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), f"{flag} at step {k}"
-        np.testing.assert_allclose(np.ctypeslib.as_array(out.shift), shown.shift.view(np.float64).reshape(6, 2), atol=1e-12)
+            assert [bool(value) for value in getattr(out, flag)] == getattr(shown, flag).tolist(), (
+                f"{flag} at step {k}"
+            )
+        np.testing.assert_allclose(
+            np.ctypeslib.as_array(out.shift), shown.shift.view(np.float64).reshape(6, 2), atol=1e-12
+        )
         np.testing.assert_allclose(np.ctypeslib.as_array(out.lift), shown.lift, atol=1e-12)
         np.testing.assert_allclose(np.ctypeslib.as_array(out.planned), shown.planned, atol=1e-12)
         fallback.append(shown.fallback.copy())
@@ -96,19 +129,28 @@ def differences(core: ct.CDLL, setup: ControllerSetup, *, sense: Sense, steps: i
 
 
 WALKS = [
-    *((name, gait, True) for name in ROBOTS for gait in ("tripod", "ripple", "wave")), ("athena", "amble", True),
-    ("athena", "tripod", False), ("phantomx_mk4", "wave", False),
-]  # fmt: skip
+    *((name, gait, True) for name in ROBOTS for gait in ("tripod", "ripple", "wave")),
+    ("athena", "amble", True),
+    ("athena", "tripod", False),
+    ("phantomx_mk4", "wave", False),
+]
 
 
 def close(worst: np.ndarray) -> bool:
-    print("largest differences of angle [rad], speed, torque and acceleration [of the servo's largest]:", worst)
+    print(
+        "largest differences of angle [rad], speed, torque and acceleration [of the servo's largest]:",
+        worst,
+    )
     return bool((worst <= [ANGLE, SPEED, TORQUE, ACCELERATION]).all())
 
 
 @pytest.mark.parametrize(("name", "gait", "compliant"), WALKS)
-def test_a_walk_is_the_same(controller_core: ct.CDLL, name: str, gait: str, compliant: bool) -> None:
-    worst, fallback = differences(controller_core, setup_of(name, gait, compliant=compliant), sense=Ground())
+def test_a_walk_is_the_same(
+    controller_core: ct.CDLL, name: str, gait: str, compliant: bool
+) -> None:
+    worst, fallback = differences(
+        controller_core, setup_of(name, gait, compliant=compliant), sense=Ground()
+    )
     assert close(worst)
     assert not fallback.any()
 
@@ -151,7 +193,9 @@ def uneven(force: np.ndarray, step: int) -> None:
 
 def heavy(force: np.ndarray, step: int) -> None:
     if step >= 300:
-        force *= 2.1 if step < 900 else 4.2 if step < 1300 else 1.0  # more than servos carry, far more, and what was planned
+        force *= (
+            2.1 if step < 900 else 4.2 if step < 1300 else 1.0
+        )  # more than servos carry, far more, and what was planned
 
 
 @pytest.mark.parametrize("spoil", [dead_and_stuck, dragged, barely_met, uneven, heavy])
@@ -171,9 +215,12 @@ def test_sensors_that_lie_ground_that_is_missing_and_slides_are_answered_at_the_
 
 
 @pytest.mark.parametrize(
-    ("gait", "bump", "parts"), [("tripod", 0.02, ALL_PARTS), ("wave", 0.02, ALL_PARTS), ("tripod", 0.039, NO_FALLBACK)]
+    ("gait", "bump", "parts"),
+    [("tripod", 0.02, ALL_PARTS), ("wave", 0.02, ALL_PARTS), ("tripod", 0.039, NO_FALLBACK)],
 )
-def test_ground_that_is_met_early_is_answered_at_the_same_step(controller_core: ct.CDLL, gait: str, bump: float, parts: Parts) -> None:
+def test_ground_that_is_met_early_is_answered_at_the_same_step(
+    controller_core: ct.CDLL, gait: str, bump: float, parts: Parts
+) -> None:
     """By all feet at 12 mm, by one higher, then by none: soft ground with a bump on it, and a torso
     that has come up again. Without fallback a bump as high as the limit of what feet are held up.
     """
@@ -181,7 +228,10 @@ def test_ground_that_is_met_early_is_answered_at_the_same_step(controller_core: 
 
     def sense(controller: Controller, step: int, measurement: Measurement) -> None:
         ground(controller, step, measurement)
-        compliant, met = controller.compliant, np.where(np.arange(6) == 2, bump, 0.012 if parts is ALL_PARTS else 0.0)
+        compliant, met = (
+            controller.compliant,
+            np.where(np.arange(6) == 2, bump, 0.012 if parts is ALL_PARTS else 0.0),
+        )
         assert compliant is not None
         height = compliant.laws._plan.height[compliant._at]
         if step < 1400:
@@ -194,7 +244,12 @@ def test_ground_that_is_met_early_is_answered_at_the_same_step(controller_core: 
 def test_joints_that_are_outrun_fall_back_at_the_same_step(controller_core: ct.CDLL) -> None:
     setup = setup_of()
     slow = replace(setup.robot, servo=replace(setup.robot.servo, speed_max=1.2))
-    worst, fallback = differences(controller_core, replace(setup, robot=slow, gains=make_gains(slow)), sense=Ground(), steps=2600)
+    worst, fallback = differences(
+        controller_core,
+        replace(setup, robot=slow, gains=make_gains(slow)),
+        sense=Ground(),
+        steps=2600,
+    )
     assert close(worst)
     assert fallback.all(axis=1).any()
     assert not fallback[-1].any()
@@ -208,13 +263,31 @@ def test_each_part_can_be_switched_off(controller_core: ct.CDLL, part: str) -> N
         ground(controller, step, measurement)
         uneven(measurement.foot_force, step)
 
-    assert close(differences(controller_core, setup_of(parts=replace(Parts(), **{part: False})), sense=sense, steps=900)[0])
+    assert close(
+        differences(
+            controller_core,
+            setup_of(parts=replace(Parts(), **{part: False})),
+            sense=sense,
+            steps=900,
+        )[0]
+    )
 
 
-def test_another_period_gait_and_touch_down_speed_are_the_same_too(controller_core: ct.CDLL) -> None:
+def test_another_period_gait_and_touch_down_speed_are_the_same_too(
+    controller_core: ct.CDLL,
+) -> None:
     robot = load_robot("athena")
-    gait = Gait(name="ripple", period=1.3, duty=0.62, offsets=make_gait(robot, "ripple").offsets, step_height=0.03, touchdown_speed=0.05)
-    setup = ControllerSetup(robot=robot, gait=gait, period=0.008, gains=make_gains(robot, period=0.008))
+    gait = Gait(
+        name="ripple",
+        period=1.3,
+        duty=0.62,
+        offsets=make_gait(robot, "ripple").offsets,
+        step_height=0.03,
+        touchdown_speed=0.05,
+    )
+    setup = ControllerSetup(
+        robot=robot, gait=gait, period=0.008, gains=make_gains(robot, period=0.008)
+    )
     worst, _ = differences(controller_core, setup, sense=Ground(), steps=1100)
     assert close(worst)
 
@@ -224,34 +297,53 @@ def test_legs_may_differ(controller_core: ct.CDLL) -> None:
     legs = []
     for k, leg in enumerate(robot.legs):
         links = [
-            replace(link, length=link.length * (1.0 + 0.01 * k), offset_y=0.002 * k, offset_z=-0.003 * k,
-                    com=(link.com[0], 0.001 * k, 0.002 * k))
+            replace(
+                link,
+                length=link.length * (1.0 + 0.01 * k),
+                offset_y=0.002 * k,
+                offset_z=-0.003 * k,
+                com=(link.com[0], 0.001 * k, 0.002 * k),
+            )
             for link in leg.links
-        ]  # fmt: skip
-        legs.append(replace(leg, hip_yaw=leg.hip_yaw + 0.05 * k, links=(links[0], links[1], links[2])))
+        ]
+        legs.append(
+            replace(leg, hip_yaw=leg.hip_yaw + 0.05 * k, links=(links[0], links[1], links[2]))
+        )
     crooked = replace(robot, legs=tuple(legs), torso=replace(robot.torso, com=(0.01, -0.02, 0.015)))
-    setup = ControllerSetup(robot=crooked, gait=make_gait(crooked), period=PERIOD, gains=make_gains(crooked))
+    setup = ControllerSetup(
+        robot=crooked, gait=make_gait(crooked), period=PERIOD, gains=make_gains(crooked)
+    )
     assert close(differences(controller_core, setup, sense=Ground(), steps=1400)[0])
 
 
-# ------------------------------------------------------------------------------------------------ as an instance
+# ------------------------------------------------------------------------------------------------
+# as an instance
 
 
 def stepped(native: NativeController, first: int, count: int) -> np.ndarray:
-    """(count, 3, 6, 3) commands of a walk with feet that are pressed and squeezed, from a step on."""
+    """(count, 3, 6, 3) commands of a walk with feet that are pressed and squeezed, from a step
+    on.
+    """
     robot, found = load_robot("athena"), []
     generator = np.random.default_rng(8)
     draws = generator.normal(size=(first + count, 6, 3))
     for k in range(first, first + count):
-        measurement = Measurement(angle=robot.stance + 0.01 * draws[k], foot_force=draws[k] + [0.0, 0.0, 8.0])
+        measurement = Measurement(
+            angle=robot.stance + 0.01 * draws[k], foot_force=draws[k] + [0.0, 0.0, 8.0]
+        )
         found.append(commands(native.step(k * PERIOD, program(k * PERIOD + 2.5), measurement)))
     return np.array(found)
 
 
 @pytest.mark.parametrize("compliant", [False, True])
-def test_a_restored_state_goes_on_bit_for_bit_and_reset_is_fresh(controller_core: ct.CDLL, compliant: bool) -> None:
+def test_a_restored_state_goes_on_bit_for_bit_and_reset_is_fresh(
+    controller_core: ct.CDLL, compliant: bool
+) -> None:
     setup = setup_of(compliant=compliant)
-    native, other = NativeController(controller_core, setup), NativeController(controller_core, setup)
+    native, other = (
+        NativeController(controller_core, setup),
+        NativeController(controller_core, setup),
+    )
     fresh = native.save()
     start = stepped(native, 0, 137)
     saved = native.save()
@@ -265,12 +357,17 @@ def test_a_restored_state_goes_on_bit_for_bit_and_reset_is_fresh(controller_core
     np.testing.assert_array_equal(stepped(native, 0, 137), start)
 
 
-def test_inputs_that_change_at_a_rate_are_taken_as_they_are_at_each_tick(controller_core: ct.CDLL) -> None:
+def test_inputs_that_change_at_a_rate_are_taken_as_they_are_at_each_tick(
+    controller_core: ct.CDLL,
+) -> None:
     stepped_input, ramped = (NativeController(controller_core, setup_of()) for _ in range(2))
     rate = HxControllerInput()
     rate.foot_force[1][0], rate.command[0] = 3.0, 0.2
     for k in range(4):
-        stepped_input.input.foot_force[1][0], stepped_input.input.command[0] = 3.0 * (k * PERIOD), 0.2 * (k * PERIOD)
+        stepped_input.input.foot_force[1][0], stepped_input.input.command[0] = (
+            3.0 * (k * PERIOD),
+            0.2 * (k * PERIOD),
+        )
         stepped_input.go((k + 1) * PERIOD)
     ramped.go(4 * PERIOD, rate=rate)
     assert ramped.save() == stepped_input.save()
@@ -290,7 +387,9 @@ def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
 
 @pytest.mark.parametrize("between", ["nothing", "another input", "a restored state", "a reset"])
 def test_a_step_after_a_look_is_the_step_without(controller_core: ct.CDLL, between: str) -> None:
-    """A look keeps its tick for the step that follows: only for the same state under the same input."""
+    """A look keeps its tick for the step that follows: only for the same state under the same
+    input.
+    """
     native, plain = (NativeController(controller_core, setup_of()) for _ in range(2))
     stepped(native, 0, 50)
     earlier = native.save()
@@ -311,10 +410,15 @@ def test_a_step_after_a_look_is_the_step_without(controller_core: ct.CDLL, betwe
 
 
 def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CDLL) -> None:
-    """Steps of two periods do both ticks under the same input; half a step holds the commands of the last tick."""
+    """Steps of two periods do both ticks under the same input; half a step holds the commands of
+    the last tick.
+    """
     setup, force = setup_of(), np.tile([0.2, 0.0, 9.0], (6, 1))
     fine, coarse, half = (NativeController(controller_core, setup, start=7.0) for _ in range(3))
-    measurement, command = Measurement(angle=setup.robot.stance.copy(), foot_force=force), BodyCommand(vx=0.05)
+    measurement, command = (
+        Measurement(angle=setup.robot.stance.copy(), foot_force=force),
+        BodyCommand(vx=0.05),
+    )
     for native in (fine, coarse, half):
         native.sense(command, measurement)
     for k in range(300):
@@ -333,7 +437,9 @@ def test_ticks_come_at_their_times_whatever_the_steps_are(controller_core: ct.CD
 
 
 @pytest.mark.parametrize("slip", [-3e-6, 3e-6])
-def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(controller_core: ct.CDLL, slip: float) -> None:
+def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(
+    controller_core: ct.CDLL, slip: float
+) -> None:
     exact, late = (NativeController(controller_core, setup_of(compliant=False)) for _ in range(2))
     for native in (exact, late):
         native.input.command[0] = 0.05
@@ -343,19 +449,26 @@ def test_a_clock_that_is_off_by_round_off_ticks_all_the_same(controller_core: ct
     np.testing.assert_array_equal(commands(exact.output()), commands(late.output()))
 
 
-# ------------------------------------------------------------------------------------------------ what is refused
+# ------------------------------------------------------------------------------------------------
+# what is refused
 
 
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("torso.mass", 0.0, "torso.mass: got 0, expected 1e-09 to 1e+09 kg"), ("gait.duty", 1.0, "gait.duty: got 1"),
-        ("period", 0.6, "period: got 0.6, expected less than 0.5 s, the gait's shorter phase"), ("servo.kp", 0.0, "servo.kp: got 0"),
-        ("LM.femur.stance", 3.0, "LM.femur.stance: got 3, expected an angle between"), ("gains.slip.kp", np.nan, "gains.slip.kp: got"),
-        ("control", 3, "control: got 3, expected 1 to 2"), ("gait.pattern", 0, "gait.pattern: got 0, expected 1 to 5"),
+        ("torso.mass", 0.0, "torso.mass: got 0, expected 1e-09 to 1e+09 kg"),
+        ("gait.duty", 1.0, "gait.duty: got 1"),
+        ("period", 0.6, "period: got 0.6, expected less than 0.5 s, the gait's shorter phase"),
+        ("servo.kp", 0.0, "servo.kp: got 0"),
+        ("LM.femur.stance", 3.0, "LM.femur.stance: got 3, expected an angle between"),
+        ("gains.slip.kp", np.nan, "gains.slip.kp: got"),
+        ("control", 3, "control: got 3, expected 1 to 2"),
+        ("gait.pattern", 0, "gait.pattern: got 0, expected 1 to 5"),
     ],
-)  # fmt: skip
-def test_an_impossible_definition_is_refused_and_changes_nothing(controller_core: ct.CDLL, name: str, value: float, expected: str) -> None:
+)
+def test_an_impossible_definition_is_refused_and_changes_nothing(
+    controller_core: ct.CDLL, name: str, value: float, expected: str
+) -> None:
     native = NativeController(controller_core, setup_of())
     stepped(native, 0, 5)
     saved = native.save()
@@ -373,7 +486,9 @@ def test_steps_back_and_inputs_that_are_no_numbers_are_refused(controller_core: 
         with pytest.raises(NativeError, match="end of step: got"):
             native.go(t)
     native.input.foot_force[2][1] = np.nan
-    with pytest.raises(NativeError, match=r"LR.foot.force\[2\]: got -?nan, expected -1e[+]09 to 1e[+]09 N"):
+    with pytest.raises(
+        NativeError, match=r"LR.foot.force\[2\]: got -?nan, expected -1e[+]09 to 1e[+]09 N"
+    ):
         native.go(1.0)
     assert native.save() == saved
 
@@ -383,7 +498,11 @@ def test_a_saved_state_that_is_damaged_is_refused(controller_core: ct.CDLL) -> N
     saved = native.save()
     damaged = bytearray(saved)
     damaged[len(saved) // 2] ^= 1
-    for bad, reason in ((bytes(damaged), "damaged"), (saved[:-8], "size"), (b"x" * len(saved), "version")):
+    for bad, reason in (
+        (bytes(damaged), "damaged"),
+        (saved[:-8], "size"),
+        (b"x" * len(saved), "version"),
+    ):
         with pytest.raises(NativeError, match=reason):
             native.restore(bad)
     assert native.save() == saved
@@ -399,7 +518,8 @@ def test_absurd_commands_end_in_finite_joint_commands(controller_core: ct.CDLL) 
     assert any(native.out.unreachable)
 
 
-# ------------------------------------------------------------------------------------------------ pieces
+# ------------------------------------------------------------------------------------------------
+# pieces
 
 
 def scattered(generator: np.random.Generator, reach: float) -> np.ndarray:
@@ -419,19 +539,37 @@ def test_the_squeeze_is_the_same_down_to_feet_without_load_or_that_stand_togethe
 ) -> None:
     generator = np.random.default_rng(6)
     for _ in range(10):
-        found, feet, normal = generator.normal(size=(6, 2)), scattered(generator, reach), np.full(6, load)
-        expected = squeeze(np.asarray(found @ [1.0, 1.0j], dtype=np.complex128), normal, feet @ [1.0, 1.0j])
+        found, feet, normal = (
+            generator.normal(size=(6, 2)),
+            scattered(generator, reach),
+            np.full(6, load),
+        )
+        expected = squeeze(
+            np.asarray(found @ [1.0, 1.0j], dtype=np.complex128), normal, feet @ [1.0, 1.0j]
+        )
         controller_core.hx_probe_squeeze(*pointers(normal, feet, found))
         np.testing.assert_allclose(found @ [1.0, 1.0j], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize(("load", "reach"), [(50.0, 0.2), (50.0, 0.0125), (50.0, 0.0101), (50.0, 0.0099), (1.5e-6, 0.2), (0.6e-6, 0.2)])
-def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(controller_core: ct.CDLL, load: float, reach: float) -> None:
+@pytest.mark.parametrize(
+    ("load", "reach"),
+    [(50.0, 0.2), (50.0, 0.0125), (50.0, 0.0101), (50.0, 0.0099), (1.5e-6, 0.2), (0.6e-6, 0.2)],
+)
+def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(
+    controller_core: ct.CDLL, load: float, reach: float
+) -> None:
     robot, generator = load_robot("athena"), np.random.default_rng(7)
     rest = InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
-    support, none = Support(robot, make_gait(robot), make_gains(robot).support, rest=rest), np.zeros((1, 6, 3))
+    support, none = (
+        Support(robot, make_gait(robot), make_gains(robot).support, rest=rest),
+        np.zeros((1, 6, 3)),
+    )
     for active in (np.ones(6), generator.uniform(0.0, 1.0, 6), np.full(6, 1e-6)):
-        feet, asked, found = scattered(generator, reach), np.array([0.3, -0.2, load, 0.0, 0.0, 0.4]), np.empty((6, 3))
+        feet, asked, found = (
+            scattered(generator, reach),
+            np.array([0.3, -0.2, load, 0.0, 0.0, 0.4]),
+            np.empty((6, 3)),
+        )
         controller_core.hx_probe_shares(*pointers(feet, active, asked, found))
         demand = Demand(
             none, np.zeros((1, 6, 3, 3)), push=np.array([0.3 - 0.2j]), weight=np.array([load]),
@@ -439,17 +577,25 @@ def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(control
         )  # fmt: skip
         expected = support.shares((feet @ [1.0, 1.0j])[None], active[None], demand).forces(0)[:, :3]
         scale = np.abs(expected).max(axis=0)  # of pushes and of loads
-        np.testing.assert_allclose(found / scale, expected / scale, atol=1e-9)  # a system of condition 1e6 at most
+        np.testing.assert_allclose(
+            found / scale, expected / scale, atol=1e-9
+        )  # a system of condition 1e6 at most
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.999999, 1.0, 1.000001, 3.0, 1e4])
-def test_the_suspension_is_the_matrix_exponential_whatever_its_damping(controller_core: ct.CDLL, ratio: float) -> None:
+def test_the_suspension_is_the_matrix_exponential_whatever_its_damping(
+    controller_core: ct.CDLL, ratio: float
+) -> None:
     mass, stiffness, period = 1.7, 4100.0, 0.005
     damping, system = 2.0 * ratio * np.sqrt(stiffness * mass), np.zeros((3, 3))
     system[0, 1], system[1] = 1.0, np.array([-stiffness, -damping, 1.0]) / mass
     found = (ct.c_double * 6)()
-    controller_core.hx_probe_suspension(*(ct.c_double(value) for value in (mass, damping, stiffness, period)), found)
+    controller_core.hx_probe_suspension(
+        *(ct.c_double(value) for value in (mass, damping, stiffness, period)), found
+    )
     expected = expm(system * period)
     scale = np.array([[1.0, period], [1.0 / period, 1.0]])
-    np.testing.assert_allclose(np.array(found[:4]).reshape(2, 2) / scale, expected[:2, :2] / scale, atol=1e-12)
+    np.testing.assert_allclose(
+        np.array(found[:4]).reshape(2, 2) / scale, expected[:2, :2] / scale, atol=1e-12
+    )
     np.testing.assert_allclose(found[4:], expected[:2, 2], rtol=1e-9, atol=1e-12 / stiffness)

@@ -1,4 +1,6 @@
-"""A plant without physics that can do what the master asks of one: joints follow at once, the torso glides along x."""
+"""A plant without physics that can do what the master asks of one: joints follow at once, the
+torso glides along x.
+"""
 
 from __future__ import annotations
 
@@ -34,10 +36,18 @@ class FakeBlock:
 
 
 class FakePlant:
-    """All variables of the default robot's FMU; refuses the step that begins at `refuse_at`, or raises `interrupt` there."""
+    """All variables of the default robot's FMU; refuses the step that begins at `refuse_at`, or
+    raises `interrupt` there.
+    """
 
-    def __init__(self, *, refuse_at: float = math.inf, interrupt: bool = False, missing: Sequence[str] = ()) -> None:
-        self.variables = {entry.name: entry for entry in load_interface(load_robot("athena")).variables if entry.name not in missing}
+    def __init__(
+        self, *, refuse_at: float = math.inf, interrupt: bool = False, missing: Sequence[str] = ()
+    ) -> None:
+        self.variables = {
+            entry.name: entry
+            for entry in load_interface(load_robot("athena")).variables
+            if entry.name not in missing
+        }
         self.values = {name: float(entry.start or 0.0) for name, entry in self.variables.items()}
         self.values["torso.quaternion[1]"] = 1.0
         self.log: list[str] = []
@@ -45,14 +55,26 @@ class FakePlant:
         self._refuse_at, self._interrupt = refuse_at, interrupt
 
     def names(self, causality: str, kind: str = "Real") -> list[str]:
-        return [name for name, entry in self.variables.items() if entry.causality == causality and entry.type == kind]
+        return [
+            name
+            for name, entry in self.variables.items()
+            if entry.causality == causality and entry.type == kind
+        ]
 
     def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FakeBlock:
         boolean = bool(names) and self.variables[names[0]].type == "Boolean"
-        return FakeBlock(self, names, np.zeros(len(names), np.int32 if boolean else np.float64) if buffer is None else buffer)
+        return FakeBlock(
+            self,
+            names,
+            np.zeros(len(names), np.int32 if boolean else np.float64) if buffer is None else buffer,
+        )
 
     def parameters(self) -> dict[str, float]:
-        return {name: value for name, value in self.values.items() if self.variables[name].causality == "parameter"}
+        return {
+            name: value
+            for name, value in self.values.items()
+            if self.variables[name].causality == "parameter"
+        }
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         self.values.update(values)
@@ -65,7 +87,11 @@ class FakePlant:
         if t >= self._refuse_at:
             if self._interrupt:
                 raise KeyboardInterrupt
-            raise StepError(f"the FMU discards the step from {t:g} s", reached=t, got="the motion has left the numbers")
+            raise StepError(
+                f"the FMU discards the step from {t:g} s",
+                reached=t,
+                got="the motion has left the numbers",
+            )
         self.steps.append((t, h))
         for name, value in list(self.values.items()):
             if name.endswith(".angle_ref"):
@@ -87,4 +113,8 @@ class FakeController:
         self.times.append(t)
         self.commands.append(command)
         self.forces.append(measurement.foot_force.copy())
-        return JointCommand(angle_ref=measurement.angle + 0.001, speed_ref=measurement.speed, torque_ref=np.full((6, 3), t))
+        return JointCommand(
+            angle_ref=measurement.angle + 0.001,
+            speed_ref=measurement.speed,
+            torque_ref=np.full((6, 3), t),
+        )

@@ -35,16 +35,31 @@ def short(*changes: str) -> Scenario:
 
 
 def steady(summary: Summary) -> Summary:
-    """Without the one figure that the machine's load decides and without those that there are none of: no NaN is equal to another."""
-    figures = {name: value for name, value in summary.metrics.items() if name != "realtime_factor" and math.isfinite(value)}
+    """Without the one figure that the machine's load decides and without those that there are
+    none of: no NaN is equal to another.
+    """
+    figures = {
+        name: value
+        for name, value in summary.metrics.items()
+        if name != "realtime_factor" and math.isfinite(value)
+    }
     return replace(summary, metrics=figures)
 
 
 def test_runs_come_in_order_and_do_not_depend_on_the_processes(plant_build: Path) -> None:
-    kinds = ((2, "kinematic", "athena"), (0, "compliant", "athena"), (1, "kinematic", "phantomx_mk4"))
-    plans = [replace(short(f"control={control}", f"robot={robot}"), seed=seed) for seed, control, robot in kinds]
+    kinds = (
+        (2, "kinematic", "athena"),
+        (0, "compliant", "athena"),
+        (1, "kinematic", "phantomx_mk4"),
+    )
+    plans = [
+        replace(short(f"control={control}", f"robot={robot}"), seed=seed)
+        for seed, control, robot in kinds
+    ]
     serial, parallel = (list(run_batch(plans, workers=workers)) for workers in (1, 2))
-    assert [(run.seed, run.control) for run in serial] == [(plan.seed, plan.control) for plan in plans]
+    assert [(run.seed, run.control) for run in serial] == [
+        (plan.seed, plan.control) for plan in plans
+    ]
     assert list(map(steady, serial)) == list(map(steady, parallel))
     assert all(run.walked for run in serial)
     assert serial[0].metrics["slip_per_metre"] != serial[1].metrics["slip_per_metre"]
@@ -111,7 +126,9 @@ def begun(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
     )  # fmt: skip
     deadline = time.monotonic() + PATIENCE
     done = folder / "compliant" / "run.json"
-    while time.monotonic() < deadline and not (done.exists() and json.loads(done.read_text())["status"] == COMPLETED):
+    while time.monotonic() < deadline and not (
+        done.exists() and json.loads(done.read_text())["status"] == COMPLETED
+    ):
         time.sleep(0.05)
     time.sleep(3.0)  # into the batch
     return process

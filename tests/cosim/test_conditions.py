@@ -30,46 +30,75 @@ def run(name: str, *overrides: str) -> Result:
 def test_a_robot_on_ice_walks_on_the_spot_and_is_told_why(plant_build: Path, friction: str) -> None:
     result = run("walk_flat", friction, "duration=2")
     position = result.outcome.recording.vector("torso.position")
-    assert float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01  # m: of 0.12 commanded; its legs swing its torso to and fro
+    assert (
+        float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01
+    )  # m: of 0.12 commanded; its legs swing its torso to and fro
     assert NO_PUSH in result.facts["warnings"]
     assert result.facts["walk"]["upright"]
 
 
-def test_a_robot_on_an_icy_slope_slides_at_the_gravity_along_it_and_is_told(plant_build: Path) -> None:
-    """From rest 1/2 g sin(a) t^2 along the slope, a = 0.1 rad: 0.4897 m in a second, whatever the legs do."""
-    result = run("stand", "terrain.kind=slope", "terrain.incline=0.1", "friction.mu=0", "duration=1")
+def test_a_robot_on_an_icy_slope_slides_at_the_gravity_along_it_and_is_told(
+    plant_build: Path,
+) -> None:
+    """From rest 1/2 g sin(a) t^2 along the slope, a = 0.1 rad: 0.4897 m in a second, whatever
+    the legs do.
+    """
+    result = run(
+        "stand", "terrain.kind=slope", "terrain.incline=0.1", "friction.mu=0", "duration=1"
+    )
     position = result.outcome.recording.vector("torso.position")
     assert float(np.linalg.norm(position[-1] - position[0])) == pytest.approx(0.48968, abs=1e-4)
     assert position[-1, 0] < position[0, 0]
-    assert "the robot slides: the ground's slope pulls it downhill at 0.979 m/s2, without friction" in result.facts["warnings"]
+    assert (
+        "the robot slides: the ground's slope pulls it downhill at 0.979 m/s2, without friction"
+        in result.facts["warnings"]
+    )
     assert result.facts["walk"]["upright"]
 
 
 def test_gains_are_not_designed_for_feet_without_friction(plant_build: Path) -> None:
     robot = load_robot("athena")
     icy = replace(robot, friction=replace(robot.friction, mu=0.0))
-    with pytest.raises(GainsError, match=r"answers to the feet's friction: got 'friction law tanh, mu 0\.0'"):
+    with pytest.raises(
+        GainsError, match=r"answers to the feet's friction: got 'friction law tanh, mu 0\.0'"
+    ):
         design_for(icy, 0.005)
 
 
-def test_a_robot_dropped_from_a_metre_lands_on_its_feet_and_has_not_fallen(plant_build: Path) -> None:
+def test_a_robot_dropped_from_a_metre_lands_on_its_feet_and_has_not_fallen(
+    plant_build: Path,
+) -> None:
     result = run("stand", "initial.position[3]=1", "duration=2")
     assert result.facts["walk"]["upright"]
     recording = result.outcome.recording
     landed = recording.time[np.argmax((recording.feet("contact") > 0.5).any(axis=1))]
-    assert landed == pytest.approx((2.0 * (1.0 - 0.132) / 9.81) ** 0.5, abs=0.006)  # s    to a macro-step; it stands at 0.132 m
+    assert landed == pytest.approx(
+        (2.0 * (1.0 - 0.132) / 9.81) ** 0.5, abs=0.006
+    )  # s    to a macro-step; it stands at 0.132 m
     assert recording.column("torso.position[3]")[-1] == pytest.approx(0.1317, abs=1e-3)
 
 
 def test_a_robot_dropped_on_its_side_has_fallen(plant_build: Path) -> None:
-    result = run("stand", "initial.position[3]=0.5", "initial.quaternion[1]=0.8", "initial.quaternion[2]=0.6", "duration=1")
+    result = run(
+        "stand",
+        "initial.position[3]=0.5",
+        "initial.quaternion[1]=0.8",
+        "initial.quaternion[2]=0.6",
+        "duration=1",
+    )
     assert not result.facts["walk"]["upright"]
 
 
-def test_a_kinematic_drive_follows_the_walk_within_a_third_of_a_milliradian(plant_build: Path) -> None:
-    """At the macro-steps' ends; told no acceleration_ref it lags by 20 mrad, the acceleration over beta^2."""
+def test_a_kinematic_drive_follows_the_walk_within_a_third_of_a_milliradian(
+    plant_build: Path,
+) -> None:
+    """At the macro-steps' ends; told no acceleration_ref it lags by 20 mrad, the acceleration
+    over beta^2.
+    """
     recording = run("walk_flat", "servo.mode=kinematic", "duration=4").outcome.recording
-    angle, wanted, told = (recording.joints(name)[400:-1] for name in ("angle", "angle_ref", "acceleration_ref"))
+    angle, wanted, told = (
+        recording.joints(name)[400:-1] for name in ("angle", "angle_ref", "acceleration_ref")
+    )
     assert float(np.abs(angle - wanted).max()) < 3.3e-4  # rad
     assert float(np.abs(told).max()) / 2500.0 > 0.015  # rad    beta = 50/s
 
@@ -80,17 +109,25 @@ WORLDS = {"moon": 1.62, "mars": 3.71}
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
 def test_the_robot_walks_under_other_gravities(plant_build: Path, world: str, control: str) -> None:
-    """The default gait's Froude number v^2/(g h) is 0.03 on the moon: it needs no scaling. The start is settled, the weight is m g."""
+    """The default gait's Froude number v^2/(g h) is 0.03 on the moon: it needs no scaling. The
+    start is settled, the weight is m g.
+    """
     result = run(world, f"control={control}", "duration=4")
     recording, walk = result.outcome.recording, result.facts["walk"]
     weight = 5.6 * WORLDS[world]  # N    5.6 kg
     assert float(recording.feet("normal_force")[0].sum()) == pytest.approx(weight, rel=1e-5)
-    assert float(recording.feet("normal_force")[400:].sum(axis=1).mean()) == pytest.approx(weight, rel=0.01)
+    assert float(recording.feet("normal_force")[400:].sum(axis=1).mean()) == pytest.approx(
+        weight, rel=0.01
+    )
     assert walk["upright"]
     assert walk["distance"] == pytest.approx(0.16, rel=0.05)  # m    two seconds at 0.08 m/s
     assert walk.get("fallback", 0.0) == 0.0
     assert result.metrics["path_error"] < (0.005 if control == "compliant" else 0.05)
-    if control == "compliant":  # a controller that plans for 9.81 m/s2 stamps with 2.4 body weights on the moon and 1.1 on Mars
+    if (
+        control == "compliant"
+        # a controller that plans for 9.81 m/s2 stamps with 2.4 body weights on the moon and 1.1 on
+        # Mars
+    ):
         assert result.metrics["peak_force"] < 0.7
 
 
@@ -102,5 +139,8 @@ def test_the_controllers_fmu_is_told_the_scenarios_gravity() -> None:
 
 @pytest.mark.parametrize("name", ["plant.gravity[3]", "controller.gravity[3]"])
 def test_a_packages_gravity_is_not_that_of_one_component(name: str) -> None:
-    with pytest.raises(HexapodError, match=r"gravity of one component alone: .* write gravity = \[0, 0, -1\.62\] into the robot's file"):
+    with pytest.raises(
+        HexapodError,
+        match=r"gravity of one component alone: .* write gravity = \[0, 0, -1\.62\] into the robot's file",
+    ):
         read_values([f"{name}=-1.62"])

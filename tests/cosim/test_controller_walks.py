@@ -22,14 +22,19 @@ SLIP_LEFT = 0.2  # of that under kinematic control, at most
 @cache
 def walk(robot: str, control: str, *overrides: str, duration: float = 4.0) -> Result:
     """A straight walk."""
-    scenario = load_scenario("walk_flat", overrides=[f"robot={robot}", f"control={control}", f"duration={duration}", *overrides])
+    scenario = load_scenario(
+        "walk_flat",
+        overrides=[f"robot={robot}", f"control={control}", f"duration={duration}", *overrides],
+    )
     return simulate(scenario, gains=make_gains(load_robot(robot)))
 
 
 def outputs(result: Result) -> np.ndarray:
     """What the FMU said."""
     recording = result.outcome.recording
-    return recording.columns([name for name in recording.names if not name.startswith("controller.")])
+    return recording.columns(
+        [name for name in recording.names if not name.startswith("controller.")]
+    )
 
 
 @pytest.mark.usefixtures("plant_build")
@@ -46,7 +51,10 @@ def test_compliance_takes_most_of_the_slip(robot: str) -> None:
 
 @pytest.mark.usefixtures("plant_build")
 def test_with_every_part_off_it_is_kinematic_control_bit_for_bit() -> None:
-    off, kinematic = walk("athena", "compliant", *NOTHING, duration=2.0), walk("athena", "kinematic", duration=2.0)
+    off, kinematic = (
+        walk("athena", "compliant", *NOTHING, duration=2.0),
+        walk("athena", "kinematic", duration=2.0),
+    )
     np.testing.assert_array_equal(outputs(off), outputs(kinematic))
 
 
@@ -54,24 +62,36 @@ def test_with_every_part_off_it_is_kinematic_control_bit_for_bit() -> None:
 def test_a_payload_is_carried_as_if_it_were_planned() -> None:
     mass = load_robot("athena").torso.mass + 1.5
     heights = [
-        walk("athena", control, f"parameters.torso.mass={mass}").outcome.recording.column("torso.position[3]")[-200:].mean()
+        walk("athena", control, f"parameters.torso.mass={mass}")
+        .outcome.recording.column("torso.position[3]")[-200:]
+        .mean()
         - walk("athena", control).outcome.recording.column("torso.position[3]")[-200:].mean()
         for control in ("kinematic", "compliant")
-    ]  # fmt: skip
+    ]
     assert heights[0] < 0.0
     assert abs(heights[1]) < 0.25 * abs(heights[0])
 
 
 @pytest.mark.usefixtures("plant_build")
 def test_with_a_dead_sensor_it_walks_on_by_the_plan_of_that_leg() -> None:
-    whole, hurt = walk("athena", "compliant"), walk("athena", "compliant", 'events=[{time=0.5, leg="RM", fault="dead"}]')
+    whole, hurt = (
+        walk("athena", "compliant"),
+        walk("athena", "compliant", 'events=[{time=0.5, leg="RM", fault="dead"}]'),
+    )
     assert hurt.completed
     assert hurt.facts["walk"]["upright"]
     assert hurt.facts["walk"]["fallback"] > 0.8
     recording = hurt.outcome.recording
-    doubted = np.array([recording.column(f"controller.{leg}.fallback").any() for leg in ("LF", "LM", "LR", "RF", "RM", "RR")])
+    doubted = np.array(
+        [
+            recording.column(f"controller.{leg}.fallback").any()
+            for leg in ("LF", "LM", "LR", "RF", "RM", "RR")
+        ]
+    )
     assert doubted.tolist() == [False, False, False, False, True, False]
-    assert hurt.facts["walk"]["distance"] == pytest.approx(whole.facts["walk"]["distance"], rel=0.03)
+    assert hurt.facts["walk"]["distance"] == pytest.approx(
+        whole.facts["walk"]["distance"], rel=0.03
+    )
     assert hurt.metrics["slip_per_metre"] < walk("athena", "kinematic").metrics["slip_per_metre"]
 
 
@@ -89,8 +109,13 @@ FIGURES = ("slip_per_metre", "height_rms", "roll_rms", "pitch_rms", "peak_force"
 
 @pytest.mark.usefixtures("plant_build")
 @pytest.mark.parametrize("error", ["contact.stiffness=1.07e4", "torso.mass=10"])
-def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_than_kinematic_control(error: str) -> None:
-    kinematic, compliant = (walk("athena", control, f"parameters.{error}", duration=6.0) for control in ("kinematic", "compliant"))
+def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_than_kinematic_control(
+    error: str,
+) -> None:
+    kinematic, compliant = (
+        walk("athena", control, f"parameters.{error}", duration=6.0)
+        for control in ("kinematic", "compliant")
+    )
     for name in FIGURES:
         assert compliant.metrics[name] < kinematic.metrics[name], name
     assert compliant.metrics["slip_per_metre"] < 0.6 * kinematic.metrics["slip_per_metre"]
@@ -99,9 +124,14 @@ def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_
 
 @pytest.mark.usefixtures("plant_build")
 def test_with_three_times_the_weight_it_is_kinematic_control() -> None:
-    kinematic, compliant = (walk("athena", control, "parameters.torso.mass=14", duration=6.0) for control in ("kinematic", "compliant"))
+    kinematic, compliant = (
+        walk("athena", control, "parameters.torso.mass=14", duration=6.0)
+        for control in ("kinematic", "compliant")
+    )
     assert compliant.facts["walk"]["fallback"] > 0.8  # from 1 s on, when that weight is known
-    assert compliant.metrics["slip_per_metre"] == pytest.approx(kinematic.metrics["slip_per_metre"], rel=0.1)
+    assert compliant.metrics["slip_per_metre"] == pytest.approx(
+        kinematic.metrics["slip_per_metre"], rel=0.1
+    )
 
 
 @pytest.mark.usefixtures("plant_build")

@@ -11,11 +11,18 @@ from hexapod_cosim.models import HexapodError
 
 
 @pytest.mark.parametrize("name", [".", "folder"])
-def test_a_folder_is_refused_before_anything_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_a_folder_is_refused_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
     monkeypatch.chdir(tmp_path)
     Path(name).mkdir(exist_ok=True)
     before = sorted(tmp_path.iterdir())
-    with pytest.raises(HexapodError, match=r"cannot write: got 'a folder', expected the name of a file"), atomic_path(Path(name)):
+    with (
+        pytest.raises(
+            HexapodError, match=r"cannot write: got 'a folder', expected the name of a file"
+        ),
+        atomic_path(Path(name)),
+    ):
         pytest.fail("a place to write to was handed out")
     assert sorted(tmp_path.iterdir()) == before
 

@@ -1,4 +1,6 @@
-"""Force sensors that are late or broken: what the controller is told, against what is true, on a plant whose forces are known."""
+"""Force sensors that are late or broken: what the controller is told, against what is true, on a
+plant whose forces are known.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ LF, RM = LEG_NAMES.index("LF"), LEG_NAMES.index("RM")
 
 
 class CountingPlant(FakePlant):
-    """Every foot's vertical force is the number of steps done, plus one; a foot is in contact after an even number."""
+    """Every foot's vertical force is the number of steps done, plus one; a foot is in contact
+    after an even number.
+    """
 
     def step(self, t: float, h: float) -> None:
         super().step(t, h)
@@ -46,12 +50,21 @@ class Listener(FakeController):
 
 
 def told(*settings: str) -> tuple[Readings, NDArray[np.bool_], Recording]:
-    """(steps, 6) vertical forces and contacts the controller was told in 10 steps of 5 ms, and what was recorded."""
+    """(steps, 6) vertical forces and contacts the controller was told in 10 steps of 5 ms, and
+    what was recorded.
+    """
     scenario = load_scenario("walk_flat", overrides=["duration=0.05", *settings])
     plant, listener, schedule = CountingPlant(), Listener(), make_schedule(scenario)
     plant.show()
     signals = Signals(plant, sensor=make_sensor(scenario, schedule))
-    outcome = run(plant, signals, listener, schedule, Recorder(signals, schedule.times, schedule.rows), h=scenario.macro_step)
+    outcome = run(
+        plant,
+        signals,
+        listener,
+        schedule,
+        Recorder(signals, schedule.times, schedule.rows),
+        h=scenario.macro_step,
+    )
     assert outcome.status == "completed", outcome.reason
     return np.array(listener.forces)[:, :, 2], np.array(listener.contacts), outcome.recording
 
@@ -59,8 +72,13 @@ def told(*settings: str) -> tuple[Readings, NDArray[np.bool_], Recording]:
 TRUE = np.arange(1.0, 11.0)
 
 
-@pytest.mark.parametrize(("delay", "steps"), [("0", 0), ("5 ms", 1), ("5.1 ms", 2), ("10 ms", 2), ("0.02", 4), ("1 ms", 1)])
-def test_readings_are_late_by_whole_steps_and_the_first_holds_until_they_come(delay: str, steps: int) -> None:
+@pytest.mark.parametrize(
+    ("delay", "steps"),
+    [("0", 0), ("5 ms", 1), ("5.1 ms", 2), ("10 ms", 2), ("0.02", 4), ("1 ms", 1)],
+)
+def test_readings_are_late_by_whole_steps_and_the_first_holds_until_they_come(
+    delay: str, steps: int
+) -> None:
     forces, contacts, _ = told(f"sensors.foot_force_delay={delay}")
     late = np.maximum(TRUE - steps, 1.0)
     for leg in range(6):
@@ -90,12 +108,18 @@ def test_a_sensor_stuck_from_the_start_keeps_its_first_reading() -> None:
 
 
 def test_a_late_sensor_sticks_at_what_it_last_told_and_not_at_what_was_true() -> None:
-    forces, _, _ = told("sensors.foot_force_delay=10 ms", "events=[{time=0.025, leg='LF', fault='stuck'}]")
+    forces, _, _ = told(
+        "sensors.foot_force_delay=10 ms", "events=[{time=0.025, leg='LF', fault='stuck'}]"
+    )
     np.testing.assert_array_equal(forces[:, LF], [1, 1, 1, 2, 3, 3, 3, 3, 3, 3])
 
 
 def test_what_is_recorded_is_true_whatever_is_told() -> None:
-    settings = ("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=10 ms", "events=[{time=0, leg='LF', fault='dead'}]")
+    settings = (
+        "sensors.foot_force_noise=0.05",
+        "sensors.foot_force_delay=10 ms",
+        "events=[{time=0, leg='LF', fault='dead'}]",
+    )
     _, _, recording = told(*settings)
     np.testing.assert_array_equal(recording.column("LF.foot.force[3]"), np.arange(1.0, 12.0))
     np.testing.assert_array_equal(recording.columns(CONTACT)[:, 0], np.arange(11) % 2 == 0)

@@ -1,4 +1,6 @@
-"""The co-simulation loop: order, times, what is recorded, and how a run ends that does not complete."""
+"""The co-simulation loop: order, times, what is recorded, and how a run ends that does not
+complete.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,15 @@ from fake_plant import SPEED, FakeController, FakePlant
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
 from hexapod_cosim.cosim.interface.names import joint_names
 from hexapod_cosim.cosim.master.fmu import Fmu, StepError
-from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, JointController, Outcome, insides, run
+from hexapod_cosim.cosim.master.loop import (
+    COMPLETED,
+    FAILED,
+    INTERRUPTED,
+    JointController,
+    Outcome,
+    insides,
+    run,
+)
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
 from hexapod_cosim.cosim.master.signals import MEASURED, Signals
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
@@ -36,7 +46,14 @@ def scenario_of(*settings: str) -> Scenario:
 def run_fake(plant: FakePlant, controller: JointController, scenario: Scenario) -> Outcome:
     schedule = make_schedule(scenario)
     signals = Signals(plant, sensor=make_sensor(scenario, schedule))
-    return run(plant, signals, controller, schedule, Recorder(signals, schedule.times, schedule.rows), h=scenario.macro_step)
+    return run(
+        plant,
+        signals,
+        controller,
+        schedule,
+        Recorder(signals, schedule.times, schedule.rows),
+        h=scenario.macro_step,
+    )
 
 
 def test_each_macro_step_reads_controls_sets_and_steps_in_this_order() -> None:
@@ -48,7 +65,9 @@ def test_each_macro_step_reads_controls_sets_and_steps_in_this_order() -> None:
 
 def test_times_are_start_plus_k_h_and_not_a_running_sum() -> None:
     plant, controller = FakePlant(), FakeController()
-    outcome = run_fake(plant, controller, scenario_of("duration=3", "macro_step=0.001", "start=0.1"))
+    outcome = run_fake(
+        plant, controller, scenario_of("duration=3", "macro_step=0.001", "start=0.1")
+    )
     expected = [0.1 + k * 0.001 for k in range(3001)]
     assert outcome.recording.time.tolist() == expected
     assert controller.times == expected[:-1]
@@ -62,7 +81,9 @@ def test_a_row_holds_the_outputs_read_and_the_inputs_set_at_its_time() -> None:
     np.testing.assert_array_equal(recording.joints("torque_ref")[:-1, 0, 0], recording.time[:-1])
     np.testing.assert_array_equal(recording.joints("angle")[1:], recording.joints("angle_ref")[:-1])
     np.testing.assert_allclose(
-        recording.column("torso.position[1]") - recording.column("torso.position[1]")[0], SPEED * recording.time, atol=1e-15
+        recording.column("torso.position[1]") - recording.column("torso.position[1]")[0],
+        SPEED * recording.time,
+        atol=1e-15,
     )
 
 
@@ -74,12 +95,22 @@ def test_measurements_are_views_on_what_the_plant_gave() -> None:
     signals = Signals(plant)
     signals.read()
     measured = signals.measurement
-    shown = [measured.angle, measured.speed, measured.foot_force, measured.quaternion, measured.angular_velocity]
+    shown = [
+        measured.angle,
+        measured.speed,
+        measured.foot_force,
+        measured.quaternion,
+        measured.angular_velocity,
+    ]
     assert np.concatenate([array.ravel() for array in shown]).tolist() == list(range(61))
     assert measured.contact.tolist() == [False, True, False, False, False, False]
     assert all(np.shares_memory(array, signals.outputs.values) for array in shown)
     row = dict(zip(signals.names, signals.values.tolist(), strict=True))
-    assert (row["LF.femur.angle"], row["LF.foot.contact"], row["LM.foot.contact"]) == (1.0, 0.0, 1.0)
+    assert (row["LF.femur.angle"], row["LF.foot.contact"], row["LM.foot.contact"]) == (
+        1.0,
+        0.0,
+        1.0,
+    )
 
 
 def test_a_step_that_the_plant_refuses_ends_the_run_and_keeps_its_rows() -> None:
@@ -92,7 +123,9 @@ def test_a_step_that_the_plant_refuses_ends_the_run_and_keeps_its_rows() -> None
 
 
 def test_an_interrupt_ends_the_run_and_keeps_its_rows() -> None:
-    outcome = run_fake(FakePlant(refuse_at=0.02, interrupt=True), FakeController(), scenario_of("duration=0.1"))
+    outcome = run_fake(
+        FakePlant(refuse_at=0.02, interrupt=True), FakeController(), scenario_of("duration=0.1")
+    )
     assert outcome.status == INTERRUPTED
     assert len(outcome.recording.time) == 5
 
@@ -129,7 +162,12 @@ class Cautious(FakeController):
         six, never = np.zeros(6), np.zeros(6, dtype=np.bool_)
         plane = np.zeros(6, dtype=np.complex128)
         self.diagnostics = Diagnostics(
-            swinging=never, planned=np.zeros((6, 3)), shift=plane, lift=six, unreachable=never, fallback=never.copy()
+            swinging=never,
+            planned=np.zeros((6, 3)),
+            shift=plane,
+            lift=six,
+            unreachable=never,
+            fallback=never.copy(),
         )
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
@@ -141,7 +179,9 @@ def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told(
     scenario, controller = scenario_of("duration=0.1"), Cautious()
     signals, schedule = Signals(FakePlant()), make_schedule(scenario)
     recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
-    recording = run(FakePlant(), signals, controller, schedule, recorder, h=scenario.macro_step).recording
+    recording = run(
+        FakePlant(), signals, controller, schedule, recorder, h=scenario.macro_step
+    ).recording
     assert recording.column("controller.RM.fallback").tolist() == [0.0] * 15 + [1.0] * 6
     assert not recording.column("controller.LM.fallback").any()
     told = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
@@ -152,13 +192,23 @@ def test_progress_reaches_the_whole_duration() -> None:
     told: list[float] = []
     plant = FakePlant()
     signals, schedule = Signals(plant), make_schedule(scenario_of("duration=1"))
-    run(plant, signals, FakeController(), schedule, Recorder(signals, schedule.times, schedule.rows), h=0.005, progress=told.append)
+    run(
+        plant,
+        signals,
+        FakeController(),
+        schedule,
+        Recorder(signals, schedule.times, schedule.rows),
+        h=0.005,
+        progress=told.append,
+    )
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1.0)
 
 
 def test_a_command_holds_from_its_time_on() -> None:
-    scenario = scenario_of("duration=0.1", "command=[{vx=0.1}, {time=0.05, yaw_rate=0.2, height='5 mm'}]")
+    scenario = scenario_of(
+        "duration=0.1", "command=[{vx=0.1}, {time=0.05, yaw_rate=0.2, height='5 mm'}]"
+    )
     controller = FakeController()
     outcome = run_fake(FakePlant(), controller, scenario)
     assert controller.commands[9] == BodyCommand(0.1, 0.0, 0.0)
@@ -170,11 +220,17 @@ def test_a_command_holds_from_its_time_on() -> None:
 def test_the_impulse_of_a_push_does_not_depend_on_the_macro_step(h: float) -> None:
     push = Push(time=0.0512, duration=0.0371, force=(0.0, 40.0, 0.0), torque=(0.0, 0.0, 2.0))
     rows = push_rows([push], h * np.arange(100.0, dtype=np.float64), h)
-    np.testing.assert_allclose(rows.sum(axis=0) * h, 0.0371 * np.array([0, 40, 0, 0, 0, 2]), rtol=1e-12)
+    np.testing.assert_allclose(
+        rows.sum(axis=0) * h, 0.0371 * np.array([0, 40, 0, 0, 0, 2]), rtol=1e-12
+    )
 
 
 def test_a_push_reaches_the_plant_only_while_it_lasts() -> None:
-    outcome = run_fake(FakePlant(), FakeController(), scenario_of("duration=0.1", "events=[{time=0.02, duration=0.03, force=[1, 2, 3]}]"))
+    outcome = run_fake(
+        FakePlant(),
+        FakeController(),
+        scenario_of("duration=0.1", "events=[{time=0.02, duration=0.03, force=[1, 2, 3]}]"),
+    )
     pushed = outcome.recording.columns(["torso.push_force[1]", "torso.push_force[3]"])
     np.testing.assert_allclose(pushed[4:10], [[1.0, 3.0]] * 6)
     np.testing.assert_allclose(np.delete(pushed, range(4, 10), axis=0), 0.0)
@@ -183,7 +239,11 @@ def test_a_push_reaches_the_plant_only_while_it_lasts() -> None:
 def forces_told(seed: int, noise: float) -> np.ndarray:
     plant, controller = FakePlant(), FakeController()
     plant.values["LF.foot.force[3]"] = 10.0
-    run_fake(plant, controller, scenario_of("duration=2", f"seed={seed}", f"sensors.foot_force_noise={noise}"))
+    run_fake(
+        plant,
+        controller,
+        scenario_of("duration=2", f"seed={seed}", f"sensors.foot_force_noise={noise}"),
+    )
     return np.array(controller.forces)
 
 
@@ -207,7 +267,9 @@ def test_a_plant_made_before_acceleration_ref_is_driven_without_it() -> None:
     signals = Signals(old)
     assert not [name for name in signals.names if name.endswith(".acceleration_ref")]
     signals.push[:] = np.arange(6.0)
-    signals.write(JointCommand(angle_ref=np.full((6, 3), 0.5), acceleration_ref=np.full((6, 3), 7.0)))
+    signals.write(
+        JointCommand(angle_ref=np.full((6, 3), 0.5), acceleration_ref=np.full((6, 3), 7.0))
+    )
     assert (old.values["RR.tibia.angle_ref"], old.values["torso.push_torque[3]"]) == (0.5, 5.0)
     new = FakePlant()
     Signals(new).write(JointCommand(acceleration_ref=np.full((6, 3), 7.0)))
@@ -225,18 +287,27 @@ def test_a_recording_survives_its_csv_file_bit_for_bit(tmp_path: Path) -> None:
 
 
 def test_columns_are_chosen_by_pattern_and_a_misspelt_one_is_refused() -> None:
-    recording = Recording(("time", "torso.position[1]", "torso.position[2]", "LF.foot.contact"), np.zeros((2, 4)))
-    assert recording.chosen(["torso.*[2]", "*.contact"]).names == ("time", "torso.position[2]", "LF.foot.contact")
+    recording = Recording(
+        ("time", "torso.position[1]", "torso.position[2]", "LF.foot.contact"), np.zeros((2, 4))
+    )
+    assert recording.chosen(["torso.*[2]", "*.contact"]).names == (
+        "time",
+        "torso.position[2]",
+        "LF.foot.contact",
+    )
     with pytest.raises(HexapodError, match=r"did you mean 'torso.position\[1\]'"):
         recording.chosen(["torso.positon[1]"])
     with pytest.raises(HexapodError, match=r"did you mean 'LF.foot.contact'"):
         recording.column("LF.foot.contakt")
 
 
-# ------------------------------------------------------------------------------------------------ the real FMU
+# ------------------------------------------------------------------------------------------------
+# the real FMU
 
 
-def test_fmpy_reads_our_csv_and_our_block_reads_what_fmpy_reads(athena_fmu: Path, tmp_path: Path) -> None:
+def test_fmpy_reads_our_csv_and_our_block_reads_what_fmpy_reads(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     from fmpy.util import read_csv as fmpy_read_csv  # noqa: PLC0415
 
     with Fmu(athena_fmu) as plant:
@@ -245,13 +316,18 @@ def test_fmpy_reads_our_csv_and_our_block_reads_what_fmpy_reads(athena_fmu: Path
         block.get()
         references = [plant.variables[name].valueReference for name in block.names]
         assert block.values.tolist() == plant._slave.getReal(references)
-    write_csv(Recording(("time", *block.names), np.array([[0.0, *block.values]])), tmp_path / "results.csv")
+    write_csv(
+        Recording(("time", *block.names), np.array([[0.0, *block.values]])),
+        tmp_path / "results.csv",
+    )
     table = fmpy_read_csv(tmp_path / "results.csv")
     assert table.dtype.names == ("time", *block.names)
     assert table["LF.femur.angle"][0] == block.values[1]
 
 
-def test_a_block_fills_the_buffer_it_is_given_and_refuses_one_that_does_not_fit(athena_fmu: Path) -> None:
+def test_a_block_fills_the_buffer_it_is_given_and_refuses_one_that_does_not_fit(
+    athena_fmu: Path,
+) -> None:
     names = joint_names("angle")
     with Fmu(athena_fmu) as plant:
         plant.initialise(0.0, 1.0)
@@ -284,7 +360,9 @@ def test_a_run_repeated_is_the_same_bit_for_bit(walked: Result) -> None:
     np.testing.assert_array_equal(again.outcome.recording.data, walked.outcome.recording.data)
 
 
-def test_a_given_fmu_of_the_robot_walks_like_the_exported_one(walked: Result, athena_fmu: Path) -> None:
+def test_a_given_fmu_of_the_robot_walks_like_the_exported_one(
+    walked: Result, athena_fmu: Path
+) -> None:
     again = simulate(scenario_of(*SHORT), fmu=athena_fmu)
     np.testing.assert_array_equal(again.outcome.recording.data, walked.outcome.recording.data)
 
@@ -294,11 +372,20 @@ def test_settings_reach_a_given_fmu(athena_fmu: Path) -> None:
     with Fmu(athena_fmu) as plant:
         adopt_settings(plant, robot)
         parameters = plant.parameters()
-    assert (parameters["friction.mu"], parameters["contact.law"], parameters["servo.kp"]) == (0.4, 2, 50.0)
+    assert (parameters["friction.mu"], parameters["contact.law"], parameters["servo.kp"]) == (
+        0.4,
+        2,
+        50.0,
+    )
 
 
 def test_the_fmu_of_another_robot_is_refused(athena_fmu: Path) -> None:
-    with Fmu(athena_fmu) as plant, pytest.raises(FmuError, match=r"the FMU holds another robot: torso\.mass: got 2\.6, expected 1\.52"):
+    with (
+        Fmu(athena_fmu) as plant,
+        pytest.raises(
+            FmuError, match=r"the FMU holds another robot: torso\.mass: got 2\.6, expected 1\.52"
+        ),
+    ):
         adopt_settings(plant, load_robot("phantomx_mk4"))
 
 
@@ -311,14 +398,28 @@ def test_a_parameter_of_the_fmu_can_be_set_by_name(plant_build: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"torso.mas": 1.0}, "the FMU has no such variable: got 'torso.mas'; did you mean 'torso.mass'"),
-        ({"LF.coxa.angle": 1.0}, "not a parameter: got 'LF.coxa.angle', expected a parameter, and this is an output"),
+        (
+            {"torso.mas": 1.0},
+            "the FMU has no such variable: got 'torso.mas'; did you mean 'torso.mass'",
+        ),
+        (
+            {"LF.coxa.angle": 1.0},
+            "not a parameter: got 'LF.coxa.angle', expected a parameter, and this is an output",
+        ),
         ({"torso.mass": -1.0}, r"athena.fmu: torso.mass: got -1"),
-        ({"torso.mass": "heavy"}, "parameter torso.mass is refused: got 'heavy', expected a number"),
-        ({"contact.law": "herz"}, "unknown choice for contact.law: got 'herz'.*did you mean 'hertz'"),
+        (
+            {"torso.mass": "heavy"},
+            "parameter torso.mass is refused: got 'heavy', expected a number",
+        ),
+        (
+            {"contact.law": "herz"},
+            "unknown choice for contact.law: got 'herz'.*did you mean 'hertz'",
+        ),
     ],
 )
-def test_a_wrong_parameter_is_refused_by_name(athena_fmu: Path, values: dict[str, object], message: str) -> None:
+def test_a_wrong_parameter_is_refused_by_name(
+    athena_fmu: Path, values: dict[str, object], message: str
+) -> None:
     with Fmu(athena_fmu) as plant, pytest.raises(FmuError, match=message):
         plant.set_parameters(values)
 
@@ -345,7 +446,9 @@ def make_zip(path: Path, members: dict[str, str]) -> Path:
     return path
 
 
-def test_what_is_no_fmu_is_refused_before_anything_is_loaded(tmp_path: Path, athena_fmu: Path) -> None:
+def test_what_is_no_fmu_is_refused_before_anything_is_loaded(
+    tmp_path: Path, athena_fmu: Path
+) -> None:
     plain = tmp_path / "plain.fmu"
     plain.write_text("no archive")
     with zipfile.ZipFile(athena_fmu) as archive:
@@ -355,7 +458,9 @@ def test_what_is_no_fmu_is_refused_before_anything_is_loaded(tmp_path: Path, ath
         "not an FMU": plain,
         "not an FMU: got .There is no item": make_zip(tmp_path / "empty.fmu", {"other.txt": ""}),
         "cannot be read": make_zip(tmp_path / "broken.fmu", {"modelDescription.xml": "<fmi"}),
-        "the FMU cannot be loaded": make_zip(tmp_path / "hollow.fmu", {"modelDescription.xml": description}),
+        "the FMU cannot be loaded": make_zip(
+            tmp_path / "hollow.fmu", {"modelDescription.xml": description}
+        ),
     }
     for message, path in cases.items():
         folder = Path.cwd()

@@ -26,7 +26,12 @@ def refusal(*commands: Command, gait: str = "tripod") -> ScenarioError:
 def test_every_bundled_walk_is_within_reach(name: str) -> None:
     scenario = load_scenario(name)
     robot = scenario_robot(scenario)
-    check_commands(scenario.commands, robot, make_gait(robot, **dict(scenario.settings.get("gait", {}))), where=name)
+    check_commands(
+        scenario.commands,
+        robot,
+        make_gait(robot, **dict(scenario.settings.get("gait", {}))),
+        where=name,
+    )
 
 
 @pytest.mark.parametrize(
@@ -41,17 +46,27 @@ def test_every_bundled_walk_is_within_reach(name: str) -> None:
         ({"roll": 1.5, "vx": 0.1}, "tripod"),
     ],
 )
-def test_the_limit_told_can_be_walked_and_a_little_more_cannot(wanted: dict[str, float], gait: str) -> None:
-    limit = {key: float(value) for key, value in LIMIT.findall(str(refusal(Command(**wanted), gait=gait).expected)) if key in wanted}
+def test_the_limit_told_can_be_walked_and_a_little_more_cannot(
+    wanted: dict[str, float], gait: str
+) -> None:
+    limit = {
+        key: float(value)
+        for key, value in LIMIT.findall(str(refusal(Command(**wanted), gait=gait).expected))
+        if key in wanted
+    }
     assert set(limit) <= set(wanted)
     assert limit
-    motionless = {key: wanted[key] for key in ("height", "roll") if key in wanted and key not in limit}
+    motionless = {
+        key: wanted[key] for key in ("height", "roll") if key in wanted and key not in limit
+    }
     check_commands([Command(**motionless, **limit)], ROBOT, make_gait(ROBOT, gait), where="")
     refusal(Command(**motionless, **{key: 1.03 * value for key, value in limit.items()}), gait=gait)
 
 
 def unreachable(speed: float) -> tuple[bool, bool]:
-    """Whether a standing foot, and any foot, is beyond reach from 2 s to 6 s of a tripod walk with the master's default step."""
+    """Whether a standing foot, and any foot, is beyond reach from 2 s to 6 s of a tripod walk
+    with the master's default step.
+    """
     period, measurement = 0.005, Measurement()
     controller = Controller(ROBOT, period=period, gait=make_gait(ROBOT, "tripod"))
     shown, standing, anyone = controller.diagnostics, False, False
@@ -76,7 +91,10 @@ def test_feet_beyond_reach_only_in_the_air_are_let_pass() -> None:
 
 
 def test_the_limit_shrinks_with_the_time_a_foot_stands() -> None:
-    tripod, wave = (float(LIMIT.findall(str(refusal(Command(vx=10.0), gait=gait).expected))[0][1]) for gait in ("tripod", "wave"))
+    tripod, wave = (
+        float(LIMIT.findall(str(refusal(Command(vx=10.0), gait=gait).expected))[0][1])
+        for gait in ("tripod", "wave")
+    )
     assert wave < 0.5 * tripod
 
 
@@ -86,7 +104,10 @@ def test_a_stride_and_a_posture_out_of_reach_are_told_apart() -> None:
 
 
 def test_the_one_impossible_command_among_several_is_told_by_its_time() -> None:
-    assert refusal(Command(vx=0.08), Command(time=2.5, vx=3.0)).where == "mine.toml: command at time = 2.5 s"
+    assert (
+        refusal(Command(vx=0.08), Command(time=2.5, vx=3.0)).where
+        == "mine.toml: command at time = 2.5 s"
+    )
 
 
 @pytest.mark.filterwarnings("error")

@@ -1,4 +1,6 @@
-"""Scenario files: what they may say, what --set does, and that every mistake is told by file, key, what was got and what is allowed."""
+"""Scenario files: what they may say, what --set does, and that every mistake is told by file,
+key, what was got and what is allowed.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,12 @@ from hexapod_cosim.controller import Controller, Parts, make_gait
 from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.run.run import known_robot
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
-from hexapod_cosim.cosim.scenario.scenario import list_scenarios, load_scenario, scenario_from_table, scenario_robot
+from hexapod_cosim.cosim.scenario.scenario import (
+    list_scenarios,
+    load_scenario,
+    scenario_from_table,
+    scenario_robot,
+)
 from hexapod_cosim.models import HexapodError, RobotError, ScenarioError, load_robot
 
 
@@ -28,12 +35,21 @@ def test_a_bundled_scenario_loads_and_fits_its_robot(name: str) -> None:
 @pytest.mark.parametrize("name", list_scenarios())
 def test_the_scenario_as_run_reads_back_as_the_same(name: str) -> None:
     scenario = load_scenario(name)
-    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+    assert (
+        scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where)
+        == scenario
+    )
 
 
 def test_the_default_scenario_is_the_papers_walk() -> None:
     scenario = load_scenario("walk_flat")
-    assert (scenario.robot, scenario.control, scenario.duration, scenario.macro_step, scenario.seed) == (
+    assert (
+        scenario.robot,
+        scenario.control,
+        scenario.duration,
+        scenario.macro_step,
+        scenario.seed,
+    ) == (
         "athena",
         "kinematic",
         10.0,
@@ -47,7 +63,13 @@ def test_the_default_scenario_is_the_papers_walk() -> None:
 
 @pytest.mark.parametrize(
     ("setting", "value"),
-    [("macro_step=5 ms", 0.005), ("macro_step=0.004", 0.004), ("duration=1 min", 60.0), ("duration=2", 2.0), ("start=-3", -3.0)],
+    [
+        ("macro_step=5 ms", 0.005),
+        ("macro_step=0.004", 0.004),
+        ("duration=1 min", 60.0),
+        ("duration=2", 2.0),
+        ("start=-3", -3.0),
+    ],
 )
 def test_a_quantity_may_say_its_unit(setting: str, value: float) -> None:
     key = setting.partition("=")[0]
@@ -70,7 +92,12 @@ def test_units_reach_into_commands_events_and_settings() -> None:
 
 
 def test_set_reaches_scenario_keys_and_hands_other_names_to_the_fmu() -> None:
-    overrides = ["robot=phantomx_mk4", "contact.law=hertz", "LF.femur.mass=0.3", "outputs.csv=['torso.*']"]
+    overrides = [
+        "robot=phantomx_mk4",
+        "contact.law=hertz",
+        "LF.femur.mass=0.3",
+        "outputs.csv=['torso.*']",
+    ]
     scenario = load_scenario("walk_flat", overrides=overrides)
     assert scenario.robot == "phantomx_mk4"
     assert scenario.settings["contact"] == {"law": "hertz"}
@@ -96,7 +123,10 @@ def test_gravity_is_a_number_a_vector_or_an_fmu_parameter_and_all_are_one_key(
     assert scenario.gravity == gravity
     assert scenario.parameters == {}
     assert scenario_robot(scenario).gravity == known_robot(scenario).gravity == gravity
-    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+    assert (
+        scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where)
+        == scenario
+    )
 
 
 def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
@@ -109,9 +139,15 @@ def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("gravity=-1.62", r"walk_flat\.toml: gravity: value not allowed: got -1\.62, expected a finite number > 0 \[m/s2\]"),
+        (
+            "gravity=-1.62",
+            r"walk_flat\.toml: gravity: value not allowed: got -1\.62, expected a finite number > 0 \[m/s2\]",
+        ),
         ("gravity=0", r"gravity: value not allowed: got 0, expected a finite number > 0"),
-        ("gravity=[0, -1.62]", r"gravity: wrong length: got \[0, -1\.62\], expected 3 numbers \[m/s2\]"),
+        (
+            "gravity=[0, -1.62]",
+            r"gravity: wrong length: got \[0, -1\.62\], expected 3 numbers \[m/s2\]",
+        ),
         ("gravity=1.62 m", r"gravity: wrong unit: got '1\.62 m', expected a value in m/s2"),
         ("gravity[3]=low", r"parameters\.gravity\[3\]: wrong type: got 'low'"),
     ],
@@ -121,10 +157,14 @@ def test_impossible_gravity_is_refused(override: str, message: str) -> None:
         load_scenario("walk_flat", overrides=[override])
 
 
-@pytest.mark.parametrize("override", ["gravity=[0, 0, 1.62]", "gravity[3]=1.62", "gravity=[0, 0, 0]"])
+@pytest.mark.parametrize(
+    "override", ["gravity=[0, 0, 1.62]", "gravity[3]=1.62", "gravity=[0, 0, 0]"]
+)
 def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(override: str) -> None:
     scenario = load_scenario("walk_flat", overrides=[override])
-    with pytest.raises(ScenarioError, match=r"gravity: nothing stands under this gravity: .* write gravity = 1\.62"):
+    with pytest.raises(
+        ScenarioError, match=r"gravity: nothing stands under this gravity: .* write gravity = 1\.62"
+    ):
         scenario_robot(scenario)
 
 
@@ -135,13 +175,19 @@ def test_static_friction_is_the_kinetic_one_unless_said() -> None:
 
 @pytest.mark.parametrize("law", ["tanh", "none"])
 def test_static_friction_is_refused_where_it_has_no_effect(law: str) -> None:
-    scenario = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"])
+    scenario = load_scenario(
+        "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"]
+    )
     message = rf"friction\.mu_static: static friction that has no effect: got '0\.8 with the law {law}', expected friction\.law = bristle"
     with pytest.raises(RobotError, match=message):
         scenario_robot(scenario)
-    sticks = load_scenario("walk_flat", overrides=["friction.law=bristle", "friction.mu_static=0.8"])
+    sticks = load_scenario(
+        "walk_flat", overrides=["friction.law=bristle", "friction.mu_static=0.8"]
+    )
     assert scenario_robot(sticks).friction.mu_static == 0.8
-    same = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"])  # the kinetic one's
+    same = load_scenario(
+        "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"]
+    )  # the kinetic one's
     assert scenario_robot(same).friction.mu_static == 0.7
 
 
@@ -161,24 +207,35 @@ def test_a_robot_file_is_found_beside_its_scenario(tmp_path: Path) -> None:
 
 EVERYTHING = [
     "events=[{time=1, leg='LM', fault='stuck'}, {time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
-    "sensors.foot_force_delay=7 ms", "compliance.slip_pid=false", "variation.attitude=1 deg", "variation.command_delay=50 ms",
-]  # fmt: skip
+    "sensors.foot_force_delay=7 ms",
+    "compliance.slip_pid=false",
+    "variation.attitude=1 deg",
+    "variation.command_delay=50 ms",
+]
 
 
 def test_faults_delays_switches_and_variations_are_read_and_written() -> None:
     scenario = load_scenario("walk_flat", overrides=EVERYTHING)
-    assert [(event.leg, event.fault, event.duration) for event in scenario.faults] == [("LM", "stuck", math.inf), ("RF", "dead", 0.02)]
+    assert [(event.leg, event.fault, event.duration) for event in scenario.faults] == [
+        ("LM", "stuck", math.inf),
+        ("RF", "dead", 0.02),
+    ]
     assert [event.force for event in scenario.pushes] == [(1.0, 2.0, 3.0)]
     assert scenario.sensors.foot_force_delay == 0.007
     assert scenario.compliance == Parts(slip_pid=False)
     assert scenario.variation == Variation(attitude=math.radians(1.0), command_delay=0.05)
-    assert scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where) == scenario
+    assert (
+        scenario_from_table(tomllib.loads(to_toml(scenario.to_table())), where=scenario.where)
+        == scenario
+    )
 
 
 def test_every_part_of_the_compliance_is_a_switch_that_is_on() -> None:
     assert asdict(load_scenario("walk_flat").compliance) == asdict(Parts())
     for name in asdict(Parts()):
-        parts = asdict(load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance)
+        parts = asdict(
+            load_scenario("walk_flat", overrides=[f"compliance.{name}=false"]).compliance
+        )
         assert [key for key, on in parts.items() if not on] == [name]
 
 
@@ -194,10 +251,24 @@ MISTAKES = {
     "macro_step=-0.005": ["macro_step", "got -0.005", "> 0"],
     "macro_step=1": ["macro_step", "<= 0.1"],
     "macro_step=0.003": ["duration", "multiple of macro_step = 0.003", "9.999"],
-    "duration=1e9": ["walk_flat.toml: duration: ", "too many macro-steps", "at most 1000000 macro-steps, 5000 s", "lengthen macro_step"],
+    "duration=1e9": [
+        "walk_flat.toml: duration: ",
+        "too many macro-steps",
+        "at most 1000000 macro-steps, 5000 s",
+        "lengthen macro_step",
+    ],
     "duration=1e308": ["too many macro-steps"],
-    "outputs.interval=0.012": ["outputs.interval", "got 0.012", "multiple of macro_step = 0.005", "0.01 is the nearest"],
-    "outputs.interval=0.001": ["outputs.interval", "multiple of macro_step = 0.005", "0.005 is the nearest"],
+    "outputs.interval=0.012": [
+        "outputs.interval",
+        "got 0.012",
+        "multiple of macro_step = 0.005",
+        "0.01 is the nearest",
+    ],
+    "outputs.interval=0.001": [
+        "outputs.interval",
+        "multiple of macro_step = 0.005",
+        "0.005 is the nearest",
+    ],
     "outputs.interval=-0.01": ["outputs.interval", "got -0.01", ">= 0"],
     "outputs.interval=often": ["outputs.interval", "'often'"],
     "macro_step=1e-9": ["too many macro-steps", "0.001 s with macro_step = 1e-09 s"],
@@ -220,7 +291,11 @@ MISTAKES = {
     "events={time=1}": ["events", "[[events]]"],
     "events=[{time=1}]": ["events[0].duration", "missing key"],
     "events=[{time=1, duration=1, force=[1, 2]}]": ["events[0].force", "3 numbers"],
-    "events=[{time=1, duration=1, force=['1 N', '2 Nm', 0]}]": ["events[0].force[1]", "'2 Nm'", "N"],
+    "events=[{time=1, duration=1, force=['1 N', '2 Nm', 0]}]": [
+        "events[0].force[1]",
+        "'2 Nm'",
+        "N",
+    ],
     "sensors.foot_force_noise=2": ["foot_force_noise", "got 2", "< 1"],
     "events=[{time=1, leg='LF'}]": ["events[0].fault", "missing key", "dead, stuck"],
     "events=[{time=1, leg='LX', fault='dead'}]": ["events[0].leg", "'LX'", "LF, LM"],
@@ -233,7 +308,10 @@ MISTAKES = {
     "sensors.foot_force_delay=10 mm": ["foot_force_delay", "'10 mm'", "ms"],
     "compliance.slip_pd=false": ["compliance", "did you mean 'slip_pid'"],
     "compliance.slip_pid=0": ["compliance.slip_pid", "got 0", "true or false"],
-    "complaince.slip_pid=false": ["--set complaince.slip_pid: ", "did you mean 'compliance.slip_pid'"],
+    "complaince.slip_pid=false": [
+        "--set complaince.slip_pid: ",
+        "did you mean 'compliance.slip_pid'",
+    ],
     "compliance=3": ["compliance", "got 3", "table"],
     "variation.height=-1 mm": ["variation.height", ">= 0"],
     "variation.hight=1 mm": ["variation", "did you mean 'height'"],
@@ -278,7 +356,9 @@ def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -
         ("parameters = {torso.mass = 1}", "parameters"),
     ],
 )
-def test_a_mistake_in_a_file_is_told_by_file_then_key(tmp_path: Path, text: str, place: str) -> None:
+def test_a_mistake_in_a_file_is_told_by_file_then_key(
+    tmp_path: Path, text: str, place: str
+) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(text)
     with pytest.raises(ScenarioError) as caught:
@@ -286,7 +366,9 @@ def test_a_mistake_in_a_file_is_told_by_file_then_key(tmp_path: Path, text: str,
     assert caught.value.where == f"{path}: {place}"
 
 
-def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_without_quotes_with_them(tmp_path: Path) -> None:
+def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_without_quotes_with_them(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("parameters = {'torso.mas' = 1}")
     with pytest.raises(ScenarioError, match=r"got 'torso\.mas'.*did you mean 'torso\.mass'"):
@@ -297,7 +379,9 @@ def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_with
 
 
 def test_the_longest_run_allowed_is_allowed() -> None:
-    assert load_scenario("walk_flat", overrides=[f"duration={0.005 * MAX_STEPS}"]).steps == MAX_STEPS
+    assert (
+        load_scenario("walk_flat", overrides=[f"duration={0.005 * MAX_STEPS}"]).steps == MAX_STEPS
+    )
 
 
 def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
@@ -308,7 +392,12 @@ def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("duration = ", "not a TOML file"), ("durration = 1", "did you mean 'duration'"), ("\udc80", "not a TOML file")]
+    ("text", "message"),
+    [
+        ("duration = ", "not a TOML file"),
+        ("durration = 1", "did you mean 'duration'"),
+        ("\udc80", "not a TOML file"),
+    ],
 )
 def test_a_bad_file_is_told_by_its_name(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "mine.toml"
@@ -329,7 +418,11 @@ def test_all_errors_share_the_one_base() -> None:
     "table",
     [
         {"a": 1, "b": 0.1, "c": True, "d": 'say "ü"\n', "e": [1, 2.5, "x"], "f": []},
-        {"plain": 1, "table": {"inner": {"deep": -1e-300}}, "list": [{"a": 1}, {"a": 2, "b": {"c": [1]}}]},
+        {
+            "plain": 1,
+            "table": {"inner": {"deep": -1e-300}},
+            "list": [{"a": 1}, {"a": 2, "b": {"c": [1]}}],
+        },
         {"dotted.key": {"torso.com[1]": 0.5}, "spaced key": 1},
     ],
 )

@@ -1,4 +1,6 @@
-"""Walks whose loop is C: bit for bit those of the Python master with the same FMUs, run after run; what goes wrong is said as there."""
+"""Walks whose loop is C: bit for bit those of the Python master with the same FMUs, run after
+run; what goes wrong is said as there.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,14 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
-from hexapod_cosim.cosim.run.run import initialise_plant, judge, make_plan, make_sensor, open_plant, simulate
+from hexapod_cosim.cosim.run.run import (
+    initialise_plant,
+    judge,
+    make_plan,
+    make_sensor,
+    open_plant,
+    simulate,
+)
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Command, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -33,12 +42,17 @@ from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import FRICTION_LAWS, FmuError, load_robot
 
 SENSORS = ("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=0.012")
-FAULTS = 'events=[{time=1.5, leg="LM", fault="dead", duration=0.5}, {time=1.2, leg="RF", fault="stuck"}]'
+FAULTS = (
+    'events=[{time=1.5, leg="LM", fault="dead", duration=0.5}, {time=1.2, leg="RF", fault="stuck"}]'
+)
 PUSH = "events=[{time=0.7, duration=0.103, force=[0, 12, 0], torque=[0.1, 0, 0]}]"
 TURN = ("command.yaw_rate=0.2", "command.roll=0.03", "command.vy=0.01")
 ENDLESS = "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"
-CLOSE = 1e-6  # relative, of figures under the C controller and under the Python one, whose commands agree to 1e-12 rad
-GROWTH = 1_000_000  # bytes    over 40 runs, whose recordings are 2 MB each: less than one of them is kept
+# relative, of figures under the C controller and under the Python one, whose commands agree to
+# 1e-12 rad
+CLOSE = 1e-6
+# bytes    over 40 runs, whose recordings are 2 MB each: less than one of them is kept
+GROWTH = 1_000_000
 
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -49,7 +63,11 @@ def planned(name: str, *changes: str, seed: int | None = None) -> Scenario:
 
 
 def gains_of(scenario: Scenario) -> Gains | None:
-    return None if scenario.control == "kinematic" else make_gains(load_robot(scenario.robot), period=scenario.macro_step)
+    return (
+        None
+        if scenario.control == "kinematic"
+        else make_gains(load_robot(scenario.robot), period=scenario.macro_step)
+    )
 
 
 def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
@@ -67,8 +85,14 @@ def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
 
 
 def steady(summary: Summary) -> Summary:
-    """Without the one figure that the machine's load decides, and without those that there are none of (no NaN is equal to another)."""
-    figures = {name: value for name, value in summary.metrics.items() if name != "realtime_factor" and np.isfinite(value)}
+    """Without the one figure that the machine's load decides, and without those that there are
+    none of (no NaN is equal to another).
+    """
+    figures = {
+        name: value
+        for name, value in summary.metrics.items()
+        if name != "realtime_factor" and np.isfinite(value)
+    }
     return replace(summary, metrics=figures)
 
 
@@ -78,16 +102,20 @@ def walker() -> Iterator[Walker]:
         yield one
 
 
-# ------------------------------------------------------------------------------------------------ the same walk
+# ------------------------------------------------------------------------------------------------
+# the same walk
 
 
 WALKS = [
-    planned("walk_flat", "control=compliant", seed=3), planned("walk_flat", "control=kinematic", "gait.name=ripple", *TURN, seed=4),
-    planned("walk_flat", "control=compliant", "gait.name=wave", PUSH), planned("walk_flat", "control=compliant", FAULTS, *SENSORS, seed=5),
+    planned("walk_flat", "control=compliant", seed=3),
+    planned("walk_flat", "control=kinematic", "gait.name=ripple", *TURN, seed=4),
+    planned("walk_flat", "control=compliant", "gait.name=wave", PUSH),
+    planned("walk_flat", "control=compliant", FAULTS, *SENSORS, seed=5),
     planned("walk_flat", "gait.name=amble", "friction.law=bristle", SENSORS[1]),
     planned("stop_and_go", "control=compliant", "macro_step=0.004"),
-    planned("phantomx_walk", "control=compliant", "start=7.3", "torso.mass=1.9", seed=6), planned("incline", "control=compliant", seed=7),
-]  # fmt: skip
+    planned("phantomx_walk", "control=compliant", "start=7.3", "torso.mass=1.9", seed=6),
+    planned("incline", "control=compliant", seed=7),
+]
 
 
 @pytest.mark.parametrize("scenario", WALKS, ids=lambda scenario: scenario.title)
@@ -105,7 +133,9 @@ def test_every_signal_of_a_walk_is_the_python_masters_bit_for_bit(scenario: Scen
     assert found.facts["walk"]["distance"] == judged.facts["walk"]["distance"] > 0.0
 
 
-def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_before(walker: Walker) -> None:
+def test_what_is_recorded_changes_no_figure_and_runs_do_not_depend_on_those_before(
+    walker: Walker,
+) -> None:
     plans = [WALKS[0], WALKS[3], replace(WALKS[1], robot="phantomx_mk4"), WALKS[2]]
     first = [steady(walker.summary(plan, gains=gains_of(plan))) for plan in plans]
     assert all(summary.walked for summary in first)
@@ -132,9 +162,14 @@ def test_bristles_are_judged_however_a_scenario_asks_for_them(walker: Walker) ->
 
 def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:
     for scenario in WALKS[:3]:
-        found, expected = walker.simulate(scenario, gains=gains_of(scenario)), simulate(scenario, gains=gains_of(scenario))
+        found, expected = (
+            walker.simulate(scenario, gains=gains_of(scenario)),
+            simulate(scenario, gains=gains_of(scenario)),
+        )
         for name in expected.metrics.keys() - {"realtime_factor"}:
-            assert found.metrics[name] == pytest.approx(expected.metrics[name], rel=CLOSE, abs=1e-12, nan_ok=True), name
+            assert found.metrics[name] == pytest.approx(
+                expected.metrics[name], rel=CLOSE, abs=1e-12, nan_ok=True
+            ), name
         assert found.facts["warnings"] == expected.facts["warnings"]
         assert found.parameters == expected.parameters
 
@@ -142,16 +177,29 @@ def test_the_figures_are_those_of_the_python_controller(walker: Walker) -> None:
 def test_a_study_may_bring_its_own_fmus(tmp_path: Path) -> None:
     scenario = WALKS[0]
     setup = make_plan(scenario).controller
-    plain = replace(setup, gains=None, gait=replace(setup.gait, period=2.0), parts=replace(setup.parts, slip_pid=False))
-    plant, controller = export_fmu(load_robot("athena"), tmp_path / "a.fmu"), export_controller(plain, tmp_path / "c.fmu")
+    plain = replace(
+        setup,
+        gains=None,
+        gait=replace(setup.gait, period=2.0),
+        parts=replace(setup.parts, slip_pid=False),
+    )
+    plant, controller = (
+        export_fmu(load_robot("athena"), tmp_path / "a.fmu"),
+        export_controller(plain, tmp_path / "c.fmu"),
+    )
     with Walker(fmu=plant, controller=controller) as given, Walker() as own:
-        assert steady(given.summary(scenario, gains=gains_of(scenario))) == steady(own.summary(scenario, gains=gains_of(scenario)))
+        assert steady(given.summary(scenario, gains=gains_of(scenario))) == steady(
+            own.summary(scenario, gains=gains_of(scenario))
+        )
 
 
-# ------------------------------------------------------------------------------------------------ what goes wrong
+# ------------------------------------------------------------------------------------------------
+# what goes wrong
 
 
-def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afresh(walker: Walker) -> None:
+def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afresh(
+    walker: Walker,
+) -> None:
     bad = planned("walk_flat", "solver.method=rk4", "solver.step=0.005", ENDLESS)
     good = walker.summary(WALKS[0], gains=gains_of(WALKS[0]))
     expected, _ = in_python(bad, walker)
@@ -166,12 +214,19 @@ def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afres
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"commands": (Command(vx=10.0),)}, "do not reach"), ({"robot": "nowhere.toml"}, "nowhere.toml"),
-        ({"parameters": {"torso.mass": float("nan")}}, "torso.mass: got nan"), ({"parameters": {"torso.mas": 1.0}}, "no such variable"),
-        ({"macro_step": 0.05, "settings": {"gait": {"period": 0.08}}}, "impossible controller period"),
+        ({"commands": (Command(vx=10.0),)}, "do not reach"),
+        ({"robot": "nowhere.toml"}, "nowhere.toml"),
+        ({"parameters": {"torso.mass": float("nan")}}, "torso.mass: got nan"),
+        ({"parameters": {"torso.mas": 1.0}}, "no such variable"),
+        (
+            {"macro_step": 0.05, "settings": {"gait": {"period": 0.08}}},
+            "impossible controller period",
+        ),
     ],
-)  # fmt: skip
-def test_a_walk_that_cannot_begin_is_refused_in_words(walker: Walker, changes: dict[str, object], said: str) -> None:
+)
+def test_a_walk_that_cannot_begin_is_refused_in_words(
+    walker: Walker, changes: dict[str, object], said: str
+) -> None:
     good = walker.summary(WALKS[1])
     summary = walker.summary(replace(WALKS[1], **changes))  # type: ignore[arg-type]
     assert summary.status == REFUSED
@@ -179,7 +234,9 @@ def test_a_walk_that_cannot_begin_is_refused_in_words(walker: Walker, changes: d
     assert steady(walker.summary(WALKS[1])) == steady(good)
 
 
-def test_fmus_that_are_missing_or_something_else_are_refused(tmp_path: Path, athena_fmu: Path) -> None:
+def test_fmus_that_are_missing_or_something_else_are_refused(
+    tmp_path: Path, athena_fmu: Path
+) -> None:
     other = export_fmu(load_robot("phantomx_mk4"), tmp_path / "p.fmu")
     missing = tmp_path / "none.fmu"
     cases = (
@@ -213,7 +270,11 @@ def test_an_interrupted_walk_keeps_its_rows(walker: Walker) -> None:
 
 
 def test_another_versions_library_is_not_called(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_master, "_Master", type("Other", (ctypes.Structure,), {"_fields_": [("h", ctypes.c_double)]}))
+    monkeypatch.setattr(
+        native_master,
+        "_Master",
+        type("Other", (ctypes.Structure,), {"_fields_": [("h", ctypes.c_double)]}),
+    )
     with pytest.raises(FmuError, match="another version's"):
         native_master._library.__wrapped__()
 
@@ -229,11 +290,21 @@ def test_memory_does_not_grow_with_the_number_of_runs(walker: Walker) -> None:
     assert resident() - before < GROWTH
 
 
-# ------------------------------------------------------------------------------------------------ in processes
+# ------------------------------------------------------------------------------------------------
+# in processes
 
 
 def test_a_batch_of_compiled_controllers_does_not_depend_on_the_processes(walker: Walker) -> None:
-    plans = [replace(WALKS[1], seed=seed) for seed in range(3)] + [replace(WALKS[1], robot="nowhere.toml"), WALKS[4]]
-    serial, parallel = (list(run_batch(plans, workers=workers, compiled=True)) for workers in (1, 2))
-    assert list(map(steady, serial)) == list(map(steady, parallel)) == [steady(walker.summary(plan)) for plan in plans]
+    plans = [replace(WALKS[1], seed=seed) for seed in range(3)] + [
+        replace(WALKS[1], robot="nowhere.toml"),
+        WALKS[4],
+    ]
+    serial, parallel = (
+        list(run_batch(plans, workers=workers, compiled=True)) for workers in (1, 2)
+    )
+    assert (
+        list(map(steady, serial))
+        == list(map(steady, parallel))
+        == [steady(walker.summary(plan)) for plan in plans]
+    )
     assert [summary.status for summary in serial] == [COMPLETED] * 3 + [REFUSED, COMPLETED]

@@ -1,4 +1,6 @@
-"""The whole co-simulation: both robots walk for a minute, and its error falls with the macro-step as it should."""
+"""The whole co-simulation: both robots walk for a minute, and its error falls with the
+macro-step as it should.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +19,20 @@ COMMANDED, SHARE = 0.08, 0.10  # m/s, 1: how near to it the mean speed must come
 LEVEL = 0.02  # rad    of roll and pitch in a walk on flat ground: a fall is beyond 0.6
 SWAY, PERIOD, LOOK = 0.05, 1.0, 0.7  # rad, s, s
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
-SLOPE = 0.15  # of the order by regression over a factor of eight: the next term of the error still shows
+# of the order by regression over a factor of eight: the next term of the error still shows
+SLOPE = 0.15
 
 
 @pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(robot: str, control: str) -> None:
+def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(
+    robot: str, control: str
+) -> None:
     columns = '["torso.*"]'
-    scenario = load_scenario("walk_flat", overrides=[f"robot={robot}", f"control={control}", "duration=60", f"outputs.csv={columns}"])
+    scenario = load_scenario(
+        "walk_flat",
+        overrides=[f"robot={robot}", f"control={control}", "duration=60", f"outputs.csv={columns}"],
+    )
     result = simulate(scenario)
     assert result.completed
     recording = result.outcome.recording
@@ -38,14 +46,19 @@ def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(robot
 
 
 def swaying(robot: Robot, ahead: float) -> NDArray[np.void]:
-    """Joint commands that turn and lift the torso once a period, as fmpy's input; what holds at t is the motion's at t + ahead."""
+    """Joint commands that turn and lift the torso once a period, as fmpy's input; what holds at
+    t is the motion's at t + ahead.
+    """
     time = np.arange(0.0, LOOK + 2e-2, 1e-4)
     phase = 2.0 * np.pi * (time + ahead) / PERIOD
     angle, speed = 0.5 * SWAY * (1.0 - np.cos(phase)), np.pi * SWAY / PERIOD * np.sin(phase)
     columns = {"time": time}
     for leg, stance in zip(LEG_NAMES, robot.stance, strict=True):
         for joint, share, start in zip(("coxa", "femur"), (1.0, -0.5), stance[:2], strict=True):
-            columns |= {f"{leg}.{joint}.angle_ref": start + share * angle, f"{leg}.{joint}.speed_ref": share * speed}
+            columns |= {
+                f"{leg}.{joint}.angle_ref": start + share * angle,
+                f"{leg}.{joint}.speed_ref": share * speed,
+            }
     rows = np.zeros(len(time), dtype=[(name, np.float64) for name in columns])
     for name, values in columns.items():
         rows[name] = values
@@ -53,19 +66,30 @@ def swaying(robot: Robot, ahead: float) -> NDArray[np.void]:
 
 
 def torso_at(fmu: Path, h: float, *, middle: bool) -> NDArray[np.float64]:
-    """Torso position and yaw at LOOK after macro-steps of h, the commands sampled at each step's start or middle and held."""
+    """Torso position and yaw at LOOK after macro-steps of h, the commands sampled at each step's
+    start or middle and held.
+    """
     result = fmpy.simulate_fmu(
-        str(fmu), stop_time=LOOK, step_size=h, output_interval=h, start_values={"solver.tolerance": 1e-9},
-        input=swaying(load_robot("athena"), 0.5 * h if middle else 0.0), output=["torso.position[1]", "torso.position[3]", "torso.yaw"],
-    )  # fmt: skip
+        str(fmu),
+        stop_time=LOOK,
+        step_size=h,
+        output_interval=h,
+        start_values={"solver.tolerance": 1e-9},
+        input=swaying(load_robot("athena"), 0.5 * h if middle else 0.0),
+        output=["torso.position[1]", "torso.position[3]", "torso.yaw"],
+    )
     row = int(np.argmin(np.abs(result["time"] - LOOK)))
     assert result["time"][row] == pytest.approx(LOOK)
     return np.array([result[name][row] for name in result.dtype.names[1:]])
 
 
 @pytest.mark.parametrize(("middle", "order"), [(False, 1), (True, 2)])
-def test_the_co_simulation_error_falls_with_the_macro_step(athena_fmu: Path, middle: bool, order: int) -> None:
-    """A command held from a step's start lags by h/2: order 1. One sampled at the middle does not: order 2."""
+def test_the_co_simulation_error_falls_with_the_macro_step(
+    athena_fmu: Path, middle: bool, order: int
+) -> None:
+    """A command held from a step's start lags by h/2: order 1. One sampled at the middle does
+    not: order 2.
+    """
     exact = torso_at(athena_fmu, 1.25e-4, middle=True)
     errors = [float(np.linalg.norm(torso_at(athena_fmu, h, middle=middle) - exact)) for h in STEPS]
     slope = np.polyfit(np.log(STEPS), np.log(errors), 1)[0]

@@ -1,4 +1,6 @@
-"""The design: requirements met by python-control's judgement, kept in a file, told when impossible."""
+"""The design: requirements met by python-control's judgement, kept in a file, told when
+impossible.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,42 @@ import control
 import numpy as np
 import pytest
 
-from hexapod_cosim.controller import Gains, GainsError, LegSolver, Requirements, SuspensionGains, load_gains, save_gains
+from hexapod_cosim.controller import (
+    Gains,
+    GainsError,
+    LegSolver,
+    Requirements,
+    SuspensionGains,
+    load_gains,
+    save_gains,
+)
 from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
-from hexapod_cosim.controller.design.closed import PLACES, closed_loop, disturbed, spectral_radius, splay
-from hexapod_cosim.controller.design.laws import Laws, delay, delay_response, delay_steps, sampled_slip_law, slip_law, slip_response
-from hexapod_cosim.controller.design.loci import all_loci, critical_size, eigenloci, frequencies, loop_margins, quick_margins, response
+from hexapod_cosim.controller.design.closed import (
+    PLACES,
+    closed_loop,
+    disturbed,
+    spectral_radius,
+    splay,
+)
+from hexapod_cosim.controller.design.laws import (
+    Laws,
+    delay,
+    delay_response,
+    delay_steps,
+    sampled_slip_law,
+    slip_law,
+    slip_response,
+)
+from hexapod_cosim.controller.design.loci import (
+    all_loci,
+    critical_size,
+    eigenloci,
+    frequencies,
+    loop_margins,
+    quick_margins,
+    response,
+)
 from hexapod_cosim.controller.design.standing import answers, axes_of, relieved, squeeze_matrix
 from hexapod_cosim.cosim.design.design import design_for, read_requirements, standing_plants
 from hexapod_cosim.models import load_robot
@@ -57,7 +89,11 @@ def gains(request: pytest.FixtureRequest, plant_build: Path) -> Gains:
 
 def test_every_loop_of_every_plant_keeps_the_margins_asked_for(gains: Gains) -> None:
     omega = frequencies(PERIOD, FINE)
-    for loci, law in zip(all_loci(load_robot(gains.robot), plants_of(gains.robot), omega), laws_of(gains).responses(omega), strict=True):
+    for loci, law in zip(
+        all_loci(load_robot(gains.robot), plants_of(gains.robot), omega),
+        laws_of(gains).responses(omega),
+        strict=True,
+    ):
         for locus in loci.values:
             found = quick_margins(locus * law, omega)
             assert found.gain >= gains.requirements.gain_margin
@@ -67,18 +103,25 @@ def test_every_loop_of_every_plant_keeps_the_margins_asked_for(gains: Gains) -> 
 def test_the_quick_margins_are_python_controls(gains: Gains) -> None:
     omega = frequencies(PERIOD, FINE)
     for loci, law in zip(
-        eigenloci(load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], omega), laws_of(gains).responses(omega), strict=True
+        eigenloci(load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], omega),
+        laws_of(gains).responses(omega),
+        strict=True,
     ):
         for locus in loci:
             mine, theirs = quick_margins(locus * law, omega), loop_margins(locus * law, omega)
             for name, error in zip(("gain", "phase"), MARGIN_ERROR, strict=True):
-                assert getattr(mine, name) == getattr(theirs, name) or abs(getattr(mine, name) - getattr(theirs, name)) < error
+                assert (
+                    getattr(mine, name) == getattr(theirs, name)
+                    or abs(getattr(mine, name) - getattr(theirs, name)) < error
+                )
             assert mine.crossover == pytest.approx(theirs.crossover, rel=0.02)
             assert mine.delay == pytest.approx(theirs.delay, rel=0.02)
 
 
 def test_margins_of_a_loop_known_in_closed_form() -> None:
-    """k / s with a delay T: crossover k, phase margin 90 deg - k T, gain margin pi / (2 k T), delay margin (pi/2)/k - T."""
+    """k / s with a delay T: crossover k, phase margin 90 deg - k T, gain margin pi / (2 k T),
+    delay margin (pi/2)/k - T.
+    """
     k, late, omega = 10.0, 0.02, np.geomspace(0.1, 300.0, 600)
     loop = k / (1j * omega) * np.exp(-1j * omega * late)
     for found in (quick_margins(loop, omega), loop_margins(loop, omega)):
@@ -90,17 +133,29 @@ def test_margins_of_a_loop_known_in_closed_form() -> None:
 
 def test_the_eigenloci_are_the_characteristic_function_of_all_feet(gains: Gains) -> None:
     """det(1 - l S P W) over all feet is the product of 1 + l locus, whatever l."""
-    robot, plant, omega = load_robot(gains.robot), plants_of(gains.robot)[NOMINAL], np.array([1.0, 30.0, 200.0])
+    robot, plant, omega = (
+        load_robot(gains.robot),
+        plants_of(gains.robot)[NOMINAL],
+        np.array([1.0, 30.0, 200.0]),
+    )
     loads, _ = answers(robot, plant)
     flat, _ = axes_of(3)
-    whole = squeeze_matrix(robot, plant) @ response(relieved(robot, plant), omega)[:, flat][:, :, flat] * np.repeat(loads, 2)
+    whole = (
+        squeeze_matrix(robot, plant)
+        @ response(relieved(robot, plant), omega)[:, flat][:, :, flat]
+        * np.repeat(loads, 2)
+    )
     for law in (1.0, 2.0 - 3.0j):
         expected = np.linalg.det(np.eye(6) - law * whole)
-        np.testing.assert_allclose(np.prod(1.0 + law * eigenloci(robot, plant, omega)[0], axis=0), expected, rtol=1e-9)
+        np.testing.assert_allclose(
+            np.prod(1.0 + law * eigenloci(robot, plant, omega)[0], axis=0), expected, rtol=1e-9
+        )
 
 
 @pytest.mark.parametrize(("name", "feet"), [(NOMINAL, 3), ("six legs, load 1, gears slip", 6)])
-def test_the_common_push_and_twist_of_all_feet_are_no_squeeze_and_have_no_locus(name: str, feet: int) -> None:
+def test_the_common_push_and_twist_of_all_feet_are_no_squeeze_and_have_no_locus(
+    name: str, feet: int
+) -> None:
     robot, plant = load_robot("athena"), plants_of("athena")[name]
     normal, matrix = plant.force[plant.standing, 2], squeeze_matrix(robot, plant)
     places = LegSolver(robot).forward(plant.angle)[plant.standing, :2]
@@ -110,7 +165,11 @@ def test_the_common_push_and_twist_of_all_feet_are_no_squeeze_and_have_no_locus(
     left = (matrix @ np.arange(2.0 * feet)).reshape(feet, 2)
     np.testing.assert_allclose(left.sum(axis=0), 0.0, atol=1e-12)
     assert abs((places[:, 0] * left[:, 1] - places[:, 1] * left[:, 0]).sum()) < 1e-12
-    assert np.linalg.matrix_rank(matrix) == 2 * feet - 3 == len(eigenloci(robot, plant, np.array([1.0]))[0])
+    assert (
+        np.linalg.matrix_rank(matrix)
+        == 2 * feet - 3
+        == len(eigenloci(robot, plant, np.array([1.0]))[0])
+    )
 
 
 def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
@@ -120,17 +179,28 @@ def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
         loop = closed_loop(robot, plant, laws)
         assert spectral_radius(loop, feet=feet) < 1.0, name
         held = np.abs(np.linalg.eigvals(loop.A) - 1.0) < AT_ONE
-        assert held.sum() == PLACES + 2 * feet  # what nothing holds is exactly 1, and nothing else is
+        assert (
+            held.sum() == PLACES + 2 * feet
+        )  # what nothing holds is exactly 1, and nothing else is
 
 
 def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains) -> None:
     """Generalised Nyquist against the eigenvalues of the whole loop, the suspension left out."""
     robot, name = load_robot(gains.robot), "six legs, load 2, gears slip"
     plant, omega = plants_of(gains.robot)[name], frequencies(PERIOD, FINE)
-    critical = 1.0 / critical_size(eigenloci(robot, plant, omega)[0] * laws_of(gains).responses(omega)[0]).max()
+    critical = (
+        1.0
+        / critical_size(
+            eigenloci(robot, plant, omega)[0] * laws_of(gains).responses(omega)[0]
+        ).max()
+    )
     spring = gains.suspension
     rigid = replace(
-        gains, suspension=SuspensionGains(limit=1.0, **{key: 1e6 * getattr(spring, key) for key in ("mass", "damping", "stiffness")})
+        gains,
+        suspension=SuspensionGains(
+            limit=1.0,
+            **{key: 1e6 * getattr(spring, key) for key in ("mass", "damping", "stiffness")},
+        ),
     )
     for by, stable in ((0.97 * critical, True), (1.03 * critical, False)):
         radius = spectral_radius(closed_loop(robot, plant, laws_of(scaled(rigid, by))), feet=6)
@@ -142,23 +212,40 @@ def test_the_design_uses_the_margin_it_has(gains: Gains) -> None:
     omega = frequencies(PERIOD, FINE)
     law, needs = laws_of(scaled(gains, 1.1)).responses(omega)[0], gains.requirements
     margin, name = gains.margins.binding.removesuffix(")").split(" (", 1)
-    found = [quick_margins(locus * law, omega) for locus in eigenloci(load_robot(gains.robot), plants_of(gains.robot)[name], omega)[0]]
+    found = [
+        quick_margins(locus * law, omega)
+        for locus in eigenloci(load_robot(gains.robot), plants_of(gains.robot)[name], omega)[0]
+    ]
     least = min(m.gain for m in found) if margin == "gain_margin" else min(m.phase for m in found)
     assert least < getattr(needs, margin)
 
 
 def test_less_delay_or_less_margin_allows_more_integral_action() -> None:
     robot, plants = load_robot("athena"), plants_of("athena")
-    for needs in (Requirements(force_delay=0.0), Requirements(delay_periods=0.0), Requirements(phase_margin=40.0, gain_margin=5.0)):
-        assert design_gains(robot, PERIOD, plants=plants, requirements=needs).slip.ki > 1.1 * designed("athena").slip.ki
+    for needs in (
+        Requirements(force_delay=0.0),
+        Requirements(delay_periods=0.0),
+        Requirements(phase_margin=40.0, gain_margin=5.0),
+    ):
+        assert (
+            design_gains(robot, PERIOD, plants=plants, requirements=needs).slip.ki
+            > 1.1 * designed("athena").slip.ki
+        )
 
 
 def test_the_steady_slip_is_what_a_steady_drag_is_left_with() -> None:
-    """Feet whose targets splay at a constant rate: the force with the law over that without it, after the transients."""
-    robot, plant, gains = load_robot("athena"), plants_of("athena")["six legs, load 1, gears slip"], designed("athena")
+    """Feet whose targets splay at a constant rate: the force with the law over that without it,
+    after the transients.
+    """
+    robot, plant, gains = (
+        load_robot("athena"),
+        plants_of("athena")["six legs, load 1, gears slip"],
+        designed("athena"),
+    )
     ramp = np.arange(600) * PERIOD
     forces = [
-        control.forced_response(system, ramp, np.outer(splay(robot, plant), ramp)).outputs[:, -1] @ splay(robot, plant)
+        control.forced_response(system, ramp, np.outer(splay(robot, plant), ramp)).outputs[:, -1]
+        @ splay(robot, plant)
         for system in (closed_loop(robot, plant, laws_of(gains)), relieved(robot, plant))
     ]
     assert forces[0] / forces[1] < 1.1 * gains.margins.slip_rejection
@@ -167,13 +254,21 @@ def test_the_steady_slip_is_what_a_steady_drag_is_left_with() -> None:
 def test_the_laws_closed_form_response_is_its_systems(gains: Gains) -> None:
     omega = frequencies(PERIOD, FINE)
     system = sampled_slip_law(gains.slip, period=PERIOD)
-    np.testing.assert_allclose(slip_response(gains.slip, omega, period=PERIOD), response(system, omega)[:, 0, 0], rtol=1e-6)
-    assert response(system, omega)[40, 0, 0] == pytest.approx(control.evalfr(system, np.exp(1j * omega[40] * PERIOD)), rel=1e-9)
+    np.testing.assert_allclose(
+        slip_response(gains.slip, omega, period=PERIOD), response(system, omega)[:, 0, 0], rtol=1e-6
+    )
+    assert response(system, omega)[40, 0, 0] == pytest.approx(
+        control.evalfr(system, np.exp(1j * omega[40] * PERIOD)), rel=1e-9
+    )
     late = delay(3, period=PERIOD)
-    np.testing.assert_allclose(delay_response(3, omega, period=PERIOD), response(late, omega)[:, 0, 0], rtol=1e-9)
+    np.testing.assert_allclose(
+        delay_response(3, omega, period=PERIOD), response(late, omega)[:, 0, 0], rtol=1e-9
+    )
     slow = np.array([1.0, 3.0])
     s = [slip_law(gains.slip)(1j * w) for w in slow]
-    np.testing.assert_allclose(slip_response(gains.slip, slow, period=PERIOD), s, rtol=1e-3)  # at 1 % of the Nyquist frequency
+    np.testing.assert_allclose(
+        slip_response(gains.slip, slow, period=PERIOD), s, rtol=1e-3
+    )  # at 1 % of the Nyquist frequency
 
 
 def test_the_law_is_the_difference_equations_that_run() -> None:
@@ -184,10 +279,14 @@ def test_the_law_is_the_difference_equations_that_run() -> None:
     for f in force:
         new = (h * (f + e) + (2.0 * gains.filter_time - h) * smooth) / (2.0 * gains.filter_time + h)
         total += 0.5 * gains.ki * h * (new + smooth)
-        slope = (2.0 * gains.kd * (new - smooth) + (2.0 * gains.derivative_time - h) * slope) / (2.0 * gains.derivative_time + h)
+        slope = (2.0 * gains.kd * (new - smooth) + (2.0 * gains.derivative_time - h) * slope) / (
+            2.0 * gains.derivative_time + h
+        )
         e, smooth = f, new
         expected.append(gains.kp * smooth + total + slope)
-    found = control.forced_response(sampled_slip_law(gains, period=h), np.arange(80) * h, force).outputs
+    found = control.forced_response(
+        sampled_slip_law(gains, period=h), np.arange(80) * h, force
+    ).outputs
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
@@ -232,11 +331,19 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
     gains = replace(designed("athena"), caveats=("the design leaves out a: b", 'and "c"'))
     path = save_gains(gains, tmp_path / "gains.toml")
     assert load_gains(path) == gains
-    assert gains_warnings(load_robot("athena"), gains, PERIOD) == ("the design leaves out a: b", 'and "c"')
-    path.write_text(path.read_text(encoding="utf-8").replace("caveats = [", "caveats = [1.0, "), encoding="utf-8")
+    assert gains_warnings(load_robot("athena"), gains, PERIOD) == (
+        "the design leaves out a: b",
+        'and "c"',
+    )
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("caveats = [", "caveats = [1.0, "),
+        encoding="utf-8",
+    )
     with pytest.raises(GainsError, match=r"caveats: wrong type: got 1\.0, expected a text"):
         load_gains(path)
-    path.write_text(re.sub("caveats = .*", 'caveats = "a"', path.read_text(encoding="utf-8")), encoding="utf-8")
+    path.write_text(
+        re.sub("caveats = .*", 'caveats = "a"', path.read_text(encoding="utf-8")), encoding="utf-8"
+    )
     with pytest.raises(GainsError, match="caveats: wrong type: got 'a', expected a list of texts"):
         load_gains(path)
 
@@ -244,7 +351,11 @@ def test_caveats_are_kept_and_warned_about(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("tracking_time = ", "traking_time = ", "unknown key.*traking_time.*did you mean 'tracking_time'"),
+        (
+            "tracking_time = ",
+            "traking_time = ",
+            "unknown key.*traking_time.*did you mean 'tracking_time'",
+        ),
         ("\n[slip]", "\n[slop]", "missing section.*\\[slip\\]"),
         ("stiffness = ", "stiffness = -", "suspension.stiffness: impossible value"),
         ("format = 2", "format = 1", "unknown format"),
@@ -271,7 +382,10 @@ def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("deflection=0.2", "misses its phase_margin of the suspension: got .*, expected at least 60"),
+        (
+            "deflection=0.2",
+            "misses its phase_margin of the suspension: got .*, expected at least 60",
+        ),
         ("slip_rejection=0.05", "misses its slip_rejection: got 0.09., expected at most 0.05"),
         ("bandwidth=40", "misses its bandwidth: got 27.4.., expected at least 40"),
         ("frequency=0", "frequency: impossible requirement"),
@@ -283,7 +397,12 @@ def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
 def test_requirements_that_cannot_be_met_are_told_by_name(setting: str, message: str) -> None:
     robot = load_robot("athena")
     with pytest.raises(GainsError, match=message):
-        design_gains(robot, PERIOD, plants=plants_of("athena"), requirements=read_requirements([setting], robot))
+        design_gains(
+            robot,
+            PERIOD,
+            plants=plants_of("athena"),
+            requirements=read_requirements([setting], robot),
+        )
 
 
 def test_a_robot_a_period_or_plants_that_do_not_fit_are_refused() -> None:
@@ -300,7 +419,10 @@ def test_a_robot_a_period_or_plants_that_do_not_fit_are_refused() -> None:
 
 
 def test_the_design_is_drawn(tmp_path: Path) -> None:
-    gains, plants = designed("athena"), {name: plant for name, plant in plants_of("athena").items() if "load 1" in name}
+    gains, plants = (
+        designed("athena"),
+        {name: plant for name, plant in plants_of("athena").items() if "load 1" in name},
+    )
     written = plot_design(load_robot("athena"), gains, plants, tmp_path)
     assert len(written) == 8
     assert all(path.stat().st_size > 5000 for path in written)

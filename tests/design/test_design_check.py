@@ -45,7 +45,12 @@ def test_a_large_squeeze_does_not(gains: Gains) -> None:
 @pytest.mark.parametrize(("by", "shakes"), [(4.5, False), (9.0, True)])
 def test_the_fmu_shakes_where_the_linear_loop_does(gains: Gains, by: float, shakes: bool) -> None:
     """The gain margin, 16.5 dB (6.7 times) under a third of the weight a leg, is the FMU's."""
-    eager = replace(gains, slip=replace(gains.slip, kp=by * gains.slip.kp, ki=by * gains.slip.ki, kd=by * gains.slip.kd))
+    eager = replace(
+        gains,
+        slip=replace(
+            gains.slip, kp=by * gains.slip.kp, ki=by * gains.slip.ki, kd=by * gains.slip.kd
+        ),
+    )
     check = check_design(load_robot("athena"), eager, squeeze=1e-3)
     for force in (check.predicted, check.simulated):
         late = abs(force[2 * len(force) // 3 :]).max()

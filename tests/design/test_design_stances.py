@@ -52,7 +52,9 @@ def strong(torque_max: float) -> Robot:
 def test_a_robot_at_rest_stays_where_it_is(robot: Robot, load: float) -> None:
     with level_fmu(robot) as fmu:
         motion, inputs = rest(fmu, robot, standing=TRIPOD, load=load)
-        bench = Bench(fmu, robot, coulomb_friction=0.0, slope=0.1 * robot.friction.slope, period=0.05)
+        bench = Bench(
+            fmu, robot, coulomb_friction=0.0, slope=0.1 * robot.friction.slope, period=0.05
+        )
         bench.start(motion, inputs)
         forces = bench.force()[2::3]
         for k in range(20):
@@ -65,7 +67,9 @@ def test_a_robot_at_rest_stays_where_it_is(robot: Robot, load: float) -> None:
 
 @pytest.mark.parametrize("load", [0.1, 1.0, 2.0])
 @pytest.mark.parametrize("stance", list(STANCES))
-def test_a_push_that_makes_a_load_leaves_every_foot_at_least_half_its_share(stance: str, load: float) -> None:
+def test_a_push_that_makes_a_load_leaves_every_foot_at_least_half_its_share(
+    stance: str, load: float
+) -> None:
     """Statics: forces, weight and push are in balance about any point.
 
     The share is what the foot has under the weight alone.
@@ -81,14 +85,19 @@ def test_a_push_that_makes_a_load_leaves_every_foot_at_least_half_its_share(stan
     assert push[[0, 1, 5]].tolist() == [0.0, 0.0, 0.0]
     np.testing.assert_array_less(0.5 * whole * alone - ROUNDING, share)
     # about the torso's origin: sum f x = W x_c - F x_t + tau_y, sum f y = W y_c - F y_t - tau_x
-    moment = robot.weight * lifted_centre(robot, angle) - push[2] * com + np.array([push[4], -push[3]])
+    moment = (
+        robot.weight * lifted_centre(robot, angle) - push[2] * com + np.array([push[4], -push[3]])
+    )
     np.testing.assert_allclose(share @ feet, moment, atol=1e-9)
 
 
 def lifted_centre(robot: Robot, angle: np.ndarray) -> np.ndarray:
     posed = replace(
         robot,
-        legs=tuple(replace(leg, stance=tuple(row)) for leg, row in zip(robot.legs, angle.tolist(), strict=True)),
+        legs=tuple(
+            replace(leg, stance=tuple(row))
+            for leg, row in zip(robot.legs, angle.tolist(), strict=True)
+        ),
     )
     return centre_of_mass(posed)
 
@@ -111,7 +120,10 @@ def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> 
 
     def bending(most: float) -> Robot:
         """With tibias that bend by so much beyond the stance [rad]."""
-        links = [(*leg.links[:2], replace(leg.links[2], angle_max=leg.stance[2] + most)) for leg in robot.legs]
+        links = [
+            (*leg.links[:2], replace(leg.links[2], angle_max=leg.stance[2] + most))
+            for leg in robot.legs
+        ]
         return replace(
             robot,
             legs=tuple(replace(leg, links=of) for leg, of in zip(robot.legs, links, strict=True)),
@@ -119,8 +131,12 @@ def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> 
 
     lifted = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0])
     np.testing.assert_allclose(lifts(robot), 0.04 * lifted, atol=1e-12)
-    np.testing.assert_allclose(lifts(scaled_robot(robot, 0.5)), 0.04 * 0.16 / 0.22 * lifted, atol=1e-12)  # legs of 0.16 m
-    np.testing.assert_allclose(lifts(scaled_robot(robot, 2.0)), 0.04 * 0.64 / 0.44 * lifted, atol=1e-12)
+    np.testing.assert_allclose(
+        lifts(scaled_robot(robot, 0.5)), 0.04 * 0.16 / 0.22 * lifted, atol=1e-12
+    )  # legs of 0.16 m
+    np.testing.assert_allclose(
+        lifts(scaled_robot(robot, 2.0)), 0.04 * 0.64 / 0.44 * lifted, atol=1e-12
+    )
     np.testing.assert_allclose(lifts(bending(0.2)), 0.02 * lifted, atol=1e-12)
     with pytest.raises(
         StanceError,
@@ -142,10 +158,14 @@ def test_servos_however_weak_carry_any_load_while_the_plant_is_looked_at() -> No
 
 
 def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
-    """Tripods have no foot before the centre of mass of a torso so heavy in front; six legs have."""
+    """Tripods have no foot before the centre of mass of a torso so heavy in front; six legs
+    have.
+    """
     gains = design_for(off_centre(0.3, 0.0, 0.0), PERIOD)
     assert len(gains.caveats) == 3
-    for text, stance, y, leg in zip(gains.caveats, ("LF LR RM", "LM RF RR"), ("1", "-1"), ("LR", "RR"), strict=False):
+    for text, stance, y, leg in zip(
+        gains.caveats, ("LF LR RM", "LM RF RR"), ("1", "-1"), ("LR", "RR"), strict=False
+    ):
         assert text == (
             f"the design leaves out tripod {stance}: the robot does not stay on its legs (got the centre of mass at (139, {y}) mm, "
             f"under which foot {leg} carries nothing, expected between {stance})"
@@ -160,8 +180,13 @@ def test_loads_under_which_a_soft_robot_finds_no_rest_are_left_out() -> None:
         "six legs, load 2, gears stick",
         "six legs, load 2, gears slip",
     ]
-    assert [text.split(":")[0] for text in left_out] == [f"tripod {legs} under 2 times its weight" for legs in ("LF LR RM", "LM RF RR")]
-    assert all("the robot does not stay on its legs (got " in text and " rad/s after " in text for text in left_out)
+    assert [text.split(":")[0] for text in left_out] == [
+        f"tripod {legs} under 2 times its weight" for legs in ("LF LR RM", "LM RF RR")
+    ]
+    assert all(
+        "the robot does not stay on its legs (got " in text and " rad/s after " in text
+        for text in left_out
+    )
 
 
 def test_stances_that_the_servos_do_not_carry_are_left_out_and_a_robot_that_none_carries_is_refused(
@@ -191,7 +216,10 @@ def plants(plant_build: object) -> dict[str, StandingPlant]:
 def test_a_robot_that_stands_on_no_legs_is_refused() -> None:
     """Hips so far back that the torso's weight lies before all feet."""
     robot = load_robot("athena")
-    legs = tuple(replace(leg, hip_position=(leg.hip_position[0] - 0.5, *leg.hip_position[1:])) for leg in robot.legs)
+    legs = tuple(
+        replace(leg, hip_position=(leg.hip_position[0] - 0.5, *leg.hip_position[1:]))
+        for leg in robot.legs
+    )
     with pytest.raises(GainsError, match="does not stand"):
         design_for(replace(robot, legs=legs), PERIOD)
 
@@ -221,20 +249,30 @@ def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
     small, large = found
     length, time, force = 2.0, 2.0**0.5, 8.0
     assert large.slip.ki * time == pytest.approx(small.slip.ki, rel=1e-4)
-    assert (large.slip.kp, large.slip.limit) == pytest.approx((small.slip.kp, small.slip.limit), rel=1e-4)
+    assert (large.slip.kp, large.slip.limit) == pytest.approx(
+        (small.slip.kp, small.slip.limit), rel=1e-4
+    )
     assert large.slip.kd == pytest.approx(small.slip.kd * time, rel=1e-4)
     assert large.slip.load_time == pytest.approx(small.slip.load_time * time)
     assert large.suspension.stiffness == pytest.approx(small.suspension.stiffness * force / length)
     assert large.suspension.mass == pytest.approx(small.suspension.mass * force / length * time**2)
     assert large.suspension.limit == pytest.approx(small.suspension.limit * length)
     for name, by in (
-        ("attitude_rate", 1.0 / time), ("height_rate", 1.0 / time), ("ground_time", time), ("angle_limit", 1.0),
-        ("height_limit", length), ("path_rate", 1.0 / time), ("speed_limit", length / time), ("turn_limit", 1.0 / time),
-    ):  # fmt: skip
+        ("attitude_rate", 1.0 / time),
+        ("height_rate", 1.0 / time),
+        ("ground_time", time),
+        ("angle_limit", 1.0),
+        ("height_limit", length),
+        ("path_rate", 1.0 / time),
+        ("speed_limit", length / time),
+        ("turn_limit", 1.0 / time),
+    ):
         assert getattr(large.hold, name) == pytest.approx(by * getattr(small.hold, name)), name
     assert large.support.handover_time == pytest.approx(small.support.handover_time * time)
     assert large.support.weight_time == pytest.approx(small.support.weight_time * time)
-    assert large.margins.slip_crossover * time == pytest.approx(small.margins.slip_crossover, rel=1e-3)
+    assert large.margins.slip_crossover * time == pytest.approx(
+        small.margins.slip_crossover, rel=1e-3
+    )
     assert large.margins.slip_rejection == pytest.approx(small.margins.slip_rejection, rel=1e-3)
 
 
@@ -254,5 +292,7 @@ def test_the_suspension_of_stiff_servos_yields_at_most_one_and_a_half_times_what
     """Six feet under a third of the weight each, on servos told nothing of it."""
     robot = soft(400.0)
     vertical = (LegSolver(robot).jacobian(robot.stance)[:, 2] ** 2).sum(axis=1) / 400.0  # m/N
-    assert requirements_for(robot).deflection == pytest.approx(1.5 * vertical.mean() * robot.weight / 3.0)
+    assert requirements_for(robot).deflection == pytest.approx(
+        1.5 * vertical.mean() * robot.weight / 3.0
+    )
     assert requirements_for(robot, deflection=0.003).deflection == 0.003

@@ -1,4 +1,6 @@
-"""The linearised FMU: it is the FMU for small motions, and obeys the closed forms of a standing robot."""
+"""The linearised FMU: it is the FMU for small motions, and obeys the closed forms of a standing
+robot.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +20,24 @@ from hexapod_cosim.models import load_robot
 
 PERIOD = 0.005  # s
 ROBOTS = ("athena", "phantomx_mk4")
-HALVED = 1e-4  # 1    of a column's size: third derivatives of contact and friction over differences of 1e-6 m and 1e-5 m/s
+# 1    of a column's size: third derivatives of contact and friction over differences of 1e-6 m and
+# 1e-5 m/s
+HALVED = 1e-4
 ROUNDING = 1e-5  # N/m and the like    of forces of 10 N over 1e-6 m
-PREDICTED = 2e-3  # 1    of the largest force change: second derivatives over motions some hundred times the differences
+# 1    of the largest force change: second derivatives over motions some hundred times the
+# differences
+PREDICTED = 2e-3
 SMALL = 1e-4  # rad    of the inputs' changes there
-STUCK, HARD = 300.0, 100.0  # 1    slope of friction and stiffness of the contact, of the robot's own
-YIELDED = 0.01  # 1    what still creeps of a force in 0.3 s, and the contact's compliance beside the leg's
-SLOW, STIFFENED = 1e-2, 0.1  # rad/s, 1    what the load does to the legs' stiffness by leaning on them
+STUCK, HARD = (
+    300.0,
+    100.0,
+)  # 1    slope of friction and stiffness of the contact, of the robot's own
+# 1    what still creeps of a force in 0.3 s, and the contact's compliance beside the leg's
+YIELDED = 0.01
+SLOW, STIFFENED = (
+    1e-2,
+    0.1,
+)  # rad/s, 1    what the load does to the legs' stiffness by leaning on them
 BALANCE = 1e-4  # 1    of the force: rest is reached to 1e-3 m/s
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -35,8 +48,17 @@ def test_halving_the_differences_changes_little(name: str, stance: str) -> None:
     robot = load_robot(name)
     with level_fmu(robot) as fmu:
         motion, inputs = rest(fmu, robot, standing=STANCES[stance], load=1.0)
-        bench = Bench(fmu, robot, coulomb_friction=robot.servo.coulomb_friction, slope=robot.friction.slope, period=PERIOD)
-        whole, half = bench.differences(motion, inputs), bench.differences(motion, inputs, scale=0.5)
+        bench = Bench(
+            fmu,
+            robot,
+            coulomb_friction=robot.servo.coulomb_friction,
+            slope=robot.friction.slope,
+            period=PERIOD,
+        )
+        whole, half = (
+            bench.differences(motion, inputs),
+            bench.differences(motion, inputs, scale=0.5),
+        )
     for one, other in zip(whole, half, strict=True):
         size = np.abs(one).max(axis=0)
         assert np.all(np.abs(one - other).max(axis=0) <= HALVED * size + ROUNDING)
@@ -47,11 +69,17 @@ def test_halving_the_differences_changes_little(name: str, stance: str) -> None:
 def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) -> None:
     """Angles, speeds and torques at random, each by its own scale; outputs and states."""
     robot = load_robot("athena")
-    told = np.random.default_rng(1).standard_normal((30, 3 * ANGLES)) * np.repeat([1.0, 10.0, 40.0], ANGLES) * SMALL
+    told = (
+        np.random.default_rng(1).standard_normal((30, 3 * ANGLES))
+        * np.repeat([1.0, 10.0, 40.0], ANGLES)
+        * SMALL
+    )
     with level_fmu(robot) as fmu:
         motion, inputs = rest(fmu, robot, standing=STANCES[stance], load=1.0)
         plant = linearise(fmu, robot, motion, inputs, period=PERIOD, coulomb_friction=friction)
-        bench = Bench(fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=PERIOD)
+        bench = Bench(
+            fmu, robot, coulomb_friction=friction, slope=robot.friction.slope, period=PERIOD
+        )
         bench.start(motion, inputs)
         state, still = np.zeros(STATES), bench.force()
         forces, predicted = [], []
@@ -63,25 +91,40 @@ def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) ->
             state = plant.system.A @ state + plant.system.B @ change
         found = bench.motion().less(motion)
     assert np.abs(np.array(forces)).max() > 100.0 * SMALL
-    np.testing.assert_allclose(forces, predicted, rtol=0.0, atol=PREDICTED * np.abs(predicted).max())
+    np.testing.assert_allclose(
+        forces, predicted, rtol=0.0, atol=PREDICTED * np.abs(predicted).max()
+    )
     np.testing.assert_allclose(found, state, rtol=0.0, atol=PREDICTED * np.abs(state).max())
 
 
 def test_a_stuck_foot_answers_a_relief_with_minus_it() -> None:
-    """In whatever way six legs work against each other: three components of each force, no sum and no moment."""
+    """In whatever way six legs work against each other: three components of each force, no sum
+    and no moment.
+    """
     robot = load_robot("athena")
     hard = replace(robot.contact, stiffness=HARD * robot.contact.stiffness)
     point = replace(robot.foot, radius=1e-4)  # a round foot rolls, so that its centre gives way
-    sticky = replace(robot, foot=point, friction=replace(robot.friction, slope=STUCK * robot.friction.slope), contact=hard)
+    sticky = replace(
+        robot,
+        foot=point,
+        friction=replace(robot.friction, slope=STUCK * robot.friction.slope),
+        contact=hard,
+    )
     with level_fmu(sticky) as fmu:
-        motion, inputs = rest(fmu, replace(sticky, friction=robot.friction), standing=STANCES["six legs"], load=1.0)
-        plant = linearise(fmu, sticky, motion, inputs, period=PERIOD, coulomb_friction=0.0, scale=0.1)
+        motion, inputs = rest(
+            fmu, replace(sticky, friction=robot.friction), standing=STANCES["six legs"], load=1.0
+        )
+        plant = linearise(
+            fmu, sticky, motion, inputs, period=PERIOD, coulomb_friction=0.0, scale=0.1
+        )
         bench = Bench(fmu, robot, coulomb_friction=0.0, slope=sticky.friction.slope, period=PERIOD)
         bench.start(motion, inputs)
         points = fmu.block(foot_vector_names("position"))
         points.get()
         feet = points.values.reshape(6, 3)
-    rows = np.concatenate([[np.eye(3), [[0, -z, y], [z, 0, -x], [-y, x, 0]]] for x, y, z in feet]).reshape(6, 2, 3, 3)
+    rows = np.concatenate(
+        [[np.eye(3), [[0, -z, y], [z, 0, -x], [-y, x, 0]]] for x, y, z in feet]
+    ).reshape(6, 2, 3, 3)
     balance = rows.transpose(1, 2, 0, 3).reshape(6, 18)
     inner = np.linalg.svd(balance)[2][6:]
     for relief in inner:
@@ -104,7 +147,9 @@ def test_the_feet_carry_the_load_asked_for_and_do_not_squeeze(stance: str, load:
 
 
 def test_no_relief_carries_less_than_the_weight_for_long() -> None:
-    """Forces of the feet after a constant vertical relief add up to the weight again, and no push along the ground is left."""
+    """Forces of the feet after a constant vertical relief add up to the weight again, and no
+    push along the ground is left.
+    """
     robot = load_robot("athena")
     with level_fmu(robot) as fmu:
         motion, inputs = rest(fmu, robot, standing=STANCES["tripod LF LR RM"], load=1.0)
@@ -118,7 +163,9 @@ def test_no_relief_carries_less_than_the_weight_for_long() -> None:
 
 
 def test_slow_squeezing_meets_friction_as_a_damper_that_goes_with_the_load() -> None:
-    """f = c x' with c = mu f_n k_t, and x goes with the load too: slow loci are four times as large under twice the load."""
+    """f = c x' with c = mu f_n k_t, and x goes with the load too: slow loci are four times as
+    large under twice the load.
+    """
     robot, loci = load_robot("athena"), []
     with level_fmu(robot) as fmu:
         for load in (0.5, 1.0):
@@ -144,6 +191,9 @@ def test_legs_that_do_not_hold_the_robot_are_refused() -> None:
     robot = load_robot("athena")
     with (
         level_fmu(robot) as fmu,
-        pytest.raises(StanceError, match=r"does not stay on its legs: got 'the centre of mass at \(0, 1\) mm', expected between LF LM"),
+        pytest.raises(
+            StanceError,
+            match=r"does not stay on its legs: got 'the centre of mass at \(0, 1\) mm', expected between LF LM",
+        ),
     ):
         rest(fmu, robot, standing=("LF", "LM"), load=1.0)

@@ -59,7 +59,10 @@ def walk(robot: Robot, scenario: Scenario, walks: dict[str, tuple[Summary, Summa
     """A robot's design and its walk under compliant control; one under kinematic control beside."""
     gains = design_for(robot, scenario.macro_step)
     with Walker() as walker:
-        kinematic, compliant = (walker.summary(replace(scenario, control=name), gains=gains) for name in ("kinematic", "compliant"))
+        kinematic, compliant = (
+            walker.summary(replace(scenario, control=name), gains=gains)
+            for name in ("kinematic", "compliant")
+        )
     walks[robot.name] = kinematic, compliant
     print(
         f"\n{robot.name}: {robot.total_mass:.2f} kg, hips {1000.0 * hip_height(robot):.0f} mm high, ki {gains.slip.ki:.3g}/s, "
@@ -83,7 +86,9 @@ def assert_walks(compliant: Summary, kinematic: Summary) -> None:
 
 
 @pytest.mark.parametrize("number", NUMBERS)
-def test_a_robot_drawn_at_random_is_designed_for_and_walks(number: int, tmp_path: Path, walks: dict[str, tuple[Summary, Summary]]) -> None:
+def test_a_robot_drawn_at_random_is_designed_for_and_walks(
+    number: int, tmp_path: Path, walks: dict[str, tuple[Summary, Summary]]
+) -> None:
     path, robot = draw_robot(number, tmp_path)
     compliant = walk(robot, walk_of(robot, path, "compliant"), walks)
     assert compliant.warnings == ()
@@ -102,11 +107,17 @@ def odd_robots() -> list[Robot]:
     robot = load_robot("athena")
     front, side = (replace(robot.torso, com=com) for com in ((0.15, 0.0, 0.0), (0.0, 0.15, 0.0)))
     odd = [replace(robot, name="heavy_in_front", torso=front), scaled_robot(robot, 0.5)]
-    return [*odd, replace(robot, name="heavy_on_the_left", torso=side), scaled_robot(robot, 2.0)] if ALL else odd
+    return (
+        [*odd, replace(robot, name="heavy_on_the_left", torso=side), scaled_robot(robot, 2.0)]
+        if ALL
+        else odd
+    )
 
 
 @pytest.mark.parametrize("robot", odd_robots(), ids=lambda robot: robot.name)
-def test_an_odd_robot_walks(robot: Robot, tmp_path: Path, walks: dict[str, tuple[Summary, Summary]]) -> None:
+def test_an_odd_robot_walks(
+    robot: Robot, tmp_path: Path, walks: dict[str, tuple[Summary, Summary]]
+) -> None:
     path = tmp_path / f"{robot.name}.urdf"
     path.write_text(robot_to_urdf(robot), encoding="utf-8")
     assert_walks(walk(robot, walk_of(robot, path, "compliant"), walks), walks[robot.name][0])

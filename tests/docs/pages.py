@@ -1,4 +1,6 @@
-"""Pages of documentation as their readers take them: blocks of code, the commands in them, and what these do in a folder."""
+"""Pages of documentation as their readers take them: blocks of code, the commands in them, and
+what these do in a folder.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,25 @@ def blocks(page: Path) -> list[tuple[str, str]]:
 
 def commands(page: Path, program: str) -> list[str]:
     """The lines of plain blocks that call a program, without their comments."""
-    lines = [line.split("#")[0].strip() for kind, text in blocks(page) if not kind for line in text.splitlines()]
+    lines = [
+        line.split("#")[0].strip()
+        for kind, text in blocks(page)
+        if not kind
+        for line in text.splitlines()
+    ]
     return [line for line in lines if line.startswith(program + " ")]
 
 
 def run(folder: Path, *arguments: str) -> str:
     """Runs a program of this environment in a folder; fails with what it printed."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False, env=os.environ | {"PATH": path})
+    done = subprocess.run(
+        arguments,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PATH": path},
+    )
     assert done.returncode == 0, done.stderr + done.stdout
     return done.stdout

@@ -1,4 +1,6 @@
-"""The plant as a C library: built from its folder alone, installed, and used by a program elsewhere, as C people expect."""
+"""The plant as a C library: built from its folder alone, installed, and used by a program
+elsewhere, as C people expect.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,11 @@ ROOT = Path(__file__).resolve().parents[2]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
 EXAMPLE = ROOT / "examples" / "c_library"
 STRICT = "-std=c11 -Wall -Wextra -Wpedantic -Werror"
-SAYS = ["stands   6 feet on the ground carry 59.841 N", "lifts    5 feet on the ground carry 59.84", "pushed   6 feet on the ground"]
+SAYS = [
+    "stands   6 feet on the ground carry 59.841 N",
+    "lifts    5 feet on the ground carry 59.84",
+    "pushed   6 feet on the ground",
+]
 PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 CMAKE = shutil.which("cmake", path=PATH) or "cmake"
 NINJA = ["-G", "Ninja"] if shutil.which("ninja", path=PATH) else []
@@ -27,7 +33,13 @@ NINJA = ["-G", "Ninja"] if shutil.which("ninja", path=PATH) else []
 
 def done(*command: str | Path, **variables: str) -> subprocess.CompletedProcess[str]:
     words = [str(word) for word in command]
-    return subprocess.run(words, env=os.environ | {"PATH": PATH} | variables, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        words,
+        env=os.environ | {"PATH": PATH} | variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def output(*command: str | Path, **variables: str) -> str:
@@ -39,7 +51,9 @@ def output(*command: str | Path, **variables: str) -> str:
 
 @pytest.fixture(scope="module")
 def vendored(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The plant and the FMI layer in another tree, with the licence and without the Python project."""
+    """The plant and the FMI layer in another tree, with the licence and without the Python
+    project.
+    """
     folder = tmp_path_factory.mktemp("vendor") / "hexapod"
     shutil.copytree(ROOT / "plant_fmu", folder)
     shutil.copytree(ROOT / "fmi", folder / "fmi")
@@ -52,7 +66,17 @@ def prefix(vendored: Path) -> Path:
     """Where it is installed; it is moved there afterwards, since an installation may be."""
     build, first, moved = (vendored.parent / name for name in ("build", "first", "moved"))
     headers = f"-DFMI_HEADERS={fmi_headers()}"
-    output(CMAKE, "-S", vendored, "-B", build, *NINJA, headers, "-DCMAKE_BUILD_TYPE=Debug", "-DHX_LINT=ON")
+    output(
+        CMAKE,
+        "-S",
+        vendored,
+        "-B",
+        build,
+        *NINJA,
+        headers,
+        "-DCMAKE_BUILD_TYPE=Debug",
+        "-DHX_LINT=ON",
+    )
     output(CMAKE, "--build", build)
     output(CMAKE, "--install", build, "--prefix", first)
     first.rename(moved)
@@ -70,13 +94,24 @@ def test_the_installation_is_what_c_people_expect(prefix: Path) -> None:
         assert "MIT License" in archive.read("documentation/licenses/license.txt").decode()
     for path in files:
         if path.endswith((".cmake", ".pc")):
-            assert str(prefix.parent) not in (prefix / path).read_text(encoding="utf-8"), f"{path} knows where it was installed"
+            assert str(prefix.parent) not in (prefix / path).read_text(encoding="utf-8"), (
+                f"{path} knows where it was installed"
+            )
 
 
 def test_a_program_elsewhere_finds_it_by_find_package(prefix: Path, tmp_path: Path) -> None:
     shutil.copytree(EXAMPLE, tmp_path / "program")
     build = tmp_path / "build"
-    output(CMAKE, "-S", tmp_path / "program", "-B", build, *NINJA, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_FLAGS={STRICT}")
+    output(
+        CMAKE,
+        "-S",
+        tmp_path / "program",
+        "-B",
+        build,
+        *NINJA,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_C_FLAGS={STRICT}",
+    )
     output(CMAKE, "--build", build)
     told = output(build / "step")
     assert all(text in told for text in SAYS), told
@@ -86,18 +121,33 @@ def test_a_program_elsewhere_finds_it_by_pkg_config(prefix: Path, tmp_path: Path
     if shutil.which("pkg-config") is None:
         pytest.skip("no pkg-config")
     (folder,) = prefix.rglob("pkgconfig")
-    flags = output("pkg-config", "--cflags", "--libs", "hexapod-plant", PKG_CONFIG_PATH=str(folder)).split()
+    flags = output(
+        "pkg-config", "--cflags", "--libs", "hexapod-plant", PKG_CONFIG_PATH=str(folder)
+    ).split()
     output("cc", *STRICT.split(), EXAMPLE / "step.c", *flags, "-o", tmp_path / "step")
-    told = output(tmp_path / "step", LD_LIBRARY_PATH=str(folder.parent), DYLD_LIBRARY_PATH=str(folder.parent))
+    told = output(
+        tmp_path / "step", LD_LIBRARY_PATH=str(folder.parent), DYLD_LIBRARY_PATH=str(folder.parent)
+    )
     assert all(text in told for text in SAYS), told
-    assert output("pkg-config", "--modversion", "hexapod-plant", PKG_CONFIG_PATH=str(folder)).strip() == VERSION
+    assert (
+        output("pkg-config", "--modversion", "hexapod-plant", PKG_CONFIG_PATH=str(folder)).strip()
+        == VERSION
+    )
 
 
 def test_the_program_of_the_page_works_as_it_stands(prefix: Path, tmp_path: Path) -> None:
-    (code,) = (text for kind, text in blocks(ROOT / "docs" / "howto" / "c-library.md") if kind == "c")
+    (code,) = (
+        text for kind, text in blocks(ROOT / "docs" / "howto" / "c-library.md") if kind == "c"
+    )
     (tmp_path / "mine.c").write_text(code, encoding="utf-8")
     (library,) = prefix.rglob("libhexapod_c.*[yo]")  # .so, .dylib
-    flags = ["-DHX_SHARED", f"-I{prefix / 'include'}", f"-L{library.parent}", "-lhexapod_c", f"-Wl,-rpath,{library.parent}"]
+    flags = [
+        "-DHX_SHARED",
+        f"-I{prefix / 'include'}",
+        f"-L{library.parent}",
+        "-lhexapod_c",
+        f"-Wl,-rpath,{library.parent}",
+    ]
     output("cc", *STRICT.split(), tmp_path / "mine.c", *flags, "-o", tmp_path / "mine")
     assert output(tmp_path / "mine") == "after 1 s the feet carry 54.936 N\n"
 
@@ -107,21 +157,37 @@ def test_the_program_of_the_page_works_as_it_stands(prefix: Path, tmp_path: Path
     [
         ("find_package(hexapod 0.2 REQUIRED)", "version"),
         ("find_package(hexapod 1.0 REQUIRED)", "version"),
-        ("find_package(hexapod REQUIRED COMPONENTS controller)", "No component controller is installed here"),
+        (
+            "find_package(hexapod REQUIRED COMPONENTS controller)",
+            "No component controller is installed here",
+        ),
     ],
 )
-def test_what_is_not_installed_is_not_found(prefix: Path, tmp_path: Path, asked: str, message: str) -> None:
-    (tmp_path / "CMakeLists.txt").write_text(f"cmake_minimum_required(VERSION 3.16)\nproject(x LANGUAGES C)\n{asked}\n", encoding="utf-8")
-    process = done(CMAKE, "-S", tmp_path, "-B", tmp_path / "build", *NINJA, f"-DCMAKE_PREFIX_PATH={prefix}")
+def test_what_is_not_installed_is_not_found(
+    prefix: Path, tmp_path: Path, asked: str, message: str
+) -> None:
+    (tmp_path / "CMakeLists.txt").write_text(
+        f"cmake_minimum_required(VERSION 3.16)\nproject(x LANGUAGES C)\n{asked}\n", encoding="utf-8"
+    )
+    process = done(
+        CMAKE, "-S", tmp_path, "-B", tmp_path / "build", *NINJA, f"-DCMAKE_PREFIX_PATH={prefix}"
+    )
     assert process.returncode != 0
     assert message in " ".join(process.stderr.split())
 
 
-def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(vendored: Path, tmp_path: Path) -> None:
-    process = done(CMAKE, "-S", vendored, "-B", tmp_path / "build", *NINJA, f"-DFMI_HEADERS={tmp_path}")
+def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(
+    vendored: Path, tmp_path: Path
+) -> None:
+    process = done(
+        CMAKE, "-S", vendored, "-B", tmp_path / "build", *NINJA, f"-DFMI_HEADERS={tmp_path}"
+    )
     assert process.returncode != 0
     told = " ".join(process.stderr.split())
-    assert f"No fmi2Functions.h in '{tmp_path}'. Give -DFMI_HEADERS=<folder of the headers of FMI 2.0 and 3.0" in told
+    assert (
+        f"No fmi2Functions.h in '{tmp_path}'. Give -DFMI_HEADERS=<folder of the headers of FMI 2.0 and 3.0"
+        in told
+    )
     assert "-DHX_FMU=OFF" in told
     alone = tmp_path / "alone" / "plant"
     shutil.copytree(ROOT / "plant_fmu", alone)
@@ -130,7 +196,9 @@ def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(vendored
     assert f"No LICENSE in {alone} or in {alone.parent}." in " ".join(process.stderr.split())
 
 
-def test_the_library_alone_needs_no_fmi_headers_and_fits_into_another_project(vendored: Path, tmp_path: Path) -> None:
+def test_the_library_alone_needs_no_fmi_headers_and_fits_into_another_project(
+    vendored: Path, tmp_path: Path
+) -> None:
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.25)\nproject(theirs VERSION 9.9 LANGUAGES C)\nset(HX_FMU OFF)\n"
         f"add_subdirectory({vendored.as_posix()} hexapod EXCLUDE_FROM_ALL)\n"
@@ -138,7 +206,16 @@ def test_the_library_alone_needs_no_fmi_headers_and_fits_into_another_project(ve
         encoding="utf-8",
     )
     build = tmp_path / "build"
-    output(CMAKE, "-S", tmp_path, "-B", build, *NINJA, "-DCMAKE_BUILD_TYPE=Debug", f"-DFMI_HEADERS={tmp_path}")
+    output(
+        CMAKE,
+        "-S",
+        tmp_path,
+        "-B",
+        build,
+        *NINJA,
+        "-DCMAKE_BUILD_TYPE=Debug",
+        f"-DFMI_HEADERS={tmp_path}",
+    )
     output(CMAKE, "--build", build)
     assert SAYS[0] in output(build / "step")
     output(CMAKE, "--install", build, "--prefix", tmp_path / "installed")

@@ -1,4 +1,6 @@
-"""The cases that control is judged and tuned on, how they are walked, and the tables made of them."""
+"""The cases that control is judged and tuned on, how they are walked, and the tables made of
+them.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,19 @@ from typing import Any
 import pytest
 
 from benchmarks.control import __main__ as command
-from benchmarks.control.cases import DATA, PARTS, Case, ablation, grid, judged_walk, model_errors, robustness, seeds, sticking, tuning
+from benchmarks.control.cases import (
+    DATA,
+    PARTS,
+    Case,
+    ablation,
+    grid,
+    judged_walk,
+    model_errors,
+    robustness,
+    seeds,
+    sticking,
+    tuning,
+)
 from benchmarks.control.measure import Section, measure
 from benchmarks.control.tables import cell, changes_table, put_into, robustness_table, write_csv
 from hexapod_cosim.controller import make_gait
@@ -34,7 +48,10 @@ def plans(cases: Sequence[Case], seed: int = 0) -> list[Scenario]:
 def traits(plan: Scenario) -> dict[str, float]:
     """What makes a walk hard or easy."""
     gait = make_gait(load_robot(plan.robot), **dict(plan.settings.get("gait", {})))
-    payload = plan.parameters.get("torso.mass", load_robot(plan.robot).torso.mass) - load_robot(plan.robot).torso.mass
+    payload = (
+        plan.parameters.get("torso.mass", load_robot(plan.robot).torso.mass)
+        - load_robot(plan.robot).torso.mass
+    )
     found = {"vx": plan.commands[0].vx, "mu": scenario_robot(plan).friction.mu, "payload": payload}
     return found | {"period": gait.period, f"duty of {gait.name}": gait.duty}
 
@@ -49,7 +66,9 @@ def values(cases: Sequence[Case]) -> dict[str, set[int]]:
 
 
 def test_judging_and_tuning_share_no_value_of_any_trait_and_no_seed() -> None:
-    judged = values([*(case for robot in ROBOTS for case in grid(robot)), *ablation(), *robustness()])
+    judged = values(
+        [*(case for robot in ROBOTS for case in grid(robot)), *ablation(), *robustness()]
+    )
     tuned = values([case for robot in ROBOTS for case in tuning(robot)])
     assert set(judged) == set(tuned)
     for name, found in judged.items():
@@ -74,7 +93,11 @@ def test_every_case_varies_by_the_standard_and_plots_nothing() -> None:
 
 def test_the_judged_walk_is_the_bundled_one() -> None:
     judged = judged_walk().plan("kinematic", 0)
-    assert (judged.commands[0].vx, judged.duration, judged.settings["gait"]["name"]) == (0.08, 10.0, "tripod")
+    assert (judged.commands[0].vx, judged.duration, judged.settings["gait"]["name"]) == (
+        0.08,
+        10.0,
+        "tripod",
+    )
     assert judged.steps == 2000
 
 
@@ -91,17 +114,23 @@ def test_the_ablation_switches_each_part_alone_and_each_part_off() -> None:
 
 
 def test_the_slip_pid_is_judged_on_plants_that_are_not_its_model() -> None:
-    """Every plant once with all parts and once without the PID alone; what is set of the plant is no setting of its controller."""
+    """Every plant once with all parts and once without the PID alone; what is set of the plant
+    is no setting of its controller.
+    """
     cases = model_errors()
     names = [case.name for case in cases]
     assert len(set(names)) == len(names) == 6
     for (whole, plan), (without, other) in zip(
-        zip(names[::2], plans(cases[::2]), strict=True), zip(names[1::2], plans(cases[1::2]), strict=True), strict=True
+        zip(names[::2], plans(cases[::2]), strict=True),
+        zip(names[1::2], plans(cases[1::2]), strict=True),
+        strict=True,
     ):
         assert whole.removesuffix(", all parts") == without.removesuffix(", all but slip_pid")
         assert plan.parameters == other.parameters
         assert plan.parameters
-        assert {name for name, is_on in asdict(other.compliance).items() if not is_on} == {"slip_pid"}
+        assert {name for name, is_on in asdict(other.compliance).items() if not is_on} == {
+            "slip_pid"
+        }
         assert all(asdict(plan.compliance).values())
 
 
@@ -114,10 +143,14 @@ def walked(scenarios: Sequence[Scenario], **_: Any) -> Iterator[Summary]:
     for plan in scenarios:
         slip = (plan.seed + 1.0) * (0.5 if plan.control == "compliant" else 1.0)
         figures = dict.fromkeys(METRICS, 1.0) | {"slip_per_metre": slip}
-        yield Summary(control=plan.control, seed=plan.seed, status=COMPLETED, upright=True, metrics=figures)
+        yield Summary(
+            control=plan.control, seed=plan.seed, status=COMPLETED, upright=True, metrics=figures
+        )
 
 
-def measured(monkeypatch: pytest.MonkeyPatch, *sections: Section) -> tuple[dict[str, dict[str, Comparison]], int]:
+def measured(
+    monkeypatch: pytest.MonkeyPatch, *sections: Section
+) -> tuple[dict[str, dict[str, Comparison]], int]:
     """What comes of sections, and in how many runs."""
     counted: list[Scenario] = []
 
@@ -131,7 +164,10 @@ def measured(monkeypatch: pytest.MonkeyPatch, *sections: Section) -> tuple[dict[
 
 
 def test_what_cases_share_is_walked_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    parts, rest = Section(name="a", cases=ablation(), seeds=range(3)), Section(name="b", cases=robustness()[:2], seeds=range(2))
+    parts, rest = (
+        Section(name="a", cases=ablation(), seeds=range(3)),
+        Section(name="b", cases=robustness()[:2], seeds=range(2)),
+    )
     found, runs = measured(monkeypatch, parts, rest)
     variants = len(ablation()) + 1  # and kinematic control
     assert runs == 3 * variants + 2 * 2  # the judged walk of the second section is the first's
@@ -143,7 +179,9 @@ def test_what_cases_share_is_walked_once(monkeypatch: pytest.MonkeyPatch) -> Non
     assert found["b"]["as judged"].changes["slip_per_metre"].relative == pytest.approx(-0.5)
 
 
-def test_a_case_that_this_version_does_not_know_is_left_out_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_case_that_this_version_does_not_know_is_left_out_and_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     cases = [judged_walk("all parts"), judged_walk("on glue", "friction.law=glue")]
     found, runs = measured(monkeypatch, Section(name="a", cases=cases, seeds=range(2)))
     assert runs == 4
@@ -170,22 +208,40 @@ def test_the_ground_that_sticks_is_one_that_the_plant_knows() -> None:
         ("yaw_drift", [(1e-6, 0.2)] * 2, "0.2 rad/m"),
     ],
 )
-def test_a_cell_says_how_much_and_how_sure(name: str, pairs: list[tuple[float, float]], text: str) -> None:
+def test_a_cell_says_how_much_and_how_sure(
+    name: str, pairs: list[tuple[float, float]], text: str
+) -> None:
     assert cell(name, change_of(name, pairs)) == text
 
 
 def comparison(*, fallback: float | None = None, status: str = COMPLETED) -> Comparison:
     figures = dict.fromkeys(METRICS, 0.01) if status == COMPLETED else NO_FIGURES
     runs = [
-        [Summary(control=control, seed=seed, status=status, reason="" if status == COMPLETED else "legs too short", upright=True,
-                 fallback=fallback, metrics=figures) for seed in range(2)]
+        [
+            Summary(
+                control=control,
+                seed=seed,
+                status=status,
+                reason="" if status == COMPLETED else "legs too short",
+                upright=True,
+                fallback=fallback,
+                metrics=figures,
+            )
+            for seed in range(2)
+        ]
         for control in ("kinematic", "compliant")
-    ]  # fmt: skip
+    ]
     return compare_runs(runs[0], runs[1])
 
 
 def test_the_robustness_table_shows_both_figures_and_the_fallback() -> None:
-    table = robustness_table({"as judged": comparison(), "a push": comparison(fallback=0.25), "a giant": comparison(status=REFUSED)})
+    table = robustness_table(
+        {
+            "as judged": comparison(),
+            "a push": comparison(fallback=0.25),
+            "a giant": comparison(status=REFUSED),
+        }
+    )
     assert "| as judged | 2 → 2 of 2 " + 5 * "| 10 → 10 " + "| 0.01 → 0.01 | - |" in table
     assert "| a push | 2 → 2 of 2 " + 5 * "| 10 → 10 " + "| 0.01 → 0.01 | 25% |" in table
     assert "Left out: a giant. legs too short" in table
@@ -196,7 +252,10 @@ def test_tables_take_their_place_in_the_page_and_the_rest_stays(tmp_path: Path) 
     page.write_text("Before.\n<!-- control:a -->\nold\n<!-- /control:a -->\nAfter.\n")
     for table in ("| new |", "| newer |"):
         put_into(page, {"a": table})
-    assert page.read_text() == "Before.\n<!-- control:a -->\n\n| newer |\n\n<!-- /control:a -->\nAfter.\n"
+    assert (
+        page.read_text()
+        == "Before.\n<!-- control:a -->\n\n| newer |\n\n<!-- /control:a -->\nAfter.\n"
+    )
     with pytest.raises(HexapodError, match="<!-- control:b -->"):
         put_into(page, {"b": "| new |"})
 
@@ -211,13 +270,19 @@ def test_the_page_has_a_place_for_every_table() -> None:
 def test_the_csv_has_a_line_per_case_and_figure_of_merit(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", {"one": comparison(), "two": comparison(status=REFUSED)})
     lines = (tmp_path / "a.csv").read_text().splitlines()
-    assert lines[0].startswith("case,seeds,walked_kinematic,walked_compliant,metric,kinematic,compliant,relative,low,high")
-    assert len(lines) == 1 + 2 * (len(METRICS) - 2)  # realtime_factor and energy_residual are none of the control
+    assert lines[0].startswith(
+        "case,seeds,walked_kinematic,walked_compliant,metric,kinematic,compliant,relative,low,high"
+    )
+    assert len(lines) == 1 + 2 * (
+        len(METRICS) - 2
+    )  # realtime_factor and energy_residual are none of the control
     assert lines[1].startswith("one,2,2,2,slip_per_metre,0.01,0.01,0,0,0")
     assert lines[-1].startswith("two,2,0,0,stability_margin,,,")
 
 
-def test_the_command_walks_a_quick_section_without_touching_the_page(plant_build: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_walks_a_quick_section_without_touching_the_page(
+    plant_build: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = command.PAGE.read_bytes()
     assert command.main(["--quick", "--only", "robustness"]) == 0
     out = capsys.readouterr().out
@@ -225,13 +290,19 @@ def test_the_command_walks_a_quick_section_without_touching_the_page(plant_build
     assert command.PAGE.read_bytes() == before
 
 
-def test_an_unknown_section_is_refused_with_the_names_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_section_is_refused_with_the_names_there_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     with pytest.raises(SystemExit):
         command.main(["--only", "ablaton"])
     assert "no section 'ablaton': choose one of ablation" in capsys.readouterr().err
 
 
 def test_a_table_without_a_single_walk_is_no_result() -> None:
-    with pytest.raises(HexapodError, match="no case of this table could be walked: got 'legs too short'"):
+    with pytest.raises(
+        HexapodError, match="no case of this table could be walked: got 'legs too short'"
+    ):
         command.expect_walks({"ablation": {"a giant": comparison(status=REFUSED)}})
-    command.expect_walks({"ablation": {"a giant": comparison(status=REFUSED), "as judged": comparison()}})
+    command.expect_walks(
+        {"ablation": {"a giant": comparison(status=REFUSED), "as judged": comparison()}}
+    )

@@ -1,4 +1,6 @@
-"""The documentation: its site builds without a warning, its notebooks run, its links lead somewhere, what it says to type works."""
+"""The documentation: its site builds without a warning, its notebooks run, its links lead
+somewhere, what it says to type works.
+"""
 
 from __future__ import annotations
 
@@ -24,10 +26,20 @@ from hexapod_cosim.models.kinematics import foot_positions
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
-PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")] + sorted(DOCS.rglob("*.md"))
+PAGES = [
+    ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "benchmarks/README.md")
+] + sorted(DOCS.rglob("*.md"))
 CODE = [
     path
-    for folder in ("plant_fmu", "controller_fmu", "models", "controller", "cosim", "tests", "benchmarks")
+    for folder in (
+        "plant_fmu",
+        "controller_fmu",
+        "models",
+        "controller",
+        "cosim",
+        "tests",
+        "benchmarks",
+    )
     for ending in ("*.c", "*.h", "*.py", "*.toml", "*.md")
     for path in (ROOT / folder).rglob(ending)
 ]
@@ -54,8 +66,13 @@ class Page(HTMLParser):
 def site(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The whole site, notebooks and validation computed."""
     folder = tmp_path_factory.mktemp("site")
-    done = subprocess.run([sys.executable, "-m", "tools.docs", "-o", folder / "html", "--work", folder / "pages"], cwd=ROOT,
-                          capture_output=True, text=True, check=False)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", "tools.docs", "-o", folder / "html", "--work", folder / "pages"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return folder / "html"
 
@@ -78,14 +95,20 @@ def test_every_link_and_anchor_of_the_site_leads_somewhere(site: Path) -> None:
             if "://" in link or link.startswith(("mailto:", "data:")):
                 continue
             target = (path.parent / name.partition("?")[0]).resolve() if name else path
-            if not target.exists() or (anchor and target in pages and anchor not in pages[target].anchors):
+            if not target.exists() or (
+                anchor and target in pages and anchor not in pages[target].anchors
+            ):
                 broken.append(f"{path.relative_to(site)}: {link}")
     assert not broken
 
 
 def test_the_site_needs_no_network(site: Path) -> None:
     """No page fetches a script, a style, a font or a picture from elsewhere."""
-    kinds = ("<(?:script|img|iframe)[^>]+src=", "<link[^>]+(?:stylesheet|preload|icon)[^>]+href=", r"url\(")
+    kinds = (
+        "<(?:script|img|iframe)[^>]+src=",
+        "<link[^>]+(?:stylesheet|preload|icon)[^>]+href=",
+        r"url\(",
+    )
     fetched = re.compile("|".join(f"""{kind}["']?https?:""" for kind in kinds))
     for path in [*site.rglob("*.html"), *site.rglob("*.css")]:
         assert not fetched.search(path.read_text(encoding="utf-8")), path
@@ -100,8 +123,14 @@ def test_formulas_are_mathml_and_numbered(site: Path) -> None:
 
 def test_every_variable_is_in_the_reference(site: Path) -> None:
     for component in ("plant", "controller"):
-        table = tomllib.loads((ROOT / f"{component}_fmu" / "interface.toml").read_text(encoding="utf-8"))
-        names = [entry["name"] for causality in ("input", "output", "parameter", "local") for entry in table.get(causality, [])]
+        table = tomllib.loads(
+            (ROOT / f"{component}_fmu" / "interface.toml").read_text(encoding="utf-8")
+        )
+        names = [
+            entry["name"]
+            for causality in ("input", "output", "parameter", "local")
+            for entry in table.get(causality, [])
+        ]
         text = (site / "reference" / f"{component}.html").read_text(encoding="utf-8")
         assert len(names) > 40
         assert not [name for name in names if f">{name}<" not in text]
@@ -115,8 +144,13 @@ def test_every_command_is_in_the_reference(site: Path) -> None:
 
 def test_every_function_of_the_c_headers_is_in_the_reference(site: Path) -> None:
     text = (site / "reference" / "c.html").read_text(encoding="utf-8")
-    for header in (ROOT / "plant_fmu/include/hexapod/hexapod.h", ROOT / "controller_fmu/include/hexapod/controller.h"):
-        functions = re.findall(r"^HX_API [^(]*?(hx_\w+)\(", header.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    for header in (
+        ROOT / "plant_fmu/include/hexapod/hexapod.h",
+        ROOT / "controller_fmu/include/hexapod/controller.h",
+    ):
+        functions = re.findall(
+            r"^HX_API [^(]*?(hx_\w+)\(", header.read_text(encoding="utf-8"), flags=re.MULTILINE
+        )
         assert len(functions) > 10
         assert not [name for name in functions if f'id="c.{name}"' not in text]
 
@@ -136,12 +170,19 @@ def test_notebooks_are_committed_without_what_they_put_out() -> None:
     assert len(NOTEBOOKS) == 3
     for path in NOTEBOOKS:
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-        assert all(not cell.get("outputs") and cell.get("execution_count") is None for cell in cells), path.name
+        assert all(
+            not cell.get("outputs") and cell.get("execution_count") is None for cell in cells
+        ), path.name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_and_anchors_of_a_page_lead_somewhere(page: Path) -> None:
-    text = re.sub(r"^```.*?^```|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(
+        r"^```.*?^```|`[^`\n]+`",
+        "",
+        page.read_text(encoding="utf-8"),
+        flags=re.DOTALL | re.MULTILINE,
+    )
     for link in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" not in link:
             name, _, anchor = link.partition("#")
@@ -157,10 +198,20 @@ def headings(page: Path) -> set[str]:
 
 
 def test_every_equation_that_the_code_cites_exists() -> None:
-    known = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", (DOCS / "equations.md").read_text(encoding="utf-8"))}
+    known = {
+        int(number)
+        for number in re.findall(
+            r"\\tag\{(\d+)\}", (DOCS / "equations.md").read_text(encoding="utf-8")
+        )
+    }
     assert known == set(range(1, 24))
     texts = [path.read_text(encoding="utf-8") for path in CODE]
-    cited = {int(number) for text in texts for group in CITED.findall(text) for number in re.findall(r"\d+", group)}
+    cited = {
+        int(number)
+        for text in texts
+        for group in CITED.findall(text)
+        for number in re.findall(r"\d+", group)
+    }
     assert {1, 4, 5, 15, 20} <= cited <= known
 
 
@@ -185,9 +236,14 @@ SIDES = {"L": 1, "R": 2}  # column of the tutorial's table by a leg's first lett
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
 def test_the_tutorial_says_where_each_joint_moves_a_foot(name: str) -> None:
-    """Against the feet's positions a small angle away from the standing pose, by their kinematics."""
+    """Against the feet's positions a small angle away from the standing pose, by their
+    kinematics.
+    """
     robot = load_robot(name)
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in (DOCS / "tutorial.md").read_text("utf-8").splitlines()]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in (DOCS / "tutorial.md").read_text("utf-8").splitlines()
+    ]
     told = {row[0]: row for row in rows if row[0] in JOINT_NAMES}
     assert list(told) == ["coxa", "femur", "tibia"]
     pose = np.array([leg.stance for leg in robot.legs])
@@ -196,8 +252,16 @@ def test_the_tutorial_says_where_each_joint_moves_a_foot(name: str) -> None:
         outwards = standing[k] - np.array(leg.hip_position)
         outwards[2] = 0.0
         outwards /= np.linalg.norm(outwards)
-        directions = {"forwards": np.array([1.0, 0.0, 0.0]), "up": np.array([0.0, 0.0, 1.0]), "outwards": outwards}
-        directions |= {"backwards": -directions["forwards"], "down": -directions["up"], "inwards": -outwards}
+        directions = {
+            "forwards": np.array([1.0, 0.0, 0.0]),
+            "up": np.array([0.0, 0.0, 1.0]),
+            "outwards": outwards,
+        }
+        directions |= {
+            "backwards": -directions["forwards"],
+            "down": -directions["up"],
+            "inwards": -outwards,
+        }
         for j, joint in enumerate(JOINT_NAMES):
             turned = pose.copy()
             turned[k, j] += 0.01
@@ -207,19 +271,33 @@ def test_the_tutorial_says_where_each_joint_moves_a_foot(name: str) -> None:
 
 
 def test_the_controller_of_the_page_lowers_the_roll(reader: Path) -> None:
-    (code,) = (text for kind, text in blocks(DOCS / "howto" / "my-controller.md") if kind == "python" and "peak_roll" in text)
-    without, with_law = map(float, re.findall(r"([\d.]+) mrad", run(reader, sys.executable, "-c", code)))
+    (code,) = (
+        text
+        for kind, text in blocks(DOCS / "howto" / "my-controller.md")
+        if kind == "python" and "peak_roll" in text
+    )
+    without, with_law = map(
+        float, re.findall(r"([\d.]+) mrad", run(reader, sys.executable, "-c", code))
+    )
     assert with_law < without
 
 
 def test_designed_gains_walk_and_serve_a_task_of_many(reader: Path) -> None:
-    """The pages on controllers and on clusters, whose designs go to the same place: once is enough."""
-    done = [line for page in ("my-controller.md", "cluster.md") for line in commands(DOCS / "howto" / page, "hexapod")]
+    """The pages on controllers and on clusters, whose designs go to the same place: once is
+    enough.
+    """
+    done = [
+        line
+        for page in ("my-controller.md", "cluster.md")
+        for line in commands(DOCS / "howto" / page, "hexapod")
+    ]
     assert len(done) == 4
     for command in [line for line in done if line != "hexapod design -o out/gains"]:
         run(reader, *shlex.split(re.sub("duration=[0-9]+", SHORT, command)))
     _, task = (text for kind, text in blocks(DOCS / "howto" / "cluster.md") if kind == "python")
-    assert run(reader, sys.executable, "-c", task.replace("duration=5", SHORT)).count("completed") == 2
+    assert (
+        run(reader, sys.executable, "-c", task.replace("duration=5", SHORT)).count("completed") == 2
+    )
 
 
 def test_the_sweep_of_the_page_on_clusters_leaves_a_table(reader: Path) -> None:
@@ -230,16 +308,29 @@ def test_the_sweep_of_the_page_on_clusters_leaves_a_table(reader: Path) -> None:
 
 
 def test_the_steps_to_a_new_contact_law_fit_the_code(tmp_path: Path) -> None:
-    """Applied to a copy as a reader applies them in a clone: the C compiles, has the law under its number, and the twin agrees."""
+    """Applied to a copy as a reader applies them in a clone: the C compiles, has the law under
+    its number, and the twin agrees.
+    """
     for folder in ("plant_fmu", "models", "tests"):
-        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__")
+        )
     patches = [text for kind, text in blocks(DOCS / "howto" / "contact-law.md") if kind == "diff"]
     assert len(patches) == 7
     subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
     for patch in patches:
-        done = subprocess.run(["git", "apply", "-"], cwd=tmp_path, input=patch, text=True, capture_output=True, check=False)
+        done = subprocess.run(
+            ["git", "apply", "-"],
+            cwd=tmp_path,
+            input=patch,
+            text=True,
+            capture_output=True,
+            check=False,
+        )
         assert done.returncode == 0, f"{done.stderr}\n{patch}"
-    table = tomllib.loads((tmp_path / "plant_fmu" / "interface.toml").read_text(encoding="utf-8"))["enumeration"]["ContactLaw"]
+    table = tomllib.loads((tmp_path / "plant_fmu" / "interface.toml").read_text(encoding="utf-8"))[
+        "enumeration"
+    ]["ContactLaw"]
     items = [name for name in table if name != "prefix"]
     assert items[-1] == "hu_guo"
     got = compiled_scale(tmp_path, law=len(items), restitution=0.4)
@@ -255,9 +346,15 @@ def compiled_scale(tree: Path, *, law: int, restitution: float) -> float:
         " return hx_contact(law)->scale(&d); }\n",
         encoding="utf-8",
     )
-    source = [tree / "ask.c", *(tree / "plant_fmu" / "src" / name for name in ("contact_law.c", "elementary.c"))]
+    source = [
+        tree / "ask.c",
+        *(tree / "plant_fmu" / "src" / name for name in ("contact_law.c", "elementary.c")),
+    ]
     includes = [f"-I{tree / 'plant_fmu' / name}" for name in ("src", "include")]
-    subprocess.run(["cc", "-shared", "-fPIC", "-std=c11", "-o", tree / "ask.so", *source, *includes, "-lm"], check=True)
+    subprocess.run(
+        ["cc", "-shared", "-fPIC", "-std=c11", "-o", tree / "ask.so", *source, *includes, "-lm"],
+        check=True,
+    )
     library = ctypes.CDLL(str(tree / "ask.so"))
     library.ask.restype, library.ask.argtypes = ctypes.c_double, [ctypes.c_int, ctypes.c_double]
     return float(library.ask(law, restitution))

@@ -23,7 +23,9 @@ def test_every_example_is_tried() -> None:
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_runs_from_any_folder(path: Path, tmp_path: Path, plant_build: Path) -> None:
-    done = subprocess.run([sys.executable, str(path)], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(path)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert all(text in done.stdout for text in SAYS[path.name]), done.stdout
     assert not list(tmp_path.iterdir())

@@ -33,13 +33,28 @@ def test_the_page_on_fmpy_has_commands_and_code() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_of_the_page_on_fmpy_works(folder: Path, command: str) -> None:
-    run(folder, *shlex.split(re.sub(r"--stop-time \d+", f"--stop-time {SHORT}", command.replace("--show-plot", ""))))
+    run(
+        folder,
+        *shlex.split(
+            re.sub(r"--stop-time \d+", f"--stop-time {SHORT}", command.replace("--show-plot", ""))
+        ),
+    )
 
 
 def test_the_code_of_the_page_on_fmpy_walks(folder: Path) -> None:
     shorter = PYTHON[0].replace("stop_time=10.0", f"stop_time={SHORT}")
     assert shorter != PYTHON[0]
-    assert float(run(folder, sys.executable, "-c", shorter + '\nprint(abs(result["torso.position[1]"][-1]))')) > 1e-3
+    assert (
+        float(
+            run(
+                folder,
+                sys.executable,
+                "-c",
+                shorter + '\nprint(abs(result["torso.position[1]"][-1]))',
+            )
+        )
+        > 1e-3
+    )
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +70,14 @@ def test_the_pages_on_robots_and_packages_have_commands() -> None:
     assert len(commands(PAGES / "libcosim_ecos.md", "hexapod")) >= 2
 
 
-@pytest.mark.parametrize("command", [line for page in ("my-robot.md", "libcosim_ecos.md") for line in commands(PAGES / page, "hexapod")])
+@pytest.mark.parametrize(
+    "command",
+    [
+        line
+        for page in ("my-robot.md", "libcosim_ecos.md")
+        for line in commands(PAGES / page, "hexapod")
+    ],
+)
 def test_a_command_of_the_pages_on_robots_and_packages_works(robots: Path, command: str) -> None:
     shorter = ["--set", f"duration={SHORT}"] if "simulate" in command else []
     assert run(robots, *shlex.split(command), *shorter)

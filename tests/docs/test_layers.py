@@ -1,4 +1,6 @@
-"""The arrows between the folders: models <- controller <- cosim; src of plant_fmu and controller_fmu sees no FMI, fmi nothing of src."""
+"""The arrows between the folders: models <- controller <- cosim; src of plant_fmu and
+controller_fmu sees no FMI, fmi nothing of src.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ from hexapod_cosim.cosim.common.plant_files import SHARED_HEADERS
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "hexapod_cosim"
-SEES = {"models": {"models"}, "controller": {"models", "controller"}, "cosim": {"models", "controller", "cosim"}}
+SEES = {
+    "models": {"models"},
+    "controller": {"models", "controller"},
+    "cosim": {"models", "controller", "cosim"},
+}
 # what each room of cosim may import; study has rooms of its own
 LOW = ["common", "interface", "scenario", "master"]
 ROOMS = {
@@ -38,7 +44,18 @@ MOST_FILES = 20  # in a folder that people write
 MAY_USE = {"models": {"numpy"}, "controller": {"numpy", "scipy", "control", "matplotlib"}}
 RUN_TIME_ONLY = {"numpy", "scipy"}  # of the controller outside controller/design
 INCLUDE = re.compile(r'^\s*#\s*include\s+["<]([^">]+)[">]', re.MULTILINE)
-STANDARD_C = {"float.h", "math.h", "stdarg.h", "stddef.h", "stdint.h", "stdio.h", "stdlib.h", "string.h", "stdbool.h", "limits.h"}
+STANDARD_C = {
+    "float.h",
+    "math.h",
+    "stdarg.h",
+    "stddef.h",
+    "stdint.h",
+    "stdio.h",
+    "stdlib.h",
+    "string.h",
+    "stdbool.h",
+    "limits.h",
+}
 INTRINSICS = {"immintrin.h"}  # of the compiler
 
 
@@ -82,13 +99,21 @@ def test_a_room_imports_only_the_rooms_below_it() -> None:
         for name in imports(path):
             if name.startswith(f"{PACKAGE}.cosim."):
                 other = room_of(tuple(name.split(".")[2:]))
-                assert other == room or other in ROOMS[room], f"{path.relative_to(ROOT)} imports {name}"
+                assert other == room or other in ROOMS[room], (
+                    f"{path.relative_to(ROOT)} imports {name}"
+                )
     assert seen == set(ROOMS)
 
 
 def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
     for room in ROOMS:
-        text = ast.get_docstring(ast.parse((ROOT / "cosim" / room.replace(".", "/") / "__init__.py").read_text(encoding="utf-8")))
+        text = ast.get_docstring(
+            ast.parse(
+                (ROOT / "cosim" / room.replace(".", "/") / "__init__.py").read_text(
+                    encoding="utf-8"
+                )
+            )
+        )
         assert text is not None, room
         assert text.count(". Imports ") == 1, f"{room}: {text}"
 
@@ -99,42 +124,64 @@ def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
     for folder in sorted(folders):
         if {"generated", "results", "node_modules", "build"} & set(folder.parts):
             continue
-        files = [path for path in folder.iterdir() if path.suffix == ".py" and path.name != "__init__.py"]
+        files = [
+            path for path in folder.iterdir() if path.suffix == ".py" and path.name != "__init__.py"
+        ]
         assert len(files) <= MOST_FILES, f"{folder.relative_to(ROOT)} holds {len(files)} files"
 
 
 @pytest.mark.parametrize("folder", MAY_USE)
 def test_a_folder_uses_only_the_packages_it_may(folder: str) -> None:
     for path in python_files(folder):
-        allowed = RUN_TIME_ONLY if folder == "controller" and "design" not in path.relative_to(ROOT).parts else MAY_USE[folder]
-        foreign = {name.split(".")[0] for name in imports(path)} - set(sys.stdlib_module_names) - {PACKAGE}
+        allowed = (
+            RUN_TIME_ONLY
+            if folder == "controller" and "design" not in path.relative_to(ROOT).parts
+            else MAY_USE[folder]
+        )
+        foreign = (
+            {name.split(".")[0] for name in imports(path)}
+            - set(sys.stdlib_module_names)
+            - {PACKAGE}
+        )
         assert foreign <= allowed, f"{path.relative_to(ROOT)} imports {sorted(foreign - allowed)}"
 
 
 def test_no_folder_is_imported_under_a_second_name() -> None:
     files = [
-        path for folder in ("models", "controller", "cosim", "tests", "examples", "tools", "benchmarks") for path in python_files(folder)
+        path
+        for folder in ("models", "controller", "cosim", "tests", "examples", "tools", "benchmarks")
+        for path in python_files(folder)
     ]
     assert files
     for path in files:
         second = {name for name in imports(path) if name.split(".")[0] in SEES}
-        assert not second, f"{path.relative_to(ROOT)} imports {sorted(second)}: a copy of {PACKAGE}'s"
+        assert not second, (
+            f"{path.relative_to(ROOT)} imports {sorted(second)}: a copy of {PACKAGE}'s"
+        )
 
 
 def c_files(*folders: str, component: str = "plant_fmu") -> list[Path]:
-    return [path for folder in folders for path in sorted((ROOT / component / folder).glob("*.[ch]"))]
+    return [
+        path for folder in folders for path in sorted((ROOT / component / folder).glob("*.[ch]"))
+    ]
 
 
 @pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
 def test_a_core_includes_itself_its_header_and_the_c_library(component: str) -> None:
     folders = ("src", "src/lanes", "include/hexapod")
     own = {path.name for path in c_files("src", "src/lanes", component=component)}
-    public = {"plant_fmu": {path.name for path in c_files("include/hexapod")}, "controller_fmu": {"controller.h", *SHARED_HEADERS}}
+    public = {
+        "plant_fmu": {path.name for path in c_files("include/hexapod")},
+        "controller_fmu": {"controller.h", *SHARED_HEADERS},
+    }
     own |= {f"hexapod/{name}" for name in public[component]}
     files = c_files(*folders, component=component)
     assert files
     for path in files:
-        included = {name.removeprefix("../").removeprefix("lanes/") for name in INCLUDE.findall(path.read_text(encoding="utf-8"))}
+        included = {
+            name.removeprefix("../").removeprefix("lanes/")
+            for name in INCLUDE.findall(path.read_text(encoding="utf-8"))
+        }
         foreign = included - own - STANDARD_C - INTRINSICS
         assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
 
@@ -146,7 +193,11 @@ def test_the_fmi_layer_includes_no_core(component: str) -> None:
     assert files
     for path in files:
         included = set(INCLUDE.findall(path.read_text(encoding="utf-8")))
-        inside = {name for name in included if Path(name).name in core and not name.startswith(("fmi/", "hexapod/"))}
+        inside = {
+            name
+            for name in included
+            if Path(name).name in core and not name.startswith(("fmi/", "hexapod/"))
+        }
         assert not inside, f"{path.relative_to(ROOT)} includes {sorted(inside)}"
 
 
@@ -155,11 +206,15 @@ def test_the_masters_loop_sees_the_standard_and_nothing_of_the_fmus_it_drives() 
     assert files
     for path in files:
         included = set(INCLUDE.findall(path.read_text(encoding="utf-8")))
-        foreign = included - {"hexapod/master.h", "hexapod/status.h", "fmi2FunctionTypes.h"} - STANDARD_C
+        foreign = (
+            included - {"hexapod/master.h", "hexapod/status.h", "fmi2FunctionTypes.h"} - STANDARD_C
+        )
         assert not foreign, f"{path.relative_to(ROOT)} includes {sorted(foreign)}"
 
 
 @pytest.mark.parametrize("component", ["plant_fmu", "controller_fmu"])
 def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
     for path in c_files("src", "src/lanes", "include/hexapod", component=component):
-        assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), f"{path.relative_to(ROOT)} names an FMI type or function"
+        assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), (
+            f"{path.relative_to(ROOT)} names an FMI type or function"
+        )

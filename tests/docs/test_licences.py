@@ -1,4 +1,6 @@
-"""What others must be told of licences travels with everything that holds software: the report's viewer, the wheel, every FMU."""
+"""What others must be told of licences travels with everything that holds software: the report's
+viewer, the wheel, every FMU.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ PERMISSION = "Permission is hereby granted, free of charge, to any person obtain
 
 
 def build_viewer() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("build_viewer", ROOT / "tools" / "build_viewer.py")
+    spec = importlib.util.spec_from_file_location(
+        "build_viewer", ROOT / "tools" / "build_viewer.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -35,14 +39,20 @@ def build_viewer() -> ModuleType:
 
 @pytest.fixture(scope="module")
 def licences() -> dict[str, str]:
-    """Texts by package of all that esbuild says it took code from; the bundle is made anew if its sources have changed."""
+    """Texts by package of all that esbuild says it took code from; the bundle is made anew if
+    its sources have changed.
+    """
     tool = build_viewer()
     tool.bundle()
     tool.install_packages(all_of_them=False)
-    inputs = json.loads((ROOT / "build" / "viewer" / "metafile.json").read_text(encoding="utf-8"))["inputs"]
+    inputs = json.loads((ROOT / "build" / "viewer" / "metafile.json").read_text(encoding="utf-8"))[
+        "inputs"
+    ]
     foreign = [path for path in inputs if not path.startswith("src/")]
     names = {re.findall(r"node_modules/((?:@[^/]+/)?[^/]+)/", path)[-1] for path in foreign}
-    return {name: (PACKAGES / name / "LICENSE").read_text(encoding="utf-8").strip() for name in names}
+    return {
+        name: (PACKAGES / name / "LICENSE").read_text(encoding="utf-8").strip() for name in names
+    }
 
 
 def test_the_viewer_bundles_the_packages_that_are_known(licences: dict[str, str]) -> None:
@@ -69,34 +79,58 @@ def test_a_report_holds_every_licence(licences: dict[str, str], call: Call, tmp_
 
 def test_the_installed_wheel_holds_every_licence(licences: dict[str, str]) -> None:
     files = {str(path): path for path in metadata.files("hexapod-cosim") or []}
-    viewer, text = (files[f"hexapod_cosim/plant/viewer/{name}"].read_text() for name in ("viewer.js", "LICENSES.txt"))
+    viewer, text = (
+        files[f"hexapod_cosim/plant/viewer/{name}"].read_text()
+        for name in ("viewer.js", "LICENSES.txt")
+    )
     for licence in [OURS, *licences.values()]:
         assert licence in viewer, "run make setup"
         assert licence in text
     assert "hexapod_cosim/plant/LICENSE" in files
-    assert OURS in next(path for name, path in files.items() if name.endswith(".dist-info/licenses/LICENSE")).read_text()
+    assert (
+        OURS
+        in next(
+            path for name, path in files.items() if name.endswith(".dist-info/licenses/LICENSE")
+        ).read_text()
+    )
 
 
-def test_a_package_without_a_licence_is_not_bundled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_without_a_licence_is_not_bundled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     tool = build_viewer()
     package = tmp_path / "node_modules" / "@somebody" / "nameless"
     package.mkdir(parents=True)
-    (package / "package.json").write_text('{"name": "@somebody/nameless", "version": "1.0.0"}', encoding="utf-8")
+    (package / "package.json").write_text(
+        '{"name": "@somebody/nameless", "version": "1.0.0"}', encoding="utf-8"
+    )
     metafile = tmp_path / "metafile.json"
-    metafile.write_text('{"inputs": {"src/main.ts": {}, "node_modules/@somebody/nameless/index.js": {}}}', encoding="utf-8")
-    for name, path in {"VIEWER": tmp_path, "METAFILE": metafile, "BUNDLE": tmp_path / "viewer.js", "LICENCES": tmp_path / "texts"}.items():
+    metafile.write_text(
+        '{"inputs": {"src/main.ts": {}, "node_modules/@somebody/nameless/index.js": {}}}',
+        encoding="utf-8",
+    )
+    for name, path in {
+        "VIEWER": tmp_path,
+        "METAFILE": metafile,
+        "BUNDLE": tmp_path / "viewer.js",
+        "LICENCES": tmp_path / "texts",
+    }.items():
         monkeypatch.setattr(tool, name, path)
     (tmp_path / "viewer.js").write_text("code", encoding="utf-8")
     with pytest.raises(tool.ViewerError, match=r"no licence's text in .*nameless"):
         tool.add_licences()
     (package / "LICENCE.md").write_text("do as you like", encoding="utf-8")
     tool.add_licences()
-    assert "---- @somebody/nameless 1.0.0 ----\n\ndo as you like" in (tmp_path / "viewer.js").read_text(encoding="utf-8")
+    assert "---- @somebody/nameless 1.0.0 ----\n\ndo as you like" in (
+        tmp_path / "viewer.js"
+    ).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("platforms", [None, ["sources"]], ids=["binary", "sources alone"])
-def test_an_fmu_holds_the_projects_licence(plant_build: Path, tmp_path: Path, fmi: int, platforms: list[str] | None) -> None:
+def test_an_fmu_holds_the_projects_licence(
+    plant_build: Path, tmp_path: Path, fmi: int, platforms: list[str] | None
+) -> None:
     robot = load_robot("athena")
     plant = export_fmu(robot, tmp_path / "plant.fmu", fmi=fmi, platforms=platforms)
     setup = make_setup(robot, control="kinematic", period=0.005)

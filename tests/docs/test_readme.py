@@ -22,7 +22,9 @@ commands = partial(pages.commands, ROOT / "README.md")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the README's reader is: the FMU is there from the first command on, and a URDF of one's own."""
+    """Where the README's reader is: the FMU is there from the first command on, and a URDF of
+    one's own.
+    """
     folder = tmp_path_factory.mktemp("reader")
     run(folder, *shlex.split(commands("hexapod export")[0]))
     run(folder, "hexapod", "export", "-o", "my.urdf")
@@ -31,7 +33,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_readme_exports_every_kind_of_file() -> None:
     lines = " ".join(commands("hexapod export"))
-    assert all(option in lines for option in ("--fmi 3", "--robot my.urdf", "--controller", "--ssp"))
+    assert all(
+        option in lines for option in ("--fmi 3", "--robot my.urdf", "--controller", "--ssp")
+    )
 
 
 @pytest.mark.parametrize("command", commands("hexapod export")[1:])
@@ -40,7 +44,14 @@ def test_an_export_of_the_readme_writes_its_file(folder: Path, command: str) -> 
     assert zipfile.is_zipfile(folder / shlex.split(command)[-1])
 
 
-@pytest.mark.parametrize("command", [line for line in commands("hexapod") if "simulate" in line or "list" in line or "design" in line])
+@pytest.mark.parametrize(
+    "command",
+    [
+        line
+        for line in commands("hexapod")
+        if "simulate" in line or "list" in line or "design" in line
+    ],
+)
 def test_a_command_of_the_readme_works(folder: Path, command: str) -> None:
     shorter = ["--set", "duration=4"] if "simulate" in command else []
     assert run(folder, *shlex.split(command), *shorter)
@@ -52,7 +63,9 @@ def test_the_readme_compares_and_simulates_the_bare_fmu_too() -> None:
 
 
 def test_the_bare_fmu_simulates(folder: Path) -> None:
-    command = shlex.split(commands("fmpy simulate")[0].replace("--show-plot", "--output-file result.csv"))
+    command = shlex.split(
+        commands("fmpy simulate")[0].replace("--show-plot", "--output-file result.csv")
+    )
     run(folder, *command)
     assert (folder / "result.csv").stat().st_size > 0
 

@@ -21,7 +21,12 @@ def test_a_missing_compiler_is_said_in_a_line_before_anything_is_made(tmp_path: 
         (tools / name).symlink_to(program)
     venv = tmp_path / "venv"
     done = subprocess.run(
-        ["make", "setup", f"VENV={venv}"], cwd=ROOT, capture_output=True, text=True, check=False, env={"PATH": str(tools)}
+        ["make", "setup", f"VENV={venv}"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={"PATH": str(tools)},
     )
     assert done.returncode != 0
     assert "no C compiler: looked for cc, gcc and clang, found none; install one" in done.stderr
@@ -29,9 +34,15 @@ def test_a_missing_compiler_is_said_in_a_line_before_anything_is_made(tmp_path: 
     assert not venv.exists()
 
 
-# the hooks of the build backend, in a process of their own, on a stand-in for scikit-build-core that says what was asked of it
+# the hooks of the build backend, in a process of their own, on a stand-in for scikit-build-core
+# that says what was asked of it
 ASK = "import build_backend; print(build_backend.{hook}); import os; print('CC', os.environ.get('CC'))"
-HOOKS = ("get_requires_for_build_wheel()", "get_requires_for_build_editable()", "build_wheel('dist')", "build_editable('dist')")
+HOOKS = (
+    "get_requires_for_build_wheel()",
+    "get_requires_for_build_editable()",
+    "build_wheel('dist')",
+    "build_editable('dist')",
+)
 STAND_IN = """
 def get_requires_for_build_wheel(settings=None): return ["asked"]
 get_requires_for_build_editable = get_requires_for_build_wheel
@@ -40,7 +51,9 @@ build_editable = build_wheel
 """
 
 
-def ask(folder: Path, hook: str, *, compilers: dict[str, str] | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
+def ask(
+    folder: Path, hook: str, *, compilers: dict[str, str] | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Calls a hook where nothing is in PATH but these compilers, which are shell scripts."""
     package, path = folder / "modules" / "scikit_build_core", folder / "bin"
     package.mkdir(parents=True, exist_ok=True)
@@ -58,7 +71,9 @@ def ask(folder: Path, hook: str, *, compilers: dict[str, str] | None = None, **e
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what to install there")
 @pytest.mark.parametrize("hook", HOOKS)
-def test_a_build_without_a_compiler_ends_at_once_with_one_paragraph(tmp_path: Path, hook: str) -> None:
+def test_a_build_without_a_compiler_ends_at_once_with_one_paragraph(
+    tmp_path: Path, hook: str
+) -> None:
     done = ask(tmp_path, hook)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.count("\n") == 1
@@ -72,7 +87,10 @@ def test_a_compiler_that_cannot_compile_is_told_with_its_own_words(tmp_path: Pat
     broken = "echo 'program.c:1:10: fatal error: math.h: No such file or directory' >&2; exit 1"
     done = ask(tmp_path, HOOKS[0], compilers={"gcc": broken})
     assert done.returncode == 1
-    assert "gcc is there but fails: program.c:1:10: fatal error: math.h: No such file or directory" in done.stderr
+    assert (
+        "gcc is there but fails: program.c:1:10: fatal error: math.h: No such file or directory"
+        in done.stderr
+    )
 
 
 def test_cc_is_the_only_compiler_that_is_tried_where_it_is_set(tmp_path: Path) -> None:

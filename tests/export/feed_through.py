@@ -1,4 +1,6 @@
-"""An FMU that answers at once (tests/native/feed_through.c), to stand for a controller in packages."""
+"""An FMU that answers at once (tests/native/feed_through.c), to stand for a controller in
+packages.
+"""
 
 from __future__ import annotations
 
@@ -38,13 +40,25 @@ DESCRIPTION = f"""<?xml version="1.0" encoding="UTF-8"?>
 
 def compiler() -> str:
     """The C compiler."""
-    return os.environ.get("CC") or next(found for name in ("cc", "gcc", "clang") if (found := shutil.which(name)))
+    return os.environ.get("CC") or next(
+        found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))
+    )
 
 
 def make_feed_through(folder: Path, platform: str) -> Path:
     """The FMU, compiled in a folder."""
     library, fmu = folder / "feed_through.so", folder / "feed_through.fmu"
-    command = [compiler(), "-shared", "-fPIC", str(SOURCE), "-I", str(HEADERS), "-lm", "-o", str(library)]
+    command = [
+        compiler(),
+        "-shared",
+        "-fPIC",
+        str(SOURCE),
+        "-I",
+        str(HEADERS),
+        "-lm",
+        "-o",
+        str(library),
+    ]
     subprocess.run(command, check=True, capture_output=True)
     with zipfile.ZipFile(fmu, "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION)

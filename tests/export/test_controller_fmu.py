@@ -1,4 +1,6 @@
-"""The controller as an FMU: it walks the plant FMU as the Python controller does, and is what its description says."""
+"""The controller as an FMU: it walks the plant FMU as the Python controller does, and is what
+its description says.
+"""
 
 from __future__ import annotations
 
@@ -34,19 +36,35 @@ from hexapod_cosim.models import LEG_NAMES, FmuError, HexapodError, load_robot
 ANGLE, SPEED = 1e-12, 1e-12  # rad; of a servo's largest
 ACCELERATION = 3e-12  # of what turns a servo's largest speed round within a period
 TORQUE = 3e-12  # of a servo's largest: tests/controller/test_native_controller.py says why
-CLOSED = 1e-12  # rad    of joint commands when both walk a plant of their own, whose motion answers to their last bits
+# rad    of joint commands when both walk a plant of their own, whose motion answers to their last
+# bits
+CLOSED = 1e-12
 MOTION = 1e-12  # m    of the torso, in the same walks
 
 
 def setup_for(scenario: Scenario) -> ControllerSetup:
     robot = known_robot(scenario)
-    gains = None if scenario.control == "kinematic" else make_gains(robot, period=scenario.macro_step)
-    return ControllerSetup(robot=robot, gait=make_gait(robot, **dict(scenario.settings.get("gait", {}))), period=scenario.macro_step,
-                           gains=gains, parts=scenario.compliance)  # fmt: skip
+    gains = (
+        None if scenario.control == "kinematic" else make_gains(robot, period=scenario.macro_step)
+    )
+    return ControllerSetup(
+        robot=robot,
+        gait=make_gait(robot, **dict(scenario.settings.get("gait", {}))),
+        period=scenario.macro_step,
+        gains=gains,
+        parts=scenario.compliance,
+    )
 
 
 @contextmanager
-def packed(setup: ControllerSetup, folder: Path, *, start: float = 0.0, stop: float = 60.0, **parameters: object) -> Iterator[Fmu]:
+def packed(
+    setup: ControllerSetup,
+    folder: Path,
+    *,
+    start: float = 0.0,
+    stop: float = 60.0,
+    **parameters: object,
+) -> Iterator[Fmu]:
     """The controller FMU of a set-up, initialised."""
     with Fmu(export_controller(setup, folder / "controller.fmu"), name="controller") as fmu:
         fmu.set_parameters({name.replace("__", "."): value for name, value in parameters.items()})
@@ -55,20 +73,39 @@ def packed(setup: ControllerSetup, folder: Path, *, start: float = 0.0, stop: fl
 
 
 class Both:
-    """The Python controller at work, the FMU told the same: the largest differences of all joint commands."""
+    """The Python controller at work, the FMU told the same: the largest differences of all joint
+    commands.
+    """
 
     def __init__(self, setup: ControllerSetup, fmu: Fmu) -> None:
-        self.lead, self.other, self.fallback = setup.build(), FmuController(fmu, period=setup.period), False
-        self.worst, self.scale = np.zeros(4), np.array([1.0, setup.robot.servo.speed_max, setup.robot.servo.torque_max, 1.0])
+        self.lead, self.other, self.fallback = (
+            setup.build(),
+            FmuController(fmu, period=setup.period),
+            False,
+        )
+        self.worst, self.scale = (
+            np.zeros(4),
+            np.array([1.0, setup.robot.servo.speed_max, setup.robot.servo.torque_max, 1.0]),
+        )
         self.scale[3] = 2.0 * setup.robot.servo.speed_max / setup.period
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        ours, theirs = self.lead.step(t, command, measurement), self.other.step(t, command, measurement)
-        gaps = [np.abs(getattr(ours, name) - getattr(theirs, name)).max() for name in (*COMMANDED, "acceleration_ref")]
+        ours, theirs = (
+            self.lead.step(t, command, measurement),
+            self.other.step(t, command, measurement),
+        )
+        gaps = [
+            np.abs(getattr(ours, name) - getattr(theirs, name)).max()
+            for name in (*COMMANDED, "acceleration_ref")
+        ]
         self.worst = np.maximum(self.worst, gaps / self.scale)
         for flag in ("swinging", "unreachable", "fallback"):
-            np.testing.assert_array_equal(getattr(self.other.diagnostics, flag), getattr(self.lead.diagnostics, flag))
-        np.testing.assert_allclose(self.other.diagnostics.planned, self.lead.diagnostics.planned, atol=1e-12)
+            np.testing.assert_array_equal(
+                getattr(self.other.diagnostics, flag), getattr(self.lead.diagnostics, flag)
+            )
+        np.testing.assert_allclose(
+            self.other.diagnostics.planned, self.lead.diagnostics.planned, atol=1e-12
+        )
         self.fallback |= bool(self.lead.diagnostics.fallback.any())
         return ours
 
@@ -85,7 +122,8 @@ def walked(scenario: Scenario, controller: JointController) -> Recording:
     return outcome.recording
 
 
-# ------------------------------------------------------------------------------------------------ the same walk
+# ------------------------------------------------------------------------------------------------
+# the same walk
 
 
 FAULTS = 'events=[{time=1.5, leg="LM", fault="dead"}, {time=2.5, leg="RF", fault="stuck"}]'
@@ -95,12 +133,25 @@ FAULTS = 'events=[{time=1.5, leg="LM", fault="dead"}, {time=2.5, leg="RF", fault
 @pytest.mark.parametrize(
     ("name", "settings", "falls_back"),
     [
-        ("walk_flat", ["gait.name=ripple", "duration=6"], False), ("phantomx_walk", ["duration=6"], False),
-        ("turn", ["duration=6", "command.roll=0.03"], False), ("push", ["duration=6"], None),
-        ("walk_flat", ["duration=5", FAULTS, "sensors.foot_force_noise=0.05", "sensors.foot_force_delay=0.01"], True),
+        ("walk_flat", ["gait.name=ripple", "duration=6"], False),
+        ("phantomx_walk", ["duration=6"], False),
+        ("turn", ["duration=6", "command.roll=0.03"], False),
+        ("push", ["duration=6"], None),
+        (
+            "walk_flat",
+            [
+                "duration=5",
+                FAULTS,
+                "sensors.foot_force_noise=0.05",
+                "sensors.foot_force_delay=0.01",
+            ],
+            True,
+        ),
     ],
-)  # fmt: skip
-def test_told_the_same_it_commands_the_same(tmp_path: Path, name: str, settings: list[str], falls_back: bool | None) -> None:
+)
+def test_told_the_same_it_commands_the_same(
+    tmp_path: Path, name: str, settings: list[str], falls_back: bool | None
+) -> None:
     scenario = load_scenario(name, overrides=["control=compliant", *settings])
     setup = setup_for(scenario)
     with packed(setup, tmp_path, start=scenario.start) as fmu:
@@ -112,29 +163,52 @@ def test_told_the_same_it_commands_the_same(tmp_path: Path, name: str, settings:
 
 @pytest.mark.usefixtures("plant_build")
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_plant_and_controller_fmu_walk_as_the_python_master_does(tmp_path: Path, control: str) -> None:
+def test_plant_and_controller_fmu_walk_as_the_python_master_does(
+    tmp_path: Path, control: str
+) -> None:
     scenario = load_scenario("walk_flat", overrides=[f"control={control}"])
     setup = setup_for(scenario)
     with packed(setup, tmp_path) as fmu:
-        ours, theirs = walked(scenario, setup.build()), walked(scenario, FmuController(fmu, period=setup.period))
+        ours, theirs = (
+            walked(scenario, setup.build()),
+            walked(scenario, FmuController(fmu, period=setup.period)),
+        )
     position = vector_names("torso.position")
     assert ours.columns(position)[-1, 0] - ours.columns(position)[0, 0] > 0.5  # m: it walks
-    np.testing.assert_allclose(theirs.columns(COMMANDED["angle_ref"]), ours.columns(COMMANDED["angle_ref"]), rtol=0.0, atol=CLOSED)
-    np.testing.assert_allclose(theirs.columns(COMMANDED["speed_ref"]), ours.columns(COMMANDED["speed_ref"]), rtol=0.0, atol=CLOSED)
+    np.testing.assert_allclose(
+        theirs.columns(COMMANDED["angle_ref"]),
+        ours.columns(COMMANDED["angle_ref"]),
+        rtol=0.0,
+        atol=CLOSED,
+    )
+    np.testing.assert_allclose(
+        theirs.columns(COMMANDED["speed_ref"]),
+        ours.columns(COMMANDED["speed_ref"]),
+        rtol=0.0,
+        atol=CLOSED,
+    )
     torque_max = setup.robot.servo.torque_max
     np.testing.assert_allclose(
-        theirs.columns(COMMANDED["torque_ref"]), ours.columns(COMMANDED["torque_ref"]), rtol=0.0, atol=TORQUE * torque_max
+        theirs.columns(COMMANDED["torque_ref"]),
+        ours.columns(COMMANDED["torque_ref"]),
+        rtol=0.0,
+        atol=TORQUE * torque_max,
     )
-    np.testing.assert_allclose(theirs.columns(position), ours.columns(position), rtol=0.0, atol=MOTION)
+    np.testing.assert_allclose(
+        theirs.columns(position), ours.columns(position), rtol=0.0, atol=MOTION
+    )
 
 
-# ------------------------------------------------------------------------------------------------ what it says it is
+# ------------------------------------------------------------------------------------------------
+# what it says it is
 
 
 @pytest.fixture(scope="module")
 def compliant_fmu(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     robot = load_robot("athena")
-    setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot))
+    setup = ControllerSetup(
+        robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot)
+    )
     return export_controller(setup, tmp_path_factory.mktemp("controller") / "controller.fmu")
 
 
@@ -152,10 +226,20 @@ def test_checkers_find_nothing(compliant_fmu: Path) -> None:
 
 def test_fmi_3_walks_the_same_walk(plant_build: Path, tmp_path: Path, compliant_fmu: Path) -> None:
     robot = load_robot("athena")
-    setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot))
+    setup = ControllerSetup(
+        robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot)
+    )
     path = export_controller(setup, tmp_path / "controller.fmu", fmi=3)
     assert validate_fmu(path) == []
-    walks, steps = [], {"stop_time": 1.0, "output_interval": PERIOD, "step_size": PERIOD, "start_values": {"command.vx": 0.05}}
+    walks, steps = (
+        [],
+        {
+            "stop_time": 1.0,
+            "output_interval": PERIOD,
+            "step_size": PERIOD,
+            "start_values": {"command.vx": 0.05},
+        },
+    )
     for fmu, angle_ref in ((path, "angle_ref"), (compliant_fmu, "RR.tibia.angle_ref")):
         found = simulate_fmu(str(fmu), output=[angle_ref], **steps)
         walks.append(np.array([np.ravel(row[1])[-1] for row in found]))
@@ -163,14 +247,23 @@ def test_fmi_3_walks_the_same_walk(plant_build: Path, tmp_path: Path, compliant_
     assert np.ptp(walks[0]) > 0.1  # rad
 
 
-def test_its_variables_have_the_plants_names_units_and_directions_reversed(fmu: Fmu, athena_fmu: Path) -> None:
+def test_its_variables_have_the_plants_names_units_and_directions_reversed(
+    fmu: Fmu, athena_fmu: Path
+) -> None:
     with Fmu(athena_fmu) as plant:
         names = [name for name in fmu.variables if not name.startswith("command.")]
         sensed = [name for name in names if fmu.variables[name].causality == "input"]
-        given = [*(name for names in COMMANDED.values() for name in names), *joint_names("acceleration_ref")]
-        assert set(sensed) == {name for key in ("angle", "foot_force", "quaternion") for name in MEASURED[key]}
+        given = [
+            *(name for names in COMMANDED.values() for name in names),
+            *joint_names("acceleration_ref"),
+        ]
+        assert set(sensed) == {
+            name for key in ("angle", "foot_force", "quaternion") for name in MEASURED[key]
+        }
         assert {plant.variables[name].causality for name in sensed} == {"output"}
-        assert {(plant.variables[name].causality, fmu.variables[name].causality) for name in given} == {("input", "output")}
+        assert {
+            (plant.variables[name].causality, fmu.variables[name].causality) for name in given
+        } == {("input", "output")}
         for name in [*sensed, *given]:
             assert plant.variables[name].unit == fmu.variables[name].unit
 
@@ -192,18 +285,32 @@ def give(fmu: Fmu, **values: float) -> None:
 def walk(fmu: Fmu, first: int, count: int, *, h: float = PERIOD) -> np.ndarray:
     """Outputs at communication points of a walk with unequal forces on the feet."""
     robot, found = load_robot("athena"), []
-    block = fmu.block([*COMMANDS, *(name for key in ("angle", "foot_force", "quaternion") for name in MEASURED[key])])
+    block = fmu.block(
+        [
+            *COMMANDS,
+            *(name for key in ("angle", "foot_force", "quaternion") for name in MEASURED[key]),
+        ]
+    )
     draws = np.random.default_rng(5).normal(size=(first + count, 6, 3))
     for k in range(first, first + count):
         force = draws[k] + [0.0, 0.0, 8.0]
-        block.values[:] = np.concatenate([[0.05, 0.0, 0.02, 0.0, 0.0, 0.0], robot.stance.ravel(), force.ravel(), [1.0, 0.0, 0.0, 0.0]])
+        block.values[:] = np.concatenate(
+            [
+                [0.05, 0.0, 0.02, 0.0, 0.0, 0.0],
+                robot.stance.ravel(),
+                force.ravel(),
+                [1.0, 0.0, 0.0, 0.0],
+            ]
+        )
         block.set()
         found.append(outputs(fmu))
         fmu.step(k * h, h)
     return np.array(found)
 
 
-def test_outputs_follow_inputs_at_once_where_the_description_says_so_and_nowhere_else(fmu: Fmu) -> None:
+def test_outputs_follow_inputs_at_once_where_the_description_says_so_and_nowhere_else(
+    fmu: Fmu,
+) -> None:
     fmu.initialise(0.0, 60.0)
     walk(fmu, 0, 10)  # not yet longer than feet that feel a force in the air are believed
     plain, flags = outputs(fmu), fmu.block(fmu.names("output", "Boolean"))
@@ -228,9 +335,16 @@ def test_outputs_follow_inputs_at_once_where_the_description_says_so_and_nowhere
 
 
 def test_every_parameter_is_tunable_before_the_start(tmp_path: Path, compliant_fmu: Path) -> None:
-    """The kinematic athena's FMU, told to be the compliant phantomx in a ripple gait, is what is exported for that one."""
+    """The kinematic athena's FMU, told to be the compliant phantomx in a ripple gait, is what is
+    exported for that one.
+    """
     athena, other = load_robot("athena"), load_robot("phantomx_mk4")
-    wanted = ControllerSetup(robot=other, gait=make_gait(other, "ripple"), period=0.004, gains=make_gains(other, period=0.004))
+    wanted = ControllerSetup(
+        robot=other,
+        gait=make_gait(other, "ripple"),
+        period=0.004,
+        gains=make_gains(other, period=0.004),
+    )
     plain = ControllerSetup(robot=athena, gait=make_gait(athena), period=PERIOD)
     with packed(wanted, tmp_path) as exported:
         parameters, expected = exported.parameters(), walk(exported, 0, 300, h=0.004)
@@ -250,10 +364,13 @@ def test_a_custom_gait_of_a_patterns_offsets_is_that_pattern(tmp_path: Path) -> 
         np.testing.assert_array_equal(walk(custom, 0, 200), expected)
 
 
-# ------------------------------------------------------------------------------------------------ as an FMU
+# ------------------------------------------------------------------------------------------------
+# as an FMU
 
 
-def test_saved_restored_and_serialised_states_go_on_bit_for_bit(fmu: Fmu, compliant_fmu: Path) -> None:
+def test_saved_restored_and_serialised_states_go_on_bit_for_bit(
+    fmu: Fmu, compliant_fmu: Path
+) -> None:
     fmu.initialise(0.0, 60.0)
     walk(fmu, 0, 123)
     slave = fmu._slave
@@ -294,11 +411,14 @@ def test_communication_steps_of_any_length_end_at_the_same_walk(compliant_fmu: P
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"gait.duty": 1.0}, "gait.duty: got 1, expected a finite number in"), ({"gains.suspension.mass": 0.0}, "gains.suspension.mass"),
+        ({"gait.duty": 1.0}, "gait.duty: got 1, expected a finite number in"),
+        ({"gains.suspension.mass": 0.0}, "gains.suspension.mass"),
         ({"control": "manual"}, "choice for control"),
     ],
-)  # fmt: skip
-def test_parameters_out_of_range_are_refused(fmu: Fmu, values: dict[str, object], said: str) -> None:
+)
+def test_parameters_out_of_range_are_refused(
+    fmu: Fmu, values: dict[str, object], said: str
+) -> None:
     with pytest.raises(HexapodError, match=said):
         fmu.set_parameters(values)
 
@@ -306,11 +426,14 @@ def test_parameters_out_of_range_are_refused(fmu: Fmu, values: dict[str, object]
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"period": 0.6}, "period: got 0.6, expected less than 0.5 s"), ({"servo.kp": 0.0}, "servo.kp: got 0, expected more than 0 under"),
+        ({"period": 0.6}, "period: got 0.6, expected less than 0.5 s"),
+        ({"servo.kp": 0.0}, "servo.kp: got 0, expected more than 0 under"),
         ({"RM.tibia.stance": 3.0}, "RM.tibia.stance: got 3, expected an angle between"),
     ],
-)  # fmt: skip
-def test_parameters_that_do_not_fit_together_are_refused_at_initialisation(fmu: Fmu, values: dict[str, float], said: str) -> None:
+)
+def test_parameters_that_do_not_fit_together_are_refused_at_initialisation(
+    fmu: Fmu, values: dict[str, float], said: str
+) -> None:
     fmu.set_parameters(values)
     with pytest.raises(FmuError, match=said):
         fmu.initialise(0.0, 1.0)
@@ -320,23 +443,40 @@ def test_inputs_that_are_no_numbers_and_steps_back_are_refused(fmu: Fmu) -> None
     fmu.initialise(0.0, 60.0)
     walk(fmu, 0, 5)
     before = outputs(fmu)
-    with pytest.raises(FmuError, match=r"command.vx: got nan, expected a finite number in \[-10, 10\] m/s"):
+    with pytest.raises(
+        FmuError, match=r"command.vx: got nan, expected a finite number in \[-10, 10\] m/s"
+    ):
         give(fmu, command__vx=np.nan)
     with pytest.raises(StepError):
         fmu.step(0.0, PERIOD)
     np.testing.assert_array_equal(outputs(fmu), before)
 
 
-# ------------------------------------------------------------------------------------------------ command
+# ------------------------------------------------------------------------------------------------
+# command
 
 
 def test_the_command_packs_what_simulate_walks_with(call: Call, tmp_path: Path) -> None:
     robot, path, gains = load_robot("phantomx_mk4"), tmp_path / "c.fmu", tmp_path / "gains.toml"
     save_gains(make_gains(robot), gains)
-    code, said, _ = call("export", "--controller", "compliant", "--robot", robot.name, "--gait", "ripple", "--gains", gains, "-o", path)
+    code, said, _ = call(
+        "export",
+        "--controller",
+        "compliant",
+        "--robot",
+        robot.name,
+        "--gait",
+        "ripple",
+        "--gains",
+        gains,
+        "-o",
+        path,
+    )
     assert code == 0
     assert str(path) in said
-    setup = make_setup(robot, control="compliant", period=PERIOD, gait="ripple", gains=make_gains(robot))
+    setup = make_setup(
+        robot, control="compliant", period=PERIOD, gait="ripple", gains=make_gains(robot)
+    )
     assert path.read_bytes() == export_controller(setup, tmp_path / "same.fmu").read_bytes()
     assert call("validate", path)[0] == 0
 
@@ -344,12 +484,13 @@ def test_the_command_packs_what_simulate_walks_with(call: Call, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--controller", "complaint"], "did you mean 'compliant'?"), (["--controller", "kinematic", "--gait", "trot"], "gait"),
+        (["--controller", "complaint"], "did you mean 'compliant'?"),
+        (["--controller", "kinematic", "--gait", "trot"], "gait"),
         (["--gait", "ripple"], "add --controller kinematic or compliant"),
         (["--controller", "kinematic", "--period", "0.7"], "impossible controller period"),
         (["--controller", "kinematic", "-o", "walk.zip"], "a name that ends in .fmu"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_packed_is_refused_in_words(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], said: str
 ) -> None:
@@ -360,7 +501,9 @@ def test_what_cannot_be_packed_is_refused_in_words(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_gains_of_another_robot_are_packed_with_a_warning_and_kinematic_control_takes_none(call: Call, tmp_path: Path) -> None:
+def test_gains_of_another_robot_are_packed_with_a_warning_and_kinematic_control_takes_none(
+    call: Call, tmp_path: Path
+) -> None:
     save_gains(make_gains(load_robot("phantomx_mk4")), tmp_path / "gains.toml")
     where = ("--gains", tmp_path / "gains.toml", "-o", tmp_path / "c.fmu")
     code, _, error = call("export", "--controller", "compliant", *where)
@@ -374,8 +517,12 @@ def test_gains_of_another_robot_are_packed_with_a_warning_and_kinematic_control_
 def test_a_robot_with_other_joint_axes_has_no_controller(tmp_path: Path) -> None:
     robot = load_robot("athena")
     leg = robot.legs[0]
-    turned = replace(leg, links=(leg.links[0], replace(leg.links[1], axis=(0.0, 1.0, 0.0)), leg.links[2]))
+    turned = replace(
+        leg, links=(leg.links[0], replace(leg.links[1], axis=(0.0, 1.0, 0.0)), leg.links[2])
+    )
     odd = replace(robot, legs=(turned, *robot.legs[1:]))
     with pytest.raises(HexapodError, match="no closed-form inverse kinematics"):
-        export_controller(ControllerSetup(robot=odd, gait=make_gait(odd), period=PERIOD), tmp_path / "odd.fmu")
+        export_controller(
+            ControllerSetup(robot=odd, gait=make_gait(odd), period=PERIOD), tmp_path / "odd.fmu"
+        )
     assert list(tmp_path.iterdir()) == []

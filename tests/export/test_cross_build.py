@@ -17,15 +17,22 @@ def test_what_changes_a_binary_changes_its_place_in_the_cache(tmp_path: Path) ->
     source = tmp_path / "a.c"
     source.write_text("int a;", encoding="utf-8")
     first = Library("a", {"a.c": source})
-    digests = [first.digest(), Library("b", {"a.c": source}).digest(), Library("a", {"b.c": source}).digest(),
-               Library("a", {"a.c": source}, flags=("-DX",)).digest()]  # fmt: skip
+    digests = [
+        first.digest(),
+        Library("b", {"a.c": source}).digest(),
+        Library("a", {"b.c": source}).digest(),
+        Library("a", {"a.c": source}, flags=("-DX",)).digest(),
+    ]
     source.write_text("int b;", encoding="utf-8")
     assert len({*digests, first.digest()}) == 5
 
 
 def test_a_damaged_or_unwritable_cache_is_made_do_without(tmp_path: Path) -> None:
     source = tmp_path / "tiny.c"
-    source.write_text('__attribute__((visibility("default"))) int fmi2Tiny(void) { return 7; }\n', encoding="utf-8")
+    source.write_text(
+        '__attribute__((visibility("default"))) int fmi2Tiny(void) { return 7; }\n',
+        encoding="utf-8",
+    )
     library, cache = Library("tiny", {"tiny.c": source}), tmp_path / "cache"
     cache.mkdir()
     (cache / "zig").symlink_to(user_cache() / "zig")
@@ -38,7 +45,9 @@ def test_a_damaged_or_unwritable_cache_is_made_do_without(tmp_path: Path) -> Non
     assert build_library(library, "x86_64-linux", cache_folder=cache) == data
 
 
-def test_sources_that_do_not_compile_are_one_error_with_the_compiler_s_words(tmp_path: Path) -> None:
+def test_sources_that_do_not_compile_are_one_error_with_the_compiler_s_words(
+    tmp_path: Path,
+) -> None:
     source = tmp_path / "bad.c"
     source.write_text("int f(void) { return unknown_thing; }\n", encoding="utf-8")
     kept = set((user_cache() / "binaries").glob("*"))
@@ -47,7 +56,9 @@ def test_sources_that_do_not_compile_are_one_error_with_the_compiler_s_words(tmp
     assert set((user_cache() / "binaries").glob("bad-*")) <= kept
 
 
-def test_without_the_compiler_the_error_says_how_to_get_it(call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_compiler_the_error_says_how_to_get_it(
+    call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(cross_build, "PACKAGE", "no_such_compiler")
     find_compiler.cache_clear()
     code, _, err = call("export", "--platforms", "all", "-o", tmp_path / "a.fmu")
@@ -59,9 +70,16 @@ def test_without_the_compiler_the_error_says_how_to_get_it(call: Call, monkeypat
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"), [("amiga64", "linux64, win64, darwin64, aarch64-linux"), ("", "linux64"), ("x86_64-amiga", "linux64")]
+    ("name", "expected"),
+    [
+        ("amiga64", "linux64, win64, darwin64, aarch64-linux"),
+        ("", "linux64"),
+        ("x86_64-amiga", "linux64"),
+    ],
 )
-def test_platforms_that_are_none_are_refused_with_those_there_are(call: Call, tmp_path: Path, name: str, expected: str) -> None:
+def test_platforms_that_are_none_are_refused_with_those_there_are(
+    call: Call, tmp_path: Path, name: str, expected: str
+) -> None:
     code, _, err = call("export", "--platforms", name, "-o", tmp_path / "a.fmu")
     assert code != 0
     assert expected in err

@@ -60,13 +60,17 @@ def test_an_exported_fmu_passes_fmpy_validation(exported: Path) -> None:
 
 
 def test_the_same_robot_makes_the_same_bytes(exported: Path, tmp_path: Path) -> None:
-    assert export_fmu(load_robot("athena"), tmp_path / "again.fmu").read_bytes() == exported.read_bytes()
+    assert (
+        export_fmu(load_robot("athena"), tmp_path / "again.fmu").read_bytes()
+        == exported.read_bytes()
+    )
 
 
 def test_both_packers_make_the_same_fmu(exported: Path, athena_fmu: Path) -> None:
     ours, cmakes = members(exported), members(athena_fmu)
     assert set(ours) == set(cmakes)
-    # compiled, drawn and simulated parts are compared in test_extras.py: other compilers and libraries make other bytes
+    # compiled, drawn and simulated parts are compared in test_extras.py: other compilers and
+    # libraries make other bytes
     made = ("binaries/", "documentation/reference/", "model.png", "terminalsAndIcons/icon.png")
     assert [name for name in ours if ours[name] != cmakes[name] and not name.startswith(made)] == []
 
@@ -82,9 +86,14 @@ def test_the_default_robot_needs_no_resources(exported: Path, tmp_path: Path) ->
     assert np.array_equal(*runs)
 
 
-def test_robots_differ_in_description_resources_and_pictures_only(exported: Path, tmp_path: Path) -> None:
+def test_robots_differ_in_description_resources_and_pictures_only(
+    exported: Path, tmp_path: Path
+) -> None:
     other = members(export_fmu(load_robot("phantomx_mk4"), tmp_path / "phantomx.fmu"))
-    other = {name.replace("reference/phantomx_mk4_", "reference/athena_"): data for name, data in other.items()}
+    other = {
+        name.replace("reference/phantomx_mk4_", "reference/athena_"): data
+        for name, data in other.items()
+    }
     athena = members(exported)
     different = {name for name in athena if athena[name] != other[name]}
     assert set(other) == set(athena)
@@ -92,40 +101,70 @@ def test_robots_differ_in_description_resources_and_pictures_only(exported: Path
         {"model.png", "terminalsAndIcons/icon.png"},
         {f"documentation/reference/athena_{part}.csv" for part in ("in", "ref")},
     )
-    assert different == {"modelDescription.xml", "documentation/index.html", "resources/start_values.txt"} | pictures | results
+    assert (
+        different
+        == {"modelDescription.xml", "documentation/index.html", "resources/start_values.txt"}
+        | pictures
+        | results
+    )
 
 
-def test_another_robot_starts_with_its_own_values_and_stands(plant_build: Path, tmp_path: Path) -> None:
+def test_another_robot_starts_with_its_own_values_and_stands(
+    plant_build: Path, tmp_path: Path
+) -> None:
     robot = load_robot("phantomx_mk4")
     path = export_fmu(robot, tmp_path / "phantomx.fmu")
-    names = ["torso.mass", "torso.position[3]", *(f"{leg}.foot.normal_force" for leg in ("LF", "LM", "LR", "RF", "RM", "RR"))]
+    names = [
+        "torso.mass",
+        "torso.position[3]",
+        *(f"{leg}.foot.normal_force" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")),
+    ]
     result = fmpy.simulate_fmu(str(path), output=names)
     weight = robot.total_mass * 9.81
     assert result["torso.mass"][0] == robot.torso.mass
-    assert sum(result[name][-1] for name in names[2:]) == pytest.approx(weight, rel=1e-3)  # at rest but for the last tremor
+    assert sum(result[name][-1] for name in names[2:]) == pytest.approx(
+        weight, rel=1e-3
+    )  # at rest but for the last tremor
 
 
 def test_every_listed_source_is_packed(exported: Path) -> None:
     packed = members(exported)
     description = fmpy.read_model_description(str(exported))
     listed = description.buildConfigurations[0].sourceFileSets[0].sourceFiles
-    assert {f"sources/{name}" for name in listed} == {name for name in packed if name.startswith("sources/") and name.endswith(".c")}
+    assert {f"sources/{name}" for name in listed} == {
+        name for name in packed if name.startswith("sources/") and name.endswith(".c")
+    }
 
 
 @pytest.mark.parametrize(
     "form",
-    ["file://{path}", "file:{path}", "file:///{path}", "file://{path}/", "FILE://localhost{path}", "file://{quoted}", "{path}", "{path}/"],
+    [
+        "file://{path}",
+        "file:{path}",
+        "file:///{path}",
+        "file://{path}/",
+        "FILE://localhost{path}",
+        "file://{quoted}",
+        "{path}",
+        "{path}/",
+    ],
 )
-def test_every_form_of_the_resources_uri_is_understood(plant_library: Path, tmp_path: Path, heavy: Robot, form: str) -> None:
+def test_every_form_of_the_resources_uri_is_understood(
+    plant_library: Path, tmp_path: Path, heavy: Robot, form: str
+) -> None:
     folder = tmp_path / "with space" / "ünïcode" / "100%" / "resources"
     guid = write_resources(folder, heavy)
     plain = folder.as_posix()
-    with Plant(plant_library, guid=guid, resources=form.format(path=plain, quoted=quote(plain))) as plant:
+    with Plant(
+        plant_library, guid=guid, resources=form.format(path=plain, quoted=quote(plain))
+    ) as plant:
         assert plant.component, plant.messages
         assert plant.real("torso.mass") == heavy.torso.mass
 
 
-def test_a_folder_whose_name_looks_encoded_is_found(plant_library: Path, tmp_path: Path, heavy: Robot) -> None:
+def test_a_folder_whose_name_looks_encoded_is_found(
+    plant_library: Path, tmp_path: Path, heavy: Robot
+) -> None:
     folder = tmp_path / "%41%20b"
     guid = write_resources(folder, heavy)
     for uri in (f"file://{folder.as_posix()}", folder.as_uri()):
@@ -133,12 +172,20 @@ def test_a_folder_whose_name_looks_encoded_is_found(plant_library: Path, tmp_pat
             assert plant.component, plant.messages
 
 
-@pytest.mark.parametrize("resources", [None, "", "file:///nowhere/at/all", "http://example.org/resources"])
-def test_without_resources_only_the_default_robot_is_there(plant_library: Path, heavy: Robot, resources: str | None) -> None:
+@pytest.mark.parametrize(
+    "resources", [None, "", "file:///nowhere/at/all", "http://example.org/resources"]
+)
+def test_without_resources_only_the_default_robot_is_there(
+    plant_library: Path, heavy: Robot, resources: str | None
+) -> None:
     with Plant(plant_library, resources=resources) as plant:
         for variable in ATHENA.of_causality("input", "parameter"):
-            assert variable.type != "Real" or plant.real(variable.name) == variable.start, variable.name
-    with Plant(plant_library, resources=resources, guid=render_fmi2(load_interface(heavy)).guid) as plant:
+            assert variable.type != "Real" or plant.real(variable.name) == variable.start, (
+                variable.name
+            )
+    with Plant(
+        plant_library, resources=resources, guid=render_fmi2(load_interface(heavy)).guid
+    ) as plant:
         assert plant.component is None
         assert "start_values.txt" in plant.last_message
 
@@ -151,7 +198,10 @@ def test_start_values_arrive_exactly(plant_library: Path, tmp_path: Path) -> Non
             if variable.type == "Real":
                 assert plant.real(variable.name) == variable.start, variable.name
             else:
-                assert plant.get_references("fmi2GetInteger", [variable.reference]) == (OK, [variable.start])
+                assert plant.get_references("fmi2GetInteger", [variable.reference]) == (
+                    OK,
+                    [variable.start],
+                )
 
 
 def test_foreign_resources_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot) -> None:
@@ -162,7 +212,9 @@ def test_foreign_resources_are_refused(plant_library: Path, tmp_path: Path, heav
 
 
 def refusal(library: Path, folder: Path, robot: Robot, old: str, new: str) -> str:
-    """What the FMU says of a robot's start values in which old was replaced by new: it must refuse them."""
+    """What the FMU says of a robot's start values in which old was replaced by new: it must
+    refuse them.
+    """
     guid = write_resources(folder, robot)
     file = folder / "start_values.txt"
     text = file.read_text(encoding="utf-8")
@@ -175,22 +227,47 @@ def refusal(library: Path, folder: Path, robot: Robot, old: str, new: str) -> st
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [("4000 0x", "4000 0y"), ("4000 0x", "4001 0x"), (" torso.mass", " torso.weight"), ("p+1 torso.mass", "p torso.mass"),
-     ("p+1 torso.mass", "p+9999 torso.mass"), ("p+1 torso.mass", "p+1"), ("0x1.8", "nan 0x1.8"), ("\n4001 ", "\n\n4001 "),
-     (" contact.law", "0 contact.law"), ("1 contact.law", "1.0 contact.law"), ("4000 0x", "4000 -0x")],
-)  # fmt: skip
-def test_malformed_start_values_are_refused_with_the_line(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
+    [
+        ("4000 0x", "4000 0y"),
+        ("4000 0x", "4001 0x"),
+        (" torso.mass", " torso.weight"),
+        ("p+1 torso.mass", "p torso.mass"),
+        ("p+1 torso.mass", "p+9999 torso.mass"),
+        ("p+1 torso.mass", "p+1"),
+        ("0x1.8", "nan 0x1.8"),
+        ("\n4001 ", "\n\n4001 "),
+        (" contact.law", "0 contact.law"),
+        ("1 contact.law", "1.0 contact.law"),
+        ("4000 0x", "4000 -0x"),
+    ],
+)
+def test_malformed_start_values_are_refused_with_the_line(
+    plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str
+) -> None:
     assert "start_values.txt: line " in refusal(plant_library, tmp_path, heavy, old, new)
 
 
-@pytest.mark.parametrize(("old", "new"), [("p+1 torso.mass", "p+0 torso.mass"), ("}\n", "}\0tail\n"), ("1 contact.law", "2 contact.law")])
-def test_start_values_other_than_the_exported_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("p+1 torso.mass", "p+0 torso.mass"),
+        ("}\n", "}\0tail\n"),
+        ("1 contact.law", "2 contact.law"),
+    ],
+)
+def test_start_values_other_than_the_exported_are_refused(
+    plant_library: Path, tmp_path: Path, heavy: Robot, old: str, new: str
+) -> None:
     assert "checksum" in refusal(plant_library, tmp_path, heavy, old, new)
 
 
-def test_an_impossible_robot_is_refused_at_instantiation(plant_library: Path, tmp_path: Path) -> None:
+def test_an_impossible_robot_is_refused_at_instantiation(
+    plant_library: Path, tmp_path: Path
+) -> None:
     robot = load_robot("athena")
-    flat = dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, inertia=(0.01, 0.01, 1.0, 0.0, 0.0, 0.0)))
+    flat = dataclasses.replace(
+        robot, torso=dataclasses.replace(robot.torso, inertia=(0.01, 0.01, 1.0, 0.0, 0.0, 0.0))
+    )
     guid = write_resources(tmp_path, flat)
     with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
         assert plant.component is None
@@ -201,11 +278,15 @@ def test_an_impossible_robot_is_refused_at_instantiation(plant_library: Path, tm
 def test_the_exporter_s_checksum_is_the_plant_s(core: ctypes.CDLL, data: bytes) -> None:
     core.hx_checksum.restype = ctypes.c_uint64
     for seed in (0, 1, 2**64 - 1):
-        assert core.hx_checksum(ctypes.c_uint64(seed), data, ctypes.c_size_t(len(data))) == checksum(seed, data)
+        assert core.hx_checksum(
+            ctypes.c_uint64(seed), data, ctypes.c_size_t(len(data))
+        ) == checksum(seed, data)
 
 
 @pytest.mark.parametrize("keep", [0, 1, 100, 400])
-def test_truncated_or_continued_start_values_are_refused(plant_library: Path, tmp_path: Path, heavy: Robot, keep: int) -> None:
+def test_truncated_or_continued_start_values_are_refused(
+    plant_library: Path, tmp_path: Path, heavy: Robot, keep: int
+) -> None:
     guid = write_resources(tmp_path, heavy)
     file = tmp_path / "start_values.txt"
     lines = file.read_text(encoding="utf-8").splitlines(keepends=True)
@@ -215,7 +296,9 @@ def test_truncated_or_continued_start_values_are_refused(plant_library: Path, tm
             assert plant.component is None
 
 
-def test_an_unwritable_place_is_one_clear_error_and_leaves_nothing(plant_build: Path, tmp_path: Path) -> None:
+def test_an_unwritable_place_is_one_clear_error_and_leaves_nothing(
+    plant_build: Path, tmp_path: Path
+) -> None:
     blocker = tmp_path / "file"
     blocker.write_text("", encoding="utf-8")
     for path in (blocker / "athena.fmu", tmp_path):
@@ -234,7 +317,11 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
     library.write_bytes(b"")
     os.utime(library, (built, built))
     monkeypatch.setattr(plant_files, "plant_folders", lambda: [tmp_path])
-    with pytest.raises(HexapodError, match="older than its sources") if stale else contextlib.nullcontext():
+    with (
+        pytest.raises(HexapodError, match="older than its sources")
+        if stale
+        else contextlib.nullcontext()
+    ):
         assert plant_files.binary(plant_files.fmi2_platform()) == library
 
 
@@ -246,7 +333,9 @@ def test_what_is_not_offered_is_refused_by_name(plant_build: Path, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
-def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(exported: Path, tmp_path: Path) -> None:
+def test_fmpy_builds_an_fmu_of_sources_alone_into_a_binary_of_the_same_results(
+    exported: Path, tmp_path: Path
+) -> None:
     bare = export_fmu(load_robot("athena"), tmp_path / "sources.fmu", platforms="sources")
     unzipped = Path(fmpy.extract(str(bare), str(tmp_path / "fmu")))
     assert not (unzipped / "binaries").exists()
@@ -276,7 +365,9 @@ def test_a_machine_s_own_folder_names_its_processor(
     assert (plant_files.fmi2_platform(), plant_files.fmi3_platform()) == (two, three)
 
 
-def test_an_arm_machine_s_binary_is_found_where_it_was_packed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_arm_machine_s_binary_is_found_where_it_was_packed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setattr(platform, "machine", lambda: "aarch64")
     assert plant_files.packed_binary(tmp_path, "hexapod") is None  # fmpy looks elsewhere

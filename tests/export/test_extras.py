@@ -1,4 +1,6 @@
-"""What travels inside an FMU besides the binary: pictures, terminals, licence, page, reference results."""
+"""What travels inside an FMU besides the binary: pictures, terminals, licence, page, reference
+results.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ from hexapod_cosim.cosim.interface.terminals import render_terminals
 from hexapod_cosim.models import list_robots, load_robot
 
 ROOT = Path(__file__).resolve().parents[2]
-ROUNDING = 1e-9  # of the solver, between two ways to give the same inputs; and of the files' 12 digits
+ROUNDING = (
+    1e-9  # of the solver, between two ways to give the same inputs; and of the files' 12 digits
+)
 
 
 @pytest.fixture(scope="module")
@@ -44,19 +48,30 @@ def test_committed_pictures_and_results_are_what_the_generator_makes(plant_build
 
 
 @pytest.mark.parametrize("robot", list_robots())
-def test_an_importer_gets_the_reference_results(plant_build: Path, tmp_path: Path, robot: str) -> None:
+def test_an_importer_gets_the_reference_results(
+    plant_build: Path, tmp_path: Path, robot: str
+) -> None:
     fmu = export_fmu(load_robot(robot), tmp_path / f"{robot}.fmu")
     with zipfile.ZipFile(fmu) as archive:
-        files = [archive.extract(f"{FOLDER}/{robot}_{part}", tmp_path) for part in ("in.csv", "ref.csv", "ref.opt")]
+        files = [
+            archive.extract(f"{FOLDER}/{robot}_{part}", tmp_path)
+            for part in ("in.csv", "ref.csv", "ref.opt")
+        ]
     options = fmpy.util.read_ref_opt_file(files[2])
     inputs = fmpy.util.read_csv(files[0])
     result = fmpy.simulate_fmu(
-        str(fmu), input=inputs, output=list(OUTPUTS), start_time=options["StartTime"], stop_time=options["StopTime"],
+        str(fmu),
+        input=inputs,
+        output=list(OUTPUTS),
+        start_time=options["StartTime"],
+        stop_time=options["StopTime"],
         output_interval=options["StepSize"],
-    )  # fmt: skip
+    )
     reference = read_csv(Path(files[1]).read_bytes())
     for name in ("time", *OUTPUTS):
-        assert result[name] == pytest.approx(np.array(reference[name]), rel=ROUNDING, abs=ROUNDING), name
+        assert result[name] == pytest.approx(
+            np.array(reference[name]), rel=ROUNDING, abs=ROUNDING
+        ), name
 
 
 def test_the_reference_run_moves_what_it_shows(exported: Path) -> None:
@@ -69,32 +84,52 @@ def test_the_reference_run_moves_what_it_shows(exported: Path) -> None:
 @pytest.mark.parametrize("robot", list_robots())
 def test_pictures_show_the_whole_robot(robot: str) -> None:
     drawn = pictures(load_interface(load_robot(robot)))
-    assert [Image.open(io.BytesIO(data)).size for data in drawn.values()] == [PICTURE_SIZE, ICON_SIZE]
+    assert [Image.open(io.BytesIO(data)).size for data in drawn.values()] == [
+        PICTURE_SIZE,
+        ICON_SIZE,
+    ]
     for data in drawn.values():
         opaque = np.asarray(Image.open(io.BytesIO(data)))[..., 3] > 250
         rows, columns = np.flatnonzero(opaque.any(axis=1)), np.flatnonzero(opaque.any(axis=0))
         height, width = opaque.shape
-        assert min(rows[0], columns[0], height - 1 - rows[-1], width - 1 - columns[-1]) >= 1  # nothing is cut off
-        assert max(np.ptp(rows) / height, np.ptp(columns) / width) > 0.85  # and it fills the picture
+        assert (
+            min(rows[0], columns[0], height - 1 - rows[-1], width - 1 - columns[-1]) >= 1
+        )  # nothing is cut off
+        assert (
+            max(np.ptp(rows) / height, np.ptp(columns) / width) > 0.85
+        )  # and it fills the picture
 
 
 def test_a_larger_torso_makes_another_picture() -> None:
-    first, second = (pictures(load_interface(load_robot(robot)))["model.png"] for robot in ("athena", "phantomx_mk4"))
+    first, second = (
+        pictures(load_interface(load_robot(robot)))["model.png"]
+        for robot in ("athena", "phantomx_mk4")
+    )
     assert first != second
 
 
 def test_every_input_of_a_leg_and_the_torso_is_in_one_terminal() -> None:
     document = ElementTree.fromstring(render_terminals(list(ATHENA.by_name)))
-    members = [str(member.get("variableName")) for member in document.iter("TerminalMemberVariable")]
+    members = [
+        str(member.get("variableName")) for member in document.iter("TerminalMemberVariable")
+    ]
     assert len(members) == len(set(members))
     assert {variable.name for variable in ATHENA.of_causality("input")} <= set(members)
-    assert {variable.name for variable in ATHENA.of_causality("output") if ".foot." in variable.name} <= set(members)
+    assert {
+        variable.name for variable in ATHENA.of_causality("output") if ".foot." in variable.name
+    } <= set(members)
 
 
 def test_legs_terminals_differ_in_their_variables_alone() -> None:
     document = ElementTree.fromstring(render_terminals(list(ATHENA.by_name)))
     shapes = {
-        tuple((part.get("name"), *(member.get("memberName") for member in part.iter("TerminalMemberVariable"))) for part in leg)
+        tuple(
+            (
+                part.get("name"),
+                *(member.get("memberName") for member in part.iter("TerminalMemberVariable")),
+            )
+            for part in leg
+        )
         for leg in document.iterfind("Terminals/Terminal")
         if leg.get("name") != "torso"
     }
@@ -110,14 +145,26 @@ def test_types_carry_units_and_angles_are_shown_in_degrees(exported: Path) -> No
     description = fmpy.read_model_description(str(exported))
     variables = {variable.name: variable for variable in description.modelVariables}
     angle, speed = variables["LF.coxa.angle"], variables["LF.coxa.speed"]
-    assert (angle.declaredType.name, angle.declaredType.unit, angle.displayUnit) == ("Angle", "rad", "deg")
-    assert (speed.declaredType.name, speed.declaredType.unit, speed.displayUnit) == ("AngularVelocity", "rad/s", "deg/s")
+    assert (angle.declaredType.name, angle.declaredType.unit, angle.displayUnit) == (
+        "Angle",
+        "rad",
+        "deg",
+    )
+    assert (speed.declaredType.name, speed.declaredType.unit, speed.displayUnit) == (
+        "AngularVelocity",
+        "rad/s",
+        "deg/s",
+    )
     assert variables["contact.law"].declaredType.name == "ContactLaw"
 
 
 @pytest.mark.parametrize("robot", list_robots())
 def test_the_page_s_quick_start_runs_as_it_stands(
-    plant_build: Path, tmp_path: Path, robot: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    plant_build: Path,
+    tmp_path: Path,
+    robot: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     fmu = export_fmu(load_robot(robot), tmp_path / f"{robot}.fmu")
     with zipfile.ZipFile(fmu) as archive:
@@ -133,33 +180,56 @@ def test_the_page_s_quick_start_runs_as_it_stands(
 
 def test_the_page_names_every_variable_s_pattern_unit_choice_and_flag(exported: Path) -> None:
     with zipfile.ZipFile(exported) as archive:
-        page, description = (archive.read(name).decode() for name in ("documentation/index.html", "modelDescription.xml"))
+        page, description = (
+            archive.read(name).decode()
+            for name in ("documentation/index.html", "modelDescription.xml")
+        )
     for pattern in ATHENA.patterns:
         assert f"<code>{pattern.name}</code>" in page
     for enumeration in ATHENA.enumerations.values():
-        assert all(f"{number} {name}:" in page for number, (name, _) in enumerate(enumeration.items, start=1))
+        assert all(
+            f"{number} {name}:" in page
+            for number, (name, _) in enumerate(enumeration.items, start=1)
+        )
     for element in map(ElementTree.fromstring(description).find, ("CoSimulation", "ModelExchange")):
         flags = {} if element is None else dict(element.attrib)
-        assert {flag for flag in flags if flag.startswith(("can", "provides", "max"))} <= set(CAPABILITIES)
-    counts = [int(number) for number in re.findall(r'</code></td><td class="value">(\d+)</td>\n', page)]
+        assert {flag for flag in flags if flag.startswith(("can", "provides", "max"))} <= set(
+            CAPABILITIES
+        )
+    counts = [
+        int(number) for number in re.findall(r'</code></td><td class="value">(\d+)</td>\n', page)
+    ]
     assert sum(counts) == len(ATHENA.variables)
 
 
 def test_the_page_s_links_lead_somewhere(exported: Path) -> None:
     with zipfile.ZipFile(exported) as archive:
         page, present = archive.read("documentation/index.html").decode(), set(archive.namelist())
-    anchors, targets = set(re.findall(r'id="([^"]+)"', page)), re.findall(r'(?:href|src)="([^"]+)"', page)
+    anchors, targets = (
+        set(re.findall(r'id="([^"]+)"', page)),
+        re.findall(r'(?:href|src)="([^"]+)"', page),
+    )
     assert targets
     for target in targets:
-        name = target[1:] if target.startswith("#") else posixpath.normpath(f"documentation/{target}")
+        name = (
+            target[1:] if target.startswith("#") else posixpath.normpath(f"documentation/{target}")
+        )
         assert name in (anchors if target.startswith("#") else present), target
 
 
 @pytest.mark.parametrize(("fmi", "platforms"), [(2, None), (2, "sources"), (3, None)])
-def test_the_page_tells_of_what_is_in_the_archive_alone(plant_build: Path, tmp_path: Path, fmi: int, platforms: str | None) -> None:
-    with zipfile.ZipFile(export_fmu(load_robot("athena"), tmp_path / "athena.fmu", fmi=fmi, platforms=platforms)) as archive:
+def test_the_page_tells_of_what_is_in_the_archive_alone(
+    plant_build: Path, tmp_path: Path, fmi: int, platforms: str | None
+) -> None:
+    with zipfile.ZipFile(
+        export_fmu(load_robot("athena"), tmp_path / "athena.fmu", fmi=fmi, platforms=platforms)
+    ) as archive:
         page, names = archive.read("documentation/index.html").decode(), archive.namelist()
-    assert (FOLDER in page) == any(name.startswith(FOLDER) for name in names) == ((fmi, platforms) == (2, None))
+    assert (
+        (FOLDER in page)
+        == any(name.startswith(FOLDER) for name in names)
+        == ((fmi, platforms) == (2, None))
+    )
     links = re.findall(r'(?:src|href)="([^"#:]+)"', page)
     assert len(links) >= 2  # the picture and the licence
     assert {posixpath.normpath(f"documentation/{link}") for link in links} <= set(names)

@@ -1,4 +1,6 @@
-"""Plant and controller FMU in a package walk as the Python master and controller do, on time and with measurements a period late."""
+"""Plant and controller FMU in a package walk as the Python master and controller do, on time and
+with measurements a period late.
+"""
 
 from __future__ import annotations
 
@@ -40,11 +42,15 @@ SEEN = (
 @pytest.fixture(scope="module")
 def setup() -> ControllerSetup:
     robot = load_robot("athena")
-    return ControllerSetup(robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot))
+    return ControllerSetup(
+        robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot)
+    )
 
 
 @pytest.fixture(scope="module")
-def package(setup: ControllerSetup, plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def package(
+    setup: ControllerSetup, plant_build: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     return export_package(setup, tmp_path_factory.mktemp("package") / "athena.ssp")
 
 
@@ -64,25 +70,39 @@ def test_what_the_controller_looks_at_and_says_is_connected(package: Path) -> No
 
 
 @pytest.mark.parametrize("is_late", [False, True], ids=["on time", "a period late"])
-def test_a_package_walks_as_the_python_master_does(setup: ControllerSetup, package: Path, plant: Path, is_late: bool) -> None:
+def test_a_package_walks_as_the_python_master_does(
+    setup: ControllerSetup, package: Path, plant: Path, is_late: bool
+) -> None:
     names = [f"{PLANT}.{name}" for name in SEEN]
     found = run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=not is_late)
     expected = late.walk(setup, plant, duration=STEPS * PERIOD, overrides=[], late=is_late)
     scale = np.maximum(np.abs(expected.columns(SEEN)).max(axis=0), 1e-3)
     assert expected.column("LF.foot.contact").min() == 0.0
-    assert np.abs(found.columns(names) - expected.columns(SEEN)).max(axis=0) / scale == pytest.approx(0.0, abs=SAME)
+    assert np.abs(found.columns(names) - expected.columns(SEEN)).max(
+        axis=0
+    ) / scale == pytest.approx(0.0, abs=SAME)
 
 
 def test_lateness_is_no_round_off(package: Path) -> None:
     names = [f"{PLANT}.{name}" for name in SEEN]
-    prompt, delayed = (run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=once) for once in (True, False))
+    prompt, delayed = (
+        run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=once)
+        for once in (True, False)
+    )
     assert judged(prompt, delayed)[0] > 1e3 * SAME
 
 
-def test_values_reach_the_parameter_sets(setup: ControllerSetup, plant_build: Path, tmp_path: Path) -> None:
-    values = read_values(["controller.command.yaw_rate=0.1", "plant.friction.mu=0.5", "controller.command.vx=0"])
+def test_values_reach_the_parameter_sets(
+    setup: ControllerSetup, plant_build: Path, tmp_path: Path
+) -> None:
+    values = read_values(
+        ["controller.command.yaw_rate=0.1", "plant.friction.mu=0.5", "controller.command.vx=0"]
+    )
     path = export_package(setup, tmp_path / "athena.ssp", values=values)
-    sets = {name: {one.name: one for one in read_ssv(str(path), f"resources/{name}.ssv").parameters} for name in ORDER}
+    sets = {
+        name: {one.name: one for one in read_ssv(str(path), f"resources/{name}.ssv").parameters}
+        for name in ORDER
+    }
     assert float(sets[CONTROLLER]["command.yaw_rate"].value) == 0.1
     assert float(sets[CONTROLLER]["command.vx"].value) == 0.0
     assert float(sets[PLANT]["friction.mu"].value) == 0.5
@@ -90,19 +110,33 @@ def test_values_reach_the_parameter_sets(setup: ControllerSetup, plant_build: Pa
 
 
 def test_without_values_the_robot_walks_straight_on(package: Path) -> None:
-    found = {one.name: one.value for one in read_ssv(str(package), f"resources/{CONTROLLER}.ssv").parameters}
+    found = {
+        one.name: one.value
+        for one in read_ssv(str(package), f"resources/{CONTROLLER}.ssv").parameters
+    }
     command = {name: float(value) for name, value in found.items() if name.startswith("command.")}
     assert {name: value for name, value in command.items() if value} == {"command.vx": 0.08}
 
 
-@pytest.mark.parametrize(("text", "said"), [("ctrl.command.vx=1", "component"), ("controller.command.vx=fast", "not a number")])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("ctrl.command.vx=1", "component"), ("controller.command.vx=fast", "not a number")],
+)
 def test_values_that_cannot_be_are_refused(text: str, said: str) -> None:
     with pytest.raises(HexapodError, match=said):
         read_values([text])
 
 
 def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
-    code, out, err = call("export", "--controller", "kinematic", "--set", "controller.command.vx=0.05", "-o", tmp_path / "walk.ssp")
+    code, out, err = call(
+        "export",
+        "--controller",
+        "kinematic",
+        "--set",
+        "controller.command.vx=0.05",
+        "-o",
+        tmp_path / "walk.ssp",
+    )
     assert (code, err) == (0, "")
     assert "walk.ssp" in out
     assert read_ssd(str(tmp_path / "walk.ssp"), validate=True).name == "athena"
@@ -117,17 +151,30 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
         (("--ssp", "--fmi", "3"), "no package of such FMUs"),
         (("--ssp", "--platforms", "sources"), "without binaries"),
         ((*KINEMATIC, "plant.friction.nu=1"), "did you mean 'friction.mu'"),
-        ((*KINEMATIC, "plant.friction.mu=-5"), "plant.friction.mu is out of range: got -5.0, expected 0 to 100"),
+        (
+            (*KINEMATIC, "plant.friction.mu=-5"),
+            "plant.friction.mu is out of range: got -5.0, expected 0 to 100",
+        ),
         ((*KINEMATIC, "plant.friction.mu=nan"), "got nan, expected 0 to 100"),
         ((*KINEMATIC, "plant.friction.mu=1e400"), "got inf, expected 0 to 100"),
-        ((*KINEMATIC, "controller.command.vx=99"), "controller.command.vx is out of range: got 99.0, expected -10 to 10 m/s"),
+        (
+            (*KINEMATIC, "controller.command.vx=99"),
+            "controller.command.vx is out of range: got 99.0, expected -10 to 10 m/s",
+        ),
         ((*KINEMATIC, "plant.friction.law=3"), "readers of packages refuse enumerations"),
         ((*KINEMATIC, "controller.gait.pattern=2"), "choose it with --gait"),
-        ((*KINEMATIC, "plant.friction.law=3"), "write law under [friction] of a robot file, and give that with --robot FILE"),
+        (
+            (*KINEMATIC, "plant.friction.law=3"),
+            "write law under [friction] of a robot file, and give that with --robot FILE",
+        ),
     ],
 )
 def test_what_cannot_be_packed_is_refused_and_nothing_written(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, ...], said: str
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     code, _, err = call("export", *arguments)

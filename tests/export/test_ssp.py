@@ -1,4 +1,6 @@
-"""Packages of plant and controller: what they say is valid and true, and what they do when a plain master runs them."""
+"""Packages of plant and controller: what they say is valid and true, and what they do when a
+plain master runs them.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,9 @@ def fmus(athena_fmu: Path, controller: Path) -> dict[str, Path]:
 
 def pack(folder: Path, fmus: dict[str, Path], **values: float) -> Path:
     given = {"controller": {"swing": SWING, **values}}
-    return export_ssp(folder / "athena.ssp", fmus, title="athena", experiment=EXPERIMENT, values=given)
+    return export_ssp(
+        folder / "athena.ssp", fmus, title="athena", experiment=EXPERIMENT, values=given
+    )
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +53,10 @@ def package(fmus: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
 
 def parameters(package: Path, component: str) -> dict[str, Any]:
     with zipfile.ZipFile(package) as archive:
-        return {one.name: one for one in read_ssv(io.BytesIO(archive.read(f"resources/{component}.ssv"))).parameters}
+        return {
+            one.name: one
+            for one in read_ssv(io.BytesIO(archive.read(f"resources/{component}.ssv"))).parameters
+        }
 
 
 def test_a_package_is_valid_by_the_standards_schemas(package: Path) -> None:
@@ -60,12 +67,17 @@ def test_a_package_is_valid_by_the_standards_schemas(package: Path) -> None:
 
 def test_the_fmus_are_packed_as_they_are(package: Path, fmus: dict[str, Path]) -> None:
     with zipfile.ZipFile(package) as archive:
-        assert {name: archive.read(f"resources/{name}.fmu") for name in fmus} == {name: fmu.read_bytes() for name, fmu in fmus.items()}
+        assert {name: archive.read(f"resources/{name}.fmu") for name in fmus} == {
+            name: fmu.read_bytes() for name, fmu in fmus.items()
+        }
 
 
 def test_outputs_drive_the_inputs_of_their_names(package: Path) -> None:
     connections = read_ssd(str(package)).system.connections
-    found = {(one.startElement, one.startConnector, one.endElement, one.endConnector) for one in connections}
+    found = {
+        (one.startElement, one.startConnector, one.endElement, one.endConnector)
+        for one in connections
+    }
     assert found == {
         ("plant", f"{JOINT}.angle", "controller", f"{JOINT}.angle"),
         ("plant", f"{FOOT}.contact", "controller", f"{FOOT}.contact"),
@@ -73,21 +85,37 @@ def test_outputs_drive_the_inputs_of_their_names(package: Path) -> None:
     }
 
 
-def test_connectors_are_the_fmus_variables_with_their_units(package: Path, fmus: dict[str, Path]) -> None:
+def test_connectors_are_the_fmus_variables_with_their_units(
+    package: Path, fmus: dict[str, Path]
+) -> None:
     with zipfile.ZipFile(package) as archive:
         root = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
     defined = {unit.get("name") for unit in root.findall("ssd:Units/ssc:Unit", PREFIXES)}
     for component in root.findall("ssd:System/ssd:Elements/ssd:Component", PREFIXES):
-        known = {one.name: one for one in read_description(fmus[component.get("name", "")]).modelVariables}
-        connectors = {one.get("name", ""): one for one in component.findall("ssd:Connectors/ssd:Connector", PREFIXES)}
-        assert set(connectors) == {name for name, one in known.items() if one.type in {"Real", "Boolean"} and one.causality in KINDS}
+        known = {
+            one.name: one
+            for one in read_description(fmus[component.get("name", "")]).modelVariables
+        }
+        connectors = {
+            one.get("name", ""): one
+            for one in component.findall("ssd:Connectors/ssd:Connector", PREFIXES)
+        }
+        assert set(connectors) == {
+            name
+            for name, one in known.items()
+            if one.type in {"Real", "Boolean"} and one.causality in KINDS
+        }
         for name, connector in connectors.items():
             assert connector.get("kind") == known[name].causality
             assert connector[0].tag == f"{{{PREFIXES['ssc']}}}{known[name].type}"
-            assert connector[0].get("unit") in ({known[name].unit} if known[name].unit in defined else {None})
+            assert connector[0].get("unit") in (
+                {known[name].unit} if known[name].unit in defined else {None}
+            )
 
 
-def test_parameter_sets_say_what_the_fmu_says_to_the_last_bit(package: Path, fmus: dict[str, Path]) -> None:
+def test_parameter_sets_say_what_the_fmu_says_to_the_last_bit(
+    package: Path, fmus: dict[str, Path]
+) -> None:
     found = parameters(package, "plant")
     for variable in read_description(fmus["plant"]).modelVariables:
         if variable.causality == "parameter" and variable.type == "Real":
@@ -101,10 +129,14 @@ def test_every_unit_in_use_is_defined_and_what_cannot_be_said_is_left_out(packag
     used = {one.unit for one in parameters(package, "plant").values() if one.unit}
     assert "kg.m2" in used
     assert all(f'<ssc:Unit name="{unit}">' in text for unit in used)
-    assert parameters(package, "controller")["gain"].unit is None  # a base unit to the power of a half
+    assert (
+        parameters(package, "controller")["gain"].unit is None
+    )  # a base unit to the power of a half
 
 
-def test_values_given_replace_start_values_and_inputs_that_are_driven_are_not_set(package: Path) -> None:
+def test_values_given_replace_start_values_and_inputs_that_are_driven_are_not_set(
+    package: Path,
+) -> None:
     found = parameters(package, "controller")
     assert set(found) == {"start", "gain", "swing"}
     assert float(found["swing"].value) == SWING
@@ -113,7 +145,9 @@ def test_values_given_replace_start_values_and_inputs_that_are_driven_are_not_se
     assert "LM.coxa.angle_ref" in driven
 
 
-def test_the_same_system_makes_the_same_bytes(package: Path, fmus: dict[str, Path], tmp_path: Path) -> None:
+def test_the_same_system_makes_the_same_bytes(
+    package: Path, fmus: dict[str, Path], tmp_path: Path
+) -> None:
     assert pack(tmp_path, fmus).read_bytes() == package.read_bytes()
 
 
@@ -125,7 +159,9 @@ def test_the_step_is_where_readers_look_for_it(package: Path) -> None:
 def test_a_controller_that_answers_at_once_holds_its_law_at_every_point(package: Path) -> None:
     found = run(package, SEEN, step=STEP, steps=STEPS, order=ORDER, at_once=True)
     angle, reference = found.column(SEEN[0]), found.column(SEEN[1])
-    late = np.concatenate([[math.nan], angle[:-1]])  # after its step it still has the angle from before
+    late = np.concatenate(
+        [[math.nan], angle[:-1]]
+    )  # after its step it still has the angle from before
     swing = SWING * np.sin(2.0 * math.pi * found.time)
     law = 0.4 + 0.5 * (late - 0.4) + swing + 1e-6 * np.arange(1, STEPS + 1)
     assert reference[1:] == pytest.approx(law[1:], abs=1e-14)
@@ -134,7 +170,10 @@ def test_a_controller_that_answers_at_once_holds_its_law_at_every_point(package:
 def test_one_step_of_delay_is_seen_by_feedback_alone(fmus: dict[str, Path], tmp_path: Path) -> None:
     def spread(gain: float) -> float:
         package = pack(tmp_path, fmus, gain=gain)
-        both = [run(package, SEEN[:1], step=STEP, steps=STEPS, order=ORDER, at_once=once).data for once in (True, False)]
+        both = [
+            run(package, SEEN[:1], step=STEP, steps=STEPS, order=ORDER, at_once=once).data
+            for once in (True, False)
+        ]
         return float(np.abs(both[0] - both[1]).max())
 
     assert spread(0.5) > 1e-4
@@ -143,7 +182,12 @@ def test_one_step_of_delay_is_seen_by_feedback_alone(fmus: dict[str, Path], tmp_
 
 def test_components_that_share_no_names_are_refused(controller: Path, tmp_path: Path) -> None:
     with pytest.raises(FmuError, match="nothing to connect"):
-        export_ssp(tmp_path / "no.ssp", {"one": controller, "other": controller}, title="no", experiment=EXPERIMENT)
+        export_ssp(
+            tmp_path / "no.ssp",
+            {"one": controller, "other": controller},
+            title="no",
+            experiment=EXPERIMENT,
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -153,7 +197,9 @@ def test_an_input_with_two_drivers_is_refused(fmus: dict[str, Path], tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["swimg", f"{JOINT}.angle", f"{JOINT}.angle_ref"])
-def test_a_value_for_what_is_not_there_or_driven_or_an_output_is_refused(fmus: dict[str, Path], tmp_path: Path, name: str) -> None:
+def test_a_value_for_what_is_not_there_or_driven_or_an_output_is_refused(
+    fmus: dict[str, Path], tmp_path: Path, name: str
+) -> None:
     with pytest.raises(FmuError, match="no such value"):
         pack(tmp_path, fmus, **{name: 0.1})
     assert not list(tmp_path.iterdir())

@@ -26,12 +26,24 @@ def tampered(source: Path, target: Path, member: str, change: Callable[[bytes], 
 @pytest.mark.parametrize(
     ("member", "change", "part"),
     [
-        ("resources/start_values.txt", lambda text: b"{wrong}" + text[text.index(b"\n") :], "has GUID"),
-        ("resources/start_values.txt", lambda text: text.replace(b" torso.mass", b"p1 torso.mass"), "torso.mass"),
+        (
+            "resources/start_values.txt",
+            lambda text: b"{wrong}" + text[text.index(b"\n") :],
+            "has GUID",
+        ),
+        (
+            "resources/start_values.txt",
+            lambda text: text.replace(b" torso.mass", b"p1 torso.mass"),
+            "torso.mass",
+        ),
         ("resources/start_values.txt", lambda text: text + b"99999 1.0\n", "99999"),
         ("resources/start_values.txt", lambda text: text + b"nonsense\n", "'nonsense'"),
         ("resources/start_values.txt", lambda text: text[: text.index(b"\n") + 1], "more"),
-        ("resources/start_values.txt", lambda text: re.sub(rb"\n\d+ \S+ torso.mass\n", b"\n", text), "lacks the value reference"),
+        (
+            "resources/start_values.txt",
+            lambda text: re.sub(rb"\n\d+ \S+ torso.mass\n", b"\n", text),
+            "lacks the value reference",
+        ),
         ("binaries/linux64/hexapod.so", lambda _: b"no library", "cannot be loaded"),
     ],
 )
@@ -46,7 +58,12 @@ def test_what_no_general_checker_sees_is_found(
 
 def test_validate_says_what_is_wrong(call: Call, tmp_path: Path, plant_build: Path) -> None:
     good = export_fmu(load_robot("athena"), tmp_path / "good.fmu")
-    bad = tampered(good, tmp_path / "bad.fmu", "modelDescription.xml", lambda text: text.replace(b'"output"', b'"outputs"', 1))
+    bad = tampered(
+        good,
+        tmp_path / "bad.fmu",
+        "modelDescription.xml",
+        lambda text: text.replace(b'"output"', b'"outputs"', 1),
+    )
     code, out, err = call("validate", bad, "--json")
     printed = json.loads(out)
     assert code == 1
@@ -55,7 +72,9 @@ def test_validate_says_what_is_wrong(call: Call, tmp_path: Path, plant_build: Pa
     assert "the FMU is not sound" in err
 
 
-def test_an_fmu_for_other_machines_alone_is_checked_without_running_it(plant_build: Path, tmp_path: Path) -> None:
+def test_an_fmu_for_other_machines_alone_is_checked_without_running_it(
+    plant_build: Path, tmp_path: Path
+) -> None:
     good = export_fmu(load_robot("athena"), tmp_path / "good.fmu")
     with zipfile.ZipFile(good) as old, zipfile.ZipFile(tmp_path / "sources.fmu", "w") as new:
         for name in old.namelist():
@@ -70,7 +89,10 @@ def test_a_missing_resource_is_found(plant_build: Path, tmp_path: Path) -> None:
         for name in old.namelist():
             if not name.startswith("resources/"):
                 new.writestr(name, old.read(name))
-    assert any("resources/start_values.txt is missing" in problem for problem in find_own_problems(tmp_path / "bare.fmu"))
+    assert any(
+        "resources/start_values.txt is missing" in problem
+        for problem in find_own_problems(tmp_path / "bare.fmu")
+    )
 
 
 @pytest.mark.parametrize(
@@ -81,7 +103,9 @@ def test_a_missing_resource_is_found(plant_build: Path, tmp_path: Path) -> None:
         (b"<fmiModelDescription fmiVersion='2.0' />", "'guid' is required"),
     ],
 )
-def test_an_unreadable_description_is_told_as_json_too(call: Call, tmp_path: Path, text: bytes, part: str) -> None:
+def test_an_unreadable_description_is_told_as_json_too(
+    call: Call, tmp_path: Path, text: bytes, part: str
+) -> None:
     bad = tmp_path / "bad.fmu"
     with zipfile.ZipFile(bad, "w") as archive:
         archive.writestr("modelDescription.xml", text)

@@ -1,8 +1,10 @@
-"""What must hold however often: instances, libraries, threads, steps. Each trial prints its figures and ends with 1 if they are bad.
+"""What must hold however often: instances, libraries, threads, steps. Each trial prints its figures
+and ends with 1 if they are bad.
 
 usage: python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
 
-Without a trial: all of them at full length, as `make test-endurance` does. test_endurance.py runs them short, each in a process of its own.
+Without a trial: all of them at full length, as `make test-endurance` does. test_endurance.py runs
+them short, each in a process of its own.
 """
 
 from __future__ import annotations
@@ -45,14 +47,21 @@ def growth(action: Callable[[], object], count: int) -> Figures:
     for _ in range(count):
         action()
     seconds = time.perf_counter() - begin
-    figures = {"count": count, "growth_bytes": resident() - memory, "growth_files": open_files() - files, "each_us": 1e6 * seconds / count}
+    figures = {
+        "count": count,
+        "growth_bytes": resident() - memory,
+        "growth_files": open_files() - files,
+        "each_us": 1e6 * seconds / count,
+    }
     assert figures["growth_bytes"] < ALLOWED_GROWTH, figures
     assert figures["growth_files"] == 0, figures
     return figures
 
 
 def instances(library: Path, count: int) -> Figures:
-    """Instantiated from resources, initialised, stepped, saved, freed without fmi2Terminate; and refused for a wrong GUID."""
+    """Instantiated from resources, initialised, stepped, saved, freed without fmi2Terminate; and
+    refused for a wrong GUID.
+    """
     with tempfile.TemporaryDirectory() as folder:
         resources = Path(folder)
         (resources / "start_values.txt").write_text(start_values(ATHENA, GUID), encoding="utf-8")
@@ -80,7 +89,9 @@ def libraries(library: Path, count: int) -> Figures:
         _ctypes.dlclose(handle)
 
     figures = growth(load, count)
-    assert not MAPS.exists() or str(library.resolve()) not in MAPS.read_text(encoding="utf-8"), "the library is still mapped"
+    assert not MAPS.exists() or str(library.resolve()) not in MAPS.read_text(encoding="utf-8"), (
+        "the library is still mapped"
+    )
     return figures
 
 
@@ -88,7 +99,15 @@ def trace(plant: Plant, seed: int, first: int, last: int) -> list[list[float]]:
     """All variables after each of some steps under inputs of its own."""
     rows = []
     for k in range(first, last):
-        assert plant.set_reals({"torso.push_force[1]": 0.1 * seed + k % 5, "RM.femur.angle_ref": 0.4 + 0.001 * (seed * k % 70)}) == OK
+        assert (
+            plant.set_reals(
+                {
+                    "torso.push_force[1]": 0.1 * seed + k % 5,
+                    "RM.femur.angle_ref": 0.4 + 0.001 * (seed * k % 70),
+                }
+            )
+            == OK
+        )
         assert plant.step(k * H, H) == OK
         rows.append(plant.everything())
     return rows
@@ -99,8 +118,12 @@ def threads(library: Path, count: int) -> Figures:
     plants = [Plant(library, name=f"plant {k}").initialize() for k in range(64)]
     together: list[list[list[float]]] = [[] for _ in plants]
     with ThreadPoolExecutor(2) as pool:
-        for k in range(count):  # whoever is free takes the next instance, so instances change threads
-            for seed, rows in enumerate(pool.map(lambda seed, k=k: trace(plants[seed], seed, k, k + 1), range(len(plants)))):
+        for k in range(
+            count
+        ):  # whoever is free takes the next instance, so instances change threads
+            for seed, rows in enumerate(
+                pool.map(lambda seed, k=k: trace(plants[seed], seed, k, k + 1), range(len(plants)))
+            ):
                 together[seed] += rows
     for seed, rows in enumerate(together):
         with Plant(library) as alone:
@@ -111,7 +134,9 @@ def threads(library: Path, count: int) -> Figures:
 
 
 def clock(library: Path, count: int) -> Figures:
-    """Steps of 1/60 s of a master that adds them up: the FMU's clock is its clock, to the last bit, up to the stop time."""
+    """Steps of 1/60 s of a master that adds them up: the FMU's clock is its clock, to the last
+    bit, up to the stop time.
+    """
     size, now, reached = 1.0 / 60.0, 0.0, ctypes.c_double()
     with Plant(library) as plant:
         assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 1, count * size) == OK
@@ -128,11 +153,18 @@ def clock(library: Path, count: int) -> Figures:
         assert reached.value == now
         sunk = abs(plant.real("torso.position[3]") - height)
     assert sunk < 1e-9, sunk  # m: it stands as it stood
-    return {"steps": count, "off_by_s": now - count * size, "each_us": 1e6 * seconds / count, "sunk_m": sunk}
+    return {
+        "steps": count,
+        "off_by_s": now - count * size,
+        "each_us": 1e6 * seconds / count,
+        "sunk_m": sunk,
+    }
 
 
 def states(library: Path, count: int) -> Figures:
-    """A state taken at every step and never freed: its own bytes, and no step slower for those before it."""
+    """A state taken at every step and never freed: its own bytes, and no step slower for those
+    before it.
+    """
     with Plant(library) as plant:
         plant.initialize()
         size, memory, times = len(plant.serialize(plant.save())), resident(), [time.perf_counter()]
@@ -168,7 +200,10 @@ def main(arguments: list[str]) -> int:
     """One trial, or all at full length, each in a process of its own."""
     library = arguments[0]
     if len(arguments) == 1:
-        trials = ([sys.executable, __file__, library, name, str(count)] for name, (_, count) in TRIALS.items())
+        trials = (
+            [sys.executable, __file__, library, name, str(count)]
+            for name, (_, count) in TRIALS.items()
+        )
         return max(subprocess.run(trial, check=False).returncode != 0 for trial in trials)
     name, count = arguments[1], int(arguments[2])
     print(name, json.dumps(TRIALS[name][0](Path(library), count)), flush=True)

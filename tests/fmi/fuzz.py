@@ -2,8 +2,9 @@
 
 usage: python tests/fmi/fuzz.py LIBRARY SEED CALLS
 
-After each call the status must be one that the model allows, a refused call must have left every byte of the state as it was, and a
-reset instance must be a new one. Ends with 1 and the last calls if not; a crash is the parent's to notice (test_fuzz.py).
+After each call the status must be one that the model allows, a refused call must have left every
+byte of the state as it was, and a reset instance must be a new one. Ends with 1 and the last calls
+if not; a crash is the parent's to notice (test_fuzz.py).
 """
 
 from __future__ import annotations
@@ -19,12 +20,31 @@ from random import Random
 
 from fmi_plant import ATHENA, DISCARD, ERROR, OK, WARNING, Plant
 
-INSTANTIATED, INITIALIZATION, STEP, TERMINATED = "instantiated", "initialization", "step", "terminated"
+INSTANTIATED, INITIALIZATION, STEP, TERMINATED = (
+    "instantiated",
+    "initialization",
+    "step",
+    "terminated",
+)
 BEFORE_END = (INSTANTIATED, INITIALIZATION, STEP)
 NONSENSE = (math.nan, math.inf, -math.inf, -1.0, 0.0, 1e300, -1e300, 5e-324)
-FOREIGN = ("fmi2EnterEventMode", "fmi2EnterContinuousTimeMode", "fmi2CancelStep")  # not of co-simulation, or with nothing to cancel
-INPUTS = [variable for variable in ATHENA.of_causality("input") if "push" in variable.name or "angle_ref" in variable.name]
-SAFE = ("torso.mass", "friction.mu", "contact.restitution", "servo.kp", "gravity[1]")  # parameters, each free of the others
+FOREIGN = (
+    "fmi2EnterEventMode",
+    "fmi2EnterContinuousTimeMode",
+    "fmi2CancelStep",
+)  # not of co-simulation, or with nothing to cancel
+INPUTS = [
+    variable
+    for variable in ATHENA.of_causality("input")
+    if "push" in variable.name or "angle_ref" in variable.name
+]
+SAFE = (
+    "torso.mass",
+    "friction.mu",
+    "contact.restitution",
+    "servo.kp",
+    "gravity[1]",
+)  # parameters, each free of the others
 UNKNOWN = (999, 3999, 2**31, 2**32 - 1)
 GENTLE = 0.05  # of an input's range at most, so that most steps can be taken
 Statuses = tuple[int, ...]
@@ -57,10 +77,32 @@ class Fuzz:
     def __post_init__(self) -> None:
         self.fresh = self.bytes()
         self.actions: list[Callable[[], tuple[int, Statuses]]] = [
-            self.set_up, self.enter, self.enter, self.leave, self.leave, self.terminate, self.reset, self.read, self.read_unknown,
-            self.set_input, self.set_input, self.set_nonsense, self.set_parameter, self.set_output, self.step, self.step, self.step,
-            self.step, self.step_wrong, self.save, self.restore, self.restore_damaged, self.free, self.foreign, self.log,
-        ]  # fmt: skip
+            self.set_up,
+            self.enter,
+            self.enter,
+            self.leave,
+            self.leave,
+            self.terminate,
+            self.reset,
+            self.read,
+            self.read_unknown,
+            self.set_input,
+            self.set_input,
+            self.set_nonsense,
+            self.set_parameter,
+            self.set_output,
+            self.step,
+            self.step,
+            self.step,
+            self.step,
+            self.step_wrong,
+            self.save,
+            self.restore,
+            self.restore_damaged,
+            self.free,
+            self.foreign,
+            self.log,
+        ]
         self.rare = (self.terminate, self.reset)
 
     def bytes(self) -> bytes:
@@ -77,9 +119,13 @@ class Fuzz:
         status, allowed = action()
         self.counts[status] = self.counts.get(status, 0) + 1
         if status not in allowed:
-            raise BrokenPromiseError(f"status {status}, expected one of {allowed}; said {self.plant.messages[-1:]}")
+            raise BrokenPromiseError(
+                f"status {status}, expected one of {allowed}; said {self.plant.messages[-1:]}"
+            )
         if status in (ERROR, DISCARD) and self.bytes() != before:
-            raise BrokenPromiseError(f"a refused call changed the state; said {self.plant.last_message}")
+            raise BrokenPromiseError(
+                f"a refused call changed the state; said {self.plant.last_message}"
+            )
         if status in (ERROR, DISCARD) and not self.plant.messages:
             raise BrokenPromiseError("a refused call without a message")
         self.plant.messages.clear()
@@ -123,8 +169,14 @@ class Fuzz:
         return status, (OK,)
 
     def read(self) -> tuple[int, Statuses]:
-        variables = [variable for variable in self.random.choices(ATHENA.variables, k=9) if variable.type == "Real"]
-        status, values = self.plant.get_references("fmi2GetReal", [variable.reference for variable in variables])
+        variables = [
+            variable
+            for variable in self.random.choices(ATHENA.variables, k=9)
+            if variable.type == "Real"
+        ]
+        status, values = self.plant.get_references(
+            "fmi2GetReal", [variable.reference for variable in variables]
+        )
         if not all(map(math.isfinite, values)):
             raise BrokenPromiseError(f"{[variable.name for variable in variables]} are {values}")
         return status, (OK,)
@@ -136,8 +188,13 @@ class Fuzz:
     def set_input(self) -> tuple[int, Statuses]:
         chosen = self.random.sample(INPUTS, 4)
         reach = [GENTLE * min(abs(variable.maximum or 0.0), 100.0) for variable in chosen]
-        values = [(variable.start or 0.0) + self.random.uniform(-size, size) for variable, size in zip(chosen, reach, strict=True)]
-        return self.plant.set_reals({v.name: value for v, value in zip(chosen, values, strict=True)}), self.allow(*BEFORE_END)
+        values = [
+            (variable.start or 0.0) + self.random.uniform(-size, size)
+            for variable, size in zip(chosen, reach, strict=True)
+        ]
+        return self.plant.set_reals(
+            {v.name: value for v, value in zip(chosen, values, strict=True)}
+        ), self.allow(*BEFORE_END)
 
     def set_nonsense(self) -> tuple[int, Statuses]:
         good, bad = self.random.sample(INPUTS, 2)
@@ -156,7 +213,9 @@ class Fuzz:
         size = self.random.choice((1e-16, 1e-9, 1e-4, 0.001, 0.005, 1.0 / 60.0, 0.1 - 2e-17))
         status = self.plant.step(self.model.time, size)
         beyond = self.model.time + size - self.model.stop
-        if self.model.mode != STEP or beyond > max(0.51 * size, 2e-9 * max(1.0, abs(self.model.time))):
+        if self.model.mode != STEP or beyond > max(
+            0.51 * size, 2e-9 * max(1.0, abs(self.model.time))
+        ):
             return status, (ERROR,)
         if status == OK:
             self.model = replace(self.model, time=self.model.time + size)
@@ -164,8 +223,12 @@ class Fuzz:
 
     def step_wrong(self) -> tuple[int, Statuses]:
         if self.random.random() < 0.5:
-            return self.plant.step(self.model.time + self.random.choice((1.0, -1.0, math.nan, math.inf)), 0.01), (ERROR,)
-        return self.plant.step(self.model.time, self.random.choice((math.nan, math.inf, 0.0, -0.01, 1e300, 101.0))), (ERROR,)
+            return self.plant.step(
+                self.model.time + self.random.choice((1.0, -1.0, math.nan, math.inf)), 0.01
+            ), (ERROR,)
+        return self.plant.step(
+            self.model.time, self.random.choice((math.nan, math.inf, 0.0, -0.01, 1e300, 101.0))
+        ), (ERROR,)
 
     def save(self) -> tuple[int, Statuses]:
         if len(self.saved) < 20:
@@ -193,7 +256,9 @@ class Fuzz:
         return self.plant.call(self.random.choice(FOREIGN)), (ERROR,)
 
     def log(self) -> tuple[int, Statuses]:
-        return self.plant.call("fmi2SetDebugLogging", self.random.choice((0, 1, -1)), ctypes.c_size_t(0), None), (OK,)
+        return self.plant.call(
+            "fmi2SetDebugLogging", self.random.choice((0, 1, -1)), ctypes.c_size_t(0), None
+        ), (OK,)
 
 
 def run(library: Path, seed: int, calls: int) -> Fuzz:

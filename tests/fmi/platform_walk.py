@@ -1,4 +1,6 @@
-"""A recorded walk that the FMU's binaries for other platforms repeat, each driven by a small C program, under an emulator where need be."""
+"""A recorded walk that the FMU's binaries for other platforms repeat, each driven by a small C
+program, under an emulator where need be.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,13 @@ import fmpy
 import pytest
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers
-from hexapod_cosim.cosim.export.cross_build import COMPILE, TARGETS, compiler_environment, find_compiler, user_cache
+from hexapod_cosim.cosim.export.cross_build import (
+    COMPILE,
+    TARGETS,
+    compiler_environment,
+    find_compiler,
+    user_cache,
+)
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
@@ -31,7 +39,9 @@ EVERYTHING = os.environ.get("HEXAPOD_PLATFORMS") == "all"  # as `make test-platf
 
 @dataclass(frozen=True)
 class Emulator:
-    """How programs for a target run here: what must be installed, the command in front of them, how paths are written."""
+    """How programs for a target run here: what must be installed, the command in front of them,
+    how paths are written.
+    """
 
     needs: tuple[str, ...] = ()
     command: tuple[str, ...] = ()
@@ -40,18 +50,27 @@ class Emulator:
 
 EMULATORS = {
     "x86_64-linux": Emulator(),
-    "aarch64-linux": Emulator(("qemu-aarch64", str(ARM_LIBRARIES / "lib" / "libc.so.6")), ("qemu-aarch64", "-L", str(ARM_LIBRARIES))),
+    "aarch64-linux": Emulator(
+        ("qemu-aarch64", str(ARM_LIBRARIES / "lib" / "libc.so.6")),
+        ("qemu-aarch64", "-L", str(ARM_LIBRARIES)),
+    ),
     "x86_64-windows": Emulator(("wine",), ("wine",), "Z:"),
 }
 
 
 def missing(target: str) -> list[str]:
     """What has to be installed before programs for a target run here."""
-    return [need for need in EMULATORS[target].needs if shutil.which(need) is None and not Path(need).is_file()]
+    return [
+        need
+        for need in EMULATORS[target].needs
+        if shutil.which(need) is None and not Path(need).is_file()
+    ]
 
 
 def record_walk(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Walks over flat ground with the controller and returns the inputs of every step in the form that walker.c reads."""
+    """Walks over flat ground with the controller and returns the inputs of every step in the
+    form that walker.c reads.
+    """
     rows: list[list[float]] = []
     inputs, step = [entry for entry in described(fmu) if entry.causality == "input"], Fmu.step
 
@@ -65,15 +84,27 @@ def record_walk(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     scenario = replace(load_scenario("walk_flat"), control="kinematic", duration=DURATION)
     simulate(scenario, fmu=fmu)
     outputs = [entry for entry in described(fmu) if entry.causality == "output"]
-    words = [[len(entries), *(entry.valueReference for entry in entries)] for entries in (inputs, outputs)]
+    words = [
+        [len(entries), *(entry.valueReference for entry in entries)]
+        for entries in (inputs, outputs)
+    ]
     head = [*words, [len(rows), pattern(scenario.macro_step)]]
-    return "\n".join(" ".join(map(str, line)) for line in [*head, *(list(map(pattern, row)) for row in rows)]) + "\n"
+    return (
+        "\n".join(
+            " ".join(map(str, line)) for line in [*head, *(list(map(pattern, row)) for row in rows)]
+        )
+        + "\n"
+    )
 
 
 @cache
 def described(fmu: Path) -> list[Any]:
     """The FMU's Real variables."""
-    return [entry for entry in fmpy.read_model_description(str(fmu)).modelVariables if entry.type == "Real"]
+    return [
+        entry
+        for entry in fmpy.read_model_description(str(fmu)).modelVariables
+        if entry.type == "Real"
+    ]
 
 
 def pattern(value: float) -> str:
@@ -97,28 +128,66 @@ def build_walker(target: str, folder: Path) -> Path:
         "-s",
     )  # a library's: the system libraries are made once for both
     libraries = [] if "windows" in target else ["-ldl"]
-    command = [*find_compiler().command, *flags, "-isystem", str(fmi_headers()), str(WALKER), *libraries, "-o", str(program)]
+    command = [
+        *find_compiler().command,
+        *flags,
+        "-isystem",
+        str(fmi_headers()),
+        str(WALKER),
+        *libraries,
+        "-o",
+        str(program),
+    ]
     environment = compiler_environment(folder, user_cache())
     for attempt in range(ATTEMPTS):
         try:
-            subprocess.run(command, check=True, capture_output=True, env=environment, timeout=TIMEOUT / ATTEMPTS)
+            subprocess.run(
+                command,
+                check=True,
+                capture_output=True,
+                env=environment,
+                timeout=TIMEOUT / ATTEMPTS,
+            )
             break
         except subprocess.TimeoutExpired:
             assert attempt < ATTEMPTS - 1, f"the compiler hangs: {command}"
     return program
 
 
-def run_walker(target: str, program: Path, library: Path, guid: str, resources: str, inputs: Path) -> subprocess.CompletedProcess[str]:
+def run_walker(
+    target: str, program: Path, library: Path, guid: str, resources: str, inputs: Path
+) -> subprocess.CompletedProcess[str]:
     """Repeats a recorded walk; what it prints are the outputs of every step."""
     emulator, environment = EMULATORS[target], dict(os.environ)
     if emulator.drive:
-        environment |= {"WINEPREFIX": str(program.parents[1] / "wine"), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": "mscoree,mshtml="}
-    paths: Sequence[str] = [f"{emulator.drive}{library.as_posix()}", guid, resources, f"{emulator.drive}{inputs.as_posix()}"]
+        environment |= {
+            "WINEPREFIX": str(program.parents[1] / "wine"),
+            "WINEDEBUG": "-all",
+            "WINEDLLOVERRIDES": "mscoree,mshtml=",
+        }
+    paths: Sequence[str] = [
+        f"{emulator.drive}{library.as_posix()}",
+        guid,
+        resources,
+        f"{emulator.drive}{inputs.as_posix()}",
+    ]
     command = [*emulator.command, str(program), *paths]
-    return subprocess.run(command, check=False, capture_output=True, text=True, errors="replace", env=environment, timeout=TIMEOUT)
+    return subprocess.run(
+        command,
+        check=False,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        env=environment,
+        timeout=TIMEOUT,
+    )
 
 
 def patient(target: str) -> None:
     """Skips Windows where its system libraries were never built: they take minutes."""
-    if target == "x86_64-windows" and not EVERYTHING and not list((user_cache() / "binaries").glob(f"*-{target}-*")):
+    if (
+        target == "x86_64-windows"
+        and not EVERYTHING
+        and not list((user_cache() / "binaries").glob(f"*-{target}-*"))
+    ):
         pytest.skip("the first binary for Windows takes minutes: make test-platforms")

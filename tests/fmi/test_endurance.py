@@ -1,4 +1,6 @@
-"""What must hold however often, in short: each trial of endurance.py in a process of its own, so that a crash is a failure of its test."""
+"""What must hold however often, in short: each trial of endurance.py in a process of its own, so
+that a crash is a failure of its test.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,9 @@ def outcome(script: str, *arguments: str) -> str:
     """What a script prints; fails with its last words unless it ends well."""
     command = [sys.executable, str(SCRIPTS / script), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT)
-    assert done.returncode == 0, f"exit code {done.returncode}\n{done.stdout[-1000:]}{done.stderr[-3000:]}"
+    assert done.returncode == 0, (
+        f"exit code {done.returncode}\n{done.stdout[-1000:]}{done.stderr[-3000:]}"
+    )
     return done.stdout
 
 
@@ -28,7 +32,9 @@ def test_it_holds_however_often(plant_library: Path, trial: str, count: int) -> 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_calls_keep_to_the_standard_s_state_machine(plant_library: Path, seed: int) -> None:
-    """Nothing crashes, a refused call changes nothing and says why, a reset instance is a new one, byte for byte."""
+    """Nothing crashes, a refused call changes nothing and says why, a reset instance is a new
+    one, byte for byte.
+    """
     counts = outcome("fuzz.py", str(plant_library), str(seed), "1500")
     assert "0:" in counts  # some were legal
     assert "3:" in counts  # some were not

@@ -1,4 +1,6 @@
-"""The FMU through the standard's C interface: legal order, values, stepping, log. Physics is tested elsewhere."""
+"""The FMU through the standard's C interface: legal order, values, stepping, log. Physics is
+tested elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,8 @@ def test_the_bare_file_passes_fmpy_validation(athena_fmu: Path) -> None:
 
 
 def test_the_bare_file_stands_still_in_fmpy(athena_fmu: Path) -> None:
-    settled = 1e-5  # m: the statics agree with the plant's equilibrium far better than a foot's 0.66 mm sinkage
+    # m: the statics agree with the plant's equilibrium far better than a foot's 0.66 mm sinkage
+    settled = 1e-5
     result = fmpy.simulate_fmu(str(athena_fmu), output=["torso.position[3]", "torso.roll"])
     assert result["time"][-1] == pytest.approx(2.0)
     assert abs(result["torso.position[3]"] - result["torso.position[3]"][0]).max() < settled
@@ -44,7 +47,9 @@ def test_the_bare_file_stands_still_in_fmpy(athena_fmu: Path) -> None:
 def test_only_the_standard_is_exported(plant_library: Path) -> None:
     nm = shutil.which("nm")
     assert nm is not None
-    listing = subprocess.run([nm, "-D", "--defined-only", str(plant_library)], capture_output=True, text=True, check=True).stdout
+    listing = subprocess.run(
+        [nm, "-D", "--defined-only", str(plant_library)], capture_output=True, text=True, check=True
+    ).stdout
     symbols = {line.split()[-1].split("@")[0] for line in listing.splitlines()}
     assert {symbol for symbol in symbols if not symbol.startswith(("fmi2", "fmi3"))} == set()
 
@@ -59,10 +64,18 @@ def test_every_function_of_the_standard_is_exported(plant_library: Path) -> None
 
 @pytest.mark.parametrize(
     ("function", "arguments"),
-    [("fmi2EnterEventMode", ()), ("fmi2EnterContinuousTimeMode", ()), ("fmi2SetTime", (0.0,)), ("fmi2GetDerivatives", (None, 0)),
-     ("fmi2GetContinuousStates", (None, 0)), ("fmi2CancelStep", ())],
-)  # fmt: skip
-def test_what_is_not_offered_is_an_error_with_a_message(running: Plant, function: str, arguments: tuple[object, ...]) -> None:
+    [
+        ("fmi2EnterEventMode", ()),
+        ("fmi2EnterContinuousTimeMode", ()),
+        ("fmi2SetTime", (0.0,)),
+        ("fmi2GetDerivatives", (None, 0)),
+        ("fmi2GetContinuousStates", (None, 0)),
+        ("fmi2CancelStep", ()),
+    ],
+)
+def test_what_is_not_offered_is_an_error_with_a_message(
+    running: Plant, function: str, arguments: tuple[object, ...]
+) -> None:
     assert running.call(function, *arguments) == ERROR
     assert function in running.last_message
     assert running.step(0.0, H) == OK
@@ -79,7 +92,9 @@ def test_what_is_not_offered_is_an_error_with_a_message(running: Plant, function
         {"kind": 7},
     ],
 )
-def test_a_wrong_instantiation_is_refused_with_a_message(plant_library: Path, arguments: dict[str, str | None]) -> None:
+def test_a_wrong_instantiation_is_refused_with_a_message(
+    plant_library: Path, arguments: dict[str, str | None]
+) -> None:
     with Plant(plant_library, **arguments) as plant:  # type: ignore[arg-type]
         assert plant.component is None
         assert "got" in plant.last_message
@@ -102,17 +117,37 @@ def test_a_missing_instance_is_an_error(plant_library: Path) -> None:
 
 Call = tuple[object, ...]  # function, arguments
 SETUP = ("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
-ENTER, EXIT, END, RESET = ("fmi2EnterInitializationMode",), ("fmi2ExitInitializationMode",), ("fmi2Terminate",), ("fmi2Reset",)
+ENTER, EXIT, END, RESET = (
+    ("fmi2EnterInitializationMode",),
+    ("fmi2ExitInitializationMode",),
+    ("fmi2Terminate",),
+    ("fmi2Reset",),
+)
 STEP = ("fmi2DoStep", 0.0, H, 1)
 
 
 @pytest.mark.parametrize(
     ("legal", "illegal"),
-    [((), STEP), ((), EXIT), ((), END), ((SETUP,), STEP), ((SETUP, ENTER), ENTER), ((SETUP, ENTER), SETUP), ((SETUP, ENTER), STEP),
-     ((SETUP, ENTER), END), ((SETUP, ENTER, EXIT), SETUP), ((SETUP, ENTER, EXIT), ENTER), ((SETUP, ENTER, EXIT), EXIT),
-     ((SETUP, ENTER, EXIT, END), STEP), ((SETUP, ENTER, EXIT, END), ENTER), ((SETUP, ENTER, EXIT, RESET), STEP)],
-)  # fmt: skip
-def test_calls_out_of_order_are_refused_and_change_nothing(plant: Plant, legal: tuple[Call, ...], illegal: Call) -> None:
+    [
+        ((), STEP),
+        ((), EXIT),
+        ((), END),
+        ((SETUP,), STEP),
+        ((SETUP, ENTER), ENTER),
+        ((SETUP, ENTER), SETUP),
+        ((SETUP, ENTER), STEP),
+        ((SETUP, ENTER), END),
+        ((SETUP, ENTER, EXIT), SETUP),
+        ((SETUP, ENTER, EXIT), ENTER),
+        ((SETUP, ENTER, EXIT), EXIT),
+        ((SETUP, ENTER, EXIT, END), STEP),
+        ((SETUP, ENTER, EXIT, END), ENTER),
+        ((SETUP, ENTER, EXIT, RESET), STEP),
+    ],
+)
+def test_calls_out_of_order_are_refused_and_change_nothing(
+    plant: Plant, legal: tuple[Call, ...], illegal: Call
+) -> None:
     for function, *arguments in legal:
         assert plant.call(str(function), *arguments) == OK
     assert plant.call(str(illegal[0]), *illegal[1:]) == ERROR
@@ -176,10 +211,20 @@ def test_last_bit_differences_of_the_clock_are_adopted(running: Plant) -> None:
 
 @pytest.mark.parametrize(
     ("start", "offset", "status"),
-    [(0.0, 5e-10, OK), (0.0, 2e-9, ERROR), (1e6, 2e-6, OK), (1e6, 1e-5, ERROR), (1e6, -1e-5, ERROR), (1e9, 2e-3, OK), (1e9, 4e-3, ERROR),
-     (-1e9, -4e-3, ERROR)],
-)  # fmt: skip
-def test_a_late_clock_is_held_to_its_rounding_and_half_a_step(plant: Plant, start: float, offset: float, status: int) -> None:
+    [
+        (0.0, 5e-10, OK),
+        (0.0, 2e-9, ERROR),
+        (1e6, 2e-6, OK),
+        (1e6, 1e-5, ERROR),
+        (1e6, -1e-5, ERROR),
+        (1e9, 2e-3, OK),
+        (1e9, 4e-3, ERROR),
+        (-1e9, -4e-3, ERROR),
+    ],
+)
+def test_a_late_clock_is_held_to_its_rounding_and_half_a_step(
+    plant: Plant, start: float, offset: float, status: int
+) -> None:
     assert plant.initialize(start=start).step(start + offset, H) == status
 
 
@@ -253,7 +298,9 @@ def test_the_log_holds_what_was_asked_for(plant_library: Path) -> None:
 
 
 def categories(*names: str) -> tuple[ctypes.c_size_t, ctypes.Array[ctypes.c_char_p]]:
-    return ctypes.c_size_t(len(names)), (ctypes.c_char_p * len(names))(*(name.encode() for name in names))
+    return ctypes.c_size_t(len(names)), (ctypes.c_char_p * len(names))(
+        *(name.encode() for name in names)
+    )
 
 
 def test_switching_categories_on_leaves_these_only_and_refusals(plant_library: Path) -> None:
@@ -281,8 +328,18 @@ def test_switching_one_category_off_leaves_the_others(plant_library: Path) -> No
 
 def test_every_declared_log_category_is_known_and_no_other(plant: Plant) -> None:
     for name in ATHENA.log_categories:
-        assert plant.call("fmi2SetDebugLogging", 1, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(name.encode())) == OK
-    assert plant.call("fmi2SetDebugLogging", 1, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(b"logRumours")) == ERROR
+        assert (
+            plant.call(
+                "fmi2SetDebugLogging", 1, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(name.encode())
+            )
+            == OK
+        )
+    assert (
+        plant.call(
+            "fmi2SetDebugLogging", 1, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(b"logRumours")
+        )
+        == ERROR
+    )
     assert "logRumours" in plant.last_message
 
 

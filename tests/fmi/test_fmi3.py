@@ -1,4 +1,6 @@
-"""FMI 3.0 through the standard's C interface: the same plant as through FMI 2.0, arrays, events, legal order, refusals, saved states."""
+"""FMI 3.0 through the standard's C interface: the same plant as through FMI 2.0, arrays, events,
+legal order, refusals, saved states.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,12 @@ from fmi3_plant import ARRAYS, TIME, Plant3
 from fmi_plant import ATHENA, DISCARD, ERROR, OK, Plant
 
 from hexapod_cosim.cosim.interface.arrays import array_name
-from hexapod_cosim.cosim.interface.model_description3 import CAPABILITIES, CO_SIMULATION, EVENTS, MODEL_EXCHANGE
+from hexapod_cosim.cosim.interface.model_description3 import (
+    CAPABILITIES,
+    CO_SIMULATION,
+    EVENTS,
+    MODEL_EXCHANGE,
+)
 
 H = 0.005  # s, communication step
 DROP = 0.15  # m, a torso that high falls for some 50 ms before the feet touch down
@@ -24,7 +31,10 @@ NAN, INF = math.nan, math.inf
 
 def dropped(plant: Plant3) -> Plant3:
     """Above the ground, pushed, ready to step."""
-    assert plant.set({"initial.position": [0.0, 0.0, DROP], "torso.push_force": [PUSH, 0.0, 0.0]}) == OK
+    assert (
+        plant.set({"initial.position": [0.0, 0.0, DROP], "torso.push_force": [PUSH, 0.0, 0.0]})
+        == OK
+    )
     return plant.initialize()
 
 
@@ -59,12 +69,17 @@ def test_what_is_declared_is_what_these_tests_hold_it_to() -> None:
     declared = CAPABILITIES | CO_SIMULATION | MODEL_EXCHANGE
     offered = {name for name, value in declared.items() if value == "true"} | set(EVENTS)
     assert offered == {
-        "canGetAndSetFMUState", "canSerializeFMUState", "canHandleVariableCommunicationStepSize", "mightReturnEarlyFromDoStep",
-        "hasEventMode", "needsCompletedIntegratorStep",
-    }  # fmt: skip
+        "canGetAndSetFMUState",
+        "canSerializeFMUState",
+        "canHandleVariableCommunicationStepSize",
+        "mightReturnEarlyFromDoStep",
+        "hasEventMode",
+        "needsCompletedIntegratorStep",
+    }
 
 
-# ------------------------------------------------------------------------------------------------------------- the same plant
+# -------------------------------------------------------------------------------------------------------------
+# the same plant
 
 
 def test_steps_give_what_fmi_2_gives_bit_for_bit(plant3: Plant3, plant: Plant) -> None:
@@ -85,7 +100,10 @@ def test_events_and_early_returns_do_not_change_the_motion(
 ) -> None:
     settings = {"solver.method": [ATHENA.enumerations["Method"].number(method)]}
     end = 0.1
-    with Plant3(plant_library) as whole, Plant3(plant_library, events=events, early=early) as broken:
+    with (
+        Plant3(plant_library) as whole,
+        Plant3(plant_library, events=events, early=early) as broken,
+    ):
         for plant in (whole, broken):
             assert plant.set(settings) == OK
             assert plant.set({"solver.step": [step]}) == OK
@@ -96,7 +114,8 @@ def test_events_and_early_returns_do_not_change_the_motion(
         times = to_end(broken, end, enter=events)
         assert len(times) >= 3
         assert early == any(not math.isclose(time / H, round(time / H)) for time in times)
-        # 1e-12: an end that an importer reaches as t + h in pieces may differ in the last bit, and with it the last step
+        # 1e-12: an end that an importer reaches as t + h in pieces may differ in the last bit, and
+        # with it the last step
         np.testing.assert_allclose(broken.everything(), whole.everything(), rtol=1e-12, atol=1e-12)
         assert broken.get("solver.steps") == whole.get("solver.steps")
 
@@ -108,22 +127,41 @@ def test_time_is_the_independent_variable(running3: Plant3) -> None:
     assert "time" in running3.last_message
 
 
-# ------------------------------------------------------------------------------------------------------------- arrays
+# -------------------------------------------------------------------------------------------------------------
+# arrays
 
 
 def test_an_array_is_its_elements_in_the_order_of_their_references() -> None:
     for name, array in ARRAYS.items():
-        assert [element.reference for element in array.elements] == list(range(array.reference, array.reference + len(array.elements)))
-        assert {array_name(re.sub(r"\[\d\]", "[i]", element.name)) for element in array.elements[:1]} >= {name} or array.shape
-        assert len({(e.type, e.unit, e.minimum, e.maximum, e.nominal, e.variability, e.enumeration) for e in array.elements}) == 1
+        assert [element.reference for element in array.elements] == list(
+            range(array.reference, array.reference + len(array.elements))
+        )
+        assert {
+            array_name(re.sub(r"\[\d\]", "[i]", element.name)) for element in array.elements[:1]
+        } >= {name} or array.shape
+        assert (
+            len(
+                {
+                    (e.type, e.unit, e.minimum, e.maximum, e.nominal, e.variability, e.enumeration)
+                    for e in array.elements
+                }
+            )
+            == 1
+        )
 
 
 @pytest.mark.parametrize(
     ("pattern", "name"),
-    [("{leg}.{joint}.angle_ref", "angle_ref"), ("{leg}.foot.force[i]", "foot.force"), ("torso.inertia_{inertia}", "torso.inertia"),
-     ("{leg}.{joint}.inertia_{inertia}", "inertia"), ("initial.{leg}.{joint}.angle", "initial.angle"), ("torso.mass", "torso.mass"),
-     ("der({leg}.foot.bristle[i])", "der(foot.bristle)")],
-)  # fmt: skip
+    [
+        ("{leg}.{joint}.angle_ref", "angle_ref"),
+        ("{leg}.foot.force[i]", "foot.force"),
+        ("torso.inertia_{inertia}", "torso.inertia"),
+        ("{leg}.{joint}.inertia_{inertia}", "inertia"),
+        ("initial.{leg}.{joint}.angle", "initial.angle"),
+        ("torso.mass", "torso.mass"),
+        ("der({leg}.foot.bristle[i])", "der(foot.bristle)"),
+    ],
+)
 def test_an_array_s_name_is_the_pattern_s_without_axes(pattern: str, name: str) -> None:
     assert array_name(pattern) == name
 
@@ -134,7 +172,11 @@ def test_elements_go_where_fmi_2_has_them(plant3: Plant3, plant: Plant) -> None:
     state = plant3.save()
     loaded = plant.deserialize(plant3.serialize(state))[1]
     assert plant.call("fmi2SetFMUstate", loaded) == OK
-    assert plant.reals(["LF.femur.angle_ref", "RR.coxa.angle_ref", "torso.push_force[2]"]) == [ref[0, 1], ref[5, 0], 2.0]
+    assert plant.reals(["LF.femur.angle_ref", "RR.coxa.angle_ref", "torso.push_force[2]"]) == [
+        ref[0, 1],
+        ref[5, 0],
+        2.0,
+    ]
     plant3.free(state)
     plant.free(loaded)
 
@@ -154,7 +196,9 @@ def test_a_number_that_is_no_item_is_refused(plant3: Plant3, item: int) -> None:
 
 @pytest.mark.parametrize("bad", [NAN, INF, -INF, 7.0])
 @pytest.mark.parametrize("place", [0, 17])
-def test_one_bad_element_leaves_the_whole_batch_unset(running3: Plant3, bad: float, place: int) -> None:
+def test_one_bad_element_leaves_the_whole_batch_unset(
+    running3: Plant3, bad: float, place: int
+) -> None:
     before = [value.copy() for value in running3.get("torso.push_force", "angle_ref")]
     ref = np.zeros(18)
     ref[place] = bad
@@ -164,8 +208,13 @@ def test_one_bad_element_leaves_the_whole_batch_unset(running3: Plant3, bad: flo
         assert (value == old).all()
 
 
-@pytest.mark.parametrize(("references", "count"), [([0], 17), ([0], 19), ([1], 17), ([0, 54], 18), ([999999], 1), ([4323], 1), ([1258], 6)])
-def test_a_wrong_count_reference_or_type_is_refused(running3: Plant3, references: list[int], count: int) -> None:
+@pytest.mark.parametrize(
+    ("references", "count"),
+    [([0], 17), ([0], 19), ([1], 17), ([0, 54], 18), ([999999], 1), ([4323], 1), ([1258], 6)],
+)
+def test_a_wrong_count_reference_or_type_is_refused(
+    running3: Plant3, references: list[int], count: int
+) -> None:
     assert running3.get_raw("Float64", references, count)[0] == ERROR
     assert "got" in running3.last_message
     assert "expected" in running3.last_message
@@ -182,7 +231,9 @@ def test_parameters_are_fixed_after_initialisation(running3: Plant3) -> None:
     assert "LF.coxa.mass" in running3.last_message
 
 
-@pytest.mark.parametrize("kind", ["Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "UInt64", "String"])
+@pytest.mark.parametrize(
+    "kind", ["Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "UInt64", "String"]
+)
 @pytest.mark.parametrize("verb", ["Get", "Set"])
 def test_types_that_no_variable_has_take_none(running3: Plant3, verb: str, kind: str) -> None:
     one = (ctypes.c_uint * 1)(0)
@@ -196,11 +247,17 @@ def test_null_arrays_are_refused_unless_empty(running3: Plant3) -> None:
     assert "NULL" in running3.last_message
 
 
-# ------------------------------------------------------------------------------------------------------------- stepping
+# -------------------------------------------------------------------------------------------------------------
+# stepping
 
 
-@pytest.mark.parametrize(("time", "size"), [(0.0, NAN), (NAN, H), (0.0, INF), (0.0, -H), (0.0, 0.0), (0.0, 1e6), (1.0, H), (INF, H)])
-def test_a_senseless_step_is_refused_and_changes_nothing(plant_library: Path, time: float, size: float) -> None:
+@pytest.mark.parametrize(
+    ("time", "size"),
+    [(0.0, NAN), (NAN, H), (0.0, INF), (0.0, -H), (0.0, 0.0), (0.0, 1e6), (1.0, H), (INF, H)],
+)
+def test_a_senseless_step_is_refused_and_changes_nothing(
+    plant_library: Path, time: float, size: float
+) -> None:
     with Plant3(plant_library, early=True) as plant:
         before = plant.initialize().everything()
         assert plant.step(time, size) == (ERROR, False, False, False, 0.0)
@@ -252,10 +309,13 @@ def test_without_event_mode_there_is_none(running3: Plant3) -> None:
     assert running3.step(0.0, H) == (OK, False, False, False, H)
 
 
-# ------------------------------------------------------------------------------------------------------------- saved states
+# -------------------------------------------------------------------------------------------------------------
+# saved states
 
 
-def test_a_restored_state_goes_on_bit_for_bit_also_after_an_early_return(plant_library: Path) -> None:
+def test_a_restored_state_goes_on_bit_for_bit_also_after_an_early_return(
+    plant_library: Path,
+) -> None:
     with Plant3(plant_library, early=True) as plant, Plant3(plant_library, early=True) as other:
         dropped(plant)
         time = plant.step(0.0, 0.2).time
@@ -285,7 +345,9 @@ def test_damaged_bytes_are_refused(running3: Plant3) -> None:
     running3.free(state)
 
 
-def test_a_state_saved_in_event_mode_goes_on_where_there_is_none(plant3: Plant3, plant_library: Path) -> None:
+def test_a_state_saved_in_event_mode_goes_on_where_there_is_none(
+    plant3: Plant3, plant_library: Path
+) -> None:
     with Plant3(plant_library, events=True) as other:
         saved = other.initialize().save()
         plant3.initialize()

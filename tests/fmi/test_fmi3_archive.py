@@ -1,4 +1,6 @@
-"""The FMI 3.0 FMU as a file: what fmpy and the standard's schemas say, runs by fmpy against FMI 2.0, sources, terminals, derivatives."""
+"""The FMI 3.0 FMU as a file: what fmpy and the standard's schemas say, runs by fmpy against FMI
+2.0, sources, terminals, derivatives.
+"""
 
 from __future__ import annotations
 
@@ -25,24 +27,46 @@ SCHEMAS = Path(fmpy.__file__).parent / "schema" / "fmi3"
 DROP, PUSH, STOP = 0.15, 3.0, 0.25  # m, N, s
 START2 = {"initial.position[3]": DROP, "torso.push_force[1]": PUSH}
 START3 = {"initial.position": [0.0, 0.0, DROP], "torso.push_force": [PUSH, 0.0, 0.0]}
-SEEN2 = ["torso.position[1]", "torso.position[3]", "RR.tibia.torque", "LF.foot.force[3]", "solver.steps"]
+SEEN2 = [
+    "torso.position[1]",
+    "torso.position[3]",
+    "RR.tibia.torque",
+    "LF.foot.force[3]",
+    "solver.steps",
+]
 SEEN3 = ["torso.position", "torque", "foot.force", "solver.steps"]
 
 
 @pytest.fixture(scope="module")
 def exported3(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return export_fmu(load_robot("athena"), tmp_path_factory.mktemp("export3") / "athena.fmu", fmi=3)
+    return export_fmu(
+        load_robot("athena"), tmp_path_factory.mktemp("export3") / "athena.fmu", fmi=3
+    )
 
 
 def run2(path: Path, **options: Any) -> NDArray[np.float64]:
     """The last row of an FMI 2.0 run, as run3's."""
-    result = fmpy.simulate_fmu(str(path), stop_time=STOP, output_interval=0.005, start_values=START2, output=SEEN2, **options)
+    result = fmpy.simulate_fmu(
+        str(path),
+        stop_time=STOP,
+        output_interval=0.005,
+        start_values=START2,
+        output=SEEN2,
+        **options,
+    )
     return np.array([result[name][-1] for name in SEEN2])
 
 
 def run3(path: Path, **options: Any) -> NDArray[np.float64]:
     """The last row of an FMI 3.0 run: the elements that SEEN2 names."""
-    result = fmpy.simulate_fmu(str(path), stop_time=STOP, output_interval=0.005, start_values=START3, output=SEEN3, **options)
+    result = fmpy.simulate_fmu(
+        str(path),
+        stop_time=STOP,
+        output_interval=0.005,
+        start_values=START3,
+        output=SEEN3,
+        **options,
+    )
     position, torque, force, steps = (result[name][-1] for name in SEEN3)
     return np.array([position[0], position[2], torque[5][2], force[0][2], steps])
 
@@ -53,9 +77,12 @@ def test_the_file_passes_fmpy_validation(exported3: Path) -> None:
 
 @pytest.mark.parametrize(
     ("member", "schema"),
-    [("modelDescription.xml", "fmi3ModelDescription"), ("sources/buildDescription.xml", "fmi3BuildDescription"),
-     ("terminalsAndIcons/terminalsAndIcons.xml", "fmi3TerminalsAndIcons")],
-)  # fmt: skip
+    [
+        ("modelDescription.xml", "fmi3ModelDescription"),
+        ("sources/buildDescription.xml", "fmi3BuildDescription"),
+        ("terminalsAndIcons/terminalsAndIcons.xml", "fmi3TerminalsAndIcons"),
+    ],
+)
 def test_documents_follow_the_standard_s_schemas(exported3: Path, member: str, schema: str) -> None:
     with zipfile.ZipFile(exported3) as archive:
         document = etree.fromstring(archive.read(member))
@@ -68,36 +95,55 @@ def test_the_archive_is_laid_out_as_fmi_3_has_it(exported3: Path) -> None:
         names = set(archive.namelist())
     library = f"binaries/{fmpy.platform_tuple}/hexapod{fmpy.sharedLibraryExtension}"
     pictures = {"documentation/diagram.png", "terminalsAndIcons/icon.png"}
-    assert {library, "documentation/index.html", "resources/start_values.txt", "sources/fmi/fmi3.c"} | pictures <= names
+    assert {
+        library,
+        "documentation/index.html",
+        "resources/start_values.txt",
+        "sources/fmi/fmi3.c",
+    } | pictures <= names
     assert not names & {"sources/fmi/fmi2.c", "model.png"}  # of FMI 2
 
 
 def test_the_bare_file_stands_still_in_fmpy(exported3: Path) -> None:
     settled = 1e-5  # m
-    height = fmpy.simulate_fmu(str(exported3), output=["torso.position"], stop_time=0.5)["torso.position"][:, 2]
+    height = fmpy.simulate_fmu(str(exported3), output=["torso.position"], stop_time=0.5)[
+        "torso.position"
+    ][:, 2]
     assert abs(height - height[0]).max() < settled
 
 
-def test_co_simulation_gives_what_fmi_2_gives_bit_for_bit(exported3: Path, athena_fmu: Path) -> None:
+def test_co_simulation_gives_what_fmi_2_gives_bit_for_bit(
+    exported3: Path, athena_fmu: Path
+) -> None:
     expected = run2(athena_fmu, fmi_type="CoSimulation")
     assert run3(exported3, fmi_type="CoSimulation").tolist() == expected.tolist()
-    assert run3(exported3, fmi_type="CoSimulation", use_event_mode=True).tolist() == expected.tolist()
+    assert (
+        run3(exported3, fmi_type="CoSimulation", use_event_mode=True).tolist() == expected.tolist()
+    )
 
 
 @pytest.mark.parametrize("event_mode", [False, True])
-def test_early_returns_change_nothing_but_rounding(exported3: Path, athena_fmu: Path, event_mode: bool) -> None:
+def test_early_returns_change_nothing_but_rounding(
+    exported3: Path, athena_fmu: Path, event_mode: bool
+) -> None:
     expected = run2(athena_fmu, fmi_type="CoSimulation")
     # fmpy asks for the rest of a step, whose end may then differ in the last bit
-    found = run3(exported3, fmi_type="CoSimulation", early_return_allowed=True, use_event_mode=event_mode)
+    found = run3(
+        exported3, fmi_type="CoSimulation", early_return_allowed=True, use_event_mode=event_mode
+    )
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
 
 
-def test_a_foreign_solver_gets_the_same_from_both_versions(exported3: Path, athena_fmu: Path) -> None:
+def test_a_foreign_solver_gets_the_same_from_both_versions(
+    exported3: Path, athena_fmu: Path
+) -> None:
     options = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-6}
     expected, found = run2(athena_fmu, **options), run3(exported3, **options)
     assert found.tolist() == expected.tolist()
     position = slice(0, 2)
-    np.testing.assert_allclose(found[position], run2(athena_fmu, fmi_type="CoSimulation")[position], atol=1e-5)  # m
+    np.testing.assert_allclose(
+        found[position], run2(athena_fmu, fmi_type="CoSimulation")[position], atol=1e-5
+    )  # m
 
 
 def test_fmpy_builds_the_sources_into_an_equal_binary(exported3: Path, tmp_path: Path) -> None:
@@ -117,10 +163,13 @@ def test_terminals_hold_known_variables(exported3: Path) -> None:
     assert set(members) <= set(ARRAYS)
 
 
-# ------------------------------------------------------------------------------------------------------------- structure
+# -------------------------------------------------------------------------------------------------------------
+# structure
 
 
-def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(exported3: Path, plant_library: Path) -> None:
+def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(
+    exported3: Path, plant_library: Path
+) -> None:
     description = fmpy.read_model_description(str(exported3))
     by_name = {variable.name: variable for variable in description.modelVariables}
     flat: list[str] = []
@@ -129,12 +178,20 @@ def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(exported3: Path, pla
         assert by_name[state.name].valueReference == ARRAYS[state.name].reference
         flat += [element.name for element in ARRAYS[state.name].elements]
     assert flat == STATE_NAMES
-    assert [indicator.variable.name for indicator in description.eventIndicators] == ["foot.event_indicator"]
-    with Plant3(plant_library, kind="ModelExchange") as plant, Plant(plant_library, kind=MODEL_EXCHANGE) as other:
+    assert [indicator.variable.name for indicator in description.eventIndicators] == [
+        "foot.event_indicator"
+    ]
+    with (
+        Plant3(plant_library, kind="ModelExchange") as plant,
+        Plant(plant_library, kind=MODEL_EXCHANGE) as other,
+    ):
         plant.initialize()
         other.initialize()
         assert plant.row("fmi3GetContinuousStates", 70).tolist() == other.reals(STATE_NAMES)
-        assert plant.row("fmi3GetEventIndicators", 6).tolist() == plant.get("foot.event_indicator")[0].tolist()
+        assert (
+            plant.row("fmi3GetEventIndicators", 6).tolist()
+            == plant.get("foot.event_indicator")[0].tolist()
+        )
         rates = [state.derivative for state in ATHENA.states]
         assert plant.row("fmi3GetContinuousStateDerivatives", 70).tolist() == other.reals(rates)
         assert plant.row("fmi3GetNominalsOfContinuousStates", 70).min() > 0.0
@@ -143,34 +200,72 @@ def test_states_and_derivatives_are_arrays_in_fmi_2_s_order(exported3: Path, pla
 def test_dependencies_are_those_of_the_elements(exported3: Path) -> None:
     description = fmpy.read_model_description(str(exported3))
     stated = {unknown.variable.name: unknown.dependencies for unknown in description.derivatives}
-    assert {variable.name for variable in stated["der(torso.quaternion)"]} == {"torso.quaternion", "torso.angular_velocity"}
+    assert {variable.name for variable in stated["der(torso.quaternion)"]} == {
+        "torso.quaternion",
+        "torso.angular_velocity",
+    }
     assert stated["der(speed)"] is None  # on all
 
 
 def test_discrete_variables_are_those_that_change_at_events(exported3: Path) -> None:
     description = fmpy.read_model_description(str(exported3))
-    discrete = {variable.name for variable in description.modelVariables if variable.variability == "discrete"}
+    discrete = {
+        variable.name
+        for variable in description.modelVariables
+        if variable.variability == "discrete"
+    }
     assert discrete == {"foot.contact", "foot.impact_speed", "foot.landings", "solver.touchdowns"}
 
 
-def test_directional_derivatives_of_arrays_are_fmi_2_s_of_elements(running3: Plant3, running: Plant) -> None:
+def test_directional_derivatives_of_arrays_are_fmi_2_s_of_elements(
+    running3: Plant3, running: Plant
+) -> None:
     known, unknown = ARRAYS["torque_ref"], ARRAYS["der(speed)"]
     seed, result = (ctypes.c_double * 18)(*np.linspace(-1.0, 1.0, 18)), (ctypes.c_double * 18)()
     references = [(ctypes.c_uint * 1)(array.reference) for array in (unknown, known)]
-    assert running3.call("fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 18, result, 18) == OK
-    numbers = [(ctypes.c_uint * 18)(*(element.reference for element in array.elements)) for array in (unknown, known)]
+    assert (
+        running3.call(
+            "fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 18, result, 18
+        )
+        == OK
+    )
+    numbers = [
+        (ctypes.c_uint * 18)(*(element.reference for element in array.elements))
+        for array in (unknown, known)
+    ]
     expected = (ctypes.c_double * 18)()
     sizes = ctypes.c_size_t(18)
-    assert running.call("fmi2GetDirectionalDerivative", numbers[0], sizes, numbers[1], sizes, seed, expected) == OK
+    assert (
+        running.call(
+            "fmi2GetDirectionalDerivative", numbers[0], sizes, numbers[1], sizes, seed, expected
+        )
+        == OK
+    )
     assert list(result) == list(expected)
     assert np.abs(result).max() > 1.0
-    assert running3.call("fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 17, result, 18) == ERROR
-    assert running3.call("fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 18, result, 6) == ERROR
+    assert (
+        running3.call(
+            "fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 17, result, 18
+        )
+        == ERROR
+    )
+    assert (
+        running3.call(
+            "fmi3GetDirectionalDerivative", references[0], 1, references[1], 1, seed, 18, result, 6
+        )
+        == ERROR
+    )
 
 
 def test_output_derivatives_of_arrays_are_rates(running3: Plant3) -> None:
     assert running3.step(0.0, 0.005).status == OK
     rate, reference = (ctypes.c_double * 18)(), (ctypes.c_uint * 1)(ARRAYS["angle"].reference)
-    assert running3.call("fmi3GetOutputDerivatives", reference, 1, (ctypes.c_int32 * 1)(1), rate, 18) == OK
+    assert (
+        running3.call("fmi3GetOutputDerivatives", reference, 1, (ctypes.c_int32 * 1)(1), rate, 18)
+        == OK
+    )
     np.testing.assert_allclose(list(rate), running3.get("speed")[0].ravel(), rtol=1e-9, atol=1e-12)
-    assert running3.call("fmi3GetOutputDerivatives", reference, 1, (ctypes.c_int32 * 1)(2), rate, 18) == ERROR
+    assert (
+        running3.call("fmi3GetOutputDerivatives", reference, 1, (ctypes.c_int32 * 1)(2), rate, 18)
+        == ERROR
+    )

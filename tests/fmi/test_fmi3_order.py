@@ -15,8 +15,19 @@ H = 0.005  # s, communication step
 NAN, INF = math.nan, math.inf
 
 
-@pytest.mark.parametrize("arguments", [{"token": "{0}"}, {"token": None}, {"name": None}, {"name": ""}, {"kind": "ScheduledExecution"}])
-def test_a_wrong_instantiation_is_refused_with_a_message(plant_library: Path, arguments: dict[str, str | None]) -> None:
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"token": "{0}"},
+        {"token": None},
+        {"name": None},
+        {"name": ""},
+        {"kind": "ScheduledExecution"},
+    ],
+)
+def test_a_wrong_instantiation_is_refused_with_a_message(
+    plant_library: Path, arguments: dict[str, str | None]
+) -> None:
     with Plant3(plant_library, **arguments) as plant:  # type: ignore[arg-type]
         assert plant.handle is None
         assert "got" in plant.last_message
@@ -38,7 +49,14 @@ def test_a_missing_instance_is_an_error(plant_library: Path) -> None:
 ENTER: tuple[object, ...] = ("fmi3EnterInitializationMode", False, 0.0, 0.0, False, 0.0)
 EXIT, END, RESET, EVENT, STEP_MODE, CONTINUOUS = (
     (f"fmi3{name}",)
-    for name in ("ExitInitializationMode", "Terminate", "Reset", "EnterEventMode", "EnterStepMode", "EnterContinuousTimeMode")
+    for name in (
+        "ExitInitializationMode",
+        "Terminate",
+        "Reset",
+        "EnterEventMode",
+        "EnterStepMode",
+        "EnterContinuousTimeMode",
+    )
 )
 STEP: tuple[object, ...] = ("fmi3DoStep", 0.0, H, True, None, None, None, None)
 UPDATE: tuple[object, ...] = ("fmi3UpdateDiscreteStates", None, None, None, None, None, None)
@@ -48,23 +66,87 @@ COMPLETED: tuple[object, ...] = ("fmi3CompletedIntegratorStep", True, None, None
 COUNT: tuple[object, ...] = ("fmi3GetNumberOfContinuousStates", ctypes.byref(ctypes.c_size_t()))
 WALKS = {
     "plain": ("CoSimulation", False, (ENTER, EXIT, STEP, END, END, RESET, ENTER, EXIT)),
-    "events": ("CoSimulation", True, (ENTER, EXIT, UPDATE, STEP_MODE, STEP, EVENT, UPDATE, UPDATE, STEP_MODE, EVENT, END, RESET, ENTER)),
-    "exchange": (
-        "ModelExchange", False,
-        (COUNT, ENTER, STATES, EXIT, UPDATE, SET_TIME, CONTINUOUS, SET_TIME, STATES, COMPLETED, EVENT, UPDATE, CONTINUOUS, END, RESET),
+    "events": (
+        "CoSimulation",
+        True,
+        (
+            ENTER,
+            EXIT,
+            UPDATE,
+            STEP_MODE,
+            STEP,
+            EVENT,
+            UPDATE,
+            UPDATE,
+            STEP_MODE,
+            EVENT,
+            END,
+            RESET,
+            ENTER,
+        ),
     ),
-}  # fmt: skip
-EVERY = (ENTER, EXIT, STEP, END, EVENT, STEP_MODE, CONTINUOUS, UPDATE, SET_TIME, STATES, COMPLETED, COUNT)
-# which of EVERY are legal after each call of a walk: what the standard's state machines say, and the liberties that fmi3.c names
+    "exchange": (
+        "ModelExchange",
+        False,
+        (
+            COUNT,
+            ENTER,
+            STATES,
+            EXIT,
+            UPDATE,
+            SET_TIME,
+            CONTINUOUS,
+            SET_TIME,
+            STATES,
+            COMPLETED,
+            EVENT,
+            UPDATE,
+            CONTINUOUS,
+            END,
+            RESET,
+        ),
+    ),
+}
+EVERY = (
+    ENTER,
+    EXIT,
+    STEP,
+    END,
+    EVENT,
+    STEP_MODE,
+    CONTINUOUS,
+    UPDATE,
+    SET_TIME,
+    STATES,
+    COMPLETED,
+    COUNT,
+)
+# which of EVERY are legal after each call of a walk: what the standard's state machines say, and
+# the liberties that fmi3.c names
 LEGAL: dict[str, dict[str, tuple[tuple[object, ...], ...]]] = {
     "plain": {"": (ENTER,), "init": (EXIT,), "run": (STEP, END), "end": (END,)},
-    "events": {"": (ENTER,), "init": (EXIT,), "event": (UPDATE, STEP_MODE, END), "run": (STEP, END, EVENT), "end": (END,)},
-    "exchange": {
-        "": (ENTER, COUNT), "init": (EXIT, STATES, COUNT), "event": (UPDATE, CONTINUOUS, SET_TIME, STATES, END, COUNT),
-        "run": (EVENT, SET_TIME, STATES, COMPLETED, END, COUNT), "end": (END, STATES, COUNT),
+    "events": {
+        "": (ENTER,),
+        "init": (EXIT,),
+        "event": (UPDATE, STEP_MODE, END),
+        "run": (STEP, END, EVENT),
+        "end": (END,),
     },
-}  # fmt: skip
-LEADS = {"EnterInitializationMode": "init", "Terminate": "end", "Reset": "", "EnterEventMode": "event", "EnterStepMode": "run"}
+    "exchange": {
+        "": (ENTER, COUNT),
+        "init": (EXIT, STATES, COUNT),
+        "event": (UPDATE, CONTINUOUS, SET_TIME, STATES, END, COUNT),
+        "run": (EVENT, SET_TIME, STATES, COMPLETED, END, COUNT),
+        "end": (END, STATES, COUNT),
+    },
+}
+LEADS = {
+    "EnterInitializationMode": "init",
+    "Terminate": "end",
+    "Reset": "",
+    "EnterEventMode": "event",
+    "EnterStepMode": "run",
+}
 
 
 def mode_after(call: tuple[object, ...], mode: str, walk: str) -> str:
@@ -86,31 +168,48 @@ def test_calls_are_taken_in_the_standard_s_order_alone(plant_library: Path, walk
                     assert plant.call(str(other[0]), *other[1:]) == ERROR, (walk, mode, other[0])
                     assert str(other[0])[:15] in plant.last_message
             seen.add(mode)
-            assert plant.call(str(call[0]), *call[1:]) == OK, (walk, mode, call[0], plant.last_message)
+            assert plant.call(str(call[0]), *call[1:]) == OK, (
+                walk,
+                mode,
+                call[0],
+                plant.last_message,
+            )
             mode = mode_after(call, mode, walk)
     assert seen == set(LEGAL[walk])
 
 
 NOT_OFFERED: tuple[tuple[object, ...], ...] = (
-    ("fmi3EnterConfigurationMode",), ("fmi3ExitConfigurationMode",), ("fmi3EvaluateDiscreteStates",),
+    ("fmi3EnterConfigurationMode",),
+    ("fmi3ExitConfigurationMode",),
+    ("fmi3EvaluateDiscreteStates",),
     ("fmi3GetNumberOfVariableDependencies", ctypes.c_uint(0), None),
     ("fmi3GetVariableDependencies", ctypes.c_uint(0), None, None, None, None, 0),
-    ("fmi3GetAdjointDerivative", None, 0, None, 0, None, 0, None, 0), ("fmi3ActivateModelPartition", ctypes.c_uint(0), 0.0),
-)  # fmt: skip
+    ("fmi3GetAdjointDerivative", None, 0, None, 0, None, 0, None, 0),
+    ("fmi3ActivateModelPartition", ctypes.c_uint(0), 0.0),
+)
 
 
 @pytest.mark.parametrize("call", NOT_OFFERED, ids=lambda call: str(call[0]))
-def test_what_is_not_offered_is_an_error_with_a_message(running3: Plant3, call: tuple[object, ...]) -> None:
+def test_what_is_not_offered_is_an_error_with_a_message(
+    running3: Plant3, call: tuple[object, ...]
+) -> None:
     assert running3.call(str(call[0]), *call[1:]) == ERROR
     assert str(call[0]) in running3.last_message
     assert running3.step(0.0, H).status == OK
 
 
 CLOCK_FUNCTIONS = {
-    "fmi3GetClock": 1, "fmi3SetClock": 1, "fmi3GetIntervalDecimal": 2, "fmi3GetIntervalFraction": 3, "fmi3GetShiftDecimal": 1,
-    "fmi3GetShiftFraction": 2, "fmi3SetIntervalDecimal": 1, "fmi3SetIntervalFraction": 2, "fmi3SetShiftDecimal": 1,
+    "fmi3GetClock": 1,
+    "fmi3SetClock": 1,
+    "fmi3GetIntervalDecimal": 2,
+    "fmi3GetIntervalFraction": 3,
+    "fmi3GetShiftDecimal": 1,
+    "fmi3GetShiftFraction": 2,
+    "fmi3SetIntervalDecimal": 1,
+    "fmi3SetIntervalFraction": 2,
+    "fmi3SetShiftDecimal": 1,
     "fmi3SetShiftFraction": 2,
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("function", CLOCK_FUNCTIONS)
@@ -142,8 +241,12 @@ def test_a_senseless_tolerance_is_only_a_warning(plant3: Plant3) -> None:
     assert plant3.call("fmi3ExitInitializationMode") == OK
 
 
-@pytest.mark.parametrize(("start", "stop"), [(NAN, None), (INF, None), (0.0, NAN), (1.0, 0.5), (1e12, None)])
-def test_a_senseless_experiment_is_refused(plant3: Plant3, start: float, stop: float | None) -> None:
+@pytest.mark.parametrize(
+    ("start", "stop"), [(NAN, None), (INF, None), (0.0, NAN), (1.0, 0.5), (1e12, None)]
+)
+def test_a_senseless_experiment_is_refused(
+    plant3: Plant3, start: float, stop: float | None
+) -> None:
     assert plant3.enter_initialization(start, stop) == ERROR
     assert "fmi3EnterInitializationMode" in plant3.last_message
     assert plant3.enter_initialization() == OK

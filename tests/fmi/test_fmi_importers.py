@@ -1,4 +1,6 @@
-"""What importers really do, as far as test_fmi.py and test_export.py do not have it: odd arguments, odd clocks, odd endings."""
+"""What importers really do, as far as test_fmi.py and test_export.py do not have it: odd
+arguments, odd clocks, odd endings.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +40,16 @@ def another(tmp_path: Path) -> tuple[str, Path]:
 def set_starts(plant: Plant) -> None:
     """Every variable that has a start value, set to it, type by type."""
     for kind, function in SETTABLE.items():
-        variables = [variable for variable in ATHENA.variables if variable.start is not None and variable.type == kind]
+        variables = [
+            variable
+            for variable in ATHENA.variables
+            if variable.start is not None and variable.type == kind
+        ]
         if variables:
-            references, values = [variable.reference for variable in variables], [float(variable.start or 0) for variable in variables]
+            references, values = (
+                [variable.reference for variable in variables],
+                [float(variable.start or 0) for variable in variables],
+            )
             assert plant.set_references(function, references, values) == OK, plant.last_message
 
 
@@ -50,11 +59,24 @@ def time_of(plant: Plant) -> float:
     return time.value
 
 
-@pytest.mark.parametrize("form", ["file:////{path}", "file:////{path}/", "file:/{path}/", "file:///{quoted}/", "file://localhost/{quoted}"])
-def test_more_forms_of_the_resources_uri(plant_library: Path, another: tuple[str, Path], form: str) -> None:
+@pytest.mark.parametrize(
+    "form",
+    [
+        "file:////{path}",
+        "file:////{path}/",
+        "file:/{path}/",
+        "file:///{quoted}/",
+        "file://localhost/{quoted}",
+    ],
+)
+def test_more_forms_of_the_resources_uri(
+    plant_library: Path, another: tuple[str, Path], form: str
+) -> None:
     guid, folder = another
     plain = folder.as_posix().removeprefix("/")
-    with Plant(plant_library, guid=guid, resources=form.format(path=plain, quoted=quote(plain))) as plant:
+    with Plant(
+        plant_library, guid=guid, resources=form.format(path=plain, quoted=quote(plain))
+    ) as plant:
         assert plant.component, plant.messages
 
 
@@ -71,7 +93,9 @@ def test_library_and_resources_may_lie_in_read_only_folders_of_any_name(
     assert sorted(path.name for path in folder.iterdir()) == ["start_values.txt"]
 
 
-def test_a_robot_with_other_numbers_does_not_run_without_its_resources(plant_library: Path, another: tuple[str, Path]) -> None:
+def test_a_robot_with_other_numbers_does_not_run_without_its_resources(
+    plant_library: Path, another: tuple[str, Path]
+) -> None:
     with Plant(plant_library, guid=another[0], resources=None) as plant:
         assert plant.component is None
         assert "resources '(NULL)'" in plant.last_message
@@ -80,9 +104,14 @@ def test_a_robot_with_other_numbers_does_not_run_without_its_resources(plant_lib
 def test_callbacks_may_all_be_missing(plant_library: Path) -> None:
     library = ctypes.CDLL(str(plant_library))
     library.fmi2Instantiate.restype = ctypes.c_void_p
-    instance = library.fmi2Instantiate(b"plant", 1, GUID.encode(), None, ctypes.byref(Callbacks()), 0, TRUE)
+    instance = library.fmi2Instantiate(
+        b"plant", 1, GUID.encode(), None, ctypes.byref(Callbacks()), 0, TRUE
+    )
     assert instance
-    assert library.fmi2DoStep(ctypes.c_void_p(instance), ctypes.c_double(0.0), ctypes.c_double(H), 1) == ERROR  # with nobody to tell
+    assert (
+        library.fmi2DoStep(ctypes.c_void_p(instance), ctypes.c_double(0.0), ctypes.c_double(H), 1)
+        == ERROR
+    )  # with nobody to tell
     library.fmi2FreeInstance(ctypes.c_void_p(instance))
 
 
@@ -130,7 +159,9 @@ def test_an_experiment_may_be_set_up_again(plant: Plant) -> None:
 
 
 @pytest.mark.parametrize("tolerance", [math.nan, math.inf, -math.inf, -1.0, 0.0, 1.0, 1e300])
-def test_whatever_the_tolerance_the_results_are_the_same(plant: Plant, plant_library: Path, tolerance: float) -> None:
+def test_whatever_the_tolerance_the_results_are_the_same(
+    plant: Plant, plant_library: Path, tolerance: float
+) -> None:
     assert plant.call("fmi2SetupExperiment", TRUE, tolerance, 0.0, 0, 0.0) in (OK, WARNING)
     assert plant.call("fmi2EnterInitializationMode") == OK
     assert plant.call("fmi2ExitInitializationMode") == OK
@@ -139,7 +170,9 @@ def test_whatever_the_tolerance_the_results_are_the_same(plant: Plant, plant_lib
         assert other.everything() == plant.everything()
 
 
-def test_start_values_set_back_in_either_mode_change_nothing(plant: Plant, plant_library: Path) -> None:
+def test_start_values_set_back_in_either_mode_change_nothing(
+    plant: Plant, plant_library: Path
+) -> None:
     set_starts(plant)
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
     set_starts(plant)
@@ -155,9 +188,17 @@ def test_start_values_set_back_in_either_mode_change_nothing(plant: Plant, plant
         assert plant.everything() == other.everything()
 
 
-def test_what_was_read_in_one_instance_can_be_set_in_another(running: Plant, plant_library: Path) -> None:
-    """Importers keep start values in double or text; values of an instance survive the way back bit for bit."""
-    names = [variable.name for variable in ATHENA.of_causality("input", "parameter") if variable.type == "Real"]
+def test_what_was_read_in_one_instance_can_be_set_in_another(
+    running: Plant, plant_library: Path
+) -> None:
+    """Importers keep start values in double or text; values of an instance survive the way back
+    bit for bit.
+    """
+    names = [
+        variable.name
+        for variable in ATHENA.of_causality("input", "parameter")
+        if variable.type == "Real"
+    ]
     assert running.step(0.0, H) == OK
     values = [float(repr(value)) for value in running.reals(names)]
     with Plant(plant_library) as other:
@@ -165,7 +206,9 @@ def test_what_was_read_in_one_instance_can_be_set_in_another(running: Plant, pla
         assert other.reals(names) == values
 
 
-def test_outputs_read_in_initialisation_mode_are_those_of_the_first_communication_point(plant: Plant) -> None:
+def test_outputs_read_in_initialisation_mode_are_those_of_the_first_communication_point(
+    plant: Plant,
+) -> None:
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     early = plant.everything()
@@ -175,14 +218,22 @@ def test_outputs_read_in_initialisation_mode_are_those_of_the_first_communicatio
 
 def test_a_step_of_a_tenth_may_miss_its_last_bits(running: Plant) -> None:
     """0.3 - 0.2 = 0.09999999999999998, from a clock that says 0.30000000000000004."""
-    for begin, size in ((0.0, 0.1), (0.1, 0.1), (0.2, 0.3 - 0.2), (0.1 + 0.2, 0.4 - 0.3), (0.4, 0.09999999999999998)):
+    for begin, size in (
+        (0.0, 0.1),
+        (0.1, 0.1),
+        (0.2, 0.3 - 0.2),
+        (0.1 + 0.2, 0.4 - 0.3),
+        (0.4, 0.09999999999999998),
+    ):
         assert running.step(begin, size) == OK, running.last_message
         assert time_of(running) == begin + size
 
 
 @pytest.mark.parametrize("stop", [2.0, 2.0 - 1e-16, math.nextafter(2.0, 0.0)])
 @pytest.mark.parametrize("size", [1e-16, 5e-324, 2e-16, 4.440892098500626e-16])
-def test_an_extra_step_of_rounding_size_at_the_end_is_taken(plant: Plant, stop: float, size: float) -> None:
+def test_an_extra_step_of_rounding_size_at_the_end_is_taken(
+    plant: Plant, stop: float, size: float
+) -> None:
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 1, stop) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     assert plant.call("fmi2ExitInitializationMode") == OK
@@ -195,7 +246,9 @@ def test_an_extra_step_of_rounding_size_at_the_end_is_taken(plant: Plant, stop: 
 
 @pytest.mark.parametrize("start", [0.3, 1.1, 1e3 / 3.0, -0.7, 1e6 + 0.1])
 @pytest.mark.parametrize("side", [-math.inf, math.inf])
-def test_a_first_step_may_miss_the_start_time_by_its_last_bit(plant: Plant, start: float, side: float) -> None:
+def test_a_first_step_may_miss_the_start_time_by_its_last_bit(
+    plant: Plant, start: float, side: float
+) -> None:
     begin = math.nextafter(start, side)
     assert plant.initialize(start=start).step(begin, H) == OK, plant.last_message
     assert time_of(plant) == begin + H
@@ -203,7 +256,9 @@ def test_a_first_step_may_miss_the_start_time_by_its_last_bit(plant: Plant, star
 
 @pytest.mark.parametrize("summed", [True, False])
 @pytest.mark.parametrize(("size", "count"), [(1.0 / 60.0, 5000), (0.1, 3000)])
-def test_the_clock_is_the_importer_s_over_many_steps(plant: Plant, size: float, count: int, summed: bool) -> None:
+def test_the_clock_is_the_importer_s_over_many_steps(
+    plant: Plant, size: float, count: int, summed: bool
+) -> None:
     """`make test-endurance` takes a million of them."""
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 1, count * size) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
@@ -216,7 +271,9 @@ def test_the_clock_is_the_importer_s_over_many_steps(plant: Plant, size: float, 
 
 
 @pytest.mark.parametrize("size", [0.1, 0.001])
-def test_a_clock_that_is_a_sum_of_a_million_steps_reaches_the_stop_time(plant: Plant, size: float) -> None:
+def test_a_clock_that_is_a_sum_of_a_million_steps_reaches_the_stop_time(
+    plant: Plant, size: float
+) -> None:
     total = 0.0
     for _ in range(1_000_000):
         total += size
@@ -235,21 +292,31 @@ def test_instances_are_freed_in_any_mode(plant_library: Path) -> None:
         ("fmi2EnterInitializationMode",),
         ("fmi2EnterInitializationMode", "fmi2ExitInitializationMode"),
         ("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2Terminate"),
-        ("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Terminate", "fmi2Reset"),
+        (
+            "fmi2EnterInitializationMode",
+            "fmi2ExitInitializationMode",
+            "fmi2Terminate",
+            "fmi2Terminate",
+            "fmi2Reset",
+        ),
     )
     for way in ways:
         with Plant(plant_library) as plant:
             assert [plant.call(function) for function in way] == [OK] * len(way)
 
 
-def test_states_taken_at_every_step_and_never_freed_cost_their_own_bytes_alone(running: Plant) -> None:
+def test_states_taken_at_every_step_and_never_freed_cost_their_own_bytes_alone(
+    running: Plant,
+) -> None:
     steps, states = 2000, []
     size = len(running.serialize(running.save()))
     before = resident()
     for k in range(steps):
         assert running.step(k * H / 10.0, H / 10.0) == OK
         states.append(running.save())
-    assert resident() - before < 1.1 * steps * size + 2e6  # bytes: allocation rounds up; Python's own objects
+    assert (
+        resident() - before < 1.1 * steps * size + 2e6
+    )  # bytes: allocation rounds up; Python's own objects
     assert running.call("fmi2SetFMUstate", states[0]) == OK
     assert running.step(H / 10.0, H / 10.0) == OK
     for state in states:
@@ -263,15 +330,21 @@ def test_a_state_may_be_freed_twice_or_not_be_there(running: Plant) -> None:
     assert running.call("fmi2FreeFMUstate", None) == OK
 
 
-@pytest.mark.parametrize("name", ["with space", "größe", "100%", "%41%20", "a#b?c", "日本語", "x" * 200])
-def test_fmpy_runs_an_fmu_unpacked_anywhere(athena_fmu: Path, tmp_path: Path, name: str, read_only: Callable[[Path], None]) -> None:
+@pytest.mark.parametrize(
+    "name", ["with space", "größe", "100%", "%41%20", "a#b?c", "日本語", "x" * 200]
+)
+def test_fmpy_runs_an_fmu_unpacked_anywhere(
+    athena_fmu: Path, tmp_path: Path, name: str, read_only: Callable[[Path], None]
+) -> None:
     copy = tmp_path / name / f"{name}.fmu"
     copy.parent.mkdir()
     shutil.copy2(athena_fmu, copy)
     unpacked = Path(fmpy.extract(str(copy), str(tmp_path / name / "unpacked")))
     read_only(copy.parent)
     result = fmpy.simulate_fmu(str(unpacked), stop_time=0.02, output=["torso.position[3]"])
-    assert result["torso.position[3]"][-1] == pytest.approx(ATHENA.variable("initial.position[3]").start, abs=1e-6)
+    assert result["torso.position[3]"][-1] == pytest.approx(
+        ATHENA.variable("initial.position[3]").start, abs=1e-6
+    )
 
 
 def test_a_walk_goes_on_after_every_kind_of_refusal(running: Plant, plant_library: Path) -> None:

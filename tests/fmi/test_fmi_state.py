@@ -24,7 +24,12 @@ def walk(plant: Plant, first: int, last: int) -> list[list[float]]:
     """Steps first..last - 1 under inputs that differ from step to step."""
     trace = []
     for k in range(first, last):
-        assert plant.set_reals({"torso.push_force[1]": 3.0 * (k % 5), "RM.femur.angle_ref": 0.4 + 0.02 * (k % 7)}) == OK
+        assert (
+            plant.set_reals(
+                {"torso.push_force[1]": 3.0 * (k % 5), "RM.femur.angle_ref": 0.4 + 0.02 * (k % 7)}
+            )
+            == OK
+        )
         assert plant.step(k * H, H) == OK
         trace.append(plant.everything())
     return trace
@@ -39,7 +44,9 @@ def test_a_restored_state_goes_on_bit_for_bit(plant: Plant) -> None:
     plant.free(state)
 
 
-def test_a_serialized_state_goes_on_in_another_instance_bit_for_bit(plant: Plant, plant_library: Path) -> None:
+def test_a_serialized_state_goes_on_in_another_instance_bit_for_bit(
+    plant: Plant, plant_library: Path
+) -> None:
     walk(plant, 0, 10)
     state = plant.save()
     data = plant.serialize(state)
@@ -86,7 +93,9 @@ def test_a_single_damaged_byte_is_refused_and_changes_nothing(plant: Plant, plac
 
 @pytest.mark.parametrize("mask", [0x80, 0x40, 0x01])
 @pytest.mark.parametrize("places", [(207, 1207), (1207, 1215), (-1001, -9), (-17, -1)])
-def test_two_damaged_bytes_do_not_make_up_for_each_other(plant: Plant, places: tuple[int, int], mask: int) -> None:
+def test_two_damaged_bytes_do_not_make_up_for_each_other(
+    plant: Plant, places: tuple[int, int], mask: int
+) -> None:
     """Among them the last bytes of words, where signs are, and neighbours."""
     state = plant.save()
     data = bytearray(plant.serialize(state))
@@ -103,7 +112,9 @@ def test_bytes_of_another_length_are_refused(plant: Plant) -> None:
     for wrong in (b"", data[:10], data[:-1], data + b"\0"):
         assert plant.deserialize(wrong)[0] == ERROR
     small = ctypes.create_string_buffer(len(data) - 1)
-    assert plant.call("fmi2SerializeFMUstate", state, small, ctypes.c_size_t(len(data) - 1)) == ERROR
+    assert (
+        plant.call("fmi2SerializeFMUstate", state, small, ctypes.c_size_t(len(data) - 1)) == ERROR
+    )
     plant.free(state)
 
 
@@ -112,7 +123,9 @@ def test_a_block_that_is_no_saved_state_is_refused(plant: Plant) -> None:
     foreign = ctypes.create_string_buffer(len(plant.serialize(state)))
     assert plant.call("fmi2SetFMUstate", foreign) == ERROR
     copy = ctypes.create_string_buffer(len(foreign))
-    assert plant.call("fmi2SerializeFMUstate", foreign, copy, ctypes.c_size_t(len(foreign))) == ERROR
+    assert (
+        plant.call("fmi2SerializeFMUstate", foreign, copy, ctypes.c_size_t(len(foreign))) == ERROR
+    )
     assert "no saved state" in plant.last_message
     assert foreign.raw == copy.raw == bytes(len(foreign))
     assert plant.call("fmi2SetFMUstate", None) == ERROR

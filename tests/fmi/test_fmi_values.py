@@ -1,4 +1,6 @@
-"""Values through the standard's C interface: what is refused, and that a refusal changes nothing."""
+"""Values through the standard's C interface: what is refused, and that a refusal changes
+nothing.
+"""
 
 from __future__ import annotations
 
@@ -12,28 +14,51 @@ from fmi_plant import ATHENA, ERROR, OK, Plant
 NAN, INF = math.nan, math.inf
 
 
-@pytest.mark.parametrize("name", [variable.name for variable in ATHENA.of_causality("input", "parameter")[::37] if variable.type == "Real"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        variable.name
+        for variable in ATHENA.of_causality("input", "parameter")[::37]
+        if variable.type == "Real"
+    ],
+)
 @pytest.mark.parametrize("value", [NAN, INF, -INF])
-def test_a_value_that_is_no_number_is_refused_by_every_kind_of_variable(plant: Plant, name: str, value: float) -> None:
+def test_a_value_that_is_no_number_is_refused_by_every_kind_of_variable(
+    plant: Plant, name: str, value: float
+) -> None:
     assert plant.set_reals({name: value}) == ERROR
     assert name in plant.last_message
     assert plant.real(name) == ATHENA.variable(name).start
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("contact.restitution", 1.01), ("contact.restitution", -0.01), ("torso.mass", -1.0), ("LF.coxa.angle_ref", 45.0)]
+    ("name", "value"),
+    [
+        ("contact.restitution", 1.01),
+        ("contact.restitution", -0.01),
+        ("torso.mass", -1.0),
+        ("LF.coxa.angle_ref", 45.0),
+    ],
 )
-def test_a_value_out_of_range_is_refused_with_the_range(plant: Plant, name: str, value: float) -> None:
+def test_a_value_out_of_range_is_refused_with_the_range(
+    plant: Plant, name: str, value: float
+) -> None:
     assert plant.set_reals({name: value}) == ERROR
     assert f"got {value:.17g}" in plant.last_message
     variable = ATHENA.variable(name)
     assert f"in [{variable.minimum:g}, {variable.maximum:g}]" in plant.last_message
 
 
-LIMITED = [variable for variable in ATHENA.of_causality("input", "parameter") if variable.type == "Real"]
-# what a limit would break though each number may be what it is: an impossible inertia, a law that divides by the restitution,
-# static friction under a law that has none
-RELATED = [*(variable.name for variable in LIMITED if ".inertia_" in variable.name), "contact.restitution", "friction.mu_static"]
+LIMITED = [
+    variable for variable in ATHENA.of_causality("input", "parameter") if variable.type == "Real"
+]
+# what a limit would break though each number may be what it is: an impossible inertia, a law that
+# divides by the restitution, static friction under a law that has none
+RELATED = [
+    *(variable.name for variable in LIMITED if ".inertia_" in variable.name),
+    "contact.restitution",
+    "friction.mu_static",
+]
 
 
 def started(plant: Plant) -> int:
@@ -44,12 +69,19 @@ def started(plant: Plant) -> int:
 
 
 @pytest.mark.parametrize("side", ["minimum", "maximum"])
-def test_every_limit_is_accepted_to_the_end_of_initialization_and_nothing_beyond(plant: Plant, side: str) -> None:
+def test_every_limit_is_accepted_to_the_end_of_initialization_and_nothing_beyond(
+    plant: Plant, side: str
+) -> None:
     for variable in LIMITED:
         limit = getattr(variable, side)
         assert limit is not None, variable.name
         assert plant.call("fmi2Reset") == OK
-        assert plant.set_reals({variable.name: math.nextafter(limit, INF if side == "maximum" else -INF)}) == ERROR
+        assert (
+            plant.set_reals(
+                {variable.name: math.nextafter(limit, INF if side == "maximum" else -INF)}
+            )
+            == ERROR
+        )
         assert plant.set_reals({variable.name: limit}) == OK
         if variable.name not in RELATED:
             assert started(plant) == OK, plant.last_message
@@ -58,12 +90,24 @@ def test_every_limit_is_accepted_to_the_end_of_initialization_and_nothing_beyond
 
 def test_no_mixture_of_limits_makes_an_output_that_is_no_number(plant: Plant) -> None:
     random = Random(5)
-    free = [variable for variable in LIMITED if variable.name not in RELATED and ".axis" not in variable.name]
+    free = [
+        variable
+        for variable in LIMITED
+        if variable.name not in RELATED and ".axis" not in variable.name
+    ]
     for count in (2, 5, 50, len(free)) * 50:
         assert plant.call("fmi2Reset") == OK
-        limits = {v.name: random.choice([v.minimum or 0.0, v.maximum or 0.0]) for v in random.sample(free, count)}
+        limits = {
+            v.name: random.choice([v.minimum or 0.0, v.maximum or 0.0])
+            for v in random.sample(free, count)
+        }
         assert plant.set_reals(limits) == OK
-        assert plant.set_references("fmi2SetInteger", ATHENA.references(["servo.mode"]), [random.randint(1, 3)]) == OK
+        assert (
+            plant.set_references(
+                "fmi2SetInteger", ATHENA.references(["servo.mode"]), [random.randint(1, 3)]
+            )
+            == OK
+        )
         assert started(plant) == OK, plant.last_message
         assert all(map(math.isfinite, plant.everything())), limits
 
@@ -71,7 +115,9 @@ def test_no_mixture_of_limits_makes_an_output_that_is_no_number(plant: Plant) ->
 @pytest.mark.parametrize("bad", [{"torso.push_force[2]": NAN}, {"torso.roll": 0.0}])
 def test_a_batch_is_set_whole_or_not_at_all(running: Plant, bad: dict[str, float]) -> None:
     before = running.everything()
-    assert running.set_reals({"torso.push_force[1]": 5.0} | bad | {"LF.coxa.angle_ref": 0.3}) == ERROR
+    assert (
+        running.set_reals({"torso.push_force[1]": 5.0} | bad | {"LF.coxa.angle_ref": 0.3}) == ERROR
+    )
     assert running.everything() == before
 
 
@@ -107,13 +153,18 @@ def test_parameters_are_fixed_after_initialization(running: Plant) -> None:
     assert "fixed" in running.last_message
 
 
-def test_a_model_that_cannot_be_is_told_at_the_end_of_initialization_and_can_be_corrected(plant: Plant) -> None:
+def test_a_model_that_cannot_be_is_told_at_the_end_of_initialization_and_can_be_corrected(
+    plant: Plant,
+) -> None:
     assert plant.set_reals({"torso.inertia_zz": 1.0}) == OK
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     assert plant.call("fmi2ExitInitializationMode") == ERROR
     assert "inertia" in plant.last_message
-    assert plant.set_reals({"torso.inertia_zz": ATHENA.variable("torso.inertia_zz").start or 0.0}) == OK
+    assert (
+        plant.set_reals({"torso.inertia_zz": ATHENA.variable("torso.inertia_zz").start or 0.0})
+        == OK
+    )
     assert plant.call("fmi2ExitInitializationMode") == OK
 
 

@@ -1,4 +1,6 @@
-"""`make test-importers` passes when every foreign tool that could be installed ran and agrees, and not else; adapters are made up here."""
+"""`make test-importers` passes when every foreign tool that could be installed ran and agrees,
+and not else; adapters are made up here.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,10 @@ from tools.importers.packages import TOOLS, PackageRow
 from tools.importers.walk import STEP, Walk
 
 PYTHON = Path(sys.executable)
-HERE, NOWHERE = ("numpy",), ("no-such-distribution",)  # packages: one of this environment, and none of any
+HERE, NOWHERE = (
+    ("numpy",),
+    ("no-such-distribution",),
+)  # packages: one of this environment, and none of any
 # each is called with FMU INPUTS NAMES OUTPUTS
 ADAPTERS = {
     "right": "import shutil, sys; shutil.copy(sys.argv[2], sys.argv[4])",
@@ -48,20 +53,37 @@ def walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Walk:
         (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
     monkeypatch.setattr(compare, "ADAPTERS", tmp_path)
     inputs, none = tmp_path / "answers.csv", tmp_path / "none"
-    reference = Recording(("time", f"{PLANT}.x"), np.array([[STEP, 1.0], [2 * STEP, 2.0], [3 * STEP, 4.0]]))
+    reference = Recording(
+        ("time", f"{PLANT}.x"), np.array([[STEP, 1.0], [2 * STEP, 2.0], [3 * STEP, 4.0]])
+    )
     write_csv(reference, inputs)
-    return Told(folder=tmp_path, fmu=none, inputs=inputs, wanted=none, reference=reference, recorded=reference)
+    return Told(
+        folder=tmp_path,
+        fmu=none,
+        inputs=inputs,
+        wanted=none,
+        reference=reference,
+        recorded=reference,
+    )
 
 
 def importers(walk: Walk, *adapters: str, of: Sequence[str] = HERE) -> list[Row]:
-    return [compare.through(Importer(name, tuple(of), f"{name}.py", ""), walk, PYTHON) for name in adapters]
+    return [
+        compare.through(Importer(name, tuple(of), f"{name}.py", ""), walk, PYTHON)
+        for name in adapters
+    ]
 
 
 def tools(walk: Walk, *adapters: str, of: Sequence[str] = HERE) -> list[PackageRow]:
     masters = [Recording(("time", "x"), walk.reference.data)] * 2
     outputs, none = walk.folder / "package.csv", walk.folder / "none"
-    commands = [[PYTHON, walk.folder / f"{name}.py", none, walk.inputs, none, outputs] for name in adapters]
-    return [packages.through(name, of, command, outputs, masters, ["x"]) for name, command in zip(adapters, commands, strict=True)]
+    commands = [
+        [PYTHON, walk.folder / f"{name}.py", none, walk.inputs, none, outputs] for name in adapters
+    ]
+    return [
+        packages.through(name, of, command, outputs, masters, ["x"])
+        for name, command in zip(adapters, commands, strict=True)
+    ]
 
 
 RIGHT = ("right",) * len(IMPORTERS)
@@ -74,7 +96,9 @@ def test_three_importers_and_two_tools_that_agree_pass(walk: Walk) -> None:
 
 
 @pytest.mark.parametrize("adapter", FAILING)
-def test_an_importer_that_was_installed_and_fails_does_not_pass(walk: Walk, adapter: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_importer_that_was_installed_and_fails_does_not_pass(
+    walk: Walk, adapter: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     rows = importers(walk, "right", "right", adapter)
     assert rows[-1].remark
     assert verdict(rows, tools(walk, *BOTH), ours=[]) == 1
@@ -82,7 +106,9 @@ def test_an_importer_that_was_installed_and_fails_does_not_pass(walk: Walk, adap
 
 
 @pytest.mark.parametrize("adapter", FAILING)
-def test_a_tool_for_packages_that_was_installed_and_fails_does_not_pass(walk: Walk, adapter: str) -> None:
+def test_a_tool_for_packages_that_was_installed_and_fails_does_not_pass(
+    walk: Walk, adapter: str
+) -> None:
     assert verdict(importers(walk, *RIGHT), tools(walk, "right", adapter), ours=[]) == 1
 
 
@@ -97,8 +123,20 @@ def test_what_could_not_be_installed_passes_with_a_remark(walk: Walk) -> None:
     absent, absent_tool = importers(walk, "crashes", of=NOWHERE), tools(walk, "crashes", of=NOWHERE)
     assert "could not be installed: no-such-distribution" in absent[0].remark
     assert "could not be installed" in absent_tool[0].trouble
-    assert verdict([*importers(walk, "right", "right"), *absent], [*tools(walk, "right"), *absent_tool], ours=[]) == 0
-    without_rust = compare.through(Importer("crashes", (), "crashes.py", ""), walk, PYTHON, missing="cargo (Rust) is not installed")
+    assert (
+        verdict(
+            [*importers(walk, "right", "right"), *absent],
+            [*tools(walk, "right"), *absent_tool],
+            ours=[],
+        )
+        == 0
+    )
+    without_rust = compare.through(
+        Importer("crashes", (), "crashes.py", ""),
+        walk,
+        PYTHON,
+        missing="cargo (Rust) is not installed",
+    )
     assert without_rust.missing
     assert "Rust" in without_rust.remark
 

@@ -1,4 +1,6 @@
-"""The short form of `make test-importers`: fmpy, our master and the C importer of examples/ on the same recorded walk."""
+"""The short form of `make test-importers`: fmpy, our master and the C importer of examples/ on
+the same recorded walk.
+"""
 
 from __future__ import annotations
 
@@ -33,10 +35,23 @@ def walk(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Walk:
 def importer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The C importer, compiled as its first lines say."""
     program = tmp_path_factory.mktemp("importer") / "importer"
-    compiler = os.environ.get("CC") or next(found for name in ("cc", "gcc", "clang") if (found := shutil.which(name)))
+    compiler = os.environ.get("CC") or next(
+        found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))
+    )
     headers = Path(fmpy.__file__).parent / "c-code"
     done = subprocess.run(
-        [compiler, "-std=gnu11", "-Wall", "-Werror", str(SOURCE), "-I", str(headers), "-ldl", "-o", str(program)],
+        [
+            compiler,
+            "-std=gnu11",
+            "-Wall",
+            "-Werror",
+            str(SOURCE),
+            "-I",
+            str(headers),
+            "-ldl",
+            "-o",
+            str(program),
+        ],
         capture_output=True,
         text=True,
         check=False,
@@ -46,11 +61,15 @@ def importer(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(*command: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, check=False
+    )
 
 
 def test_the_recorded_walk_lifts_and_sets_down_feet(walk: Walk) -> None:
-    contact = walk.reference.columns([f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")])
+    contact = walk.reference.columns(
+        [f"{leg}.foot.contact" for leg in ("LF", "LM", "LR", "RF", "RM", "RR")]
+    )
     changes = np.diff(contact, axis=0)
     assert (changes < 0.0).any()
     assert (changes > 0.0).any()
@@ -89,13 +108,20 @@ def test_the_c_importer_walks_as_fmpy_does(walk: Walk, importer: Path, tmp_path:
     assert done.returncode == 0, done.stderr
     (tmp_path / "outputs.csv").write_text(done.stdout, encoding="utf-8")
     found = read_csv(tmp_path / "outputs.csv")
-    # it reads outputs after it has set the inputs of the next step, which reach torques and accelerations at once, but no positions
-    names = [name for name in found.names if name.endswith((".angle", ".speed", ".foot.normal_force")) or name.startswith("torso.")]
+    # it reads outputs after it has set the inputs of the next step, which reach torques and
+    # accelerations at once, but no positions
+    names = [
+        name
+        for name in found.names
+        if name.endswith((".angle", ".speed", ".foot.normal_force")) or name.startswith("torso.")
+    ]
     reference = walk.reference.columns(names)
     scale = np.maximum(np.abs(reference).max(axis=0), 1e-3)
     assert len(names) > 40
     assert found.time == pytest.approx([0.0, *walk.reference.time], abs=1e-12)
-    assert np.abs(found.columns(names)[1:] - reference).max(axis=0) / scale == pytest.approx(0.0, abs=ROUND_OFF)
+    assert np.abs(found.columns(names)[1:] - reference).max(axis=0) / scale == pytest.approx(
+        0.0, abs=ROUND_OFF
+    )
 
 
 def test_the_c_importer_stands_without_commands(walk: Walk, importer: Path, tmp_path: Path) -> None:
@@ -119,22 +145,34 @@ def test_the_c_importer_names_a_column_that_the_fmu_does_not_know(
     walk: Walk, importer: Path, tmp_path: Path, column: str, quote: str
 ) -> None:
     names = ("time", "LF.coxa.angle_ref", column)
-    (tmp_path / "commands.csv").write_text(",".join(f"{quote}{name}{quote}" for name in names) + "\n0,0,0\n", encoding="utf-8")
+    (tmp_path / "commands.csv").write_text(
+        ",".join(f"{quote}{name}{quote}" for name in names) + "\n0,0,0\n", encoding="utf-8"
+    )
     done = run(importer, walk.unpacked, tmp_path / "commands.csv")
     assert (done.returncode, done.stderr) == (1, f"importer: trouble with {column}\n")
 
 
-def test_the_c_importer_refuses_a_short_row_and_takes_names_without_quotes(walk: Walk, importer: Path, tmp_path: Path) -> None:
+def test_the_c_importer_refuses_a_short_row_and_takes_names_without_quotes(
+    walk: Walk, importer: Path, tmp_path: Path
+) -> None:
     commands = tmp_path / "commands.csv"
-    commands.write_text("time,LF.coxa.angle_ref,LM.coxa.angle_ref\n0,0.1,0.1\n0.005,0.1\n", encoding="utf-8")
+    commands.write_text(
+        "time,LF.coxa.angle_ref,LM.coxa.angle_ref\n0,0.1,0.1\n0.005,0.1\n", encoding="utf-8"
+    )
     done = run(importer, walk.unpacked, commands)
     assert done.returncode == 1
     assert "a row of too few commands" in done.stderr
     assert len(done.stdout.splitlines()) == 3  # names and the rows before each of two steps
 
 
-@pytest.mark.parametrize(("words", "said"), [((), "modelDescription.xml"), (("no_such_folder",), "folder")])
-def test_the_c_importer_says_what_it_lacks(importer: Path, tmp_path: Path, words: tuple[str, ...], said: str) -> None:
-    done = subprocess.run([str(importer), *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+@pytest.mark.parametrize(
+    ("words", "said"), [((), "modelDescription.xml"), (("no_such_folder",), "folder")]
+)
+def test_the_c_importer_says_what_it_lacks(
+    importer: Path, tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    done = subprocess.run(
+        [str(importer), *words], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     assert said in done.stderr

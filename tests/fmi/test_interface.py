@@ -25,7 +25,8 @@ LEGS = ("LF", "LM", "LR", "RF", "RM", "RR")
 JOINTS = ("coxa", "femur", "tibia")
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
-# the names that other tools rely on; L, J, i and I stand for legs, joints, indices and inertia entries
+# the names that other tools rely on; L, J, i and I stand for legs, joints, indices and inertia
+# entries
 CONTRACT = {
     "input": "L.J.angle_ref L.J.speed_ref L.J.torque_ref torso.push_force[3] torso.push_torque[3] L.J.acceleration_ref",
     "output": "L.J.angle L.J.speed L.J.torque L.J.reaction_force[3] L.J.reaction_torque[3] "
@@ -57,7 +58,9 @@ def expand(pattern: str) -> list[str]:
         if stem.endswith("_I"):
             labels = tuple(stem[:-1] + entry for entry in INERTIA)
         indices = [f"[{i}]" for i in range(1, int(size) + 1)] if size else [""]
-        names = [f"{name}.{label}{index}" for name in names for label in labels for index in indices]
+        names = [
+            f"{name}.{label}{index}" for name in names for label in labels for index in indices
+        ]
     return [name[1:] for name in names]
 
 
@@ -85,11 +88,22 @@ def test_names_and_references_are_unique() -> None:
 def test_no_two_variables_share_a_field_and_each_is_named_after_its_own() -> None:
     assert len({variable.field for variable in ATHENA.variables}) == len(ATHENA.variables)
     for variable in ATHENA.variables:
-        identifiers = set(re.findall(r"[a-z_]+", variable.field)) - {"definition", "input", "output", "rate", "leg", "link"}
-        assert [word for word in identifiers if word not in variable.name.replace(".", "_")] == [], variable.name
+        identifiers = set(re.findall(r"[a-z_]+", variable.field)) - {
+            "definition",
+            "input",
+            "output",
+            "rate",
+            "leg",
+            "link",
+        }
+        assert [
+            word for word in identifiers if word not in variable.name.replace(".", "_")
+        ] == [], variable.name
 
 
-def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nominal_that_is_not_zero() -> None:
+def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nominal_that_is_not_zero() -> (
+    None
+):
     for variable in ATHENA.variables:
         assert variable.description, variable.name
         if variable.type == "Real":
@@ -113,14 +127,18 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 
 def test_a_robot_that_does_not_fit_its_variables_is_refused() -> None:
     robot = load_robot("athena")
-    impossible = dataclasses.replace(robot, contact=dataclasses.replace(robot.contact, restitution=1.5))
+    impossible = dataclasses.replace(
+        robot, contact=dataclasses.replace(robot.contact, restitution=1.5)
+    )
     with pytest.raises(HexapodError, match=r"contact\.restitution.*1\.5"):
         load_interface(impossible)
 
 
 def test_the_guid_follows_every_number_of_the_robot() -> None:
     robot = load_robot("athena")
-    heavier = dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, mass=robot.torso.mass * (1 + 1e-15)))
+    heavier = dataclasses.replace(
+        robot, torso=dataclasses.replace(robot.torso, mass=robot.torso.mass * (1 + 1e-15))
+    )
     assert render_fmi2(load_interface(heavier)).guid != GUID
     assert render_fmi2(load_interface(load_robot("phantomx_mk4"))).guid != GUID
     assert render_fmi2(load_interface(load_robot("athena"))).guid == GUID
@@ -158,9 +176,21 @@ def test_the_model_description_tells_what_the_interface_says(athena_fmu: Path) -
     description = fmpy.read_model_description(str(athena_fmu))
     assert description.guid == GUID
     for variable, told in zip(ATHENA.variables, description.modelVariables, strict=True):
-        assert (told.name, told.valueReference, told.type) == (variable.name, variable.reference, variable.type)
-        assert (told.causality, told.variability, told.unit) == (variable.causality, variable.variability, variable.unit)
-        for text, number in ((told.start, variable.start), (told.min, variable.minimum), (told.max, variable.maximum)):
+        assert (told.name, told.valueReference, told.type) == (
+            variable.name,
+            variable.reference,
+            variable.type,
+        )
+        assert (told.causality, told.variability, told.unit) == (
+            variable.causality,
+            variable.variability,
+            variable.unit,
+        )
+        for text, number in (
+            (told.start, variable.start),
+            (told.min, variable.minimum),
+            (told.max, variable.maximum),
+        ):
             assert (None if text is None else float(text)) == number, variable.name
 
 

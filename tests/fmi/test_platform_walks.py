@@ -1,4 +1,5 @@
-"""The FMU's binaries for all platforms that run here, under emulators too, walk the same recorded walk, bit for bit.
+"""The FMU's binaries for all platforms that run here, under emulators too, walk the same recorded
+walk, bit for bit.
 
 `make test-platforms` installs the emulators and skips nothing.
 """
@@ -12,7 +13,16 @@ from urllib.parse import quote
 import fmpy
 import pytest
 from fmi_plant import GUID
-from platform_walk import EMULATORS, EVERYTHING, build_walker, missing, number, patient, record_walk, run_walker
+from platform_walk import (
+    EMULATORS,
+    EVERYTHING,
+    build_walker,
+    missing,
+    number,
+    patient,
+    record_walk,
+    run_walker,
+)
 
 from hexapod_cosim.cosim.export.cross_build import TARGETS, build_library
 from hexapod_cosim.cosim.export.export import export_fmu
@@ -21,7 +31,9 @@ from hexapod_cosim.models.robot import load_robot
 
 
 class Walk:
-    """A recorded walk, the FMU's resources below a folder with an awkward name, and what the binary CMake built makes of the walk."""
+    """A recorded walk, the FMU's resources below a folder with an awkward name, and what the
+    binary CMake built makes of the walk.
+    """
 
     def __init__(self, folder: Path, library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         self.folder = folder
@@ -34,7 +46,10 @@ class Walk:
     def repeat(self, target: str, data: bytes, resources: str) -> list[str]:
         folder = self.folder / target
         folder.mkdir(exist_ok=True)
-        library, program = folder / f"hexapod{TARGETS[target].suffix}", folder / ("walker.exe" if "windows" in target else "walker")
+        library, program = (
+            folder / f"hexapod{TARGETS[target].suffix}",
+            folder / ("walker.exe" if "windows" in target else "walker"),
+        )
         library.write_bytes(data)
         if not program.exists():
             build_walker(target, folder)
@@ -57,7 +72,9 @@ def runs_here(target: str) -> None:
 
 
 def test_the_recorded_walk_is_one(walk: Walk) -> None:
-    steps = [list(map(number, walk.expected[k : k + 391])) for k in range(0, len(walk.expected), 391)]
+    steps = [
+        list(map(number, walk.expected[k : k + 391])) for k in range(0, len(walk.expected), 391)
+    ]
     assert len(steps) == 300
     assert len({tuple(step) for step in steps}) == len(steps)
 

@@ -1,6 +1,7 @@
 """Binaries for other platforms: what they are, what they show and need.
 
-The system libraries for Windows take the compiler two minutes the first time: `make test-platforms` skips nothing.
+The system libraries for Windows take the compiler two minutes the first time: `make test-platforms`
+skips nothing.
 """
 
 from __future__ import annotations
@@ -18,11 +19,20 @@ from platform_walk import EVERYTHING, patient
 
 from hexapod_cosim.cosim.common.plant_files import fmi_headers, source_files
 from hexapod_cosim.cosim.export import cross_build, platforms
-from hexapod_cosim.cosim.export.cross_build import TARGETS, Library, build_library, find_compiler, user_cache
+from hexapod_cosim.cosim.export.cross_build import (
+    TARGETS,
+    Library,
+    build_library,
+    find_compiler,
+    user_cache,
+)
 from hexapod_cosim.cosim.export.fat_binary import join_mach_o
 from hexapod_cosim.models.errors import FmuError
 
-LINKER_MADE = {"__mh_dylib_header", "___dso_handle"}  # Zig's linker for macOS exports its own two marks
+LINKER_MADE = {
+    "__mh_dylib_header",
+    "___dso_handle",
+}  # Zig's linker for macOS exports its own two marks
 NEWEST_GLIBC = (2, 17)
 SYSTEM = {
     "linux": re.compile(r"lib[cm]\.so\.6"),
@@ -52,10 +62,20 @@ def system_of(target: str) -> str:
 
 @pytest.fixture(scope="session")
 def built() -> dict[str, bytes]:
-    """The plant's binaries by target, Windows only where it does not take minutes. Built at once, from the cache if they are there."""
+    """The plant's binaries by target, Windows only where it does not take minutes. Built at
+    once, from the cache if they are there.
+    """
     quick = [target for target in TARGETS if target != "x86_64-windows"]
     with ThreadPoolExecutor() as pool:
-        return dict(zip(quick, pool.map(lambda target: build_library(platforms.component_library(), target), quick), strict=True))
+        return dict(
+            zip(
+                quick,
+                pool.map(
+                    lambda target: build_library(platforms.component_library(), target), quick
+                ),
+                strict=True,
+            )
+        )
 
 
 @pytest.fixture(params=list(TARGETS))
@@ -66,7 +86,9 @@ def target(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def data(built: dict[str, bytes], target: str) -> bytes:
-    return built[target] if target in built else build_library(platforms.component_library(), target)
+    return (
+        built[target] if target in built else build_library(platforms.component_library(), target)
+    )
 
 
 def parsed(data: bytes) -> Any:
@@ -78,7 +100,11 @@ def exported(binary: Any) -> set[str]:
     if binary.format == lief.Binary.FORMATS.PE:
         return {entry.name for entry in binary.get_export().entries}
     names = {symbol.name for symbol in binary.exported_symbols}
-    return {name.removeprefix("_") for name in names - LINKER_MADE} if binary.format == lief.Binary.FORMATS.MACHO else names
+    return (
+        {name.removeprefix("_") for name in names - LINKER_MADE}
+        if binary.format == lief.Binary.FORMATS.MACHO
+        else names
+    )
 
 
 def libraries(binary: Any) -> list[str]:
@@ -87,7 +113,11 @@ def libraries(binary: Any) -> list[str]:
 
 def machine(binary: Any) -> str:
     header = binary.header
-    kind = header.machine if binary.format == lief.Binary.FORMATS.PE else getattr(header, "machine_type", None) or header.cpu_type
+    kind = (
+        header.machine
+        if binary.format == lief.Binary.FORMATS.PE
+        else getattr(header, "machine_type", None) or header.cpu_type
+    )
     return str(kind).rpartition(".")[2]
 
 
@@ -107,7 +137,13 @@ def test_each_binary_needs_the_c_library_alone(data: bytes, target: str) -> None
 
 
 def test_no_path_of_this_machine_is_inside(data: bytes) -> None:
-    places = [str(Path.home()), str(Path(__file__).parents[2]), "hexapod-build-", "ziglang", "/tmp/"]
+    places = [
+        str(Path.home()),
+        str(Path(__file__).parents[2]),
+        "hexapod-build-",
+        "ziglang",
+        "/tmp/",
+    ]
     assert [place for place in places if place.encode() in data] == []
 
 
@@ -115,18 +151,26 @@ def protections(binary: Any) -> tuple[bool, bool]:
     """Whether relocations are read-only once done, and all done at load time."""
     relro = any(segment.type == lief.ELF.Segment.TYPE.GNU_RELRO for segment in binary.segments)
     flags = [
-        str(entry) for entry in binary.dynamic_entries if entry.tag in (lief.ELF.DynamicEntry.TAG.FLAGS, lief.ELF.DynamicEntry.TAG.FLAGS_1)
+        str(entry)
+        for entry in binary.dynamic_entries
+        if entry.tag in (lief.ELF.DynamicEntry.TAG.FLAGS, lief.ELF.DynamicEntry.TAG.FLAGS_1)
     ]
     return relro, any("NOW" in flag for flag in flags)
 
 
 def newest_glibc(binary: Any) -> tuple[int, ...]:
-    versions = [entry.name for need in binary.symbols_version_requirement for entry in need.get_auxiliary_symbols()]
+    versions = [
+        entry.name
+        for need in binary.symbols_version_requirement
+        for entry in need.get_auxiliary_symbols()
+    ]
     return max(tuple(map(int, version.removeprefix("GLIBC_").split("."))) for version in versions)
 
 
 @pytest.mark.parametrize("target", ["x86_64-linux", "aarch64-linux"])
-def test_linux_binaries_run_with_glibc_2_17_and_are_read_only_where_they_can(built: dict[str, bytes], target: str) -> None:
+def test_linux_binaries_run_with_glibc_2_17_and_are_read_only_where_they_can(
+    built: dict[str, bytes], target: str
+) -> None:
     binary = parsed(built[target])
     assert newest_glibc(binary) <= NEWEST_GLIBC
     assert protections(binary) == (True, True)
@@ -149,38 +193,61 @@ def plant_sources() -> list[Path]:
 
 
 def compiled(folder: Path, sources: list[Path], *command: str) -> Any:
-    """Sources as an importer compiles them: no flags but those for a shared library, and some optimisation."""
+    """Sources as an importer compiles them: no flags but those for a shared library, and some
+    optimisation.
+    """
     out = folder / "plain.so"
-    plant = Path(next(path for name, path in source_files().items() if name == "fmi/fmi2.c")).parents[1]
+    plant = Path(
+        next(path for name, path in source_files().items() if name == "fmi/fmi2.c")
+    ).parents[1]
     includes = [f"-I{plant}", f"-I{plant / 'include'}", "-isystem", str(fmi_headers())]
     environment = cross_build.compiler_environment(folder, user_cache())
-    subprocess.run([*command, "-O1", "-shared", "-fPIC", *includes, *map(str, sources), "-lm", "-o", str(out)], check=True, env=environment)
+    subprocess.run(
+        [*command, "-O1", "-shared", "-fPIC", *includes, *map(str, sources), "-lm", "-o", str(out)],
+        check=True,
+        env=environment,
+    )
     return lief.parse(str(out))
 
 
 def test_names_stay_inside_however_an_importer_compiles_the_sources(tmp_path: Path) -> None:
     compiler = shutil.which("cc") or shutil.which("gcc")
     assert compiler, "these tests need a C compiler"
-    ours = {name for name in exported(compiled(tmp_path, plant_sources(), compiler)) if not name.startswith("_")}
+    ours = {
+        name
+        for name in exported(compiled(tmp_path, plant_sources(), compiler))
+        if not name.startswith("_")
+    }
     assert ours == STANDARD
 
 
 def fused(binary: Any) -> int:
-    """Fused multiply-adds in the code for a 64-bit Arm: scalar (fmadd and its kin), vector (fmla, fmls), vector by element."""
+    """Fused multiply-adds in the code for a 64-bit Arm: scalar (fmadd and its kin), vector
+    (fmla, fmls), vector by element.
+    """
     code = bytes(binary.get_section(".text").content)
-    words = [int.from_bytes(code[place : place + 4], "little") for place in range(0, len(code) - 3, 4)]
-    return sum(word >> 24 == 0x1F or word & 0xBF20FC00 == 0x0E20CC00 or word & 0xBF80B400 == 0x0F801000 for word in words)
+    words = [
+        int.from_bytes(code[place : place + 4], "little") for place in range(0, len(code) - 3, 4)
+    ]
+    return sum(
+        word >> 24 == 0x1F or word & 0xBF20FC00 == 0x0E20CC00 or word & 0xBF80B400 == 0x0F801000
+        for word in words
+    )
 
 
 def test_arm_compilers_fuse_no_arithmetic_of_ours_unasked(tmp_path: Path) -> None:
     command = (*find_compiler().command, "-target", TARGETS["aarch64-linux"].triple)
     eager = tmp_path / "eager.c"
-    eager.write_text("double f(double a, double b, double c) { return a * b + c; }\n", encoding="utf-8")
+    eager.write_text(
+        "double f(double a, double b, double c) { return a * b + c; }\n", encoding="utf-8"
+    )
     assert fused(compiled(tmp_path, [eager], *command)) == 1
     assert fused(compiled(tmp_path, plant_sources(), *command)) == 0
 
 
-def test_the_same_sources_make_the_same_bytes_in_another_place(built: dict[str, bytes], tmp_path: Path) -> None:
+def test_the_same_sources_make_the_same_bytes_in_another_place(
+    built: dict[str, bytes], tmp_path: Path
+) -> None:
     copied = {}
     for name, path in source_files().items():
         copied[name] = tmp_path / "elsewhere" / name
@@ -190,12 +257,19 @@ def test_the_same_sources_make_the_same_bytes_in_another_place(built: dict[str, 
     cache.mkdir()
     (cache / "zig").symlink_to(user_cache() / "zig")
     for target in TARGETS if EVERYTHING else ("aarch64-linux", "aarch64-darwin"):
-        again = build_library(Library("hexapod", copied, (fmi_headers(),)), target, cache_folder=cache)
+        again = build_library(
+            Library("hexapod", copied, (fmi_headers(),)), target, cache_folder=cache
+        )
         assert again == build_library(platforms.component_library(), target), target
 
 
 def test_each_version_of_the_standard_has_its_own_names() -> None:
-    assert platforms.choose_platforms("all", fmi=2) == ["linux64", "win64", "darwin64", "aarch64-linux"]
+    assert platforms.choose_platforms("all", fmi=2) == [
+        "linux64",
+        "win64",
+        "darwin64",
+        "aarch64-linux",
+    ]
     assert platforms.choose_platforms("all", fmi=3) == list(TARGETS)
     assert platforms.choose_platforms(["win64", "linux64"], fmi=2) == ["linux64", "win64"]
     with pytest.raises(FmuError, match="contradicting"):
@@ -203,10 +277,19 @@ def test_each_version_of_the_standard_has_its_own_names() -> None:
 
 
 def test_either_standard_s_names_do_for_either_version() -> None:
-    assert platforms.choose_platforms(["win64", "darwin64"], fmi=3) == ["x86_64-windows", "x86_64-darwin", "aarch64-darwin"]
-    assert platforms.choose_platforms(["x86_64-windows", "x86_64-linux"], fmi=2) == ["linux64", "win64"]
+    assert platforms.choose_platforms(["win64", "darwin64"], fmi=3) == [
+        "x86_64-windows",
+        "x86_64-darwin",
+        "aarch64-darwin",
+    ]
+    assert platforms.choose_platforms(["x86_64-windows", "x86_64-linux"], fmi=2) == [
+        "linux64",
+        "win64",
+    ]
     assert platforms.choose_platforms(["aarch64-darwin"], fmi=3) == ["aarch64-darwin"]
-    assert platforms.choose_platforms(["aarch64-darwin", "x86_64-darwin"], fmi=2) == ["darwin64"]  # one file for both
+    assert platforms.choose_platforms(["aarch64-darwin", "x86_64-darwin"], fmi=2) == [
+        "darwin64"
+    ]  # one file for both
     assert platforms.choose_platforms(["win64", "x86_64-windows"], fmi=3) == ["x86_64-windows"]
     assert platforms.choose_platforms(["sources"], fmi=3) == []
     with pytest.raises(FmuError, match="got 'win32', expected linux64, win64"):
@@ -218,7 +301,10 @@ def test_a_universal_binary_holds_both_processors_whole(built: dict[str, bytes])
     joined = join_mach_o(parts)
     fat: Any = lief.MachO.parse(list(joined))
     assert [machine(fat.at(index)) for index in range(fat.size)] == ["X86_64", "ARM64"]
-    assert [joined[fat.at(k).fat_offset : fat.at(k).fat_offset + len(part)] for k, part in enumerate(parts)] == parts
+    assert [
+        joined[fat.at(k).fat_offset : fat.at(k).fat_offset + len(part)]
+        for k, part in enumerate(parts)
+    ] == parts
     assert all(fat.at(k).fat_offset % 2**14 == 0 for k in range(2))
     with pytest.raises(FmuError, match="each once"):
         join_mach_o([parts[0], parts[0]])
@@ -229,7 +315,11 @@ def test_a_universal_binary_holds_both_processors_whole(built: dict[str, bytes])
 def test_fmi_2_and_3_hold_the_same_binaries(built: dict[str, bytes]) -> None:
     quick = ["aarch64-linux", "x86_64-darwin", "aarch64-darwin"]
     three = platforms.build_binaries(platforms.component_library(), quick, fmi=3)
-    assert three == {f"binaries/{name}/hexapod{TARGETS[name].suffix}": built[name] for name in quick}
-    two = platforms.build_binaries(platforms.component_library(), ["darwin64", "aarch64-linux"], fmi=2)
+    assert three == {
+        f"binaries/{name}/hexapod{TARGETS[name].suffix}": built[name] for name in quick
+    }
+    two = platforms.build_binaries(
+        platforms.component_library(), ["darwin64", "aarch64-linux"], fmi=2
+    )
     assert list(two) == ["binaries/darwin64/hexapod.dylib", "binaries/aarch64-linux/hexapod.so"]
     assert two["binaries/aarch64-linux/hexapod.so"] == built["aarch64-linux"]

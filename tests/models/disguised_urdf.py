@@ -1,4 +1,6 @@
-"""Random robots, and any robot as a URDF in other words: other frames, signs, parts, names and order."""
+"""Random robots, and any robot as a URDF in other words: other frames, signs, parts, names and
+order.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES, Array
 
 
 def random_robot(seed: int, *, pattern: bool) -> Robot:
-    """Six legs that all differ: lengths, offsets, masses of random bodies, yaws, limits; axes that the controller takes, or any."""
+    """Six legs that all differ: lengths, offsets, masses of random bodies, yaws, limits; axes
+    that the controller takes, or any.
+    """
     rng, robot = np.random.default_rng(seed), load_robot(("athena", "phantomx_mk4")[seed % 2])
     mass, com, inertia = _random_matter(rng, 3.0, np.array(robot.torso.size))
     legs = [
@@ -28,10 +32,17 @@ def random_robot(seed: int, *, pattern: bool) -> Robot:
         )
         for leg in robot.legs
     ]
-    return replace(robot, name=f"random{seed}", torso=replace(robot.torso, mass=mass, com=com, inertia=inertia), legs=tuple(legs))
+    return replace(
+        robot,
+        name=f"random{seed}",
+        torso=replace(robot.torso, mass=mass, com=com, inertia=inertia),
+        legs=tuple(legs),
+    )
 
 
-def _random_links(links: tuple[Link, Link, Link], rng: np.random.Generator, *, pattern: bool) -> tuple[Link, Link, Link]:
+def _random_links(
+    links: tuple[Link, Link, Link], rng: np.random.Generator, *, pattern: bool
+) -> tuple[Link, Link, Link]:
     coxa, femur, tibia = (_random_link(link, rng, pattern=pattern) for link in links)
     return coxa, femur, tibia
 
@@ -41,17 +52,29 @@ def _random_link(link: Link, rng: np.random.Generator, *, pattern: bool) -> Link
     axis = np.array(link.axis) + (0.0 if pattern else 1.0) * rng.normal(0.0, 0.02, 3)
     y, z, extra = rng.normal(0.0, 0.0015, 3).tolist()
     return replace(
-        link, mass=mass, com=com, inertia=inertia, axis=_triple(axis / np.linalg.norm(axis)), length=link.length + extra,
-        offset_y=link.offset_y + y, offset_z=link.offset_z + z, angle_max=link.angle_max + float(rng.uniform(0.0, 0.1)),
-    )  # fmt: skip
+        link,
+        mass=mass,
+        com=com,
+        inertia=inertia,
+        axis=_triple(axis / np.linalg.norm(axis)),
+        length=link.length + extra,
+        offset_y=link.offset_y + y,
+        offset_z=link.offset_z + z,
+        angle_max=link.angle_max + float(rng.uniform(0.0, 0.1)),
+    )
 
 
 def _random_matter(rng: np.random.Generator, mass: float, size: Array) -> tuple[float, Any, Any]:
     """Mass, centre and inertia of ten points: a possible body."""
-    weights, points = rng.uniform(0.5, 1.5, 10) * mass / 10.0, rng.uniform(-0.5, 0.5, (10, 3)) * size
+    weights, points = (
+        rng.uniform(0.5, 1.5, 10) * mass / 10.0,
+        rng.uniform(-0.5, 0.5, (10, 3)) * size,
+    )
     com = weights @ points / weights.sum()
     arms = points - com
-    inertia = sum(w * (d @ d * np.eye(3) - np.outer(d, d)) for w, d in zip(weights, arms, strict=True))
+    inertia = sum(
+        w * (d @ d * np.eye(3) - np.outer(d, d)) for w, d in zip(weights, arms, strict=True)
+    )
     entries = tuple(float(inertia[k]) for k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
     return float(weights.sum()), _triple(com), entries
 
@@ -62,14 +85,26 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 
 def disguised(robot: Robot, seed: int, extension: str = "") -> str:
-    """The robot with links' frames turned at random, joints counted the other way round, matter in two links each, other names and order.
+    """The robot with links' frames turned at random, joints counted the other way round, matter in
+    two links each, other names and order.
 
     `extension` is put in at the end.
     """
     rng = np.random.default_rng(seed)
     root = ET.Element("robot", name=robot.name)
-    torso = _halves(root, "trunk", robot.torso.mass, np.array(robot.torso.com), inertia_matrix(robot.torso.inertia), rng)
-    ET.SubElement(ET.SubElement(ET.SubElement(torso, "visual"), "geometry"), "box", size=_text(robot.torso.size))
+    torso = _halves(
+        root,
+        "trunk",
+        robot.torso.mass,
+        np.array(robot.torso.com),
+        inertia_matrix(robot.torso.inertia),
+        rng,
+    )
+    ET.SubElement(
+        ET.SubElement(ET.SubElement(torso, "visual"), "geometry"),
+        "box",
+        size=_text(robot.torso.size),
+    )
     for k in rng.permutation(6):
         _disguised_leg(root, int(k), robot, rng)
     return ET.tostring(root, encoding="unicode").replace("</robot>", f"{extension}</robot>")
@@ -77,22 +112,54 @@ def disguised(robot: Robot, seed: int, extension: str = "") -> str:
 
 def _disguised_leg(root: ET.Element, number: int, robot: Robot, rng: np.random.Generator) -> None:
     leg = robot.legs[number]
-    parent, R_above, place, R_hip = "trunk", np.eye(3), np.array(leg.hip_position), _turn(0.0, 0.0, leg.hip_yaw)
+    parent, R_above, place, R_hip = (
+        "trunk",
+        np.eye(3),
+        np.array(leg.hip_position),
+        _turn(0.0, 0.0, leg.hip_yaw),
+    )
     for joint, link in zip("xyz", leg.links, strict=True):
         # R and R_above: this link's and its parent's axes in the torso's at angle 0
-        name, R, sign = f"l{number}{joint}", R_hip @ _turn(*rng.uniform(-1.5, 1.5, 3)), float(rng.choice((-1.0, 1.0)))
+        name, R, sign = (
+            f"l{number}{joint}",
+            R_hip @ _turn(*rng.uniform(-1.5, 1.5, 3)),
+            float(rng.choice((-1.0, 1.0))),
+        )
         to_link = R.T @ R_hip
-        _halves(root, name, link.mass, to_link @ np.array(link.com), to_link @ inertia_matrix(link.inertia) @ to_link.T, rng)
-        element = _joint(root, f"{name}_joint", parent, name, "revolute", R_above.T @ place, R_above.T @ R)
+        _halves(
+            root,
+            name,
+            link.mass,
+            to_link @ np.array(link.com),
+            to_link @ inertia_matrix(link.inertia) @ to_link.T,
+            rng,
+        )
+        element = _joint(
+            root, f"{name}_joint", parent, name, "revolute", R_above.T @ place, R_above.T @ R
+        )
         ET.SubElement(element, "axis", xyz=_text(sign * (to_link @ np.array(link.axis))))
         low, high = sorted((sign * link.angle_min, sign * link.angle_max))
-        limit = ET.SubElement(element, "limit", lower=repr(low), upper=repr(high), effort=repr(robot.servo.torque_max))
+        limit = ET.SubElement(
+            element, "limit", lower=repr(low), upper=repr(high), effort=repr(robot.servo.torque_max)
+        )
         limit.set("velocity", repr(robot.servo.speed_max))
         ET.SubElement(element, "dynamics", friction=repr(robot.servo.coulomb_friction))
         parent, R_above, place = name, R, R_hip @ np.array(link.tip)
     foot = ET.SubElement(root, "link", name=f"l{number}foot")
-    ET.SubElement(ET.SubElement(ET.SubElement(foot, "collision"), "geometry"), "sphere", radius=repr(robot.foot.radius))
-    _joint(root, f"l{number}foot_joint", parent, f"l{number}foot", "fixed", R_above.T @ place, np.eye(3))
+    ET.SubElement(
+        ET.SubElement(ET.SubElement(foot, "collision"), "geometry"),
+        "sphere",
+        radius=repr(robot.foot.radius),
+    )
+    _joint(
+        root,
+        f"l{number}foot_joint",
+        parent,
+        f"l{number}foot",
+        "fixed",
+        R_above.T @ place,
+        np.eye(3),
+    )
 
 
 def stances(robot: Robot) -> str:
@@ -102,8 +169,12 @@ def stances(robot: Robot) -> str:
     return f'<hexapod>{legs}<servo kp="{servo.kp}" kd="{servo.kd}" rotor_inertia="{servo.rotor_inertia}"/></hexapod>'
 
 
-def _halves(root: ET.Element, name: str, mass: float, com: Array, inertia: Array, rng: np.random.Generator) -> ET.Element:
-    """A link of half the mass, and one fixed to it, turned, with the other half; together they have the inertia."""
+def _halves(
+    root: ET.Element, name: str, mass: float, com: Array, inertia: Array, rng: np.random.Generator
+) -> ET.Element:
+    """A link of half the mass, and one fixed to it, turned, with the other half; together they
+    have the inertia.
+    """
     d, Q = rng.normal(0.0, 1e-3, 3), _turn(*rng.uniform(-1.5, 1.5, 3))
     part = 0.5 * inertia - 0.5 * mass * (d @ d * np.eye(3) - np.outer(d, d))
     link = ET.SubElement(root, "link", name=name)
@@ -119,11 +190,22 @@ def _inertial(link: ET.Element, mass: float, com: Array, inertia: Array) -> None
     element = ET.SubElement(link, "inertial")
     ET.SubElement(element, "origin", xyz=_text(com))
     ET.SubElement(element, "mass", value=repr(mass))
-    entries = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-    ET.SubElement(element, "inertia", {key: repr(float(inertia[place])) for key, place in entries.items()})
+    entries = {
+        "ixx": (0, 0),
+        "iyy": (1, 1),
+        "izz": (2, 2),
+        "ixy": (0, 1),
+        "ixz": (0, 2),
+        "iyz": (1, 2),
+    }
+    ET.SubElement(
+        element, "inertia", {key: repr(float(inertia[place])) for key, place in entries.items()}
+    )
 
 
-def _joint(root: ET.Element, name: str, parent: str, child: str, kind: str, place: Array, R: Array) -> ET.Element:
+def _joint(
+    root: ET.Element, name: str, parent: str, child: str, kind: str, place: Array, R: Array
+) -> ET.Element:
     joint = ET.SubElement(root, "joint", name=name, type=kind)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
@@ -150,7 +232,10 @@ def differences(a: Robot, b: Robot) -> Mapping[str, float]:
     found: dict[str, float] = {}
     pairs: list[tuple[str, Any, Any]] = [("torso", a.torso, b.torso)]
     for leg, x, y in zip(LEG_NAMES, a.legs, b.legs, strict=True):
-        pairs += [(f"{leg} hip", x, y), *((f"{leg} {joint}", x.links[k], y.links[k]) for k, joint in enumerate(JOINT_NAMES))]
+        pairs += [
+            (f"{leg} hip", x, y),
+            *((f"{leg} {joint}", x.links[k], y.links[k]) for k, joint in enumerate(JOINT_NAMES)),
+        ]
     for name, x, y in pairs:
         for key, value in vars(x).items():
             if key not in ("name", "links"):

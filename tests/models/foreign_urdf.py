@@ -22,7 +22,8 @@ HIPS = {
 }
 NUMBERS = {"RM": 1, "LR": 2, "LF": 3, "RR": 4, "LM": 5, "RF": 6}  # as someone counted the legs
 
-# another naming, base_footprint below, rpy rounded to print, axes z throughout, right legs' the other way round, masses in fixed links
+# another naming, base_footprint below, rpy rounded to print, axes z throughout, right legs' the
+# other way round, masses in fixed links
 LEG = """
   <joint name="j_c{n}" type="revolute">
     <parent link="body"/> <child link="coxa_{n}"/>
@@ -99,13 +100,26 @@ def spider_urdf(names: Iterable[str] = NUMBERS) -> str:
 
 
 def _spider_leg(name: str) -> str:
-    """A left leg's joints turn as ours; a right one's coxa and femur the other way, and with the femur the tibia."""
+    """A left leg's joints turn as ours; a right one's coxa and femur the other way, and with the
+    femur the tibia.
+    """
     x, y, yaw = HIPS[name]
     left = name.startswith("L")
-    bounds = {key: (low, high) if left else (-high, -low) for key, low, high in (("c", -0.9, 0.8), ("f", -1.5, 1.4), ("t", -0.7, 2.1))}
-    limits = {f"{key}_low": pair[0] for key, pair in bounds.items()} | {f"{key}_high": pair[1] for key, pair in bounds.items()}
+    bounds = {
+        key: (low, high) if left else (-high, -low)
+        for key, low, high in (("c", -0.9, 0.8), ("f", -1.5, 1.4), ("t", -0.7, 2.1))
+    }
+    limits = {f"{key}_low": pair[0] for key, pair in bounds.items()} | {
+        f"{key}_high": pair[1] for key, pair in bounds.items()
+    }
     return LEG.format(
-        n=NUMBERS[name], x=x, y=y, yaw=repr(math.radians(yaw)), up=1 if left else -1, roll=1.5708 if left else -1.5708, **limits
+        n=NUMBERS[name],
+        x=x,
+        y=y,
+        yaw=repr(math.radians(yaw)),
+        up=1 if left else -1,
+        roll=1.5708 if left else -1.5708,
+        **limits,
     )
 
 
@@ -114,21 +128,49 @@ def spider() -> Robot:
 
 
 def spider_table() -> dict[str, Any]:
-    """The same robot as a file of ours would have it, put together by the parallel-axis theorem by hand."""
+    """The same robot as a file of ours would have it, put together by the parallel-axis theorem
+    by hand.
+    """
     table = athena_table()
     for name in ("links", "legs", "source"):
         del table[name]
-    # battery, turned by 90 degrees: xx and yy change places; d = (-0.06, 0, 0.03) between the two, reduced mass 2 x 0.4 / 2.4
+    # battery, turned by 90 degrees: xx and yy change places; d = (-0.06, 0, 0.03) between the two,
+    # reduced mass 2 x 0.4 / 2.4
     m, dx, dz = 2.0 * 0.4 / 2.4, 0.06, 0.03
-    inertia = [8e-3 + 5e-4 + m * dz * dz, 0.025 + 2e-4 + m * (dx * dx + dz * dz), 0.03 + 6e-4 + m * dx * dx, 0.0, m * dx * dz, 0.0]
-    table["torso"] = {"mass": 2.4, "size": [0.34, 0.2, 0.07], "com": [-0.01, 0.0, 0.005], "inertia": inertia}
+    inertia = [
+        8e-3 + 5e-4 + m * dz * dz,
+        0.025 + 2e-4 + m * (dx * dx + dz * dz),
+        0.03 + 6e-4 + m * dx * dx,
+        0.0,
+        m * dx * dz,
+        0.0,
+    ]
+    table["torso"] = {
+        "mass": 2.4,
+        "size": [0.34, 0.2, 0.07],
+        "com": [-0.01, 0.0, 0.005],
+        "inertia": inertia,
+    }
     table["links"] = _spider_links()
-    table["legs"] = {name: {"hip_position": [x, y, 0.01], "hip_yaw": math.radians(yaw)} for name, (x, y, yaw) in HIPS.items()}
+    table["legs"] = {
+        name: {"hip_position": [x, y, 0.01], "hip_yaw": math.radians(yaw)}
+        for name, (x, y, yaw) in HIPS.items()
+    }
     for joint, low, high in (("coxa", -0.9, 0.8), ("femur", -1.5, 1.4), ("tibia", -0.7, 2.1)):
         table["links"][joint] |= {"angle_min": low, "angle_max": high}
     table["foot"]["radius"] = 0.012
-    table["servo"] |= {"torque_max": 5.5, "speed_max": 6.0, "coulomb_friction": 0.04, "kp": 5.5 / 0.15, "kd": 0.02 * 5.5 / 0.15}
-    table["servo"] |= {"rotor_inertia": 0.01 / 40.0 * 5.5 / 0.15, "torque_continuous": 0.2 * 5.5, "motor_constant": math.sqrt(5.5 / 6.0)}
+    table["servo"] |= {
+        "torque_max": 5.5,
+        "speed_max": 6.0,
+        "coulomb_friction": 0.04,
+        "kp": 5.5 / 0.15,
+        "kd": 0.02 * 5.5 / 0.15,
+    }
+    table["servo"] |= {
+        "rotor_inertia": 0.01 / 40.0 * 5.5 / 0.15,
+        "torque_continuous": 0.2 * 5.5,
+        "motor_constant": math.sqrt(5.5 / 6.0),
+    }
     return table | {"name": "spider"}
 
 
@@ -141,7 +183,14 @@ def _spider_links() -> dict[str, dict[str, Any]]:
         ("tibia", 0.1, 0.15, 0.069, (8e-6, 2e-4 + shift, 2e-4 + shift), [0.0, 1.0, 0.0]),
     )
     return {
-        name: {"mass": mass, "length": length, "com": [x, 0.0, 0.0], "inertia": [*moments, 0.0, 0.0, 0.0], "axis": axis, "stance": stance}
+        name: {
+            "mass": mass,
+            "length": length,
+            "com": [x, 0.0, 0.0],
+            "inertia": [*moments, 0.0, 0.0, 0.0],
+            "axis": axis,
+            "stance": stance,
+        }
         for (name, mass, length, x, moments, axis), stance in zip(rows, STANCE, strict=True)
     }
 

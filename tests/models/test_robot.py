@@ -53,7 +53,9 @@ def test_athena_has_the_reference_figures() -> None:
     assert robot.contact.stiffness == pytest.approx(1.07e6, rel=5e-3)
     assert np.degrees(robot.legs[0].stance) == pytest.approx((0.0, 22.0, 180.0 - 78.0), abs=0.5)
     tripod_share = robot.total_mass * 9.81 / 3.0
-    assert (tripod_share / robot.contact.stiffness) ** (2.0 / 3.0) == pytest.approx(0.66e-3, rel=1e-2)
+    assert (tripod_share / robot.contact.stiffness) ** (2.0 / 3.0) == pytest.approx(
+        0.66e-3, rel=1e-2
+    )
 
 
 def test_athena_stance_feet_are_where_the_reference_puts_them() -> None:
@@ -62,7 +64,9 @@ def test_athena_stance_feet_are_where_the_reference_puts_them() -> None:
     arms = models.foot_positions(robot, robot.stance) - hips
     assert np.hypot(arms[:, 0], arms[:, 1]) == pytest.approx(np.full(6, 0.18), abs=1e-9)
     assert arms[:, 2] == pytest.approx(np.full(6, -0.12), abs=1e-9)
-    assert np.arctan2(arms[:, 1], arms[:, 0]) == pytest.approx([leg.hip_yaw for leg in robot.legs], abs=1e-9)
+    assert np.arctan2(arms[:, 1], arms[:, 0]) == pytest.approx(
+        [leg.hip_yaw for leg in robot.legs], abs=1e-9
+    )
 
 
 def test_phantomx_has_the_reference_figures() -> None:
@@ -109,13 +113,19 @@ def test_a_heavier_torso_gets_its_own_inertia_and_a_softer_foot_its_own_stiffnes
 
 
 def test_the_motor_constant_is_the_data_sheets_or_else_an_ideal_motors() -> None:
-    """MX-64: 6.0 N m at stall from 12 V and 4.1 A. An ideal motor takes at stall its torque times its no-load speed."""
-    assert load_robot("athena").servo.motor_constant == pytest.approx(6.0 / math.sqrt(12.0 * 4.1), rel=1e-3)
+    """MX-64: 6.0 N m at stall from 12 V and 4.1 A. An ideal motor takes at stall its torque
+    times its no-load speed.
+    """
+    assert load_robot("athena").servo.motor_constant == pytest.approx(
+        6.0 / math.sqrt(12.0 * 4.1), rel=1e-3
+    )
     table = athena_table()
     del table["servo"]["motor_constant"]
     put(table, "servo.torque_max", 5.0)
     put(table, "servo.speed_max", 3.2)
-    assert robot_from_table(table, where="a").servo.motor_constant == pytest.approx(1.25)  # sqrt(5.0 / 3.2)
+    assert robot_from_table(table, where="a").servo.motor_constant == pytest.approx(
+        1.25
+    )  # sqrt(5.0 / 3.2)
 
 
 def test_robots_are_frozen_comparable_and_picklable() -> None:
@@ -131,55 +141,178 @@ BAD: list[tuple[str, Callable[[Table], None], list[str]]] = [
     ("unknown key", lambda t: put(t, "torso.mas", 1.0), ["torso", "'mas'", "did you mean 'mass'?"]),
     ("unknown section", lambda t: put(t, "servos", {}), ["'servos'", "did you mean 'servo'?"]),
     ("unknown leg", lambda t: put(t, "legs.FL", {}), ["legs", "'FL'", "LF, LM, LR"]),
-    ("unknown link key", lambda t: put(t, "legs.LF.tibia.lenght", 1.0), ["legs.LF.tibia", "did you mean 'length'?"]),
-    ("unknown law", lambda t: put(t, "contact.law", "floris"), ["contact.law", "did you mean 'flores'?"]),
-    ("name of wrong type", lambda t: put(t, "contact.law", 3), ["contact.law", "got 3", "exact_restitution"]),
+    (
+        "unknown link key",
+        lambda t: put(t, "legs.LF.tibia.lenght", 1.0),
+        ["legs.LF.tibia", "did you mean 'length'?"],
+    ),
+    (
+        "unknown law",
+        lambda t: put(t, "contact.law", "floris"),
+        ["contact.law", "did you mean 'flores'?"],
+    ),
+    (
+        "name of wrong type",
+        lambda t: put(t, "contact.law", 3),
+        ["contact.law", "got 3", "exact_restitution"],
+    ),
     ("missing section", lambda t: drop(t, "servo"), ["servo", "missing section", "[servo]"]),
     ("missing key", lambda t: drop(t, "servo.kp"), ["servo.kp", "missing key", "N m/rad"]),
     ("missing leg", lambda t: drop(t, "legs.RR"), ["legs.RR", "missing leg", "add [legs.RR]"]),
-    ("missing link key", lambda t: drop(t, "links.femur.mass"), ["legs.LF.femur.mass", "missing key"]),
-    ("missing stance", lambda t: drop(t, "links.femur.stance"), ["legs.LF.femur.stance", "missing key"]),
+    (
+        "missing link key",
+        lambda t: drop(t, "links.femur.mass"),
+        ["legs.LF.femur.mass", "missing key"],
+    ),
+    (
+        "missing stance",
+        lambda t: drop(t, "links.femur.stance"),
+        ["legs.LF.femur.stance", "missing key"],
+    ),
     ("missing name", lambda t: drop(t, "name"), ["name", "expected a text"]),
-    ("text for number", lambda t: put(t, "torso.mass", "2.6 kg"), ["torso.mass", "'2.6 kg'", "[kg]"]),
+    (
+        "text for number",
+        lambda t: put(t, "torso.mass", "2.6 kg"),
+        ["torso.mass", "'2.6 kg'", "[kg]"],
+    ),
     ("true for number", lambda t: put(t, "torso.mass", True), ["torso.mass", "got True", "[kg]"]),
     ("number for table", lambda t: put(t, "torso", 3.0), ["torso", "expected a table"]),
     ("number for vector", lambda t: put(t, "torso.com", 0.0), ["torso.com", "3 numbers [m]"]),
-    ("short vector", lambda t: put(t, "links.tibia.com", [0.0, 0.0]), ["links.tibia.com", "wrong length", "exactly 3"]),
+    (
+        "short vector",
+        lambda t: put(t, "links.tibia.com", [0.0, 0.0]),
+        ["links.tibia.com", "wrong length", "exactly 3"],
+    ),
     ("not finite", lambda t: put(t, "servo.kp", math.nan), ["servo.kp", "got nan", "finite"]),
-    ("entry not finite", lambda t: put(t, "gravity", [0.0, 0.0, -math.inf]), ["gravity[2]", "got -inf"]),
-    ("zero mass", lambda t: put(t, "links.coxa.mass", 0.0), ["links.coxa.mass", "got 0.0", "> 0 [kg]"]),
-    ("negative mass of one leg", lambda t: put(t, "legs.LM.femur", {"mass": -1.0}), ["legs.LM.femur.mass", "got -1.0", "> 0 [kg]"]),
+    (
+        "entry not finite",
+        lambda t: put(t, "gravity", [0.0, 0.0, -math.inf]),
+        ["gravity[2]", "got -inf"],
+    ),
+    (
+        "zero mass",
+        lambda t: put(t, "links.coxa.mass", 0.0),
+        ["links.coxa.mass", "got 0.0", "> 0 [kg]"],
+    ),
+    (
+        "negative mass of one leg",
+        lambda t: put(t, "legs.LM.femur", {"mass": -1.0}),
+        ["legs.LM.femur.mass", "got -1.0", "> 0 [kg]"],
+    ),
     ("negative gain", lambda t: put(t, "servo.kd", -0.1), ["servo.kd", "got -0.1", ">= 0"]),
-    ("negative moment", lambda t: put(t, "links.tibia.inertia", [1e-5, -1e-5, 1e-5, 0, 0, 0]), ["tibia.inertia", "not positive definite"]),
-    ("large product", lambda t: put(t, "torso.inertia", [0.01, 0.03, 0.04, 0.02, 0, 0]), ["torso.inertia", "not positive definite"]),
-    ("triangle", lambda t: put(t, "links.coxa.inertia", [1e-5, 1e-5, 3e-5, 0, 0, 0]), ["coxa.inertia", "no possible body", "sum of"]),
-    ("wrong unit", lambda t: put(t, "links.femur.inertia", [0.0675, 0.2004, 0.2004, 0, 0, 0]), ["femur.inertia", "radius of gyration"]),
-    ("com in mm", lambda t: put(t, "links.femur.com", [65.0, 0.0, 0.0]), ["femur.com", "check the unit (m)"]),
-    ("limits swapped", lambda t: put(t, "links.coxa.angle_min", 1.5), ["coxa.angle_min", "not ordered", "angle_min < angle_max"]),
-    ("limits in degrees", lambda t: put(t, "links.coxa.angle_max", 55.0), ["links.coxa.angle_max", "got 55.0", "rad"]),
-    ("stance outside", lambda t: put(t, "legs.RF.coxa", {"stance": 1.2}), ["legs.RF.coxa.stance", "outside the joint's limits"]),
-    ("one foot in the air", lambda t: put(t, "legs.RM.femur", {"stance": 0.9}), ["legs.RM.stance", "does not reach the ground"]),
-    ("feet above hips", lambda t: put(t, "links.femur", t["links"]["femur"] | {"stance": 1.5}), ["stance", "above its hip"]),
+    (
+        "negative moment",
+        lambda t: put(t, "links.tibia.inertia", [1e-5, -1e-5, 1e-5, 0, 0, 0]),
+        ["tibia.inertia", "not positive definite"],
+    ),
+    (
+        "large product",
+        lambda t: put(t, "torso.inertia", [0.01, 0.03, 0.04, 0.02, 0, 0]),
+        ["torso.inertia", "not positive definite"],
+    ),
+    (
+        "triangle",
+        lambda t: put(t, "links.coxa.inertia", [1e-5, 1e-5, 3e-5, 0, 0, 0]),
+        ["coxa.inertia", "no possible body", "sum of"],
+    ),
+    (
+        "wrong unit",
+        lambda t: put(t, "links.femur.inertia", [0.0675, 0.2004, 0.2004, 0, 0, 0]),
+        ["femur.inertia", "radius of gyration"],
+    ),
+    (
+        "com in mm",
+        lambda t: put(t, "links.femur.com", [65.0, 0.0, 0.0]),
+        ["femur.com", "check the unit (m)"],
+    ),
+    (
+        "limits swapped",
+        lambda t: put(t, "links.coxa.angle_min", 1.5),
+        ["coxa.angle_min", "not ordered", "angle_min < angle_max"],
+    ),
+    (
+        "limits in degrees",
+        lambda t: put(t, "links.coxa.angle_max", 55.0),
+        ["links.coxa.angle_max", "got 55.0", "rad"],
+    ),
+    (
+        "stance outside",
+        lambda t: put(t, "legs.RF.coxa", {"stance": 1.2}),
+        ["legs.RF.coxa.stance", "outside the joint's limits"],
+    ),
+    (
+        "one foot in the air",
+        lambda t: put(t, "legs.RM.femur", {"stance": 0.9}),
+        ["legs.RM.stance", "does not reach the ground"],
+    ),
+    (
+        "feet above hips",
+        lambda t: put(t, "links.femur", t["links"]["femur"] | {"stance": 1.5}),
+        ["stance", "above its hip"],
+    ),
     ("no length", lambda t: put(t, "links.femur.length", 0.0), ["femur.length", "without extent"]),
     ("long axis", lambda t: put(t, "links.femur.axis", [0.0, -2.0, 0.0]), ["femur.axis", "unit"]),
-    ("restitution above 1", lambda t: put(t, "contact.restitution", 1.2), ["contact.restitution", "got 1.2", "<= 1"]),
-    ("restitution 0", lambda t: put(t, "contact.restitution", 0.0), ["contact.restitution", "> 0", "hertz"]),
-    ("no floor", lambda t: put(t, "contact.impact_speed_floor", 0.0), ["contact.impact_speed_floor", "> 0 [m/s]"]),
-    ("friction order", lambda t: put(t, "friction.mu_static", 0.1), ["friction.mu_static", "at least mu = 0.7"]),
-    ("idle static friction", lambda t: put(t, "friction.mu_static", 0.8),
-     ["friction.mu_static", "has no effect", "got '0.8 with the law tanh'", "leave it out"]),
-    ("presliding 0", lambda t: put(t, "friction.presliding", 0.0), ["friction.presliding", "got 0.0", ">= 1e-07"]),
-    ("bristles that pull", lambda t: put(t, "friction.bristle_damping", -1.0), ["friction.bristle_damping", "got -1.0"]),
-    ("continuous torque", lambda t: put(t, "servo.torque_continuous", 7.0), ["servo.torque_continuous", "torque_max = 6"]),
+    (
+        "restitution above 1",
+        lambda t: put(t, "contact.restitution", 1.2),
+        ["contact.restitution", "got 1.2", "<= 1"],
+    ),
+    (
+        "restitution 0",
+        lambda t: put(t, "contact.restitution", 0.0),
+        ["contact.restitution", "> 0", "hertz"],
+    ),
+    (
+        "no floor",
+        lambda t: put(t, "contact.impact_speed_floor", 0.0),
+        ["contact.impact_speed_floor", "> 0 [m/s]"],
+    ),
+    (
+        "friction order",
+        lambda t: put(t, "friction.mu_static", 0.1),
+        ["friction.mu_static", "at least mu = 0.7"],
+    ),
+    (
+        "idle static friction",
+        lambda t: put(t, "friction.mu_static", 0.8),
+        ["friction.mu_static", "has no effect", "got '0.8 with the law tanh'", "leave it out"],
+    ),
+    (
+        "presliding 0",
+        lambda t: put(t, "friction.presliding", 0.0),
+        ["friction.presliding", "got 0.0", ">= 1e-07"],
+    ),
+    (
+        "bristles that pull",
+        lambda t: put(t, "friction.bristle_damping", -1.0),
+        ["friction.bristle_damping", "got -1.0"],
+    ),
+    (
+        "continuous torque",
+        lambda t: put(t, "servo.torque_continuous", 7.0),
+        ["servo.torque_continuous", "torque_max = 6"],
+    ),
     ("rk4 without step", lambda t: put(t, "solver.method", "rk4"), ["solver.step", "fixed step"]),
-    ("vertical slope", lambda t: put(t, "terrain.incline", 1.6), ["terrain.incline", "got 1.6", "rad"]),
+    (
+        "vertical slope",
+        lambda t: put(t, "terrain.incline", 1.6),
+        ["terrain.incline", "got 1.6", "rad"],
+    ),
     ("duty of 1", lambda t: put(t, "gait.duty", 1.0), ["gait.duty", "< 1"]),
-    ("compressible beyond physics", lambda t: put(t, "foot.poisson", 0.6), ["foot.poisson", "<= 0.5"]),
-]  # fmt: skip
+    (
+        "compressible beyond physics",
+        lambda t: put(t, "foot.poisson", 0.6),
+        ["foot.poisson", "<= 0.5"],
+    ),
+]
 
 
-@pytest.mark.parametrize(("change", "words"), [case[1:] for case in BAD], ids=[case[0] for case in BAD])
-def test_a_bad_robot_is_refused_with_file_key_and_remedy(change: Callable[[Table], None], words: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("change", "words"), [case[1:] for case in BAD], ids=[case[0] for case in BAD]
+)
+def test_a_bad_robot_is_refused_with_file_key_and_remedy(
+    change: Callable[[Table], None], words: list[str]
+) -> None:
     table = athena_table()
     change(table)
     with pytest.raises(RobotError) as caught:
@@ -222,5 +355,11 @@ def test_errors_keep_their_data_and_survive_pickling() -> None:
     copied = pickle.loads(pickle.dumps(error))
     assert isinstance(copied, RobotError)
     assert isinstance(copied, HexapodError)
-    assert (copied.what, copied.got, copied.expected, copied.fix, copied.where) == ("no", 1, "2", "do", "file")
+    assert (copied.what, copied.got, copied.expected, copied.fix, copied.where) == (
+        "no",
+        1,
+        "2",
+        "do",
+        "file",
+    )
     assert str(copied) == "file: no: got 1, expected 2; do"

@@ -1,4 +1,6 @@
-"""What other engines read in our URDFs and MJCFs is the robot: masses, centre of mass, mass matrix, feet."""
+"""What other engines read in our URDFs and MJCFs is the robot: masses, centre of mass, mass
+matrix, feet.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +24,11 @@ from hexapod_cosim.models.statics import settled
 from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
-EXACT = 1e-12  # relative to the largest entry: some 1e3 times the rounding of a dozen products in a row
-# MuJoCo turns inertias to principal axes, by an iteration that ends at 1e-12, and keeps the axes as a quaternion
+EXACT = (
+    1e-12  # relative to the largest entry: some 1e3 times the rounding of a dozen products in a row
+)
+# MuJoCo turns inertias to principal axes, by an iteration that ends at 1e-12, and keeps the axes as
+# a quaternion
 PRINCIPAL_AXES = 1e-9
 UNKNOWNS = 24
 ROBOTS = {
@@ -41,21 +46,43 @@ def pose(robot: Robot, seed: int) -> tuple[Array, Array, Array]:
     """Place of the torso's frame (3,), its quaternion (4,), joint angles (6, 3)."""
     rng = np.random.default_rng(seed)
     quaternion = rng.normal(0.0, 0.3, 4) + np.eye(4)[0]
-    return rng.normal(0.0, 0.3, 3), quaternion / np.linalg.norm(quaternion), robot.stance + rng.normal(0.0, 0.4, (6, 3))
+    return (
+        rng.normal(0.0, 0.3, 3),
+        quaternion / np.linalg.norm(quaternion),
+        robot.stance + rng.normal(0.0, 0.4, (6, 3)),
+    )
 
 
-def bodies(robot: Robot, place: Array, quaternion: Array, angle: Array, velocity: Array, spin: Array, speed: Array) -> Array:
+def bodies(
+    robot: Robot,
+    place: Array,
+    quaternion: Array,
+    angle: Array,
+    velocity: Array,
+    spin: Array,
+    speed: Array,
+) -> Array:
     """(19, 13) our bodies, from place, velocity and spin of the torso's frame, world axes."""
     arm = rotation_matrix(quaternion) @ np.array(robot.torso.com)
-    return body_states(robot, place + arm, quaternion, velocity + np.cross(spin, arm), spin, angle, speed)
+    return body_states(
+        robot, place + arm, quaternion, velocity + np.cross(spin, arm), spin, angle, speed
+    )
 
 
-def our_mass_matrix(robot: Robot, place: Array, quaternion: Array, angle: Array, *, local_velocity: bool) -> Array:
-    """(24, 24) of the torso frame's velocity (torso or world axes), its spin in torso axes and the joints' speeds."""
+def our_mass_matrix(
+    robot: Robot, place: Array, quaternion: Array, angle: Array, *, local_velocity: bool
+) -> Array:
+    """(24, 24) of the torso frame's velocity (torso or world axes), its spin in torso axes and
+    the joints' speeds.
+    """
     R, columns = rotation_matrix(quaternion), []
     for unit in np.eye(UNKNOWNS):
         velocity = R @ unit[:3] if local_velocity else unit[:3]
-        columns.append(bodies(robot, place, quaternion, angle, velocity, R @ unit[3:6], unit[6:].reshape(6, 3))[:, 7:13].ravel())
+        columns.append(
+            bodies(
+                robot, place, quaternion, angle, velocity, R @ unit[3:6], unit[6:].reshape(6, 3)
+            )[:, 7:13].ravel()
+        )
     J = np.array(columns).T
     still = bodies(robot, place, quaternion, angle, np.zeros(3), np.zeros(3), np.zeros((6, 3)))
     return np.asarray(J.T @ mass_matrix(robot, still) @ J)
@@ -67,7 +94,9 @@ def our_centre(robot: Robot, body: Array) -> Array:
 
 def assert_same(theirs: Any, ours: Any, tolerance: float) -> None:
     ours = np.asarray(ours)
-    assert float(np.max(np.abs(np.asarray(theirs) - ours))) <= tolerance * max(float(np.max(np.abs(ours))), 1e-300)
+    assert float(np.max(np.abs(np.asarray(theirs) - ours))) <= tolerance * max(
+        float(np.max(np.abs(ours))), 1e-300
+    )
 
 
 def joint_names(form: str) -> list[str]:
@@ -78,21 +107,31 @@ def test_pinocchio_reads_the_urdf_as_the_robot(robot: Robot) -> None:
     model = pin.buildModelFromXML(robot_to_urdf(robot), pin.JointModelFreeFlyer())
     data = model.createData()
     assert model.nv == UNKNOWNS
-    assert sum(inertia.mass for inertia in model.inertias) == pytest.approx(robot.total_mass, rel=EXACT)
+    assert sum(inertia.mass for inertia in model.inertias) == pytest.approx(
+        robot.total_mass, rel=EXACT
+    )
     joints = [model.getJointId(name) for name in joint_names("{leg}_{joint}_joint")]
     order = [*range(6), *(model.joints[joint].idx_v for joint in joints)]
     for seed in range(4):
         place, quaternion, angle = pose(robot, seed)
         q = np.concatenate([place, quaternion[1:], quaternion[:1], np.zeros(18)])
         q[[model.joints[joint].idx_q for joint in joints]] = angle.ravel()
-        light = replace(robot, servo=replace(robot.servo, rotor_inertia=0.0))  # a URDF has no rotors
+        light = replace(
+            robot, servo=replace(robot.servo, rotor_inertia=0.0)
+        )  # a URDF has no rotors
         H = np.triu(pin.crba(model, data, q))
         H = (H + H.T - np.diag(np.diag(H)))[np.ix_(order, order)]
         assert_same(H, our_mass_matrix(light, place, quaternion, angle, local_velocity=True), EXACT)
-        assert_same(pin.centerOfMass(model, data, q), our_centre(robot, bodies(robot, place, quaternion, angle, *still())), EXACT)
+        assert_same(
+            pin.centerOfMass(model, data, q),
+            our_centre(robot, bodies(robot, place, quaternion, angle, *still())),
+            EXACT,
+        )
         pin.framesForwardKinematics(model, data, q)
         feet = [data.oMf[model.getFrameId(f"{leg}_foot")].translation for leg in LEG_NAMES]
-        assert_same(feet, place + foot_positions(robot, angle) @ rotation_matrix(quaternion).T, EXACT)
+        assert_same(
+            feet, place + foot_positions(robot, angle) @ rotation_matrix(quaternion).T, EXACT
+        )
 
 
 def still() -> tuple[Array, Array, Array]:
@@ -100,19 +139,28 @@ def still() -> tuple[Array, Array, Array]:
 
 
 def test_viewers_find_geometry_in_the_urdf(robot: Robot) -> None:
-    """What meshcat and its like are given: the torso, a cylinder a link, a sphere a foot; for contact the feet alone."""
+    """What meshcat and its like are given: the torso, a cylinder a link, a sphere a foot; for
+    contact the feet alone.
+    """
     text = robot_to_urdf(robot)
     model = pin.buildModelFromXML(text)
-    shown, touching = (pin.buildGeomFromUrdfString(model, text, kind) for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION))
+    shown, touching = (
+        pin.buildGeomFromUrdfString(model, text, kind)
+        for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
+    )
     assert (shown.ngeoms, touching.ngeoms) == (1 + 18 + 6, 6)
 
 
 def test_the_exported_file_loads_as_viewers_load_it(robot: Robot, tmp_path: Path) -> None:
-    """pinocchio's MeshcatVisualizer takes these three: every body has its mass and something of a size to show, without any mesh."""
+    """pinocchio's MeshcatVisualizer takes these three: every body has its mass and something of
+    a size to show, without any mesh.
+    """
     path = export_description(robot, tmp_path / "robot.urdf", FORMATS["urdf"])
     model, _, shown = pin.buildModelsFromUrdf(str(path), root_joint=pin.JointModelFreeFlyer())
     joints = [1, *(model.getJointId(name) for name in joint_names("{leg}_{joint}_joint"))]
-    assert [model.inertias[joint].mass for joint in joints] == pytest.approx(masses(robot).tolist(), rel=EXACT)
+    assert [model.inertias[joint].mass for joint in joints] == pytest.approx(
+        masses(robot).tolist(), rel=EXACT
+    )
     assert {geometry.parentJoint for geometry in shown.geometryObjects} == set(joints)
     for geometry in shown.geometryObjects:
         geometry.geometry.computeLocalAABB()
@@ -129,7 +177,11 @@ def test_mujoco_reads_the_urdf_with_the_same_masses(robot: Robot) -> None:
     joints = [model.joint(name) for name in joint_names("{leg}_{joint}_joint")]
     data.qpos[[joint.qposadr[0] for joint in joints]] = angle.ravel()
     mujoco.mj_forward(model, data)
-    assert_same(data.subtree_com[0], our_centre(robot, bodies(robot, place, quaternion, angle, *still())), EXACT)
+    assert_same(
+        data.subtree_com[0],
+        our_centre(robot, bodies(robot, place, quaternion, angle, *still())),
+        EXACT,
+    )
     order = [joint.dofadr[0] for joint in joints]
     light = replace(robot, servo=replace(robot.servo, rotor_inertia=0.0))
     ours = our_mass_matrix(light, place, quaternion, angle, local_velocity=False)[6:, 6:]
@@ -152,15 +204,27 @@ def test_mujoco_reads_the_mjcf_as_the_robot(robot: Robot) -> None:
         place, quaternion, angle = pose(robot, seed)
         data.qpos[:] = np.concatenate([place, quaternion, angle.ravel()])
         mujoco.mj_forward(model, data)
-        assert_same(their_mass_matrix(model, data), our_mass_matrix(robot, place, quaternion, angle, local_velocity=False), PRINCIPAL_AXES)
-        assert_same(data.subtree_com[0], our_centre(robot, bodies(robot, place, quaternion, angle, *still())), EXACT)
+        assert_same(
+            their_mass_matrix(model, data),
+            our_mass_matrix(robot, place, quaternion, angle, local_velocity=False),
+            PRINCIPAL_AXES,
+        )
+        assert_same(
+            data.subtree_com[0],
+            our_centre(robot, bodies(robot, place, quaternion, angle, *still())),
+            EXACT,
+        )
         feet = [data.site(f"{leg}_foot").xpos for leg in LEG_NAMES]
-        assert_same(feet, place + foot_positions(robot, angle) @ rotation_matrix(quaternion).T, EXACT)
+        assert_same(
+            feet, place + foot_positions(robot, angle) @ rotation_matrix(quaternion).T, EXACT
+        )
 
 
 def test_mujocos_joints_and_servos_are_the_robots(robot: Robot) -> None:
     model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
-    assert np.array_equal(model.jnt_range[1:], np.stack([robot.angle_min.ravel(), robot.angle_max.ravel()], axis=1))
+    assert np.array_equal(
+        model.jnt_range[1:], np.stack([robot.angle_min.ravel(), robot.angle_max.ravel()], axis=1)
+    )
     assert set(model.dof_armature[6:]) == {robot.servo.rotor_inertia}
     assert set(model.dof_frictionloss[6:]) == {robot.servo.coulomb_friction}
     assert set(model.actuator_gainprm[:, 0]) == {robot.servo.kp}
@@ -184,11 +248,17 @@ def test_in_mujoco_the_robot_stands_as_deep_in_the_ground_as_hertz_says(name: st
     for _ in range(2000):
         mujoco.mj_step(model, data)
     assert data.ncon == 6
-    assert sum(contact_force(model, data, k) for k in range(6)) == pytest.approx(robot.weight, rel=1e-3)  # the last tremor
+    assert sum(contact_force(model, data, k) for k in range(6)) == pytest.approx(
+        robot.weight, rel=1e-3
+    )  # the last tremor
     tripod = (robot.weight / 3.0 / robot.contact.stiffness) ** (2.0 / 3.0)
-    # a linear spring that is right at a third of the weight gives half of that depth at a sixth; the mobility varies by legs and pose
-    assert np.mean([-contact.dist for contact in data.contact]) == pytest.approx(0.5 * tripod, rel=0.1)
-    # feet that stick hold legs up that would spread them on feet that creep; rigid legs would hold the torso higher
+    # a linear spring that is right at a third of the weight gives half of that depth at a sixth;
+    # the mobility varies by legs and pose
+    assert np.mean([-contact.dist for contact in data.contact]) == pytest.approx(
+        0.5 * tripod, rel=0.1
+    )
+    # feet that stick hold legs up that would spread them on feet that creep; rigid legs would hold
+    # the torso higher
     rigid = robot.foot.radius - foot_positions(robot, robot.stance)[:, 2].min() + robot.torso.com[2]
     height = (data.qpos[:3] + rotation_matrix(data.qpos[3:7]) @ np.array(robot.torso.com))[2]
     assert settled(robot)[0][2] - tripod < height < rigid
@@ -202,13 +272,19 @@ def contact_force(model: Any, data: Any, number: int) -> float:
 
 def test_mujocos_ground_is_the_robots_slope() -> None:
     robot = load_robot("athena")
-    robot = replace(robot, terrain=replace(robot.terrain, kind="slope", height=0.03, incline=0.15, heading=0.7))
+    robot = replace(
+        robot, terrain=replace(robot.terrain, kind="slope", height=0.03, incline=0.15, heading=0.7)
+    )
     model = mujoco.MjModel.from_xml_string(robot_to_mjcf(robot))
     ground = model.geom("ground")
-    assert rotation_matrix(ground.quat)[:, 2] == pytest.approx(ground_normal(robot.terrain), abs=EXACT)
+    assert rotation_matrix(ground.quat)[:, 2] == pytest.approx(
+        ground_normal(robot.terrain), abs=EXACT
+    )
     assert tuple(ground.pos) == (0.0, 0.0, 0.03)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     feet = np.array([data.site(f"{leg}_foot").xpos for leg in LEG_NAMES]) - ground.pos
-    assert feet @ ground_normal(robot.terrain) == pytest.approx(np.full(6, robot.foot.radius), abs=1e-9)  # m    the stance is that flat
+    assert feet @ ground_normal(robot.terrain) == pytest.approx(
+        np.full(6, robot.foot.radius), abs=1e-9
+    )  # m    the stance is that flat

@@ -1,4 +1,6 @@
-"""How the robots stand: balance of forces, agreement with the equations of motion, and the poses that do not exist."""
+"""How the robots stand: balance of forces, agreement with the equations of motion, and the poses
+that do not exist.
+"""
 
 from __future__ import annotations
 
@@ -22,25 +24,49 @@ ROBOTS = ("athena", "phantomx_mk4")
 MODES = ("position", "torque", "kinematic")
 
 
-def robot_on(name: str, *, mode: str = "position", kind: str = "flat", incline: float = 0.0, law: str = "tanh") -> Robot:
+def robot_on(
+    name: str,
+    *,
+    mode: str = "position",
+    kind: str = "flat",
+    incline: float = 0.0,
+    law: str = "tanh",
+) -> Robot:
     robot = load_robot(name)
     terrain = replace(robot.terrain, kind=kind, incline=incline, heading=0.7, height=0.3)
-    return replace(robot, servo=replace(robot.servo, mode=mode), friction=replace(robot.friction, law=law), terrain=terrain)
+    return replace(
+        robot,
+        servo=replace(robot.servo, mode=mode),
+        friction=replace(robot.friction, law=law),
+        terrain=terrain,
+    )
 
 
 def bodies(robot: Robot, pose: Standing) -> Array:
-    return body_states(robot, pose.position, pose.quaternion, pose.velocity, np.zeros(3), pose.angle, np.zeros((6, 3)))
+    return body_states(
+        robot,
+        pose.position,
+        pose.quaternion,
+        pose.velocity,
+        np.zeros(3),
+        pose.angle,
+        np.zeros((6, 3)),
+    )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 @pytest.mark.parametrize("incline", [0.0, 0.2])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_nothing_accelerates_in_the_standing_pose(name: str, mode: str, incline: float, law: str) -> None:
+def test_nothing_accelerates_in_the_standing_pose(
+    name: str, mode: str, incline: float, law: str
+) -> None:
     robot = robot_on(name, mode=mode, kind="slope", incline=incline, law=law)
     pose = standing(robot)
     body = bodies(robot, pose)
-    result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle)
+    result = accelerations(
+        robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle
+    )
     assert float(np.max(np.abs(result.dv))) < AT_REST
 
 
@@ -50,7 +76,9 @@ def test_standing_forces_carry_the_weight_below_the_centre_of_mass(name: str, mo
     robot = robot_on(name, mode=mode)
     pose = standing(robot)
     body = bodies(robot, pose)
-    assert pose.foot_force.sum(axis=0) == pytest.approx(-robot.total_mass * np.array(robot.gravity), abs=BALANCE)
+    assert pose.foot_force.sum(axis=0) == pytest.approx(
+        -robot.total_mass * np.array(robot.gravity), abs=BALANCE
+    )
     assert np.all(pose.foot_force[:, 2] > 0.0)
     assert np.all(pose.velocity == pytest.approx(0.0, abs=1e-9))
     pressure = pose.foot_force[:, 2] @ foot_centres(robot, body) / pose.foot_force[:, 2].sum()
@@ -78,7 +106,9 @@ def test_servos_sag_by_their_torque_over_their_stiffness_and_stay_within_limits(
     robot = robot_on(name)
     pose = standing(robot)
     body = bodies(robot, pose)
-    torque = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body)).drive_torque
+    torque = accelerations(
+        robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body)
+    ).drive_torque
     assert robot.stance - pose.angle == pytest.approx(torque / robot.servo.kp, abs=1e-12)
     assert float(np.max(np.abs(torque))) < robot.servo.torque_continuous
     assert np.all(robot.angle_min < pose.angle)
@@ -103,28 +133,47 @@ def test_on_a_slope_the_robot_creeps_downhill_at_the_speed_of_the_tanh_law(incli
     robot = robot_on("athena", kind="slope", incline=incline)
     pose = standing(robot)
     creep = math.atanh(math.tan(incline) / robot.friction.mu) / robot.friction.slope
-    downhill = -np.array([math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)])
+    downhill = -np.array(
+        [math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)]
+    )
     assert pose.velocity == pytest.approx(creep * downhill, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("incline", [0.1, 0.3])
-def test_on_a_slope_bristles_hold_the_robot_where_it_has_given_way_by_their_closed_form(incline: float) -> None:
+def test_on_a_slope_bristles_hold_the_robot_where_it_has_given_way_by_their_closed_form(
+    incline: float,
+) -> None:
     robot = robot_on("athena", kind="slope", incline=incline, law="bristle")
     pose = standing(robot)
-    downhill = -np.array([math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)])
-    way = robot.friction.presliding * 2.0 * math.sin(math.asin(math.tan(incline) / robot.friction.mu) / 3.0)  # u (3 - u^2)/2 = share
+    downhill = -np.array(
+        [math.cos(0.7) * math.cos(incline), math.sin(0.7) * math.cos(incline), math.sin(incline)]
+    )
+    way = (
+        robot.friction.presliding
+        * 2.0
+        * math.sin(math.asin(math.tan(incline) / robot.friction.mu) / 3.0)
+    )  # u (3 - u^2)/2 = share
     assert not pose.velocity.any()
     assert pose.bristle == pytest.approx(np.tile(way * downhill, (6, 1)), rel=1e-6, abs=1e-6 * way)
 
 
-@pytest.mark.parametrize("servo", [{"torque_max": 0.3, "torque_continuous": 0.3}, {"kp": 0.0}], ids=["weak", "limp"])
+@pytest.mark.parametrize(
+    "servo", [{"torque_max": 0.3, "torque_continuous": 0.3}, {"kp": 0.0}], ids=["weak", "limp"]
+)
 def test_servos_that_cannot_hold_the_robot_are_refused(servo: dict[str, float]) -> None:
     robot = robot_on("athena")
-    with pytest.raises(RobotError, match=r"athena: the robot does not stand: .*raise servo\.kp or servo\.torque_max"):
+    with pytest.raises(
+        RobotError,
+        match=r"athena: the robot does not stand: .*raise servo\.kp or servo\.torque_max",
+    ):
         settled(replace(robot, servo=replace(robot.servo, **servo)))  # type: ignore[arg-type]
 
 
-FRICTIONLESS = {"none": {"law": "none"}, "tanh": {"law": "tanh", "mu": 0.0}, "bristle": {"law": "bristle", "mu": 0.0}}
+FRICTIONLESS = {
+    "none": {"law": "none"},
+    "tanh": {"law": "tanh", "mu": 0.0},
+    "bristle": {"law": "bristle", "mu": 0.0},
+}
 
 
 def with_friction(robot: Robot, **friction: object) -> Robot:
@@ -133,7 +182,9 @@ def with_friction(robot: Robot, **friction: object) -> Robot:
 
 @pytest.mark.parametrize("friction", FRICTIONLESS.values(), ids=FRICTIONLESS)
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
-def test_on_level_ground_the_robot_stands_without_friction_as_with_it(friction: dict[str, object], mode: str) -> None:
+def test_on_level_ground_the_robot_stands_without_friction_as_with_it(
+    friction: dict[str, object], mode: str
+) -> None:
     """The servos hold it: no foot pushes along the ground in the pose of rest."""
     robot = robot_on("athena", mode=mode)
     slippery = with_friction(robot, **friction)
@@ -142,22 +193,38 @@ def test_on_level_ground_the_robot_stands_without_friction_as_with_it(friction: 
     assert pose.position == pytest.approx(held.position, abs=1e-12)
     assert not pose.slide.any()
     body = bodies(slippery, pose)
-    result = accelerations(slippery, body, Command(angle_ref=robot.stance), standing_damping(slippery, body))
+    result = accelerations(
+        slippery, body, Command(angle_ref=robot.stance), standing_damping(slippery, body)
+    )
     assert float(np.max(np.abs(result.dv))) < AT_REST
 
 
-@pytest.mark.parametrize("friction", [*FRICTIONLESS.values(), {"mu": 0.2}, {"law": "bristle", "mu": 0.2}], ids=str)
+@pytest.mark.parametrize(
+    "friction", [*FRICTIONLESS.values(), {"mu": 0.2}, {"law": "bristle", "mu": 0.2}], ids=str
+)
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
-def test_a_slope_steeper_than_friction_holds_lets_the_robot_slide_as_one_body(friction: dict[str, float | str], mode: str) -> None:
-    """All bodies accelerate by g (sin a - mu cos a) downhill, and none turns: of a slope of 0.4 rad, 3.8202 or 2.0131 m/s2."""
+def test_a_slope_steeper_than_friction_holds_lets_the_robot_slide_as_one_body(
+    friction: dict[str, float | str], mode: str
+) -> None:
+    """All bodies accelerate by g (sin a - mu cos a) downhill, and none turns: of a slope of 0.4
+    rad, 3.8202 or 2.0131 m/s2.
+    """
     robot = with_friction(robot_on("athena", mode=mode, kind="slope", incline=0.4), **friction)
     pose = standing(robot)
-    downhill = -np.array([math.cos(0.7) * math.cos(0.4), math.sin(0.7) * math.cos(0.4), math.sin(0.4)])
+    downhill = -np.array(
+        [math.cos(0.7) * math.cos(0.4), math.sin(0.7) * math.cos(0.4), math.sin(0.4)]
+    )
     size = 2.0131 if friction.get("mu") == 0.2 else 3.8202
     assert pose.slide == pytest.approx(size * downhill, abs=1e-4)
-    fast = 10.0 * downhill if robot.friction.law == "tanh" else np.zeros(3)  # m/s  tanh friction is all there
-    body = body_states(robot, pose.position, pose.quaternion, fast, np.zeros(3), pose.angle, np.zeros((6, 3)))
-    result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle)
+    fast = (
+        10.0 * downhill if robot.friction.law == "tanh" else np.zeros(3)
+    )  # m/s  tanh friction is all there
+    body = body_states(
+        robot, pose.position, pose.quaternion, fast, np.zeros(3), pose.angle, np.zeros((6, 3))
+    )
+    result = accelerations(
+        robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle
+    )
     assert float(np.max(np.abs(result.dv - np.concatenate([pose.slide, np.zeros(3)])))) < AT_REST
 
 
@@ -169,14 +236,26 @@ def test_a_robot_slides_from_the_friction_angle_on(law: str, share: float, slide
 
 
 @pytest.mark.parametrize(("incline", "slides"), [(0.5, False), (0.6, True)])
-def test_bristles_hold_the_robot_up_to_their_static_friction_and_let_it_slide_with_kinetic(incline: float, slides: bool) -> None:
-    """0.3 and 0.6: tan 0.5 = 0.546, tan 0.6 = 0.684, where it slides at 9.81 (sin 0.6 - 0.3 cos 0.6) = 3.1101 m/s2."""
-    robot = with_friction(robot_on("athena", kind="slope", incline=incline, law="bristle"), mu=0.3, mu_static=0.6)
+def test_bristles_hold_the_robot_up_to_their_static_friction_and_let_it_slide_with_kinetic(
+    incline: float, slides: bool
+) -> None:
+    """0.3 and 0.6: tan 0.5 = 0.546, tan 0.6 = 0.684, where it slides at 9.81 (sin 0.6 - 0.3 cos
+    0.6) = 3.1101 m/s2.
+    """
+    robot = with_friction(
+        robot_on("athena", kind="slope", incline=incline, law="bristle"), mu=0.3, mu_static=0.6
+    )
     pose = standing(robot)
     assert float(np.linalg.norm(pose.slide)) == pytest.approx(3.1101 if slides else 0.0, abs=1e-4)
     if not slides:
         body = bodies(robot, pose)
-        result = accelerations(robot, body, Command(angle_ref=robot.stance), standing_damping(robot, body), pose.bristle)
+        result = accelerations(
+            robot,
+            body,
+            Command(angle_ref=robot.stance),
+            standing_damping(robot, body),
+            pose.bristle,
+        )
         assert float(np.max(np.abs(result.dv))) < AT_REST
 
 

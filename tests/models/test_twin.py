@@ -26,7 +26,13 @@ from hexapod_cosim.models.dynamics import (
     masses,
     world_inertias,
 )
-from hexapod_cosim.models.energy import centre_of_mass, constraint_errors, kinetic_energy, momentum, potential_energy
+from hexapod_cosim.models.energy import (
+    centre_of_mass,
+    constraint_errors,
+    kinetic_energy,
+    momentum,
+    potential_energy,
+)
 from hexapod_cosim.models.kinematics import (
     axis_normals,
     axis_quaternion,
@@ -57,7 +63,9 @@ def random_bodies(robot: Robot, seed: int, *, height: float = 0.12, drift: float
     quaternion = np.array([1.0, 0.0, 0.0, 0.0]) + rng.normal(0.0, 0.05, 4)
     angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 2.0, (6, 3))
     position = np.array([0.3, -0.2, height])
-    body = body_states(robot, position, quaternion, rng.normal(0.0, 0.3, 3), rng.normal(0.0, 1.0, 3), angle, speed)
+    body = body_states(
+        robot, position, quaternion, rng.normal(0.0, 0.3, 3), rng.normal(0.0, 1.0, 3), angle, speed
+    )
     body = body + drift * rng.normal(0.0, 1.0, body.shape)
     body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
     return body
@@ -93,7 +101,9 @@ def advanced(body: Array, dv: Array, h: float) -> Array:
 
 def close(a: Any, b: Any, tolerance: float) -> bool:
     """Largest difference within the tolerance, relative to the largest entry (or 1)."""
-    return float(np.max(np.abs(np.subtract(a, b)))) <= tolerance * max(1.0, float(np.max(np.abs(b))))
+    return float(np.max(np.abs(np.subtract(a, b)))) <= tolerance * max(
+        1.0, float(np.max(np.abs(b)))
+    )
 
 
 # kinematics
@@ -103,14 +113,21 @@ def test_quaternion_rate_turns_the_rotation_matrix() -> None:
     rng = np.random.default_rng(1)
     p, w = rng.normal(size=4), rng.normal(size=3)
     p /= np.linalg.norm(p)
-    rate = (rotation_matrix(p + DIFFERENCE * quaternion_rate(p, w)) - rotation_matrix(p - DIFFERENCE * quaternion_rate(p, w))) / (
-        2.0 * DIFFERENCE
+    rate = (
+        rotation_matrix(p + DIFFERENCE * quaternion_rate(p, w))
+        - rotation_matrix(p - DIFFERENCE * quaternion_rate(p, w))
+    ) / (2.0 * DIFFERENCE)
+    assert close(
+        rate, np.array([cross(w, column) for column in rotation_matrix(p).T]).T, DIFFERENCES_AGREE
     )
-    assert close(rate, np.array([cross(w, column) for column in rotation_matrix(p).T]).T, DIFFERENCES_AGREE)
 
 
-@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8), (0.48, 0.6, 0.64)])
-def test_axis_normals_and_the_axis_are_orthonormal_and_right_handed(axis: tuple[float, float, float]) -> None:
+@pytest.mark.parametrize(
+    "axis", [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8), (0.48, 0.6, 0.64)]
+)
+def test_axis_normals_and_the_axis_are_orthonormal_and_right_handed(
+    axis: tuple[float, float, float],
+) -> None:
     a, b = axis_normals(np.array(axis))
     frame = np.column_stack([axis, a, b])
     assert close(frame.T @ frame, np.eye(3), EXACT)
@@ -122,7 +139,15 @@ def test_bodies_from_joint_angles_satisfy_the_joints_and_give_the_angles_back(na
     robot = load_robot(name)
     rng = np.random.default_rng(2)
     angle, speed = rng.uniform(-3.0, 3.0, (6, 3)), rng.normal(0.0, 5.0, (6, 3))
-    body = body_states(robot, rng.normal(size=3), rng.normal(size=4), rng.normal(size=3), rng.normal(size=3), angle, speed)
+    body = body_states(
+        robot,
+        rng.normal(size=3),
+        rng.normal(size=4),
+        rng.normal(size=3),
+        rng.normal(size=3),
+        angle,
+        speed,
+    )
     assert max(constraint_errors(robot, body)) < EXACT * 100.0
     assert close(joint_angles(robot, body), angle, EXACT)
     assert close(joint_speeds(robot, body), speed, EXACT)
@@ -132,14 +157,20 @@ def test_feet_of_the_bodies_are_the_feet_of_the_angles() -> None:
     robot = load_robot("phantomx_mk4")
     body = random_bodies(robot, 3)
     R_WT = rotation_matrix(body[0, 3:7])
-    feet = body[0, 0:3] + (foot_positions(robot, joint_angles(robot, body)) - np.array(robot.torso.com)) @ R_WT.T
+    feet = (
+        body[0, 0:3]
+        + (foot_positions(robot, joint_angles(robot, body)) - np.array(robot.torso.com)) @ R_WT.T
+    )
     assert close(foot_centres(robot, body), feet, EXACT)
 
 
 def test_a_positive_femur_angle_raises_the_foot_and_a_positive_tibia_angle_lowers_it() -> None:
     robot = load_robot("athena")
     flat = np.zeros((6, 3))
-    femur, tibia = foot_positions(robot, flat + np.array([0.0, 0.1, 0.0])), foot_positions(robot, flat + np.array([0.0, 0.0, 0.1]))
+    femur, tibia = (
+        foot_positions(robot, flat + np.array([0.0, 0.1, 0.0])),
+        foot_positions(robot, flat + np.array([0.0, 0.0, 0.1])),
+    )
     assert np.all(femur[:, 2] > 0.0)
     assert np.all(tibia[:, 2] < 0.0)
     assert foot_positions(robot, flat + np.array([0.1, 0.0, 0.0]))[1, 0] < 0.0
@@ -149,11 +180,15 @@ def test_a_positive_femur_angle_raises_the_foot_and_a_positive_tibia_angle_lower
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_constraint_rates_and_gamma_are_the_time_derivatives_of_drifted_constraints(seed: int) -> None:
+def test_constraint_rates_and_gamma_are_the_time_derivatives_of_drifted_constraints(
+    seed: int,
+) -> None:
     robot = load_robot("phantomx_mk4")
     body = random_bodies(robot, seed, drift=0.05)
     free = np.zeros((19, 6))
-    now, later, before = (constraints(robot, advanced(body, free, h)) for h in (0.0, DIFFERENCE, -DIFFERENCE))
+    now, later, before = (
+        constraints(robot, advanced(body, free, h)) for h in (0.0, DIFFERENCE, -DIFFERENCE)
+    )
     assert close((later.phi - before.phi) / (2.0 * DIFFERENCE), now.dphi, DIFFERENCES_AGREE)
     assert close(-(later.dphi - before.dphi) / (2.0 * DIFFERENCE), now.gamma, DIFFERENCES_AGREE)
     assert close(now.D @ body[:, 7:13].ravel(), now.dphi, EXACT)
@@ -161,7 +196,9 @@ def test_constraint_rates_and_gamma_are_the_time_derivatives_of_drifted_constrai
 
 
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])
-def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balances(mode: str) -> None:
+def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balances(
+    mode: str,
+) -> None:
     robot = with_mode(load_robot("phantomx_mk4"), mode)
     body, command = random_bodies(robot, 4, drift=0.01), random_command(robot, 4)
     result, joints = accelerations(robot, body, command, np.full(6, 5.0)), constraints(robot, body)
@@ -169,7 +206,8 @@ def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balance
     wanted = joints.gamma - 2.0 * alpha * joints.dphi - beta**2 * joints.phi
     assert close(joints.D @ result.dv.ravel(), wanted, 1e-10)
 
-    # each body by itself: child and parent feel equal and opposite reactions, each at its own copy of the drifted joint's point
+    # each body by itself: child and parent feel equal and opposite reactions, each at its own copy
+    # of the drifted joint's point
     force, torque = joint_reactions(robot, body, result.multipliers)
     applied = applied_forces(robot, body, command, np.full(6, 5.0))
     rotor = robot.servo.rotor_inertia * (joints.G @ result.dv.ravel())
@@ -179,9 +217,15 @@ def test_accelerations_satisfy_the_stabilised_constraints_and_every_body_balance
         about_point = torque[k] + on_axis[k] * (R_i @ model.s_i)
         arms = {model.parent: R_i @ model.point_i, model.child: R_j @ model.point_j}
         for sign, number in ((1.0, model.child), (-1.0, model.parent)):
-            applied[number] += sign * np.concatenate([force[k], about_point + cross(arms[number], force[k])])
+            applied[number] += sign * np.concatenate(
+                [force[k], about_point + cross(arms[number], force[k])]
+            )
     inertia = np.concatenate(
-        [masses(robot)[:, None] * result.dv[:, 0:3], np.einsum("kij,kj->ki", world_inertias(robot, body), result.dv[:, 3:6])], axis=1
+        [
+            masses(robot)[:, None] * result.dv[:, 0:3],
+            np.einsum("kij,kj->ki", world_inertias(robot, body), result.dv[:, 3:6]),
+        ],
+        axis=1,
     )
     assert close(inertia, applied, 1e-9)
 
@@ -202,10 +246,16 @@ def test_in_free_flight_momentum_changes_by_gravity_alone(mode: str) -> None:
     body = random_bodies(robot, 7, height=2.0)
     command = Command(angle_ref=robot.stance + 0.1)
     dv = accelerations(robot, body, command, NO_CONTACT).dv
-    (before, spin_before), (after, spin_after) = (momentum(robot, advanced(body, dv, h)) for h in (-DIFFERENCE, DIFFERENCE))
+    (before, spin_before), (after, spin_after) = (
+        momentum(robot, advanced(body, dv, h)) for h in (-DIFFERENCE, DIFFERENCE)
+    )
     weight = robot.total_mass * np.array(robot.gravity)
     assert close((after - before) / (2.0 * DIFFERENCE), weight, DIFFERENCES_AGREE)
-    assert close((spin_after - spin_before) / (2.0 * DIFFERENCE), cross(centre_of_mass(robot, body), weight), DIFFERENCES_AGREE)
+    assert close(
+        (spin_after - spin_before) / (2.0 * DIFFERENCE),
+        cross(centre_of_mass(robot, body), weight),
+        DIFFERENCES_AGREE,
+    )
 
 
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
@@ -214,7 +264,11 @@ def test_power_in_less_power_lost_is_the_rate_of_stored_energy(mode: str) -> Non
     body, command, damping = random_bodies(robot, 8), random_command(robot, 8), np.full(6, 3.0)
     result = accelerations(robot, body, command, damping)
     stored = [
-        sum(energy(robot, advanced(body, result.dv, h)) for energy in (kinetic_energy, potential_energy)) for h in (-DIFFERENCE, DIFFERENCE)
+        sum(
+            energy(robot, advanced(body, result.dv, h))
+            for energy in (kinetic_energy, potential_energy)
+        )
+        for h in (-DIFFERENCE, DIFFERENCE)
     ]
     speed = joint_speeds(robot, body)
     power = float(np.sum((result.drive_torque + result.gear_torque) * speed))
@@ -230,12 +284,23 @@ def test_left_right_mirrored_bodies_have_mirrored_accelerations() -> None:
     rng = np.random.default_rng(9)
     flip, axial = np.array([1.0, -1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
     angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 1.0, (6, 3))
-    p, v, w, r = rng.normal(0.0, 0.05, 4) + np.eye(4)[0], rng.normal(size=3), rng.normal(size=3), np.array([0.0, 0.1, 0.12])
+    p, v, w, r = (
+        rng.normal(0.0, 0.05, 4) + np.eye(4)[0],
+        rng.normal(size=3),
+        rng.normal(size=3),
+        np.array([0.0, 0.1, 0.12]),
+    )
     other, coxa = [3, 4, 5, 0, 1, 2], np.array([-1.0, 1.0, 1.0])
     damping, command = np.full(6, 3.0), Command(angle_ref=robot.stance)
     plain = accelerations(robot, body_states(robot, r, p, v, w, angle, speed), command, damping)
     mirrored_bodies = body_states(
-        robot, r * flip, p * [1.0, -1.0, 1.0, -1.0], v * flip, w * axial, angle[other] * coxa, speed[other] * coxa
+        robot,
+        r * flip,
+        p * [1.0, -1.0, 1.0, -1.0],
+        v * flip,
+        w * axial,
+        angle[other] * coxa,
+        speed[other] * coxa,
     )
     mirrored = accelerations(robot, mirrored_bodies, command, damping)
     assert close(mirrored.dv[0], plain.dv[0] * np.concatenate([flip, axial]), 1e-10)
@@ -245,14 +310,20 @@ def test_left_right_mirrored_bodies_have_mirrored_accelerations() -> None:
 # kinematic drives
 
 
-def test_a_kinematic_drive_gives_the_commanded_acceleration_and_its_multiplier_is_the_torque() -> None:
+def test_a_kinematic_drive_gives_the_commanded_acceleration_and_its_multiplier_is_the_torque() -> (
+    None
+):
     robot = with_mode(load_robot("athena"), "kinematic")
     body, command, damping = random_bodies(robot, 10), random_command(robot, 10), np.full(6, 3.0)
     driven = accelerations(robot, body, command, damping)
     G = constraints(robot, body).G
     assert close(G @ driven.dv.ravel(), drive_acceleration(robot, body, command).ravel(), 1e-10)
-    strong = replace(robot, servo=replace(robot.servo, mode="torque", torque_max=1e6, speed_max=1e9))
-    by_torque = accelerations(strong, body, replace(command, torque_ref=driven.drive_torque), damping)
+    strong = replace(
+        robot, servo=replace(robot.servo, mode="torque", torque_max=1e6, speed_max=1e9)
+    )
+    by_torque = accelerations(
+        strong, body, replace(command, torque_ref=driven.drive_torque), damping
+    )
     assert close(by_torque.dv, driven.dv, 1e-8)
 
 
@@ -273,7 +344,10 @@ def test_the_contact_point_is_the_material_point_that_the_foot_presses() -> None
     body = random_bodies(robot, 12)
     free = np.zeros((19, 6))
     for leg, foot in enumerate(foot_contacts(robot, body)):
-        later, before = (foot_contacts(robot, advanced(body, free, h))[leg].penetration for h in (DIFFERENCE, -DIFFERENCE))
+        later, before = (
+            foot_contacts(robot, advanced(body, free, h))[leg].penetration
+            for h in (DIFFERENCE, -DIFFERENCE)
+        )
         assert (later - before) / (2.0 * DIFFERENCE) == pytest.approx(foot.approach_speed, abs=1e-7)
         assert ground(robot.terrain, foot.point)[0] == pytest.approx(-foot.penetration, abs=EXACT)
 

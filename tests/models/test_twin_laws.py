@@ -1,4 +1,6 @@
-"""The laws of force by themselves: servo and gear, normal force with restitution, friction, ground."""
+"""The laws of force by themselves: servo and gear, normal force with restitution, friction,
+ground.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,14 @@ import pytest
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import CHI, achieved_restitution, contact_damping, exact_restitution_chi, friction_force, normal_force
+from hexapod_cosim.models.contact import (
+    CHI,
+    achieved_restitution,
+    contact_damping,
+    exact_restitution_chi,
+    friction_force,
+    normal_force,
+)
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.terrain import ground
 
@@ -21,21 +30,34 @@ FIGURES = 1e-4  # printed with four to six digits
 def test_the_servo_follows_its_law_inside_the_torque_speed_line() -> None:
     servo = load_robot("athena").servo
     zero = np.zeros(1)
-    assert servo_torque(servo, zero, zero, zero + 0.05, zero + 0.5, zero + 0.1)[0] == pytest.approx(40.0 * 0.05 + 0.8 * 0.5 + 0.1)
+    assert servo_torque(servo, zero, zero, zero + 0.05, zero + 0.5, zero + 0.1)[0] == pytest.approx(
+        40.0 * 0.05 + 0.8 * 0.5 + 0.1
+    )
     assert servo_torque(servo, zero, zero, zero + 1.0, zero, zero)[0] == servo.torque_max
-    assert servo_torque(servo, zero, zero + servo.speed_max / 2.0, zero + 1.0, zero, zero)[0] == pytest.approx(servo.torque_max / 2.0)
+    assert servo_torque(servo, zero, zero + servo.speed_max / 2.0, zero + 1.0, zero, zero)[
+        0
+    ] == pytest.approx(servo.torque_max / 2.0)
     assert servo_torque(servo, zero, zero + 2.0 * servo.speed_max, zero + 9.0, zero, zero)[0] == 0.0
-    assert servo_torque(servo, zero, zero - servo.speed_max / 4.0, zero - 1.0, zero, zero)[0] == pytest.approx(-0.75 * servo.torque_max)
+    assert servo_torque(servo, zero, zero - servo.speed_max / 4.0, zero - 1.0, zero, zero)[
+        0
+    ] == pytest.approx(-0.75 * servo.torque_max)
     assert servo_torque(servo, zero, zero + 99.0, zero - 9.0, zero, zero)[0] == -servo.torque_max
 
 
 def test_a_torque_servo_ignores_angles_and_the_gear_opposes_motion() -> None:
     servo = replace(load_robot("athena").servo, mode="torque")
-    assert servo_torque(servo, np.ones(1), np.zeros(1), np.zeros(1), np.ones(1), np.full(1, 0.7))[0] == 0.7
-    assert gear_friction(servo, np.array([-1.0, 0.0, 1.0])) == pytest.approx([0.05, 0.0, -0.05], rel=1e-9)
+    assert (
+        servo_torque(servo, np.ones(1), np.zeros(1), np.zeros(1), np.ones(1), np.full(1, 0.7))[0]
+        == 0.7
+    )
+    assert gear_friction(servo, np.array([-1.0, 0.0, 1.0])) == pytest.approx(
+        [0.05, 0.0, -0.05], rel=1e-9
+    )
 
 
-@pytest.mark.parametrize(("e", "chi"), [(0.3, 3.0871), (0.5, 1.43275), (0.7, 0.634828), (0.9, 0.166482)])
+@pytest.mark.parametrize(
+    ("e", "chi"), [(0.3, 3.0871), (0.5, 1.43275), (0.7, 0.634828), (0.9, 0.166482)]
+)
 def test_exact_restitution_has_the_reference_figures(e: float, chi: float) -> None:
     assert exact_restitution_chi(e) == pytest.approx(chi, rel=FIGURES)
 
@@ -46,14 +68,24 @@ def test_exact_restitution_is_exact_over_the_whole_range(e: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("law", "achieved"), [("hunt_crossley", 0.6630), ("lankarani_nikravesh", 0.7252), ("flores", 0.4704), ("exact_restitution", 0.5)]
+    ("law", "achieved"),
+    [
+        ("hunt_crossley", 0.6630),
+        ("lankarani_nikravesh", 0.7252),
+        ("flores", 0.4704),
+        ("exact_restitution", 0.5),
+    ],
 )
-def test_each_law_gives_back_its_reference_figure_when_asked_for_a_half(law: str, achieved: float) -> None:
+def test_each_law_gives_back_its_reference_figure_when_asked_for_a_half(
+    law: str, achieved: float
+) -> None:
     assert achieved_restitution(CHI[law](0.5)) == pytest.approx(achieved, rel=FIGURES)
 
 
 @pytest.mark.parametrize("law", [*CHI, "hertz"])
-def test_a_bouncing_foot_returns_with_the_achieved_restitution_and_the_predicted_penetration(law: str) -> None:
+def test_a_bouncing_foot_returns_with_the_achieved_restitution_and_the_predicted_penetration(
+    law: str,
+) -> None:
     contact, mass, v0 = replace(load_robot("athena").contact, law=law), 0.5, 0.4
     d, h, state, deepest = contact_damping(contact, v0), 2e-6, np.array([0.0, v0]), 0.0
 
@@ -68,7 +100,9 @@ def test_a_bouncing_foot_returns_with_the_achieved_restitution_and_the_predicted
     assert -state[1] / v0 == pytest.approx(achieved_restitution(d * v0), abs=1e-3)
     chi = d * v0
     share = 1.0 / chi - math.log1p(chi) / chi**2 if chi > 0.0 else 0.5
-    assert deepest == pytest.approx((2.5 * mass * v0**2 / contact.stiffness * share) ** 0.4, rel=1e-4)
+    assert deepest == pytest.approx(
+        (2.5 * mass * v0**2 / contact.stiffness * share) ** 0.4, rel=1e-4
+    )
 
 
 def test_the_ground_never_pulls_and_a_slow_touch_down_counts_as_the_floor() -> None:
@@ -76,7 +110,11 @@ def test_the_ground_never_pulls_and_a_slow_touch_down_counts_as_the_floor() -> N
     assert normal_force(contact, 100.0, 1e-3, -1.0) == 0.0
     assert normal_force(contact, 1.0, -1e-3, 1.0) == 0.0
     assert normal_force(contact, math.nan, 1e-3, 0.0) == 0.0
-    assert contact_damping(contact, 0.0) == contact_damping(contact, 0.01) > contact_damping(contact, 0.02)
+    assert (
+        contact_damping(contact, 0.0)
+        == contact_damping(contact, 0.01)
+        > contact_damping(contact, 0.02)
+    )
 
 
 def test_the_constant_law_and_hertz_do_not_ask_for_the_impact_speed() -> None:
@@ -89,13 +127,17 @@ def test_friction_opposes_slip_within_the_cone_and_has_the_linear_limit() -> Non
     friction = load_robot("athena").friction
     for speed in (0.0, 1e-9, 0.99e-7, 1.01e-7, 1e-3, 1.0):
         force = friction_force(friction, 10.0, speed * np.array([0.6, -0.8, 0.0]))
-        assert force == pytest.approx(-0.7 * 10.0 * math.tanh(100.0 * speed) * np.array([0.6, -0.8, 0.0]), rel=EXACT, abs=0.0)
+        assert force == pytest.approx(
+            -0.7 * 10.0 * math.tanh(100.0 * speed) * np.array([0.6, -0.8, 0.0]), rel=EXACT, abs=0.0
+        )
         assert float(np.linalg.norm(force)) <= 7.0 * (1.0 + EXACT)
     assert not friction_force(replace(friction, law="none"), 10.0, np.ones(3)).any()
 
 
 def test_a_slope_rises_by_its_incline_along_its_heading() -> None:
-    terrain = replace(load_robot("athena").terrain, kind="slope", incline=0.2, heading=0.5, height=0.3)
+    terrain = replace(
+        load_robot("athena").terrain, kind="slope", incline=0.2, heading=0.5, height=0.3
+    )
     way = 2.0 * np.array([math.cos(0.5), math.sin(0.5), math.tan(0.2)])
     assert ground(terrain, np.array([0.0, 0.0, 0.3]) + way)[0] == pytest.approx(0.0, abs=EXACT)
     assert ground(terrain, np.array([0.0, 0.0, 1.3]))[0] == pytest.approx(math.cos(0.2))

@@ -1,4 +1,6 @@
-"""The plant's measures of one step against models/measure.py, whose impulses are those of an explicit method's stages."""
+"""The plant's measures of one step against models/measure.py, whose impulses are those of an
+explicit method's stages.
+"""
 
 from __future__ import annotations
 
@@ -22,18 +24,34 @@ H = 2e-4  # s
 SAME = 1e-9  # relative: differences of depths and angles over a step lose some digits
 
 
-def stage_forces(robot: Robot, body: Array, command: Command, damping: Array) -> tuple[Array, Array, Array]:
+def stage_forces(
+    robot: Robot, body: Array, command: Command, damping: Array
+) -> tuple[Array, Array, Array]:
     """Motor and gear torques (6, 3) and forces on feet (6, 3) at body states (19, 13)."""
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
-    motor = servo_torque(robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref)
-    feet = np.array([foot_force(robot, foot, damping[leg]) for leg, foot in enumerate(foot_contacts(robot, body))])
+    motor = servo_torque(
+        robot.servo, angle, speed, command.angle_ref, command.speed_ref, command.torque_ref
+    )
+    feet = np.array(
+        [
+            foot_force(robot, foot, damping[leg])
+            for leg, foot in enumerate(foot_contacts(robot, body))
+        ]
+    )
     return motor, gear_friction(robot.servo, speed), feet
 
 
 @pytest.mark.parametrize("seed", [2, 5, 11])
 @pytest.mark.parametrize("terrain", [{}, {"kind": "slope", "incline": 0.2, "heading": 0.7}])
-def test_a_step_s_measures_are_those_of_the_readable_equations(core: ct.CDLL, seed: int, terrain: dict[str, object]) -> None:
-    robot = changed(lopsided(seed), solver={"method": "bs32", "step": H}, terrain=terrain, servo={"torque_max": 3.0, "speed_max": 8.0})
+def test_a_step_s_measures_are_those_of_the_readable_equations(
+    core: ct.CDLL, seed: int, terrain: dict[str, object]
+) -> None:
+    robot = changed(
+        lopsided(seed),
+        solver={"method": "bs32", "step": H},
+        terrain=terrain,
+        servo={"torque_max": 3.0, "speed_max": 8.0},
+    )
     command = random_command(robot, seed)
     plant, there = (Plant(core, robot, **random_pose(robot, seed)) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
@@ -50,11 +68,23 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(core: ct.CDLL, se
     measured = measured_step(robot, before, after, H, command, works.motor, damping)
 
     assert int(np.count_nonzero(~np.isnan(damping))) > 1
-    parts = {"contact_loss": works.contact, "friction_loss": works.friction, "gear_loss": works.gear}
+    parts = {
+        "contact_loss": works.contact,
+        "friction_loss": works.friction,
+        "gear_loss": works.gear,
+    }
     for name, got in (parts | {"actuator_work": float(np.sum(works.motor))}).items():
         assert getattr(output.energy, name) == pytest.approx(got, rel=1e-6, abs=1e-9), name
     for name in ("positive_work", "negative_work", "torque_squared"):
-        np.testing.assert_allclose(getattr(output, name), getattr(measured, name), rtol=SAME, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            getattr(output, name), getattr(measured, name), rtol=SAME, atol=1e-9, err_msg=name
+        )
     for name in ("slip_distance", "impulse", "peak_force", "peak_force_rate"):
         expected = getattr(measured, name)
-        np.testing.assert_allclose(getattr(output.foot, name), expected, rtol=1e-6, atol=1e-6 * float(np.max(expected)), err_msg=name)
+        np.testing.assert_allclose(
+            getattr(output.foot, name),
+            expected,
+            rtol=1e-6,
+            atol=1e-6 * float(np.max(expected)),
+            err_msg=name,
+        )

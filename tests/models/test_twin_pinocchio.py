@@ -1,4 +1,6 @@
-"""The readable equations against an independent engine: Pinocchio's articulated-body algorithm in joint coordinates."""
+"""The readable equations against an independent engine: Pinocchio's articulated-body algorithm
+in joint coordinates.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,17 @@ from hexapod_cosim.models import LEG_NAMES, Robot, load_robot
 from hexapod_cosim.models.contact import foot_contacts, foot_force
 from hexapod_cosim.models.dynamics import Command, accelerations, constraints, joint_torques
 from hexapod_cosim.models.energy import kinetic_energy
-from hexapod_cosim.models.kinematics import body_states, inertia_matrix, joint_angles, joint_speeds, rotation_matrix
+from hexapod_cosim.models.kinematics import (
+    body_states,
+    inertia_matrix,
+    joint_angles,
+    joint_speeds,
+    rotation_matrix,
+)
 from hexapod_cosim.models.records import Array
 
-AGREEMENT = 1e-11  # relative to the largest entry: some 1e3 times what rounding makes of two different algorithms here
+# relative to the largest entry: some 1e3 times what rounding makes of two different algorithms here
+AGREEMENT = 1e-11
 ROBOTS = ("athena", "phantomx_mk4")
 
 
@@ -25,7 +34,9 @@ def random_bodies(robot: Robot, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     quaternion, position = rng.normal(0.0, 0.05, 4) + np.eye(4)[0], np.array([0.3, -0.2, 0.12])
     angle, speed = robot.stance + rng.normal(0.0, 0.2, (6, 3)), rng.normal(0.0, 2.0, (6, 3))
-    return body_states(robot, position, quaternion, rng.normal(0.0, 0.3, 3), rng.normal(0.0, 1.0, 3), angle, speed)
+    return body_states(
+        robot, position, quaternion, rng.normal(0.0, 0.3, 3), rng.normal(0.0, 1.0, 3), angle, speed
+    )
 
 
 def random_command(robot: Robot, seed: int) -> Command:
@@ -44,27 +55,48 @@ def pinocchio_model(robot: Robot) -> Any:
     model = pin.Model()
     model.gravity.linear = np.array(robot.gravity)
     root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "torso")
-    model.appendBodyToJoint(root, pin.Inertia(robot.torso.mass, np.zeros(3), inertia_matrix(robot.torso.inertia)), pin.SE3.Identity())
+    model.appendBodyToJoint(
+        root,
+        pin.Inertia(robot.torso.mass, np.zeros(3), inertia_matrix(robot.torso.inertia)),
+        pin.SE3.Identity(),
+    )
     for leg, name in zip(robot.legs, LEG_NAMES, strict=True):
         parent = root
-        placement = pin.SE3(pin.utils.rotate("z", leg.hip_yaw), np.subtract(leg.hip_position, robot.torso.com))
+        placement = pin.SE3(
+            pin.utils.rotate("z", leg.hip_yaw), np.subtract(leg.hip_position, robot.torso.com)
+        )
         for number, link in enumerate(leg.links):
-            parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(np.array(link.axis)), placement, f"{name}{number}")
-            model.appendBodyToJoint(parent, pin.Inertia(link.mass, np.array(link.com), inertia_matrix(link.inertia)), pin.SE3.Identity())
+            parent = model.addJoint(
+                parent,
+                pin.JointModelRevoluteUnaligned(np.array(link.axis)),
+                placement,
+                f"{name}{number}",
+            )
+            model.appendBodyToJoint(
+                parent,
+                pin.Inertia(link.mass, np.array(link.com), inertia_matrix(link.inertia)),
+                pin.SE3.Identity(),
+            )
             placement = pin.SE3(np.eye(3), np.array(link.tip))
     model.armature = np.concatenate([np.zeros(6), np.full(18, robot.servo.rotor_inertia)])
     return model
 
 
-def pinocchio_accelerations(robot: Robot, body: Array, torque: Array, foot: Array, push: Array) -> Array:
-    """(24,) torso's linear and angular acceleration in the world and the joints', by the articulated-body algorithm.
+def pinocchio_accelerations(
+    robot: Robot, body: Array, torque: Array, foot: Array, push: Array
+) -> Array:
+    """(24,) torso's linear and angular acceleration in the world and the joints', by the
+    articulated-body algorithm.
 
-    torque (6, 3) at the joints; foot (6, 2, 3) contact points and forces in the world; push (6,) force and torque on the torso.
+    torque (6, 3) at the joints; foot (6, 2, 3) contact points and forces in the world; push (6,)
+    force and torque on the torso.
     """
     model = pinocchio_model(robot)
     data = model.createData()
     R, v, w = rotation_matrix(body[0, 3:7]), body[0, 7:10], body[0, 10:13]
-    q = np.concatenate([body[0, 0:3], body[0, 4:7], body[0, 3:4], joint_angles(robot, body).ravel()])
+    q = np.concatenate(
+        [body[0, 0:3], body[0, 4:7], body[0, 3:4], joint_angles(robot, body).ravel()]
+    )
     qd = np.concatenate([R.T @ v, R.T @ w, joint_speeds(robot, body).ravel()])
     pin.forwardKinematics(model, data, q, qd)
     external = [pin.Force(np.zeros(6)) for _ in range(model.njoints)]
@@ -89,10 +121,19 @@ def test_forward_dynamics_agree_with_pinocchio(name: str, terrain: str, mode: st
     )
     touching = 0
     for seed in range(8):
-        body, command, damping = random_bodies(robot, seed), random_command(robot, seed), np.full(6, 3.0)
+        body, command, damping = (
+            random_bodies(robot, seed),
+            random_command(robot, seed),
+            np.full(6, 3.0),
+        )
         result = accelerations(robot, body, command, damping)
         feet = foot_contacts(robot, body)
-        forces = np.array([[foot.point, foot_force(robot, foot, d)] for foot, d in zip(feet, damping, strict=True)])
+        forces = np.array(
+            [
+                [foot.point, foot_force(robot, foot, d)]
+                for foot, d in zip(feet, damping, strict=True)
+            ]
+        )
         touching += sum(foot.penetration > 0.0 for foot in feet)
         motor, gear = joint_torques(robot, body, command)
         push = np.concatenate([command.push_force, command.push_torque])
@@ -106,7 +147,13 @@ def test_kinetic_energy_agrees_with_pinocchio() -> None:
     robot = load_robot("phantomx_mk4")
     body, model = random_bodies(robot, 6), pinocchio_model(load_robot("phantomx_mk4"))
     R = rotation_matrix(body[0, 3:7])
-    q = np.concatenate([body[0, 0:3], body[0, 4:7], body[0, 3:4], joint_angles(robot, body).ravel()])
-    qd = np.concatenate([R.T @ body[0, 7:10], R.T @ body[0, 10:13], joint_speeds(robot, body).ravel()])
+    q = np.concatenate(
+        [body[0, 0:3], body[0, 4:7], body[0, 3:4], joint_angles(robot, body).ravel()]
+    )
+    qd = np.concatenate(
+        [R.T @ body[0, 7:10], R.T @ body[0, 10:13], joint_speeds(robot, body).ravel()]
+    )
     rotors = 0.5 * robot.servo.rotor_inertia * float(np.sum(qd[6:] ** 2))
-    assert kinetic_energy(robot, body) == pytest.approx(pin.computeKineticEnergy(model, model.createData(), q, qd) + rotors, rel=AGREEMENT)
+    assert kinetic_energy(robot, body) == pytest.approx(
+        pin.computeKineticEnergy(model, model.createData(), q, qd) + rotors, rel=AGREEMENT
+    )

@@ -13,7 +13,8 @@ from foreign_urdf import SIDE, spider_urdf
 
 from hexapod_cosim.models import RobotError, load_robot
 
-# a word of the spider and what it becomes; the first place alone, which is leg RM's (number 1) for what is in a leg
+# a word of the spider and what it becomes; the first place alone, which is leg RM's (number 1) for
+# what is in a leg
 ARM = """<link name="camera"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial></link>
 <joint name="pan" type="continuous"><parent link="body"/><child link="camera"/></joint>"""
 FEMUR = """<inertial> <origin xyz="0.05 0 0"/> <mass value="0.16"/>
@@ -23,58 +24,212 @@ TIBIA = '<joint name="j_t1" type="revolute">\n    <parent link="{}"/>'
 TOE = 'name="toe_joint_1" type="{}"'
 
 CASES: dict[str, tuple[str, str, list[str]]] = {
-    "prismatic": ('name="j_f1" type="revolute"', 'name="j_f1" type="prismatic"', ["joint 'j_f1'", "slides", "got 'prismatic'", "fixed"]),
-    "planar": ('name="j_f1" type="revolute"', 'name="j_f1" type="planar"', ["joint 'j_f1'", "slides", "got 'planar'"]),
-    "unknown type": ('name="j_f1" type="revolute"', 'name="j_f1" type="revolut"', ["joint 'j_f1'", "did you mean 'revolute'"]),
-    "floating leg": ('name="j_f1" type="revolute"', 'name="j_f1" type="floating"', ["joint 'j_f1'", "floats", "femur_1"]),
-    "mimic": ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 2"/><mimic joint="j_f1"/>', ["joint 'j_t1'", "follows", "j_f1", "<mimic>"]),
-    "damping": ('<dynamics friction="0.04"/>', '<dynamics damping="0.1"/>', ["joint 'j_f1'", "viscous damping", "got 0.1", "servo.kd"]),
-    "seven moving joints": ("</robot>", f"{ARM}</robot>", ["not six legs alone", "7 moving joints", "that are no legs' fixed: pan"]),
-    "five legs": ('name="j_c1" type="revolute"', 'name="j_c1" type="fixed"', ["three joints", "j_f1"]),
-    "two joints": ('name="j_t1" type="revolute"', 'name="j_t1" type="fixed"', ["chain of three joints", "got ['j_c1', 'j_f1']"]),
-    "four joints": (TOE.format("fixed"), TOE.format("continuous"), ["chain of three", "toe_joint_1", "joint 4"]),
-    "a fork": (TIBIA.format("femur_1"), TIBIA.format("coxa_1"),
-               ["no chain", "j_f1, j_t1", "'coxa_1'"]),
-    "no inertial": (FEMUR, "",
-                    ["link 'femur_1'", "without mass", "<inertial>"]),
-    "no possible body": ('ixx="5e-5" iyy="1.8e-4"', 'ixx="5e-5" iyy="2.8e-4"', ["link 'femur_1'", "no possible body", "sum of"]),
-    "negative moment": ('ixx="5e-5" iyy="1.8e-4"', 'ixx="-5e-5" iyy="1.8e-4"', ["link 'femur_1'", "not positive definite"]),
-    "negative mass": ('<mass value="0.16"/>', '<mass value="-0.16"/>', ["link 'femur_1'", "negative mass", "got -0.16"]),
-    "moments in g mm2": (MOMENTS, 'ixx="50" iyy="180" izz="170"', ["legs.RM.femur", "joint j_f1", "radius of gyration"]),
-    "no mass value": ('<mass value="0.16"/>', "<mass/>", ["link 'femur_1'", "no good value", "a finite number"]),
-    "not a number": ('<mass value="0.16"/>', '<mass value="0.16 kg"/>', ["link 'femur_1'", "got '0.16 kg'"]),
-    "nan": ('<origin xyz="0.09 0 0"', '<origin xyz="nan 0 0"', ["joint 'j_t1'", "origin", "got 'nan 0 0'", "3 finite numbers"]),
-    "two numbers": ('<origin xyz="0.09 0 0"', '<origin xyz="0.09 0"', ["joint 'j_t1'", "got '0.09 0'", "3 finite numbers"]),
-    "no axis": ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 0"/>', ["joint 'j_t1'", "without direction"]),
-    "no limit": ('<limit lower="-0.8" upper="0.9" effort="5.5" velocity="6.0"/>', "", ["joint 'j_c1'", "without limits", "continuous"]),
-    "limits swapped": ('<limit lower="-0.8" upper="0.9"', '<limit lower="0.9" upper="-0.8"', ["joint 'j_c1'", "limit", "not ordered"]),
-    "limits equal": ('<limit lower="-0.8" upper="0.9"', "<limit", ["joint 'j_c1'", "not ordered", "got [0.0, 0.0]"]),
-    "other effort": ('effort="5.5"', 'effort="4.5"', ["joint 'j_c1'", "another effort", "same servo", "servo.torque_max"]),
+    "prismatic": (
+        'name="j_f1" type="revolute"',
+        'name="j_f1" type="prismatic"',
+        ["joint 'j_f1'", "slides", "got 'prismatic'", "fixed"],
+    ),
+    "planar": (
+        'name="j_f1" type="revolute"',
+        'name="j_f1" type="planar"',
+        ["joint 'j_f1'", "slides", "got 'planar'"],
+    ),
+    "unknown type": (
+        'name="j_f1" type="revolute"',
+        'name="j_f1" type="revolut"',
+        ["joint 'j_f1'", "did you mean 'revolute'"],
+    ),
+    "floating leg": (
+        'name="j_f1" type="revolute"',
+        'name="j_f1" type="floating"',
+        ["joint 'j_f1'", "floats", "femur_1"],
+    ),
+    "mimic": (
+        '<axis xyz="0 0 2"/>',
+        '<axis xyz="0 0 2"/><mimic joint="j_f1"/>',
+        ["joint 'j_t1'", "follows", "j_f1", "<mimic>"],
+    ),
+    "damping": (
+        '<dynamics friction="0.04"/>',
+        '<dynamics damping="0.1"/>',
+        ["joint 'j_f1'", "viscous damping", "got 0.1", "servo.kd"],
+    ),
+    "seven moving joints": (
+        "</robot>",
+        f"{ARM}</robot>",
+        ["not six legs alone", "7 moving joints", "that are no legs' fixed: pan"],
+    ),
+    "five legs": (
+        'name="j_c1" type="revolute"',
+        'name="j_c1" type="fixed"',
+        ["three joints", "j_f1"],
+    ),
+    "two joints": (
+        'name="j_t1" type="revolute"',
+        'name="j_t1" type="fixed"',
+        ["chain of three joints", "got ['j_c1', 'j_f1']"],
+    ),
+    "four joints": (
+        TOE.format("fixed"),
+        TOE.format("continuous"),
+        ["chain of three", "toe_joint_1", "joint 4"],
+    ),
+    "a fork": (
+        TIBIA.format("femur_1"),
+        TIBIA.format("coxa_1"),
+        ["no chain", "j_f1, j_t1", "'coxa_1'"],
+    ),
+    "no inertial": (FEMUR, "", ["link 'femur_1'", "without mass", "<inertial>"]),
+    "no possible body": (
+        'ixx="5e-5" iyy="1.8e-4"',
+        'ixx="5e-5" iyy="2.8e-4"',
+        ["link 'femur_1'", "no possible body", "sum of"],
+    ),
+    "negative moment": (
+        'ixx="5e-5" iyy="1.8e-4"',
+        'ixx="-5e-5" iyy="1.8e-4"',
+        ["link 'femur_1'", "not positive definite"],
+    ),
+    "negative mass": (
+        '<mass value="0.16"/>',
+        '<mass value="-0.16"/>',
+        ["link 'femur_1'", "negative mass", "got -0.16"],
+    ),
+    "moments in g mm2": (
+        MOMENTS,
+        'ixx="50" iyy="180" izz="170"',
+        ["legs.RM.femur", "joint j_f1", "radius of gyration"],
+    ),
+    "no mass value": (
+        '<mass value="0.16"/>',
+        "<mass/>",
+        ["link 'femur_1'", "no good value", "a finite number"],
+    ),
+    "not a number": (
+        '<mass value="0.16"/>',
+        '<mass value="0.16 kg"/>',
+        ["link 'femur_1'", "got '0.16 kg'"],
+    ),
+    "nan": (
+        '<origin xyz="0.09 0 0"',
+        '<origin xyz="nan 0 0"',
+        ["joint 'j_t1'", "origin", "got 'nan 0 0'", "3 finite numbers"],
+    ),
+    "two numbers": (
+        '<origin xyz="0.09 0 0"',
+        '<origin xyz="0.09 0"',
+        ["joint 'j_t1'", "got '0.09 0'", "3 finite numbers"],
+    ),
+    "no axis": (
+        '<axis xyz="0 0 2"/>',
+        '<axis xyz="0 0 0"/>',
+        ["joint 'j_t1'", "without direction"],
+    ),
+    "no limit": (
+        '<limit lower="-0.8" upper="0.9" effort="5.5" velocity="6.0"/>',
+        "",
+        ["joint 'j_c1'", "without limits", "continuous"],
+    ),
+    "limits swapped": (
+        '<limit lower="-0.8" upper="0.9"',
+        '<limit lower="0.9" upper="-0.8"',
+        ["joint 'j_c1'", "limit", "not ordered"],
+    ),
+    "limits equal": (
+        '<limit lower="-0.8" upper="0.9"',
+        "<limit",
+        ["joint 'j_c1'", "not ordered", "got [0.0, 0.0]"],
+    ),
+    "other effort": (
+        'effort="5.5"',
+        'effort="4.5"',
+        ["joint 'j_c1'", "another effort", "same servo", "servo.torque_max"],
+    ),
     "no effort": ('effort="5.5"', 'effort="0"', ["joint 'j_c1'", "no effort", "servo.torque_max"]),
-    "other friction": ('<dynamics friction="0.04"/>', "", ["joint 'j_f1'", "another friction", "servo.coulomb_friction"]),
-    "other feet": ('radius="0.012"', 'radius="0.02"', ["joint 'j_t1'", "another radius", "foot.radius"]),
-    "quaternion": ('<origin xyz="0.09 0 0" rpy', '<origin xyz="0.09 0 0" quat_xyzw="0 0 0 1" rpy', ["joint 'j_t1'", "quaternion", "rpy"]),
+    "other friction": (
+        '<dynamics friction="0.04"/>',
+        "",
+        ["joint 'j_f1'", "another friction", "servo.coulomb_friction"],
+    ),
+    "other feet": (
+        'radius="0.012"',
+        'radius="0.02"',
+        ["joint 'j_t1'", "another radius", "foot.radius"],
+    ),
+    "quaternion": (
+        '<origin xyz="0.09 0 0" rpy',
+        '<origin xyz="0.09 0 0" quat_xyzw="0 0 0 1" rpy',
+        ["joint 'j_t1'", "quaternion", "rpy"],
+    ),
     "no parent": ('<parent link="coxa_1"/> ', "", ["joint 'j_f1'", "without parent"]),
-    "no such link": ('<parent link="coxa_1"/>', '<parent link="coxa1"/>', ["joint 'j_f1'", "'coxa1'", "did you mean 'coxa_1'"]),
-    "two parents": ('<child link="coxa_1"/>', '<child link="femur_1"/>', ["closed loop", "femur_1"]),
+    "no such link": (
+        '<parent link="coxa_1"/>',
+        '<parent link="coxa1"/>',
+        ["joint 'j_f1'", "'coxa1'", "did you mean 'coxa_1'"],
+    ),
+    "two parents": (
+        '<child link="coxa_1"/>',
+        '<child link="femur_1"/>',
+        ["closed loop", "femur_1"],
+    ),
     "loose link": ("</robot>", '<link name="loose"/></robot>', ["not one root", "loose"]),
-    "ring": ("</robot>", '<link name="a"/><link name="b"/><joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>'
-             '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint></robot>', ["ring", "'a'"]),
+    "ring": (
+        "</robot>",
+        '<link name="a"/><link name="b"/><joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>'
+        '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint></robot>',
+        ["ring", "'a'"],
+    ),
     "twin links": ('<link name="femur_1">', '<link name="coxa_1">', ["link twice", "coxa_1"]),
     "twin joints": ('name="j_f1"', 'name="j_c1"', ["joint twice", "j_c1"]),
     "nameless": ('<link name="femur_1">', "<link>", ["without a name"]),
-    "all to one side": ('xyz="0.0 -0.11 0.01"', 'xyz="0.0 0.31 0.01"', ["three hips left and three right", "j_c1 at (0, 0.31)", "forward"]),
-    "fixed to the world": ('name="base_footprint"/>', 'name="world"/>', ["fixed to the world", "floating"]),
-    "xacro": ('<gazebo reference="body"/>', '<xacro:leg xmlns:xacro="http://ros.org/wiki/xacro"/>', ["xacro", "xacro my.urdf.xacro"]),
-    "document type": ("<!-- a spider", '<!DOCTYPE robot SYSTEM "file:///etc/hosts"><!-- a spider', ["document type", "DOCTYPE"]),
+    "all to one side": (
+        'xyz="0.0 -0.11 0.01"',
+        'xyz="0.0 0.31 0.01"',
+        ["three hips left and three right", "j_c1 at (0, 0.31)", "forward"],
+    ),
+    "fixed to the world": (
+        'name="base_footprint"/>',
+        'name="world"/>',
+        ["fixed to the world", "floating"],
+    ),
+    "xacro": (
+        '<gazebo reference="body"/>',
+        '<xacro:leg xmlns:xacro="http://ros.org/wiki/xacro"/>',
+        ["xacro", "xacro my.urdf.xacro"],
+    ),
+    "document type": (
+        "<!-- a spider",
+        '<!DOCTYPE robot SYSTEM "file:///etc/hosts"><!-- a spider',
+        ["document type", "DOCTYPE"],
+    ),
     "another format": ("<robot", "<mujoco", ["not XML"]),
     "cut off": ("</robot>", "", ["not XML", "no element found"]),
-    "own element, unknown": ("</robot>", '<hexapod><feet radius="1"/></hexapod></robot>', ["hexapod", "'feet'", "did you mean 'foot'"]),
-    "own element, attribute": ("</robot>", '<hexapod><foot radus="1"/></hexapod></robot>', ["'radus'", "did you mean 'radius'"]),
-    "own element, value": ("</robot>", '<hexapod><foot radius="big"/></hexapod></robot>', ["hexapod: foot", "got 'big'"]),
-    "own element, range": ("</robot>", '<hexapod><foot radius="-1"/></hexapod></robot>', ["foot.radius", "got -1.0"]),
-    "own element, name": ("</robot>", '<hexapod><contact law="hertzz"/></hexapod></robot>', ["contact.law", "did you mean 'hertz'"]),
-}  # fmt: skip
+    "own element, unknown": (
+        "</robot>",
+        '<hexapod><feet radius="1"/></hexapod></robot>',
+        ["hexapod", "'feet'", "did you mean 'foot'"],
+    ),
+    "own element, attribute": (
+        "</robot>",
+        '<hexapod><foot radus="1"/></hexapod></robot>',
+        ["'radus'", "did you mean 'radius'"],
+    ),
+    "own element, value": (
+        "</robot>",
+        '<hexapod><foot radius="big"/></hexapod></robot>',
+        ["hexapod: foot", "got 'big'"],
+    ),
+    "own element, range": (
+        "</robot>",
+        '<hexapod><foot radius="-1"/></hexapod></robot>',
+        ["foot.radius", "got -1.0"],
+    ),
+    "own element, name": (
+        "</robot>",
+        '<hexapod><contact law="hertzz"/></hexapod></robot>',
+        ["contact.law", "did you mean 'hertz'"],
+    ),
+}
 
 
 def refusal(path: Path) -> str:
@@ -85,40 +240,66 @@ def refusal(path: Path) -> str:
 
 
 @pytest.mark.parametrize(("old", "new", "words"), CASES.values(), ids=list(CASES))
-def test_what_cannot_be_represented_is_refused_by_name(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+def test_what_cannot_be_represented_is_refused_by_name(
+    tmp_path: Path, old: str, new: str, words: list[str]
+) -> None:
     text = spider_urdf()
     if "world" in new:
         text = text.replace('parent link="base_footprint"', 'parent link="world"')
     assert old in text
     path = tmp_path / "spider.urdf"
     changed = text.replace(old, new, 1)
-    path.write_text(changed.replace(' upper="0.9" effort', " effort", 1) if new == "<limit" else changed, encoding="utf-8")
+    path.write_text(
+        changed.replace(' upper="0.9" effort', " effort", 1) if new == "<limit" else changed,
+        encoding="utf-8",
+    )
     message = refusal(path)
     assert message.startswith(str(path))
     assert [word for word in words if word not in message] == []
 
 
-@pytest.mark.parametrize(("legs", "arm", "joints"), [("LF LR RF RR", "", 4), ("LF LR RF RR", ARM, 5), ("LM RM", "", 2)])
+@pytest.mark.parametrize(
+    ("legs", "arm", "joints"), [("LF LR RF RR", "", 4), ("LF LR RF RR", ARM, 5), ("LM RM", "", 2)]
+)
 def test_a_robot_with_fewer_legs_is_told_that_six_are_needed_and_not_to_fix_joints(
     tmp_path: Path, legs: str, arm: str, joints: int
 ) -> None:
     path = tmp_path / "quadruped.urdf"
-    path.write_text(spider_urdf(legs.split()).replace("</robot>", f"{arm}</robot>"), encoding="utf-8")
+    path.write_text(
+        spider_urdf(legs.split()).replace("</robot>", f"{arm}</robot>"), encoding="utf-8"
+    )
     message = refusal(path)
     assert f"{path}: six legs only" in message
-    assert f"{len(legs.split())} legs of three joints each, of {joints} moving joints on " in message
+    assert (
+        f"{len(legs.split())} legs of three joints each, of {joints} moving joints on " in message
+    )
     assert "fixed" not in message
 
 
 def test_a_torso_behind_a_moving_joint_is_told_to_be_fixed(tmp_path: Path) -> None:
     path = tmp_path / "spider.urdf"
-    text = spider_urdf().replace('name="base_joint" type="fixed"', 'name="base_joint" type="continuous"')
-    path.write_text(text.replace('<link name="base_footprint"/>', f'<link name="base_footprint">{FEMUR}</link>'), encoding="utf-8")
+    text = spider_urdf().replace(
+        'name="base_joint" type="fixed"', 'name="base_joint" type="continuous"'
+    )
+    path.write_text(
+        text.replace(
+            '<link name="base_footprint"/>', f'<link name="base_footprint">{FEMUR}</link>'
+        ),
+        encoding="utf-8",
+    )
     assert "make 'base_joint' fixed" in refusal(path)
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"\xff\xfe\x00", b"name = 'athena'", b'<?xml version="1.0" encoding="no-such"?><robot/>', b"<html/>", b"<robot/>"]
+    "content",
+    [
+        b"",
+        b"\xff\xfe\x00",
+        b"name = 'athena'",
+        b'<?xml version="1.0" encoding="no-such"?><robot/>',
+        b"<html/>",
+        b"<robot/>",
+    ],
 )
 def test_what_is_no_urdf_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "robot.urdf"
@@ -129,7 +310,9 @@ def test_what_is_no_urdf_is_refused(tmp_path: Path, content: bytes) -> None:
 def test_entities_that_would_expand_for_ever_are_refused_at_once(tmp_path: Path) -> None:
     bomb = "".join(f'<!ENTITY e{k + 1} "{f"&e{k};" * 10}">' for k in range(12))
     path = tmp_path / "bomb.urdf"
-    path.write_text(f'<!DOCTYPE robot [<!ENTITY e0 "ha">{bomb}]><robot name="&e12;"/>', encoding="utf-8")
+    path.write_text(
+        f'<!DOCTYPE robot [<!ENTITY e0 "ha">{bomb}]><robot name="&e12;"/>', encoding="utf-8"
+    )
     assert "document type" in refusal(path)
 
 
@@ -145,7 +328,9 @@ def test_a_thousand_fixed_links_in_a_row_are_no_problem(tmp_path: Path) -> None:
         f'<link name="{child}"/><joint name="to_{child}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
         for parent, child in pairwise(names)
     )
-    (tmp_path / "spider.urdf").write_text(spider_urdf().replace("</robot>", f"{chain}</robot>"), encoding="utf-8")
+    (tmp_path / "spider.urdf").write_text(
+        spider_urdf().replace("</robot>", f"{chain}</robot>"), encoding="utf-8"
+    )
     assert load_robot(tmp_path / "spider.urdf").torso.mass == pytest.approx(2.4)
 
 
@@ -153,17 +338,37 @@ SIDES: dict[str, tuple[str, str, list[str]]] = {
     "no file": ('file = "spider.urdf"', "", ["urdf.file", "no URDF named"]),
     "file of wrong type": ('file = "spider.urdf"', "file = 3", ["urdf.file", "got 3"]),
     "no table": ('[urdf]\nfile = "spider.urdf"', "urdf = 3", ["urdf", "a table"]),
-    "unknown option": ("[links]", "forwards = 1\n[links]", ["'forwards'", "did you mean 'forward'"]),
+    "unknown option": (
+        "[links]",
+        "forwards = 1\n[links]",
+        ["'forwards'", "did you mean 'forward'"],
+    ),
     "unknown direction": ("[links]", 'forward = "z"\n[links]', ["urdf.forward", "'z'"]),
-    "cannot be ignored": ("[links]", 'ignore = ["mimic"]\n[links]', ["urdf.ignore", "mimic", "damping"]),
-    "frames of wrong type": ("[links]", "keep_frames = 1\n[links]", ["urdf.keep_frames", "true or false"]),
+    "cannot be ignored": (
+        "[links]",
+        'ignore = ["mimic"]\n[links]',
+        ["urdf.ignore", "mimic", "damping"],
+    ),
+    "frames of wrong type": (
+        "[links]",
+        "keep_frames = 1\n[links]",
+        ["urdf.keep_frames", "true or false"],
+    ),
     "unknown section": ("[links]", "[servos]\n[links]", ["'servos'", "did you mean 'servo'"]),
     "section of wrong type": ("[urdf]", "servo = 3\n[urdf]", ["servo", "a table"]),
     "value of wrong type": ("[links]", '[servo]\nkp = "stiff"\n[links]', ["servo.kp", "'stiff'"]),
-    "stance of wrong type": ("coxa.stance = 0.0", 'coxa.stance = "straight"', ["links.coxa.stance", "'straight'"]),
+    "stance of wrong type": (
+        "coxa.stance = 0.0",
+        'coxa.stance = "straight"',
+        ["links.coxa.stance", "'straight'"],
+    ),
     "unknown joint": ("coxa.stance", "hip.stance", ["links", "'hip'"]),
     "unknown leg": ("[links]", "[legs.FL]\n[links]", ["legs", "'FL'"]),
-    "stance beyond limits": ("coxa.stance = 0.0", "coxa.stance = 1.0", ["legs.LF.coxa.stance", "joint j_c3", "0.8"]),
+    "stance beyond limits": (
+        "coxa.stance = 0.0",
+        "coxa.stance = 1.0",
+        ["legs.LF.coxa.stance", "joint j_c3", "0.8"],
+    ),
 }
 
 
@@ -180,9 +385,15 @@ def test_a_bad_side_file_is_refused(tmp_path: Path, old: str, new: str, words: l
 
 def test_limits_beyond_half_a_turn_are_those_of_half_a_turn(tmp_path: Path) -> None:
     path = tmp_path / "spider.urdf"
-    path.write_text(spider_urdf().replace('lower="-0.8" upper="0.9"', 'lower="-6.0" upper="6.0"'), encoding="utf-8")
+    path.write_text(
+        spider_urdf().replace('lower="-0.8" upper="0.9"', 'lower="-6.0" upper="6.0"'),
+        encoding="utf-8",
+    )
     robot = load_robot(path)
-    assert (robot.legs[4].links[0].angle_min, robot.legs[4].links[0].angle_max) == (-math.pi, math.pi)
+    assert (robot.legs[4].links[0].angle_min, robot.legs[4].links[0].angle_max) == (
+        -math.pi,
+        math.pi,
+    )
     assert "3 limits beyond half a turn" in robot.source["URDF, ignored"]
 
 

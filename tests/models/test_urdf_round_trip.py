@@ -13,7 +13,9 @@ from foreign_urdf import SIDE, spider, spider_urdf
 from hexapod_cosim.models import check_robot, list_robots, load_robot
 from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
-ROUNDING = 1e-12  # kg, m, kg m2, rad: some 1e4 times the rounding of what is turned, shifted and added up
+ROUNDING = (
+    1e-12  # kg, m, kg m2, rad: some 1e4 times the rounding of what is turned, shifted and added up
+)
 SEEDS = range(8)
 
 
@@ -33,20 +35,31 @@ def test_a_bundled_robot_comes_back_to_the_last_bit(name: str, tmp_path: Path) -
 
 @pytest.mark.parametrize("pattern", [True, False], ids=["controller's axes", "any axes"])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_random_robot_comes_back_to_the_last_bit(seed: int, pattern: bool, tmp_path: Path) -> None:
+def test_a_random_robot_comes_back_to_the_last_bit(
+    seed: int, pattern: bool, tmp_path: Path
+) -> None:
     robot = random_robot(seed, pattern=pattern)
     check_robot(robot)
     assert load_robot(written(robot_to_urdf(robot), tmp_path)) == robot
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_robot_in_other_frames_names_and_parts_is_the_same_robot(seed: int, tmp_path: Path) -> None:
+def test_a_robot_in_other_frames_names_and_parts_is_the_same_robot(
+    seed: int, tmp_path: Path
+) -> None:
     robot = random_robot(seed, pattern=True)
     again = load_robot(written(disguised(robot, seed, stances(robot)), tmp_path))
-    apart = {name: difference for name, difference in differences(again, robot).items() if difference > ROUNDING}
+    apart = {
+        name: difference
+        for name, difference in differences(again, robot).items()
+        if difference > ROUNDING
+    }
     assert apart == {}
     # what a URDF does not tell is assumed
-    torque, constant = 0.2 * robot.servo.torque_max, math.sqrt(robot.servo.torque_max / robot.servo.speed_max)
+    torque, constant = (
+        0.2 * robot.servo.torque_max,
+        math.sqrt(robot.servo.torque_max / robot.servo.speed_max),
+    )
     servo = replace(robot.servo, torque_continuous=torque, motor_constant=constant)
     assert (again.servo, again.foot.radius) == (servo, robot.foot.radius)
 
@@ -54,11 +67,21 @@ def test_a_robot_in_other_frames_names_and_parts_is_the_same_robot(seed: int, tm
 def test_a_urdf_by_hand_is_the_robot_it_describes(tmp_path: Path) -> None:
     written(spider_urdf(), tmp_path, "spider.urdf")
     robot = load_robot(written(SIDE, tmp_path, "spider.toml"))
-    apart = {name: difference for name, difference in differences(robot, spider()).items() if difference > ROUNDING}
+    apart = {
+        name: difference
+        for name, difference in differences(robot, spider()).items()
+        if difference > ROUNDING
+    }
     assert apart == {}
     assert robot.foot == spider().foot
     assert robot.servo.torque_max == 5.5
     assert robot.servo.kp == pytest.approx(spider().servo.kp, rel=ROUNDING)
     assert robot.source["leg LF"] == "read: joints j_c3, j_f3, j_t3"
-    assert robot.source["URDF, angles"] == "counted against the URDF's axes: j_c6, j_f6, j_t6, j_c1, j_f1, j_t1, j_c4, j_f4, j_t4"
-    assert robot.source["URDF, ignored"] == "in the URDF, without effect here: 1 gazebo, 6 mesh, 6 transmission"
+    assert (
+        robot.source["URDF, angles"]
+        == "counted against the URDF's axes: j_c6, j_f6, j_t6, j_c1, j_f1, j_t1, j_c4, j_f4, j_t4"
+    )
+    assert (
+        robot.source["URDF, ignored"]
+        == "in the URDF, without effect here: 1 gazebo, 6 mesh, 6 transmission"
+    )

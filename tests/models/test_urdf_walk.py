@@ -1,4 +1,6 @@
-"""A URDF's robot in the FMU and under the controller; the commands that write and read robots for other tools."""
+"""A URDF's robot in the FMU and under the controller; the commands that write and read robots
+for other tools.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,8 @@ from hexapod_cosim.cosim.results.recordings import read_recording
 from hexapod_cosim.cosim.results.results import RESULTS
 from hexapod_cosim.models import LEG_NAMES, RobotError, list_robots, load_robot
 
-SAME_WALK = 1e-9  # m    the robots differ in the last bits of some inertias; what contact makes of that in seconds
+# m    the robots differ in the last bits of some inertias; what contact makes of that in seconds
+SAME_WALK = 1e-9
 SAME_COURSE = 0.1  # m    the walk is as long as commanded, less the ramps
 
 
@@ -30,19 +33,29 @@ def files(tmp_path: Path) -> Path:
     table = spider_table()
     table["gait"] |= {"stride": 0.07, "step_height": 0.03}
     (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
-    (tmp_path / "side.toml").write_text(f"{SIDE}\n[gait]\nperiod = 1.0\nstride = 0.07\nstep_height = 0.03\n", encoding="utf-8")
+    (tmp_path / "side.toml").write_text(
+        f"{SIDE}\n[gait]\nperiod = 1.0\nstride = 0.07\nstep_height = 0.03\n", encoding="utf-8"
+    )
     return tmp_path
 
 
 def walked(call: Call, robot: Path, folder: Path, duration: float) -> Recording:
     settings = [f"robot={robot}", f"duration={duration}", "outputs.plots=false"]
-    code, _, err = call("simulate", "walk_flat", "-o", folder, *(word for text in settings for word in ("--set", text)))
+    code, _, err = call(
+        "simulate",
+        "walk_flat",
+        "-o",
+        folder,
+        *(word for text in settings for word in ("--set", text)),
+    )
     assert code == 0, err
     return read_recording(folder, RESULTS)
 
 
 def test_a_urdf_robot_walks_as_the_same_robot_in_a_file_of_ours(call: Call, files: Path) -> None:
-    ours, theirs = (walked(call, files / f"{name}.toml", files / name, 2.0) for name in ("ours", "side"))
+    ours, theirs = (
+        walked(call, files / f"{name}.toml", files / name, 2.0) for name in ("ours", "side")
+    )
     for axis in (1, 2, 3):
         name = f"torso.position[{axis}]"
         assert theirs.column(name) == pytest.approx(ours.column(name), abs=SAME_WALK)
@@ -62,7 +75,9 @@ def test_a_urdf_robot_of_any_size_is_given_a_gait_of_one_froude_number(tmp_path:
 
 
 def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Path) -> None:
-    """Tibias that hang straight down at angle 0, as most URDFs draw them: length 0, all in the offset."""
+    """Tibias that hang straight down at angle 0, as most URDFs draw them: length 0, all in the
+    offset.
+    """
     table = athena_table()
     (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
     tibia, quarter = table["links"]["tibia"], 0.5 * math.pi
@@ -74,9 +89,16 @@ def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Pa
     }
     tibia |= {key: tibia[key] - quarter for key in ("angle_min", "angle_max", "stance")}
     (tmp_path / "hanging.toml").write_text(to_toml(table), encoding="utf-8")
-    ours, hanging = (walked(call, tmp_path / f"{name}.toml", tmp_path / name, 2.0) for name in ("ours", "hanging"))
-    assert hanging.column("torso.position[1]") == pytest.approx(ours.column("torso.position[1]"), abs=SAME_WALK)
-    assert hanging.column("LF.tibia.angle") + quarter == pytest.approx(ours.column("LF.tibia.angle"), abs=SAME_WALK)
+    ours, hanging = (
+        walked(call, tmp_path / f"{name}.toml", tmp_path / name, 2.0)
+        for name in ("ours", "hanging")
+    )
+    assert hanging.column("torso.position[1]") == pytest.approx(
+        ours.column("torso.position[1]"), abs=SAME_WALK
+    )
+    assert hanging.column("LF.tibia.angle") + quarter == pytest.approx(
+        ours.column("LF.tibia.angle"), abs=SAME_WALK
+    )
 
 
 def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> None:
@@ -88,13 +110,17 @@ def test_a_bare_urdf_stands_in_any_tool_and_walks(call: Call, files: Path) -> No
     robot = load_robot(files / "spider.urdf")
     names = [f"{leg}.foot.normal_force" for leg in LEG_NAMES]
     result = fmpy.simulate_fmu(str(path), output=names, stop_time=1.0)
-    assert sum(result[name][-1] for name in names) == pytest.approx(robot.weight, rel=1e-3)  # the last tremor
+    assert sum(result[name][-1] for name in names) == pytest.approx(
+        robot.weight, rel=1e-3
+    )  # the last tremor
     course = walked(call, files / "spider.urdf", files / "walk", 2.0).column("torso.position[1]")
     assert course[-1] > SAME_COURSE
 
 
 @pytest.mark.parametrize("name", list_robots())
-def test_the_fmu_of_a_robot_and_of_its_urdf_are_the_same(call: Call, tmp_path: Path, name: str) -> None:
+def test_the_fmu_of_a_robot_and_of_its_urdf_are_the_same(
+    call: Call, tmp_path: Path, name: str
+) -> None:
     call("export", "--urdf", "--robot", name, "-o", tmp_path / "robot.urdf")
     hashes = []
     for robot in (name, tmp_path / "robot.urdf"):
@@ -105,7 +131,9 @@ def test_the_fmu_of_a_robot_and_of_its_urdf_are_the_same(call: Call, tmp_path: P
 
 
 def test_a_scenario_finds_the_urdf_beside_it(call: Call, files: Path) -> None:
-    (files / "walk.toml").write_text('robot = "spider.urdf"\nduration = 0.05\n[outputs]\nplots = false\n', encoding="utf-8")
+    (files / "walk.toml").write_text(
+        'robot = "spider.urdf"\nduration = 0.05\n[outputs]\nplots = false\n', encoding="utf-8"
+    )
     code, _, err = call("simulate", files / "walk.toml", "-o", files / "out")
     assert code == 0
     assert err.startswith("warning: kinematic: too short for metrics: got 0.05 s")
@@ -122,7 +150,9 @@ def test_a_robot_is_written_by_option_or_by_suffix(
     code, out, _ = call("export", "-o", tmp_path / "deep" / f"robot.{suffix}", "--json")
     assert code == 0
     assert json.loads(out)[option.removeprefix("--")] == str(tmp_path / "deep" / f"robot.{suffix}")
-    assert (tmp_path / "deep" / f"robot.{suffix}").read_text() == (tmp_path / f"athena.{suffix}").read_text()
+    assert (tmp_path / "deep" / f"robot.{suffix}").read_text() == (
+        tmp_path / f"athena.{suffix}"
+    ).read_text()
     assert start in (tmp_path / f"athena.{suffix}").read_text()
 
 
@@ -138,7 +168,11 @@ def test_a_robot_is_written_by_option_or_by_suffix(
     ],
 )
 def test_a_mistake_leaves_one_paragraph_and_no_file(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], parts: list[str]
+    call: Call,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    parts: list[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("file", "file.urdf"):
@@ -153,10 +187,10 @@ def test_forward_may_be_another_axis_of_the_urdf(tmp_path: Path) -> None:
     text = disguised(robot, 3, stances(robot))
     (tmp_path / "x.urdf").write_text(text, encoding="utf-8")
     # a root without mass, turned by -90 degrees against the trunk: the trunk's x is the root's y
-    turned = (
-        '<link name="root"/><joint name="turn" type="fixed"><parent link="root"/><child link="trunk"/><origin rpy="0 0 1.5708"/></joint>'
+    turned = '<link name="root"/><joint name="turn" type="fixed"><parent link="root"/><child link="trunk"/><origin rpy="0 0 1.5708"/></joint>'
+    (tmp_path / "y.urdf").write_text(
+        text.replace("</robot>", f"{turned}</robot>"), encoding="utf-8"
     )
-    (tmp_path / "y.urdf").write_text(text.replace("</robot>", f"{turned}</robot>"), encoding="utf-8")
     (tmp_path / "y.toml").write_text('[urdf]\nfile = "y.urdf"\nforward = "y"\n', encoding="utf-8")
     first, second = load_robot(tmp_path / "x.urdf"), load_robot(tmp_path / "y.toml")
     for a, b in zip(first.legs, second.legs, strict=True):
@@ -167,40 +201,70 @@ def test_forward_may_be_another_axis_of_the_urdf(tmp_path: Path) -> None:
 
 
 def test_a_side_file_stands_above_the_urdf(tmp_path: Path) -> None:
-    (tmp_path / "spider.urdf").write_text(spider_urdf().replace('damping="0"', 'damping="0.1"'), encoding="utf-8")
+    (tmp_path / "spider.urdf").write_text(
+        spider_urdf().replace('damping="0"', 'damping="0.1"'), encoding="utf-8"
+    )
     head = 'name = "mine"\n[urdf]\nfile = "spider.urdf"\nignore = ["damping"]\n[servo]\ntorque_max = 9.0\nkd = 0.5\n'
     masses = "[torso]\nmass = 3.0\n[legs.RM.tibia]\nmass = 0.2\n[links.tibia]\nmass = 0.12\n"
     (tmp_path / "mine.toml").write_text(head + masses, encoding="utf-8")
     robot = load_robot(tmp_path / "mine.toml")
-    assert (robot.name, robot.servo.torque_max, robot.servo.kd, robot.servo.kp) == ("mine", 9.0, 0.5, 60.0)
+    assert (robot.name, robot.servo.torque_max, robot.servo.kd, robot.servo.kp) == (
+        "mine",
+        9.0,
+        0.5,
+        60.0,
+    )
     assert robot.torso.mass == 3.0
     assert [leg.links[2].mass for leg in robot.legs] == [0.12, 0.12, 0.12, 0.12, 0.2, 0.12]
     assert "6 damping" in robot.source["URDF, ignored"]
 
 
 def test_what_a_urdf_has_wrong_or_lacks_a_side_file_may_give(tmp_path: Path) -> None:
-    """As in published URDFs: a quarter turn as 1.5704, an inertia in other units, feet that are meshes only."""
-    text = spider_urdf().replace('rpy="1.5708 0 0"', 'rpy="1.5704 0 0"').replace('ixx="5e-5"', 'ixx="0.1"')
-    text = re.sub("<joint name=.toe_joint.*?</joint>|<link name=.toe_.*?</link>", "", text, flags=re.DOTALL)
+    """As in published URDFs: a quarter turn as 1.5704, an inertia in other units, feet that are
+    meshes only.
+    """
+    text = (
+        spider_urdf()
+        .replace('rpy="1.5708 0 0"', 'rpy="1.5704 0 0"')
+        .replace('ixx="5e-5"', 'ixx="0.1"')
+    )
+    text = re.sub(
+        "<joint name=.toe_joint.*?</joint>|<link name=.toe_.*?</link>", "", text, flags=re.DOTALL
+    )
     (tmp_path / "spider.urdf").write_text(text, encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text('[urdf]\nfile = "spider.urdf"\n', encoding="utf-8")
-    with pytest.raises(RobotError, match=r"link 'femur_3'.* no possible body.* under \[links\.femur\]"):
+    with pytest.raises(
+        RobotError, match=r"link 'femur_3'.* no possible body.* under \[links\.femur\]"
+    ):
         load_robot(path)
-    path.write_text(f"{path.read_text()}[links.femur]\ninertia = [5e-5, 1.7e-4, 1.8e-4, 0, 0, 0]\n", encoding="utf-8")
-    with pytest.raises(RobotError, match=r"link 'tibia_3'.* without a foot.* under \[links\.tibia\]"):
+    path.write_text(
+        f"{path.read_text()}[links.femur]\ninertia = [5e-5, 1.7e-4, 1.8e-4, 0, 0, 0]\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(
+        RobotError, match=r"link 'tibia_3'.* without a foot.* under \[links\.tibia\]"
+    ):
         load_robot(path)
     path.write_text(f"{path.read_text()}[links.tibia]\nlength = 0.15\n", encoding="utf-8")
     robot = load_robot(path)
-    assert [link.axis for link in robot.legs[0].links] == [(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)]
+    assert [link.axis for link in robot.legs[0].links] == [
+        (0.0, 0.0, 1.0),
+        (0.0, -1.0, 0.0),
+        (0.0, 1.0, 0.0),
+    ]
     assert robot.legs[0].links[2].tip == (0.15, 0.0, 0.0)
     assert "foot.radius" in robot.source["URDF, assumed"]
 
 
 def test_the_side_file_of_the_documentation_works(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "docs" / "howto" / "my-robot.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "howto" / "my-robot.md").read_text(
+        encoding="utf-8"
+    )
     side = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)[0]
     (tmp_path / "my.urdf").write_text(spider_urdf(), encoding="utf-8")
-    (tmp_path / "mine.toml").write_text(side.replace('forward = "y"', 'forward = "x"'), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(
+        side.replace('forward = "y"', 'forward = "x"'), encoding="utf-8"
+    )
     robot = load_robot(tmp_path / "mine.toml")
     assert (robot.name, robot.servo.kp, robot.legs[0].links[0].inertia[0]) == ("mine", 25.0, 2.2e-5)

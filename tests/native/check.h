@@ -13,9 +13,11 @@ static inline void check(int holds, const char *what, const char *file, int line
   ++failures;
 }
 
-static inline void near(double got, double expected, double tolerance, const char *what, const char *file, int line) {
+static inline void near(double got, double expected, double tolerance, const char *what,
+                        const char *file, int line) {
   if (fabs(got - expected) <= tolerance) return;
-  fprintf(stderr, "%s:%d: %s: got %.17g, expected %.17g within %g\n", file, line, what, got, expected, tolerance);
+  fprintf(stderr, "%s:%d: %s: got %.17g, expected %.17g within %g\n", file, line, what, got,
+          expected, tolerance);
   ++failures;
 }
 

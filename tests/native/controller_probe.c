@@ -1,24 +1,31 @@
-/* controller_probe.c - the controller's internal functions for the tests, under names that the library shows. */
+/* controller_probe.c - the controller's internal functions for the tests, under names that the
+ * library shows. */
 #include <string.h>
 
 #include "slip_pid.h"
 #include "support.h"
 #include "suspension.h"
 
-HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period, hxSuspension *suspension);
-HX_API void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
-HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS], const double asked[6], double force[HX_LEGS][3]);
+HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period,
+                                hxSuspension *suspension);
+HX_API void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
+                             hxPlane push[HX_LEGS]);
+HX_API void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
+                            const double asked[6], double force[HX_LEGS][3]);
 
-void hx_probe_suspension(double mass, double damping, double stiffness, double period, hxSuspension *suspension) {
+void hx_probe_suspension(double mass, double damping, double stiffness, double period,
+                         hxSuspension *suspension) {
   hx_suspension_discretise(mass, damping, stiffness, period, suspension);
 }
 
-void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]) {
+void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
+                      hxPlane push[HX_LEGS]) {
   hx_slip_squeeze(normal, feet, push);
 }
 
 /* asked: push x y, weight, moment x y, twist */
-void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS], const double asked[6], double force[HX_LEGS][3]) {
+void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
+                     const double asked[6], double force[HX_LEGS][3]) {
   hxDemand demand;
   hxShares shares;
   memset(&demand, 0, sizeof demand);

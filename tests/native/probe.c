@@ -1,6 +1,7 @@
 /* probe.c - the plant's internal functions for the tests, one leg (one lane) at a time.
  *
- * Compiled into the shared library with HX_PROBE only. Vectors and matrices cross as rows of doubles.
+ * Compiled into the shared library with HX_PROBE only. Vectors and matrices cross as rows of
+ * doubles.
  */
 #include <stddef.h>
 #include <string.h>
@@ -14,10 +15,13 @@
 #include "robot.h"
 
 #if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wmissing-prototypes" /* called from Python only: there is no header */
+#pragma GCC diagnostic ignored                                                                     \
+    "-Wmissing-prototypes" /* called from Python only: there is no header */
 #endif
 
-/* ---- layout ------------------------------------------------------------------------------------------------------------- */
+/* ---- layout
+ * -------------------------------------------------------------------------------------------------------------
+ */
 
 typedef struct {
   const char *name;
@@ -151,11 +155,17 @@ HX_API const char *hx_probe_field(size_t i, size_t *offset, size_t *size) {
 
 HX_API int hx_probe_lanes(void) { return HX_LANES; }
 
-/* ---- lanes, vectors ------------------------------------------------------------------------------------------------------- */
+/* ---- lanes, vectors
+ * -------------------------------------------------------------------------------------------------------
+ */
 
-static void put3(hxVec3 a, int lane, double *out) { out[0] = hx_lane(a.x, lane), out[1] = hx_lane(a.y, lane), out[2] = hx_lane(a.z, lane); }
+static void put3(hxVec3 a, int lane, double *out) {
+  out[0] = hx_lane(a.x, lane), out[1] = hx_lane(a.y, lane), out[2] = hx_lane(a.z, lane);
+}
 
-static hxQuat quat(const double p[4]) { return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])}; }
+static hxQuat quat(const double p[4]) {
+  return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])};
+}
 
 /* packs of legs at a time; n is a multiple of HX_SLOTS */
 HX_API void hx_probe_tanh(const double *x, double *out, int n) {
@@ -167,10 +177,12 @@ HX_API void hx_probe_expm1(const double *x, double *out, int n) {
 }
 
 HX_API void hx_probe_angle_from_half(const double *y, const double *x, double *out, int n) {
-  for (int i = 0; i < n; i += HX_LANES) hx_store(out + i, hx_angle_from_half(hx_load(y + i), hx_load(x + i)));
+  for (int i = 0; i < n; i += HX_LANES)
+    hx_store(out + i, hx_angle_from_half(hx_load(y + i), hx_load(x + i)));
 }
 
-HX_API void hx_probe_elementary(const double *x, double *sine, double *cosine, double *logarithm, int n) {
+HX_API void hx_probe_elementary(const double *x, double *sine, double *cosine, double *logarithm,
+                                int n) {
   for (int i = 0; i < n; i++) {
     hx_sin_cos(x[i], &sine[i], &cosine[i]);
     logarithm[i] = x[i] > -1.0 ? hx_log1p(x[i]) : 0.0;
@@ -197,13 +209,17 @@ HX_API void hx_probe_rotation_matrix(const double p[4], double R[3][3]) {
 
 HX_API void hx_probe_quaternion_rate(const double p[4], const double w[3], double out[4]) {
   const hxQuat d = hx_quaternion_rate(quat(p), hx_splat_vec3(w));
-  out[0] = hx_lane(d.w, 0), out[1] = hx_lane(d.x, 0), out[2] = hx_lane(d.y, 0), out[3] = hx_lane(d.z, 0);
+  out[0] = hx_lane(d.w, 0), out[1] = hx_lane(d.x, 0), out[2] = hx_lane(d.y, 0),
+  out[3] = hx_lane(d.z, 0);
 }
 
-HX_API void hx_probe_axis_normals(const double axis[3], double a[3], double b[3]) { hx_axis_normals(axis, a, b); }
+HX_API void hx_probe_axis_normals(const double axis[3], double a[3], double b[3]) {
+  hx_axis_normals(axis, a, b);
+}
 
 static hxSym3 take_sym3(const double S[3][3]) {
-  return (hxSym3){hx_splat(S[0][0]), hx_splat(S[1][1]), hx_splat(S[2][2]), hx_splat(S[0][1]), hx_splat(S[0][2]), hx_splat(S[1][2])};
+  return (hxSym3){hx_splat(S[0][0]), hx_splat(S[1][1]), hx_splat(S[2][2]),
+                  hx_splat(S[0][1]), hx_splat(S[0][2]), hx_splat(S[1][2])};
 }
 
 static hxMotion6 unit_motion(int j) {
@@ -218,10 +234,10 @@ static void put_column(hxForce6 f, int j, double out[6][6]) {
   for (int i = 0; i < 6; ++i) out[i][j] = column[i];
 }
 
-/* as 6 x 6, angular part first, from the origin: a body with mass and J at c; that less s U U^T, by both ways; a block A at c and the body less
- * s U U^T; the inverse of the last, column by column */
-HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3][3], const double c[3], double s, const double U[6],
-                             double out[4][6][6]) {
+/* as 6 x 6, angular part first, from the origin: a body with mass and J at c; that less s U U^T, by
+ * both ways; a block A at c and the body less s U U^T; the inverse of the last, column by column */
+HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3][3],
+                             const double c[3], double s, const double U[6], double out[4][6][6]) {
   const hxRigid6 body = hx_rigid_inertia(hx_splat(mass), take_sym3(J), hx_splat_vec3(c));
   const hxForce6 force = {hx_splat_vec3(U), hx_splat_vec3(U + 3)};
   const hxInertia6 lessened = hx_rigid_downdate(&body, hx_splat(s), force);
@@ -238,7 +254,9 @@ HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3
   }
 }
 
-/* ---- laws -------------------------------------------------------------------------------------------------------------------- */
+/* ---- laws
+ * --------------------------------------------------------------------------------------------------------------------
+ */
 
 HX_API double hx_probe_exact_restitution_chi(double e) { return hx_exact_restitution_chi(e); }
 
@@ -247,17 +265,24 @@ HX_API double hx_probe_contact_damping(const hxPlant *plant, double impact_speed
 }
 
 /* out: force, elastic part, stiffness, viscosity */
-HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double damping, double delta, double ddelta, double out[4]) {
-  const hxNormalForce f = hx_normal_force(&plant->model, hx_splat(closed), hx_splat(damping), hx_splat(delta), hx_splat(ddelta));
-  out[0] = hx_lane(f.force, 0), out[1] = hx_lane(f.elastic, 0), out[2] = hx_lane(f.stiffness, 0), out[3] = hx_lane(f.viscosity, 0);
+HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double damping, double delta,
+                                  double ddelta, double out[4]) {
+  const hxNormalForce f = hx_normal_force(&plant->model, hx_splat(closed), hx_splat(damping),
+                                          hx_splat(delta), hx_splat(ddelta));
+  out[0] = hx_lane(f.force, 0), out[1] = hx_lane(f.elastic, 0), out[2] = hx_lane(f.stiffness, 0),
+  out[3] = hx_lane(f.viscosity, 0);
 }
 
-HX_API double hx_probe_friction(const hxPlant *plant, double speed) { return hx_lane(hx_friction(&plant->model, hx_splat(speed)), 0); }
+HX_API double hx_probe_friction(const hxPlant *plant, double speed) {
+  return hx_lane(hx_friction(&plant->model, hx_splat(speed)), 0);
+}
 
 /* command: angle, speed, torque; out: torque, friction, stiffness, damping */
-HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed, const double command[3], double out[4]) {
+HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
+                           const double command[3], double out[4]) {
   const hxServo servo =
-      hx_servo_torque(&plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]), hx_splat(command[1]), hx_splat(command[2]));
+      hx_servo_torque(&plant->model, hx_splat(angle), hx_splat(speed), hx_splat(command[0]),
+                      hx_splat(command[1]), hx_splat(command[2]));
   out[0] = hx_lane(servo.torque, 0), out[1] = hx_lane(servo.friction, 0);
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
@@ -270,7 +295,8 @@ HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double 
 }
 
 /* the plant's contacts after a switch; state: closed, damping, impact speed */
-HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS], const double ddelta[HX_LEGS], double state[3][HX_LEGS]) {
+HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
+                                   const double ddelta[HX_LEGS], double state[3][HX_LEGS]) {
   double slots[2][HX_SLOTS] = {{0}};
   hxContactState *contact = &plant->state.contact;
   memcpy(slots[0], delta, HX_LEGS * sizeof(double));
@@ -282,34 +308,42 @@ HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS], 
   return touchdowns;
 }
 
-/* ---- the plant as it is now ---------------------------------------------------------------------------------------------------- */
+/* ---- the plant as it is now
+ * ----------------------------------------------------------------------------------------------------
+ */
 
-static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplicit *implicit, hxWork *work, hxRate *rate) {
+static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplicit *implicit,
+                     hxWork *work, hxRate *rate) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time - age);
-  hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time, &plant->state.motion, implicit, 1, work, rate);
+  hx_dynamics_evaluate(&plant->model, &plant->state.contact, &command, plant->state.time,
+                       &plant->state.motion, implicit, 1, work, rate);
 }
 
 /* out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz */
-HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int joint, double out[27]) {
+HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int joint,
+                           double out[27]) {
   hxWork work;
   hxRate rate;
   evaluate(plant, input, 0.0, NULL, &work, &rate);
   const int lane = leg % HX_LANES;
   const hxJointWork *w = &work.pack[leg / HX_LANES].joint[joint];
   const hxJointKinematics *k = &w->reaction.kin;
-  const hxConstraint constraint = hx_joint_constraint(&plant->model, &plant->state.motion, joint, leg - lane);
+  const hxConstraint constraint =
+      hx_joint_constraint(&plant->model, &plant->state.motion, joint, leg - lane);
   put3(constraint.phi_lin, lane, out), put3(constraint.dphi_lin, lane, out + 5);
-  for (int i = 0; i < 2; ++i) out[3 + i] = hx_lane(constraint.phi[i], lane), out[8 + i] = hx_lane(constraint.dphi[i], lane);
+  for (int i = 0; i < 2; ++i)
+    out[3 + i] = hx_lane(constraint.phi[i], lane), out[8 + i] = hx_lane(constraint.dphi[i], lane);
   put3(k->s, lane, out + 10), put3(k->sP_i, lane, out + 13), put3(k->sP_j, lane, out + 16);
   out[19] = hx_lane(w->angle, lane), out[20] = hx_lane(w->speed, lane);
   const hxReal J[6] = {w->J.xx, w->J.yy, w->J.zz, w->J.xy, w->J.xz, w->J.yz};
   for (int i = 0; i < 6; ++i) out[21 + i] = hx_lane(J[i], lane);
 }
 
-/* out: point, velocity, normal, penetration, approach speed, force on the foot, its slopes stiffness, viscosity, drag as a step of length `ahead`
- * takes them */
-HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double ahead, double out[17]) {
+/* out: point, velocity, normal, penetration, approach speed, force on the foot, its slopes
+ * stiffness, viscosity, drag as a step of length `ahead` takes them */
+HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double ahead,
+                          double out[17]) {
   hxWork work;
   hxRate rate;
   hxImplicit implicit = {.z = 1e-3, .ahead = ahead};
@@ -317,20 +351,25 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   const int lane = leg % HX_LANES, pack = leg / HX_LANES;
   const hxFootWork *foot = &work.pack[pack].foot;
   const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
-  put3(hx_add(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3), put3(foot->kin.normal, lane, out + 6);
+  put3(hx_add(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
+      put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
-  out[14] = hx_lane(implicit.slope[pack].stiffness, lane), out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
+  out[14] = hx_lane(implicit.slope[pack].stiffness, lane),
+  out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
   out[16] = hx_lane(implicit.slope[pack].drag, lane);
 }
 
-/* dy/dt under a command given `age` seconds ago: bodies, and the powers of motors, push and everything that dissipates */
-HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age, double body[HX_BODIES][HX_BODY_STATE], double power[3]) {
+/* dy/dt under a command given `age` seconds ago: bodies, and the powers of motors, push and
+ * everything that dissipates */
+HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age,
+                          double body[HX_BODIES][HX_BODY_STATE], double power[3]) {
   hxWork work;
   hxRate rate;
   evaluate(plant, input, age, NULL, &work, &rate);
   hx_bodies_from_motion(&plant->model, &rate.motion, body);
-  power[0] = rate.motion.actuator_work, power[1] = rate.motion.push_work, power[2] = rate.motion.dissipated;
+  power[0] = rate.motion.actuator_work, power[1] = rate.motion.push_work,
+  power[2] = rate.motion.dissipated;
 }
 
 static void fill_bristles(const double z[HX_LEGS][3], hxMotion *motion) {
@@ -341,7 +380,8 @@ static void fill_bristles(const double z[HX_LEGS][3], hxMotion *motion) {
 }
 
 /* puts the bristles; rate: their db/dt there */
-HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3], double rate[HX_LEGS][3]) {
+HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3],
+                              double rate[HX_LEGS][3]) {
   hxWork work;
   hxRate all;
   fill_bristles(z, &plant->state.motion);
@@ -351,7 +391,8 @@ HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double
 }
 
 /* a change from (v, w) of s_x and of s_v: rows of the bodies */
-static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6], hxRate *change) {
+static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6],
+                       hxRate *change) {
   memset(change, 0, sizeof *change);
   for (int i = 0; i < 3; ++i) {
     change->motion.torso[HX_R + i] = s_x[0][i], change->torso_turn[i] = s_x[0][3 + i];
@@ -366,10 +407,12 @@ static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIE
   }
 }
 
-/* k/h of a stage (eq. 15) with h gamma = z after changes s_x, s_v (linear, angular rows): the bodies' rates and the angular velocities theirs
- * stand for. The slopes are this point's, `ahead` of it. */
-HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead, const double s_x[HX_BODIES][6],
-                           const double s_v[HX_BODIES][6], double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {
+/* k/h of a stage (eq. 15) with h gamma = z after changes s_x, s_v (linear, angular rows): the
+ * bodies' rates and the angular velocities theirs stand for. The slopes are this point's, `ahead`
+ * of it. */
+HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead,
+                           const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6],
+                           double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {
   hxWork work;
   hxRate rate, change;
   hxImplicit implicit = {.z = z, .ahead = ahead};
@@ -380,7 +423,8 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
   hx_bodies_from_motion(&plant->model, &rate.motion, body);
   for (int i = 0; i < 3; ++i) {
     turn[0][i] = rate.torso_turn[i];
-    for (int b = 1; b < HX_BODIES; ++b) turn[b][i] = rate.link_turn[(b - 1) % HX_JOINTS][i][(b - 1) / HX_JOINTS];
+    for (int b = 1; b < HX_BODIES; ++b)
+      turn[b][i] = rate.link_turn[(b - 1) % HX_JOINTS][i][(b - 1) / HX_JOINTS];
   }
 }
 
@@ -391,7 +435,8 @@ HX_API void hx_probe_stain_stack(int byte) {
 }
 
 /* dy/dt by the i-th kernel; its name, or NULL when there is none or it does not run here */
-HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input, double body[HX_BODIES][HX_BODY_STATE]) {
+HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
+                                   double body[HX_BODIES][HX_BODY_STATE]) {
   hxCommand command;
   hxMotion rate;
   for (int k = 0; k <= i; ++k)
@@ -404,11 +449,13 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input, 
 }
 
 /* shape: stages, order, error order; the rest as in hxMethodRow */
-HX_API void hx_probe_method(int method, int shape[3], double *gamma, double a[HX_STAGES][HX_STAGES], double g[HX_STAGES][HX_STAGES],
-                            double c[HX_STAGES], double b[HX_STAGES], double e[HX_STAGES]) {
+HX_API void hx_probe_method(int method, int shape[3], double *gamma, double a[HX_STAGES][HX_STAGES],
+                            double g[HX_STAGES][HX_STAGES], double c[HX_STAGES],
+                            double b[HX_STAGES], double e[HX_STAGES]) {
   const hxMethodRow *row = hx_method(method);
   shape[0] = row->stages, shape[1] = row->order, shape[2] = row->error_order;
   *gamma = row->gamma;
   memcpy(a, row->a, sizeof row->a), memcpy(g, row->g, sizeof row->g);
-  memcpy(c, row->c, sizeof row->c), memcpy(b, row->b, sizeof row->b), memcpy(e, row->e, sizeof row->e);
+  memcpy(c, row->c, sizeof row->c), memcpy(b, row->b, sizeof row->b),
+      memcpy(e, row->e, sizeof row->e);
 }

@@ -11,7 +11,9 @@ static void tick(hxController *controller, double vx, int ticks) {
   hxControllerInput input;
   hx_controller_input_default(&input);
   input.command.vx = vx;
-  for (int k = 0; k < ticks; ++k) CHECK(hx_controller_step(controller, &input, NULL, hx_controller_time(controller) + 0.005) == HX_OK);
+  for (int k = 0; k < ticks; ++k)
+    CHECK(hx_controller_step(controller, &input, NULL, hx_controller_time(controller) + 0.005) ==
+          HX_OK);
 }
 
 static void without_a_command_it_holds_the_stance(void) {

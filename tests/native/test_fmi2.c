@@ -1,4 +1,5 @@
-/* test_fmi2.c - the FMU's binary through FMI 2.0: co-simulation, saved states, derivatives, model exchange, refusals.
+/* test_fmi2.c - the FMU's binary through FMI 2.0: co-simulation, saved states, derivatives, model
+ * exchange, refusals.
  *
  * usage: test_fmi2 modelDescription.xml
  */
@@ -11,7 +12,8 @@
 
 static int complaints;
 
-static void complain(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...) {
+static void complain(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                     fmi2String category, fmi2String text, ...) {
   (void)environment, (void)name, (void)status, (void)category, (void)text;
   ++complaints;
 }
@@ -55,25 +57,30 @@ static void it_stands_and_goes_back(void) {
   size_t size = 0;
   CHECK(fmi2DoStep(fmu, 0.0, 0.5, fmi2True) == fmi2OK);
   NEAR(weight_on_feet(fmu), 5.6 * 9.81, 1e-3);
-  CHECK(fmi2GetFMUstate(fmu, &state) == fmi2OK && fmi2SerializedFMUstateSize(fmu, state, &size) == fmi2OK);
+  CHECK(fmi2GetFMUstate(fmu, &state) == fmi2OK &&
+        fmi2SerializedFMUstateSize(fmu, state, &size) == fmi2OK);
   fmi2Byte *bytes = malloc(size);
   CHECK(fmi2SerializeFMUstate(fmu, state, bytes, size) == fmi2OK);
 
-  CHECK(set(fmu, "torso.push_force[1]", 10.0) == fmi2OK && fmi2DoStep(fmu, 0.5, 0.1, fmi2True) == fmi2OK);
+  CHECK(set(fmu, "torso.push_force[1]", 10.0) == fmi2OK &&
+        fmi2DoStep(fmu, 0.5, 0.1, fmi2True) == fmi2OK);
   const double pushed = real(fmu, "torso.position[1]");
   CHECK(pushed > 1e-4);
   CHECK(fmi2SetFMUstate(fmu, state) == fmi2OK);
   NEAR(real(fmu, "torso.position[1]"), 0.0, 1e-6);
   other = initialised(fmi2CoSimulation);
-  CHECK(fmi2DeSerializeFMUstate(other, bytes, size, &copy) == fmi2OK && fmi2SetFMUstate(other, copy) == fmi2OK);
-  CHECK(set(other, "torso.push_force[1]", 10.0) == fmi2OK && fmi2DoStep(other, 0.5, 0.1, fmi2True) == fmi2OK);
+  CHECK(fmi2DeSerializeFMUstate(other, bytes, size, &copy) == fmi2OK &&
+        fmi2SetFMUstate(other, copy) == fmi2OK);
+  CHECK(set(other, "torso.push_force[1]", 10.0) == fmi2OK &&
+        fmi2DoStep(other, 0.5, 0.1, fmi2True) == fmi2OK);
   CHECK(real(other, "torso.position[1]") == pushed);
   CHECK(complaints == 0);
   bytes[size / 2] ^= 1;
   CHECK(fmi2DeSerializeFMUstate(other, bytes, size, &copy) > fmi2Warning);
 
   free(bytes);
-  CHECK(fmi2FreeFMUstate(fmu, &state) == fmi2OK && !state && fmi2FreeFMUstate(other, &copy) == fmi2OK);
+  CHECK(fmi2FreeFMUstate(fmu, &state) == fmi2OK && !state &&
+        fmi2FreeFMUstate(other, &copy) == fmi2OK);
   CHECK(fmi2Reset(other) == fmi2OK);
   CHECK(fmi2Terminate(fmu) == fmi2OK);
   fmi2FreeInstance(fmu), fmi2FreeInstance(other);
@@ -81,7 +88,8 @@ static void it_stands_and_goes_back(void) {
 
 static void derivatives_are_differences(void) {
   fmi2Component fmu = initialised(fmi2CoSimulation);
-  const fmi2ValueReference known = reference_of("RM.tibia.torque_ref"), unknown = reference_of("RM.tibia.torque");
+  const fmi2ValueReference known = reference_of("RM.tibia.torque_ref"),
+                           unknown = reference_of("RM.tibia.torque");
   const fmi2Real change = 1.0;
   fmi2Real derivative = 0.0;
   CHECK(fmi2DoStep(fmu, 0.0, 0.1, fmi2True) == fmi2OK);
@@ -95,22 +103,27 @@ static void derivatives_are_differences(void) {
 
 static void solvers_of_others_see_it_fall(void) {
   enum { MOST = 200, FEET = 6 };
-  fmi2Component fmu = fmi2Instantiate("robot", fmi2ModelExchange, guid, NULL, &callbacks, fmi2False, fmi2False);
+  fmi2Component fmu =
+      fmi2Instantiate("robot", fmi2ModelExchange, guid, NULL, &callbacks, fmi2False, fmi2False);
   double state[MOST], rate[MOST], foot[FEET];
   fmi2EventInfo event;
   size_t n = 0;
-  for (const char *at = description; (at = strstr(at + 1, "derivative=\"")) != NULL; ++n) { /* counts states */
+  for (const char *at = description; (at = strstr(at + 1, "derivative=\"")) != NULL;
+       ++n) { /* counts states */
   }
   CHECK(n > 0 && n <= MOST);
   CHECK(set(fmu, "initial.position[3]", 1.0) == fmi2OK);
   CHECK(fmi2SetupExperiment(fmu, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK);
   CHECK(fmi2EnterInitializationMode(fmu) == fmi2OK && fmi2ExitInitializationMode(fmu) == fmi2OK);
   CHECK(fmi2NewDiscreteStates(fmu, &event) == fmi2OK && fmi2EnterContinuousTimeMode(fmu) == fmi2OK);
-  CHECK(fmi2GetContinuousStates(fmu, state, n) == fmi2OK && fmi2GetDerivatives(fmu, rate, n) == fmi2OK);
+  CHECK(fmi2GetContinuousStates(fmu, state, n) == fmi2OK &&
+        fmi2GetDerivatives(fmu, rate, n) == fmi2OK);
   CHECK(fmi2GetEventIndicators(fmu, foot, FEET) == fmi2OK);
-  for (int k = 0; k < FEET; ++k) NEAR(foot[k], -0.87, 0.02); /* m  the default robot's torso stands at 0.13 */
+  for (int k = 0; k < FEET; ++k)
+    NEAR(foot[k], -0.87, 0.02); /* m  the default robot's torso stands at 0.13 */
   CHECK(fmi2SetTime(fmu, 0.001) == fmi2OK && fmi2SetContinuousStates(fmu, state, n) == fmi2OK);
-  CHECK(fmi2GetDerivatives(fmu, rate, n) == fmi2OK && fmi2GetContinuousStates(fmu, state, n) == fmi2OK);
+  CHECK(fmi2GetDerivatives(fmu, rate, n) == fmi2OK &&
+        fmi2GetContinuousStates(fmu, state, n) == fmi2OK);
   for (size_t k = 0; k < n; ++k) CHECK(isfinite(rate[k]) && isfinite(state[k]));
   CHECK(fmi2GetDerivatives(fmu, rate, n - 1) > fmi2Warning);
   fmi2FreeInstance(fmu);
@@ -118,7 +131,8 @@ static void solvers_of_others_see_it_fall(void) {
 
 static void misuse_is_refused(void) {
   complaints = 0;
-  CHECK(!fmi2Instantiate("robot", fmi2CoSimulation, "{another}", NULL, &callbacks, fmi2False, fmi2False));
+  CHECK(!fmi2Instantiate("robot", fmi2CoSimulation, "{another}", NULL, &callbacks, fmi2False,
+                         fmi2False));
   fmi2Component fmu = initialised(fmi2CoSimulation);
   const fmi2ValueReference nowhere = 4000000000u;
   fmi2Real value;

@@ -1,6 +1,8 @@
-/* test_fmi3.c - the FMU's binary through FMI 3.0: arrays, stops at touch-downs, saved states, refusals.
+/* test_fmi3.c - the FMU's binary through FMI 3.0: arrays, stops at touch-downs, saved states,
+ * refusals.
  *
- * usage: test_fmi3 modelDescription.xml of FMI 2.0, whose references are the first ones of FMI 3.0's arrays
+ * usage: test_fmi3 modelDescription.xml of FMI 2.0, whose references are the first ones of
+ * FMI 3.0's arrays
  */
 #include "fmi3Functions.h"
 
@@ -11,19 +13,22 @@ enum { LEGS = 6, JOINTS = 3 };
 
 static int complaints;
 
-static void complain(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String text) {
+static void complain(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
+                     fmi3String text) {
   (void)environment, (void)status, (void)category, (void)text;
   ++complaints;
 }
 
 static fmi3Instance instantiated(fmi3Boolean events) {
-  fmi3Instance fmu = fmi3InstantiateCoSimulation("robot", guid, NULL, fmi3False, fmi3False, events, events, NULL, 0, NULL, complain, NULL);
+  fmi3Instance fmu = fmi3InstantiateCoSimulation("robot", guid, NULL, fmi3False, fmi3False, events,
+                                                 events, NULL, 0, NULL, complain, NULL);
   CHECK(fmu);
   return fmu;
 }
 
 static void initialise(fmi3Instance fmu) {
-  CHECK(fmi3EnterInitializationMode(fmu, fmi3False, 0.0, 0.0, fmi3False, 0.0) == fmi3OK && fmi3ExitInitializationMode(fmu) == fmi3OK);
+  CHECK(fmi3EnterInitializationMode(fmu, fmi3False, 0.0, 0.0, fmi3False, 0.0) == fmi3OK &&
+        fmi3ExitInitializationMode(fmu) == fmi3OK);
 }
 
 static double height(fmi3Instance fmu) {
@@ -34,7 +39,8 @@ static double height(fmi3Instance fmu) {
 }
 
 static void arrays_hold_all_legs(void) {
-  const fmi3ValueReference command = reference_of("LF.coxa.angle_ref"), carried = reference_of("LF.foot.normal_force");
+  const fmi3ValueReference command = reference_of("LF.coxa.angle_ref"),
+                           carried = reference_of("LF.foot.normal_force");
   fmi3Instance fmu = instantiated(fmi3False);
   fmi3Float64 angle[LEGS * JOINTS], force[LEGS], sum = 0.0, last = 0.0;
   fmi3Boolean event, terminate, early;
@@ -67,7 +73,8 @@ static double dropped(fmi3Boolean events) {
   for (int calls = 0; time < 0.2 && calls < 1000; ++calls) {
     if (events) {
       if (calls > 0) CHECK(fmi3EnterEventMode(fmu) == fmi3OK);
-      CHECK(fmi3UpdateDiscreteStates(fmu, &update, &terminate, &nominals, &states, &timed, &next) == fmi3OK);
+      CHECK(fmi3UpdateDiscreteStates(fmu, &update, &terminate, &nominals, &states, &timed, &next) ==
+            fmi3OK);
       CHECK(fmi3EnterStepMode(fmu) == fmi3OK);
     }
     CHECK(fmi3DoStep(fmu, time, 0.2 - time, fmi3True, &event, &terminate, &early, &time) == fmi3OK);
@@ -80,7 +87,9 @@ static double dropped(fmi3Boolean events) {
 }
 
 /* an importer computes the end in pieces, so the last step may differ by rounding */
-static void stops_at_touch_downs_leave_no_trace(void) { NEAR(dropped(fmi3True), dropped(fmi3False), 1e-12); }
+static void stops_at_touch_downs_leave_no_trace(void) {
+  NEAR(dropped(fmi3True), dropped(fmi3False), 1e-12);
+}
 
 static void a_saved_state_goes_on(void) {
   fmi3Instance fmu = instantiated(fmi3False), other = instantiated(fmi3False);
@@ -92,10 +101,12 @@ static void a_saved_state_goes_on(void) {
   size_t size = 0;
   initialise(fmu), initialise(other);
   CHECK(fmi3DoStep(fmu, 0.0, 0.1, fmi3True, &event, &terminate, &early, &last) == fmi3OK);
-  CHECK(fmi3GetFMUState(fmu, &state) == fmi3OK && fmi3SerializedFMUStateSize(fmu, state, &size) == fmi3OK);
+  CHECK(fmi3GetFMUState(fmu, &state) == fmi3OK &&
+        fmi3SerializedFMUStateSize(fmu, state, &size) == fmi3OK);
   fmi3Byte *bytes = malloc(size);
   CHECK(fmi3SerializeFMUState(fmu, state, bytes, size) == fmi3OK);
-  CHECK(fmi3DeserializeFMUState(other, bytes, size, &copy) == fmi3OK && fmi3SetFMUState(other, copy) == fmi3OK);
+  CHECK(fmi3DeserializeFMUState(other, bytes, size, &copy) == fmi3OK &&
+        fmi3SetFMUState(other, copy) == fmi3OK);
   fmi3Instance both[] = {fmu, other};
   for (int k = 0; k < 2; ++k) {
     CHECK(fmi3SetFloat64(both[k], &push, 1, force, 3) == fmi3OK);

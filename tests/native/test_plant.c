@@ -34,7 +34,8 @@ static void walk_in_place(hxPlant *plant, double t_end) {
   }
 }
 
-/* motors that do nothing and gears without friction: nothing but gravity acts on a robot in the air */
+/* motors that do nothing and gears without friction: nothing but gravity acts on a robot in the air
+ */
 static hxDefinition falling_robot(void) {
   hxDefinition robot;
   hx_definition_default(&robot);
@@ -62,7 +63,8 @@ static void everything_falls_at_the_same_rate(void) {
   hxPlant *plant = hx_plant_create();
   const hxDefinition robot = falling_robot();
   const double z = robot.initial.position[2], t = 0.3;
-  double acceleration[HX_BODIES][6], multiplier[HX_BODIES - 1][HX_MULTIPLIERS], torque[HX_BODIES - 1];
+  double acceleration[HX_BODIES][6], multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
+      torque[HX_BODIES - 1];
   hxInput input;
   hx_input_default(&input);
   CHECK(hx_plant_reset(plant, &robot, 0.0) == HX_OK);
@@ -92,15 +94,18 @@ static void rates_are_the_derivatives_of_coordinates(void) {
   hx_plant_rates(plant, &input, &rate);
   CHECK(hx_plant_step(plant, &input, 0.1 + 1e-6) == HX_OK);
   hx_plant_get_coordinates(plant, &after);
-  for (int i = 0; i < 3; ++i) NEAR((after.position[i] - before.position[i]) / 1e-6, rate.position[i], 1e-4);
+  for (int i = 0; i < 3; ++i)
+    NEAR((after.position[i] - before.position[i]) / 1e-6, rate.position[i], 1e-4);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      NEAR((after.angle[leg][joint] - before.angle[leg][joint]) / 1e-6, rate.angle[leg][joint], 1e-4);
+      NEAR((after.angle[leg][joint] - before.angle[leg][joint]) / 1e-6, rate.angle[leg][joint],
+           1e-4);
       NEAR(rate.angle[leg][joint], before.speed[leg][joint], 1e-12);
     }
   CHECK(hx_plant_set_coordinates(plant, 0.1, &before) == HX_OK);
   hx_plant_get_coordinates(plant, &after);
-  for (size_t k = 0; k < HX_COORDINATES; ++k) NEAR(((const double *)&after)[k], ((const double *)&before)[k], 1e-12);
+  for (size_t k = 0; k < HX_COORDINATES; ++k)
+    NEAR(((const double *)&after)[k], ((const double *)&before)[k], 1e-12);
   hx_plant_destroy(plant);
 }
 
@@ -123,7 +128,8 @@ static void tangents_are_differences(void) {
   input.torque_ref[RM][TIBIA] += step * change.torque_ref[RM][TIBIA];
   hx_plant_rates(plant, &input, &changed);
   if (status == HX_OK) {
-    for (int i = 0; i < 3; ++i) NEAR(tangent.velocity[i], (changed.velocity[i] - rate.velocity[i]) / step, 1e-8);
+    for (int i = 0; i < 3; ++i)
+      NEAR(tangent.velocity[i], (changed.velocity[i] - rate.velocity[i]) / step, 1e-8);
     NEAR(tangent.speed[RM][TIBIA], (changed.speed[RM][TIBIA] - rate.speed[RM][TIBIA]) / step, 1e-6);
     CHECK(fabs(tangent.speed[RM][TIBIA]) > 1.0);
   }
@@ -163,7 +169,8 @@ static void stops_at_touch_downs_leave_no_trace(void) {
   hx_input_default(&input);
   robot.initial.position[2] += 0.02;
   robot.initial.angle[RR][FEMUR] += 0.1; /* the feet land one after the other */
-  CHECK(hx_plant_reset(through, &robot, 0.0) == HX_OK && hx_plant_reset(stopping, &robot, 0.0) == HX_OK);
+  CHECK(hx_plant_reset(through, &robot, 0.0) == HX_OK &&
+        hx_plant_reset(stopping, &robot, 0.0) == HX_OK);
   CHECK(hx_plant_step_to_event(through, &input, 0.3, 0, &found) == HX_OK && found);
   for (int calls = 0; hx_plant_time(stopping) < 0.3 && calls < 1000; ++calls) {
     CHECK(hx_plant_step_to_event(stopping, &input, 0.3, 1, &found) == HX_OK);
@@ -224,7 +231,8 @@ static void moves(hxPlant *plant, const hxDefinition *robot) {
   hxInput input;
   hx_input_default(&input);
   const hxOutput seen = seen_by(plant, &input);
-  CHECK(isfinite(seen.torso.position[2]) && isfinite(seen.energy.residual) && isfinite(weight_on_feet(&seen)));
+  CHECK(isfinite(seen.torso.position[2]) && isfinite(seen.energy.residual) &&
+        isfinite(weight_on_feet(&seen)));
   CHECK(seen.solver.steps >= 10.0);
   hx_plant_get_bodies(plant, body);
   CHECK(hx_plant_set_bodies(plant, (const double (*)[HX_BODY_STATE])body) == HX_OK);
@@ -257,11 +265,14 @@ static void ranges_cover_what_they_name(void) {
   const hxRange *range;
   const size_t definition = hx_definition_ranges(&range);
   CHECK(definition > 400 && strcmp(range[0].name, "torso.mass") == 0);
-  for (size_t k = 0; k < definition; ++k) CHECK(range[k].offset < sizeof(hxDefinition) && range[k].min <= range[k].max);
+  for (size_t k = 0; k < definition; ++k)
+    CHECK(range[k].offset < sizeof(hxDefinition) && range[k].min <= range[k].max);
   const size_t input = hx_input_ranges(&range);
   CHECK(input == 78);
-  for (size_t k = 0; k < input; ++k) CHECK(range[k].offset == k * sizeof(double) && !range[k].is_int);
-  for (hxStatus status = HX_OK; status <= HX_BAD_STATE; ++status) CHECK(strlen(hx_status_name(status)) > 0);
+  for (size_t k = 0; k < input; ++k)
+    CHECK(range[k].offset == k * sizeof(double) && !range[k].is_int);
+  for (hxStatus status = HX_OK; status <= HX_BAD_STATE; ++status)
+    CHECK(strlen(hx_status_name(status)) > 0);
 }
 
 int main(void) {

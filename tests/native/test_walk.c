@@ -8,7 +8,7 @@
 #include "check.h"
 
 static const double h = 0.005, duration = 4.0; /* s */
-static const double speed = 0.08;              /* m/s */
+static const double speed = 0.08; /* m/s */
 
 static void sense(const hxOutput *seen, hxControllerInput *sensed) {
   memcpy(sensed->angle, seen->angle, sizeof sensed->angle);
@@ -53,7 +53,8 @@ int main(void) {
   for (int control = HX_CONTROL_KINEMATIC; control <= HX_CONTROL_COMPLIANT; ++control) {
     const hxOutput seen = walk(control), again = walk(control);
     NEAR(seen.time, duration, 1e-12);
-    CHECK(seen.torso.position[0] > 0.7 * speed * duration && seen.torso.position[0] < speed * duration);
+    CHECK(seen.torso.position[0] > 0.7 * speed * duration &&
+          seen.torso.position[0] < speed * duration);
     NEAR(seen.torso.position[1], 0.0, 0.01);
     NEAR(seen.torso.position[2], 0.13, 0.01);
     NEAR(seen.torso.roll, 0.0, 0.02);

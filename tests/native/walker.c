@@ -1,8 +1,10 @@
-/* walker.c - loads an FMU's binary, drives it with recorded inputs and prints its outputs bit by bit.
+/* walker.c - loads an FMU's binary, drives it with recorded inputs and prints its outputs bit by
+ * bit.
  *
  * usage: walker LIBRARY GUID RESOURCES INPUTS
- * INPUTS, words apart: number of inputs and their references, number of outputs and theirs, number of steps, step size, then the inputs of
- * each step; Reals as 64-bit patterns in hexadecimal. Prints a line of such patterns a step. Exit code 0 when every call was well.
+ * INPUTS, words apart: number of inputs and their references, number of outputs and theirs, number
+ * of steps, step size, then the inputs of each step; Reals as 64-bit patterns in hexadecimal.
+ * Prints a line of such patterns a step. Exit code 0 when every call was well.
  */
 #include <inttypes.h>
 #include <stdarg.h>
@@ -20,7 +22,9 @@ static void *load(const char *path) {
   static wchar_t wide[4096];
   return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, 4096) ? (void *)LoadLibraryW(wide) : NULL;
 }
-static Function *find(void *library, const char *name) { return (Function *)GetProcAddress((HMODULE)library, name); }
+static Function *find(void *library, const char *name) {
+  return (Function *)GetProcAddress((HMODULE)library, name);
+}
 #else
 #include <dlfcn.h>
 static void *load(const char *path) {
@@ -36,7 +40,8 @@ static Function *find(void *library, const char *name) {
 }
 #endif
 
-static void log_line(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...) {
+static void log_line(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                     fmi2String category, fmi2String text, ...) {
   (void)environment, (void)category;
   fprintf(stderr, "%s: status %d: %s\n", name, (int)status, text);
 }
@@ -88,11 +93,13 @@ static int walk(void *library, fmi2Component plant, FILE *inputs) {
   const unsigned n_in = read_references(inputs, in), n_out = read_references(inputs, out);
   unsigned steps;
   double h;
-  if (!n_in || !n_out || fscanf(inputs, "%u", &steps) != 1 || !read_real(inputs, &h)) return fail("inputs");
+  if (!n_in || !n_out || fscanf(inputs, "%u", &steps) != 1 || !read_real(inputs, &h))
+    return fail("inputs");
   for (unsigned k = 0; k < steps; k++) {
     for (unsigned i = 0; i < n_in; i++)
       if (!read_real(inputs, &given[i])) return fail("inputs end early");
-    if (set(plant, in, n_in, given) != fmi2OK || step(plant, k * h, h, fmi2True) != fmi2OK) return fail("step");
+    if (set(plant, in, n_in, given) != fmi2OK || step(plant, k * h, h, fmi2True) != fmi2OK)
+      return fail("step");
     if (get(plant, out, n_out, seen) != fmi2OK) return fail("outputs");
     print_reals(seen, n_out);
   }
@@ -103,14 +110,19 @@ static int run(void *library, const char *guid, const char *resources, FILE *inp
   static const fmi2CallbackFunctions callbacks = {log_line, calloc, free, NULL, NULL};
   fmi2InstantiateTYPE *instantiate = (fmi2InstantiateTYPE *)find(library, "fmi2Instantiate");
   fmi2SetupExperimentTYPE *setup = (fmi2SetupExperimentTYPE *)find(library, "fmi2SetupExperiment");
-  fmi2EnterInitializationModeTYPE *enter = (fmi2EnterInitializationModeTYPE *)find(library, "fmi2EnterInitializationMode");
-  fmi2ExitInitializationModeTYPE *leave = (fmi2ExitInitializationModeTYPE *)find(library, "fmi2ExitInitializationMode");
+  fmi2EnterInitializationModeTYPE *enter =
+      (fmi2EnterInitializationModeTYPE *)find(library, "fmi2EnterInitializationMode");
+  fmi2ExitInitializationModeTYPE *leave =
+      (fmi2ExitInitializationModeTYPE *)find(library, "fmi2ExitInitializationMode");
   fmi2TerminateTYPE *terminate = (fmi2TerminateTYPE *)find(library, "fmi2Terminate");
   fmi2FreeInstanceTYPE *release = (fmi2FreeInstanceTYPE *)find(library, "fmi2FreeInstance");
-  if (!instantiate || !setup || !enter || !leave || !terminate || !release) return fail("a function is missing");
-  fmi2Component plant = instantiate("plant", fmi2CoSimulation, guid, resources, &callbacks, fmi2False, fmi2False);
+  if (!instantiate || !setup || !enter || !leave || !terminate || !release)
+    return fail("a function is missing");
+  fmi2Component plant =
+      instantiate("plant", fmi2CoSimulation, guid, resources, &callbacks, fmi2False, fmi2False);
   if (!plant) return fail("not instantiated");
-  if (setup(plant, fmi2False, 0.0, 0.0, fmi2False, 0.0) != fmi2OK || enter(plant) != fmi2OK || leave(plant) != fmi2OK)
+  if (setup(plant, fmi2False, 0.0, 0.0, fmi2False, 0.0) != fmi2OK || enter(plant) != fmi2OK ||
+      leave(plant) != fmi2OK)
     return fail("not initialised");
   const int failed = walk(library, plant, inputs);
   terminate(plant);

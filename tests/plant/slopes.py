@@ -1,4 +1,6 @@
-"""Slopes of contacts and servos by displacement and velocity, by differences of the twin: what W = M - z G_v - z^2 G_x is made of."""
+"""Slopes of contacts and servos by displacement and velocity, by differences of the twin: what W
+= M - z G_v - z^2 G_x is made of.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,24 @@ import numpy as np
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.contact import foot_contact, foot_contacts, foot_force, standing_damping
 from hexapod_cosim.models.dynamics import Command, constraints, joint_torques
-from hexapod_cosim.models.kinematics import body_states, cross, foot_centres, joint_models, quaternion_product, rotation_matrix, skew
+from hexapod_cosim.models.kinematics import (
+    body_states,
+    cross,
+    foot_centres,
+    joint_models,
+    quaternion_product,
+    rotation_matrix,
+    skew,
+)
 from hexapod_cosim.models.records import Array
 
 STEP = 1e-7  # m, rad, m/s: of central differences
 
 
 def resting(robot: Robot, seed: int) -> Array:
-    """Bodies on their joints and at rest, feet in the ground: there W's approximate slopes are exact, save for geometric stiffness."""
+    """Bodies on their joints and at rest, feet in the ground: there W's approximate slopes are
+    exact, save for geometric stiffness.
+    """
     rng = np.random.default_rng(seed)
     still = np.zeros(3)
     place = [robot.stance + rng.normal(0.0, 0.03, (6, 3)), np.zeros((6, 3))]
@@ -30,21 +42,37 @@ def body_height(robot: Robot, body: Array) -> Array:
 
 
 def foot_slopes(robot: Robot, body: Array, leg: int, damping: float) -> tuple[Array, Array]:
-    """(3, 6) twice: slopes of a foot's force by its tibia's displacement and velocity, linear then angular, by differences."""
+    """(3, 6) twice: slopes of a foot's force by its tibia's displacement and velocity, linear
+    then angular, by differences.
+    """
     tibia, centre = body[3 * (leg + 1)], foot_centres(robot, body)[leg]
 
     def force(displacement: Array, velocity: Array) -> Array:
         moved = tibia.copy()
         moved[0:3] += displacement[0:3]
         moved[7:13] += velocity
-        moved[3:7] = quaternion_product(np.concatenate([[1.0], displacement[3:6] / 2.0]), tibia[3:7])
+        moved[3:7] = quaternion_product(
+            np.concatenate([[1.0], displacement[3:6] / 2.0]), tibia[3:7]
+        )
         return foot_force(
-            robot, foot_contact(robot, moved, centre + displacement[0:3] + cross(displacement[3:6], centre - tibia[0:3])), damping
+            robot,
+            foot_contact(
+                robot,
+                moved,
+                centre + displacement[0:3] + cross(displacement[3:6], centre - tibia[0:3]),
+            ),
+            damping,
         )
 
     still = np.zeros(6)
-    by_x = [(force(STEP * unit, still) - force(-STEP * unit, still)) / (2.0 * STEP) for unit in np.eye(6)]
-    by_v = [(force(still, STEP * unit) - force(still, -STEP * unit)) / (2.0 * STEP) for unit in np.eye(6)]
+    by_x = [
+        (force(STEP * unit, still) - force(-STEP * unit, still)) / (2.0 * STEP)
+        for unit in np.eye(6)
+    ]
+    by_v = [
+        (force(still, STEP * unit) - force(still, -STEP * unit)) / (2.0 * STEP)
+        for unit in np.eye(6)
+    ]
     return np.array(by_x).T, np.array(by_v).T
 
 
@@ -66,7 +94,9 @@ def joint_slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Ar
 
 @dataclass(frozen=True)
 class LawSlopes:
-    """Slopes of the laws themselves: of the joints' torques (18,), and of the feet's forces by displacement and velocity there (3, 3)."""
+    """Slopes of the laws themselves: of the joints' torques (18,), and of the feet's forces by
+    displacement and velocity there (3, 3).
+    """
 
     by_angle: Array
     by_speed: Array
@@ -76,13 +106,20 @@ class LawSlopes:
 def law_slopes(robot: Robot, command: Command, body: Array) -> LawSlopes:
     """The slopes at these bodies."""
     damping = standing_damping(robot, body)
-    touching = [leg for leg, foot in enumerate(foot_contacts(robot, body)) if foot.penetration > 0.0]
+    touching = [
+        leg for leg, foot in enumerate(foot_contacts(robot, body)) if foot.penetration > 0.0
+    ]
     both = {leg: foot_slopes(robot, body, leg, float(damping[leg])) for leg in touching}
-    return LawSlopes(*joint_slopes(robot, command, body), {leg: (by_x[:, :3], by_v[:, :3]) for leg, (by_x, by_v) in both.items()})
+    return LawSlopes(
+        *joint_slopes(robot, command, body),
+        {leg: (by_x[:, :3], by_v[:, :3]) for leg, (by_x, by_v) in both.items()},
+    )
 
 
 def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of these laws where the bodies are, geometric stiffness left out as W leaves it out."""
+    """(114, 114) twice: G_x and G_v of these laws where the bodies are, geometric stiffness left
+    out as W leaves it out.
+    """
     G, feet = constraints(robot, body).G, foot_contacts(robot, body)
     G_x, G_v = G.T @ np.diag(law.by_angle) @ G, G.T @ np.diag(law.by_speed) @ G
     for leg, (by_x, by_v) in law.feet.items():

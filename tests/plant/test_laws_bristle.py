@@ -1,4 +1,6 @@
-"""Feet that stick: what the bristle law promises of a block on an incline, of pushes, and of a walk."""
+"""Feet that stick: what the bristle law promises of a block on an incline, of pushes, and of a
+walk.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,13 @@ EXACT = 1e-12  # relative: rounding
 HELD = 1e-9  # m in a minute: the tanh law creeps 0.1 m in that time at a share of 0.3
 CLOSED = 1e-6  # relative, of the way given: at rest but for what is left of the first swing
 UNEVEN = 1e-3  # relative, of one foot's bristle against another's: the leaning block turns a little
-LEANING = 0.03  # relative: the block leans as its downhill feet take more of its weight, and its feet roll
-OVERSHOT = 5e-3  # of the presliding: some steps' error, 1e-3 each at the default tolerance; the force keeps its cone all the same
-RETURNED = 1e-8  # m: where a push that comes back leaves the block; a thousandth of what one swing moves it
+# relative: the block leans as its downhill feet take more of its weight, and its feet roll
+LEANING = 0.03
+# of the presliding: some steps' error, 1e-3 each at the default tolerance; the force keeps its cone
+# all the same
+OVERSHOT = 5e-3
+# m: where a push that comes back leaves the block; a thousandth of what one swing moves it
+RETURNED = 1e-8
 
 
 # the law by itself
@@ -36,7 +42,10 @@ def test_below_break_away_a_bristle_is_a_spring() -> None:
         slip, z = rng.normal(size=3), share * FRICTION.presliding * np.array([0.6, 0.8, 0.0])
         assert bristle_rate(FRICTION, slip, z) == pytest.approx(slip, rel=EXACT)
         still = bristle_force(FRICTION, 10.0, np.zeros(3), z)
-        assert still == pytest.approx(-FRICTION.mu * 10.0 * 0.5 * share * (3.0 - share**2) * np.array([0.6, 0.8, 0.0]), rel=EXACT)
+        assert still == pytest.approx(
+            -FRICTION.mu * 10.0 * 0.5 * share * (3.0 - share**2) * np.array([0.6, 0.8, 0.0]),
+            rel=EXACT,
+        )
 
 
 def test_a_full_bristle_follows_the_slip_and_comes_back_elastically() -> None:
@@ -53,7 +62,10 @@ def test_no_motion_takes_a_bristle_past_its_presliding_or_friction_past_its_cone
         direction, slip = rng.normal(size=3) * [1.0, 1.0, 0.0], rng.normal(size=3) * [1.0, 1.0, 0.0]
         direction /= np.linalg.norm(direction)
         z = rng.uniform(0.0, 1.0) * FRICTION.presliding * direction
-        assert float(bristle_rate(FRICTION, slip, FRICTION.presliding * direction) @ direction) <= EXACT
+        assert (
+            float(bristle_rate(FRICTION, slip, FRICTION.presliding * direction) @ direction)
+            <= EXACT
+        )
         force = bristle_force(FRICTION, 10.0, slip, z)
         assert float(np.linalg.norm(force)) <= FRICTION.mu * 10.0 * (1.0 + EXACT)
 
@@ -64,19 +76,32 @@ def test_turning_slip_and_bristle_turns_the_force() -> None:
     for _ in range(20):
         slip, z = rng.normal(0.0, 0.05, 3), rng.normal(0.0, 3e-4, 3)
         rate, force = bristle_rate(FRICTION, slip, z), bristle_force(FRICTION, 10.0, slip, z)
-        assert bristle_rate(FRICTION, turn @ slip, turn @ z) == pytest.approx(turn @ rate, rel=EXACT, abs=EXACT)
-        assert bristle_force(FRICTION, 10.0, turn @ slip, turn @ z) == pytest.approx(turn @ force, rel=EXACT, abs=EXACT)
+        assert bristle_rate(FRICTION, turn @ slip, turn @ z) == pytest.approx(
+            turn @ rate, rel=EXACT, abs=EXACT
+        )
+        assert bristle_force(FRICTION, 10.0, turn @ slip, turn @ z) == pytest.approx(
+            turn @ force, rel=EXACT, abs=EXACT
+        )
 
 
 def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
-    """C1 in the deflection: slopes on either side of break-away and of the presliding agree to first order in the distance."""
+    """C1 in the deflection: slopes on either side of break-away and of the presliding agree to
+    first order in the distance.
+    """
     x_axis = np.array([1.0, 0.0, 0.0])
     for share in (BREAK_AWAY, 1.0):
         slopes = [
-            (bristle_rate(FRICTION, x_axis, (share + side + 1e-6) * FRICTION.presliding * x_axis)[0]
-             - bristle_rate(FRICTION, x_axis, (share + side - 1e-6) * FRICTION.presliding * x_axis)[0]) / 2e-6
+            (
+                bristle_rate(
+                    FRICTION, x_axis, (share + side + 1e-6) * FRICTION.presliding * x_axis
+                )[0]
+                - bristle_rate(
+                    FRICTION, x_axis, (share + side - 1e-6) * FRICTION.presliding * x_axis
+                )[0]
+            )
+            / 2e-6
             for side in (-1e-4, 1e-4)
-        ]  # fmt: skip
+        ]
         assert slopes[0] == pytest.approx(slopes[1], abs=0.05)
 
 
@@ -90,7 +115,9 @@ def given(share: float) -> float:
 
 @pytest.mark.parametrize("by", ["gravity", "slope"])
 @pytest.mark.parametrize(("angle", "heading"), [(0.1, 0.0), (0.2, 2.0), (0.35, math.pi)])
-def test_below_the_friction_angle_a_block_holds_still_where_it_has_given_way(core: ct.CDLL, by: str, angle: float, heading: float) -> None:
+def test_below_the_friction_angle_a_block_holds_still_where_it_has_given_way(
+    core: ct.CDLL, by: str, angle: float, heading: float
+) -> None:
     plant, downhill, _ = tilted(core, angle, heading, by=by, law="bristle")
     friction, start = plant.robot.friction, plant.output().foot.position
     plant.step(2.0)
@@ -117,11 +144,15 @@ def test_a_constant_force_between_break_away_and_the_limit_is_held_too(core: ct.
     plant.step(25.0)
     held = plant.output()
     assert float(np.max(np.abs(held.torso.position - settled.torso.position))) < HELD
-    assert held.foot.force.sum(axis=0) @ downhill == pytest.approx(-plant.robot.total_mass * 9.81 * math.sin(0.58), rel=CLOSED)
+    assert held.foot.force.sum(axis=0) @ downhill == pytest.approx(
+        -plant.robot.total_mass * 9.81 * math.sin(0.58), rel=CLOSED
+    )
 
 
 @pytest.mark.parametrize("heading", [0.0, 1.0])
-def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(core: ct.CDLL, heading: float) -> None:
+def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
+    core: ct.CDLL, heading: float
+) -> None:
     plant, downhill, _ = tilted(core, 0.15, 0.0, by="gravity", law="bristle")
     weight, mu = plant.robot.total_mass * 9.81, plant.robot.friction.mu
     size = 0.35 * mu * weight
@@ -130,7 +161,9 @@ def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(cor
     places, swing = [], 0.0
     for k in range(1200):  # 60 swings of 0.1 s, from the third on compared at their ends
         t = 5e-3 * k
-        plant.step(t + 5e-3, replace(plant.hold(), push_force=size * math.sin(20.0 * math.pi * t) * way))
+        plant.step(
+            t + 5e-3, replace(plant.hold(), push_force=size * math.sin(20.0 * math.pi * t) * way)
+        )
         place = plant.output().torso.position @ downhill
         places.append(place)
         swing = max(swing, abs(place - places[0]))
@@ -144,10 +177,17 @@ def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
     plant = laid(core, robot, np.eye(4)[0])
     plant.step(1.0)
-    force, start, taken = 0.3 * robot.friction.mu * robot.total_mass * 9.81, plant.output().energy.dissipated, []
+    force, start, taken = (
+        0.3 * robot.friction.mu * robot.total_mass * 9.81,
+        plant.output().energy.dissipated,
+        [],
+    )
     for k in range(400):
         share = math.sin(math.pi * (k + 1) / 400.0) ** 2
-        plant.step(1.0 + 0.01 * (k + 1), replace(plant.hold(), push_force=np.array([0.0, share * force, 0.0])))
+        plant.step(
+            1.0 + 0.01 * (k + 1),
+            replace(plant.hold(), push_force=np.array([0.0, share * force, 0.0])),
+        )
         taken.append(plant.output().energy.dissipated - start)
     u = given(0.3)
     held = force / 0.3 * robot.friction.presliding * (0.75 * u**2 - 0.125 * u**4)
@@ -159,7 +199,9 @@ def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_bristles_are_slack_in_the_air_and_never_past_their_presliding(core: ct.CDLL, name: str) -> None:
+def test_bristles_are_slack_in_the_air_and_never_past_their_presliding(
+    core: ct.CDLL, name: str
+) -> None:
     robot = changed(load_robot(name), friction={"law": "bristle"})
     plant, stretched = stood(core, robot), 0.0
     for k in range(200):
@@ -182,11 +224,15 @@ def test_a_walk_converges_in_proportion_to_the_tolerance(core: ct.CDLL) -> None:
 
     exact = end(**ACCURATE)
     for tolerance in (1e-4, 1e-6):
-        assert end(tolerance=tolerance) == pytest.approx(exact, abs=tolerance)  # m, after half a second
+        assert end(tolerance=tolerance) == pytest.approx(
+            exact, abs=tolerance
+        )  # m, after half a second
 
 
 def test_a_stuck_leg_does_not_ring(core: ct.CDLL) -> None:
-    """Pushed and let go, the standing robot is quiet after a fifth of a second: its bristles damp what its servos leave."""
+    """Pushed and let go, the standing robot is quiet after a fifth of a second: its bristles
+    damp what its servos leave.
+    """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=ACCURATE)
     plant, speeds = stood(core, robot), []
     pushed = Command(angle_ref=robot.stance, push_force=np.array([0.0, 5.0, 0.0]))

@@ -1,7 +1,7 @@
 """Impact laws through the whole plant: restitution, penetration, touch-down, bouncing.
 
-A robot with its joints locked (kinematic drives on their references) that falls flat on six equal feet is a point mass on a
-contact of six times a foot's stiffness, so closed forms hold.
+A robot with its joints locked (kinematic drives on their references) that falls flat on six equal
+feet is a point mass on a contact of six times a foot's stiffness, so closed forms hold.
 """
 
 from __future__ import annotations
@@ -29,7 +29,12 @@ STILL = np.zeros(3)
 def rigid(law: str = "exact_restitution", *, gravity: float = 0.0, **contact: Any) -> Robot:
     """Athena with locked joints; the high stiffness keeps impacts short."""
     settings = {"law": law} | contact
-    robot = changed(load_robot("athena"), servo={"mode": "kinematic"}, contact=settings, solver={"tolerance": TIGHT, "step_max": 1.0})
+    robot = changed(
+        load_robot("athena"),
+        servo={"mode": "kinematic"},
+        contact=settings,
+        solver={"tolerance": TIGHT, "step_max": 1.0},
+    )
     return changed_gravity(robot, gravity)
 
 
@@ -39,7 +44,9 @@ def changed_gravity(robot: Robot, gravity: float) -> Robot:
 
 def above(robot: Robot, clearance: float) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Where the torso of the level stance is with all feet this far [m] above the ground."""
-    feet = foot_contacts(robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, robot.stance, np.zeros((6, 3))))
+    feet = foot_contacts(
+        robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, robot.stance, np.zeros((6, 3)))
+    )
     return np.array([0.0, 0.0, clearance + float(np.mean([foot.penetration for foot in feet]))])
 
 
@@ -48,7 +55,9 @@ def falling(core: ct.CDLL, robot: Robot, *, clearance: float = 1e-3, speed: floa
 
 
 def flown_off(plant: Plant, *, step: float = 1e-4, limit: float = 2.0) -> Any:
-    """The output just after all feet that touched have left again, with the deepest penetration seen as `deepest`."""
+    """The output just after all feet that touched have left again, with the deepest penetration
+    seen as `deepest`.
+    """
     deepest, touched, end = 0.0, False, plant.time + limit
     while plant.time < end:
         plant.step(plant.time + step)
@@ -66,28 +75,41 @@ def flown_off(plant: Plant, *, step: float = 1e-4, limit: float = 2.0) -> Any:
 
 @pytest.mark.parametrize("e", [0.1, 0.3, 0.5, 0.7, 0.9])
 @pytest.mark.parametrize("speed", [0.1, 1.0])
-def test_the_exact_law_gives_back_the_restitution_asked_for(core: ct.CDLL, e: float, speed: float) -> None:
+def test_the_exact_law_gives_back_the_restitution_asked_for(
+    core: ct.CDLL, e: float, speed: float
+) -> None:
     bounced = flown_off(falling(core, rigid(restitution=e), speed=speed))
     assert bounced.torso.velocity[2] / speed == pytest.approx(e, abs=RESTITUTION)
     assert float(np.max(np.abs(bounced.torso.velocity[:2]))) < 1e-9
     assert bounced.solver.touchdowns == 6
 
 
-@pytest.mark.parametrize(("law", "achieved"), [("hunt_crossley", 0.6630), ("lankarani_nikravesh", 0.7252), ("flores", 0.4704)])
+@pytest.mark.parametrize(
+    ("law", "achieved"),
+    [("hunt_crossley", 0.6630), ("lankarani_nikravesh", 0.7252), ("flores", 0.4704)],
+)
 @pytest.mark.parametrize("stiffness", [1e5, 1e7])
-def test_each_classic_law_asked_for_a_half_gives_its_reference_figure(core: ct.CDLL, law: str, achieved: float, stiffness: float) -> None:
-    bounced = flown_off(falling(core, rigid(law, restitution=0.5, stiffness=stiffness), speed=0.4), step=2e-3)
+def test_each_classic_law_asked_for_a_half_gives_its_reference_figure(
+    core: ct.CDLL, law: str, achieved: float, stiffness: float
+) -> None:
+    bounced = flown_off(
+        falling(core, rigid(law, restitution=0.5, stiffness=stiffness), speed=0.4), step=2e-3
+    )
     assert bounced.torso.velocity[2] / 0.4 == pytest.approx(achieved, abs=FIGURES)
 
 
 def test_hertz_gives_everything_back(core: ct.CDLL) -> None:
     bounced = flown_off(falling(core, rigid("hertz"), speed=0.4))
     assert bounced.torso.velocity[2] == pytest.approx(0.4, rel=1e-6)
-    assert bounced.energy.dissipated == pytest.approx(0.0, abs=1e-6 * bounced.energy.kinetic)  # eq. 22 is of order 2 in the step
+    assert bounced.energy.dissipated == pytest.approx(
+        0.0, abs=1e-6 * bounced.energy.kinetic
+    )  # eq. 22 is of order 2 in the step
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.8])
-def test_a_constant_damping_factor_gives_back_less_the_faster_the_impact(core: ct.CDLL, speed: float) -> None:
+def test_a_constant_damping_factor_gives_back_less_the_faster_the_impact(
+    core: ct.CDLL, speed: float
+) -> None:
     """It is the law with chi = 1.5 c v0: chi (1 + e) = ln[(1 + chi)/(1 - chi e)]."""
     bounced = flown_off(falling(core, rigid("constant_damping", damping_factor=1.1), speed=speed))
     chi, e = 1.5 * 1.1 * speed, bounced.torso.velocity[2] / speed
@@ -101,7 +123,9 @@ def test_the_deepest_penetration_has_its_closed_form(core: ct.CDLL, law: str) ->
     chi = {"exact_restitution": exact_restitution_chi(0.6), "hunt_crossley": 0.6, "hertz": 0.0}[law]
     share = 1.0 / chi - math.log1p(chi) / chi**2 if chi else 0.5
     depth = (2.5 * robot.total_mass * speed**2 / (6.0 * robot.contact.stiffness) * share) ** 0.4
-    assert bounced.deepest == pytest.approx(depth, rel=1e-5)  # seen every 10 us: half a microsecond's parabola at most
+    assert bounced.deepest == pytest.approx(
+        depth, rel=1e-5
+    )  # seen every 10 us: half a microsecond's parabola at most
 
 
 def test_the_energy_lost_in_an_impact_is_one_less_the_restitution_squared(core: ct.CDLL) -> None:
@@ -113,7 +137,9 @@ def test_the_energy_lost_in_an_impact_is_one_less_the_restitution_squared(core: 
 
 
 def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core: ct.CDLL) -> None:
-    """Gravity works in the contact too, on a way of delta_max: a stiff ground and a weak gravity keep that below 1e-3."""
+    """Gravity works in the contact too, on a way of delta_max: a stiff ground and a weak gravity
+    keep that below 1e-3.
+    """
     e, height, gravity = 0.8, 0.1, 1.0
     robot = rigid(gravity=gravity, restitution=e, stiffness=1e10)
     plant, rising, last = falling(core, robot, clearance=height), False, 0.0
@@ -121,7 +147,9 @@ def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core
     floor = above(robot, 0.0)[2]
     while len(apexes) < 3:
         plant.step(plant.time + 5e-3)
-        z, speed = (value[2] for value in (plant.output().torso.position, plant.output().torso.velocity))
+        z, speed = (
+            value[2] for value in (plant.output().torso.position, plant.output().torso.velocity)
+        )
         if rising and speed <= 0.0:
             apexes.append(z - floor + 0.5 * speed**2 / gravity)
         rising, last = speed > 0.0, z
@@ -134,13 +162,19 @@ def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core
 
 @pytest.mark.parametrize("macro", [0.13, 0.05, 0.0037])
 @pytest.mark.parametrize("method", ["rosw3", "ros2", "dp54", "bs32"])
-def test_the_impact_speed_is_the_ballistic_one_whatever_the_macro_step(core: ct.CDLL, macro: float, method: str) -> None:
+def test_the_impact_speed_is_the_ballistic_one_whatever_the_macro_step(
+    core: ct.CDLL, macro: float, method: str
+) -> None:
     height, gravity = 0.08, 9.81
-    robot = changed(rigid(gravity=gravity), solver={"method": method, "tolerance": 1e-6})  # a parabola: exact with any
+    robot = changed(
+        rigid(gravity=gravity), solver={"method": method, "tolerance": 1e-6}
+    )  # a parabola: exact with any
     plant = falling(core, robot, clearance=height)
     while not plant.output().solver.touchdowns:
         plant.step(plant.time + macro)
-    assert plant.output().foot.impact_speed[0] == pytest.approx(math.sqrt(2.0 * gravity * height), abs=LOCATED)
+    assert plant.output().foot.impact_speed[0] == pytest.approx(
+        math.sqrt(2.0 * gravity * height), abs=LOCATED
+    )
 
 
 def test_fixed_steps_find_the_touchdown_too(core: ct.CDLL) -> None:
@@ -150,14 +184,27 @@ def test_fixed_steps_find_the_touchdown_too(core: ct.CDLL) -> None:
     plant.step(fall - 1e-4)
     assert plant.output().solver.touchdowns == 0
     plant.step(fall + 1e-4)
-    assert plant.output().foot.impact_speed == pytest.approx(np.full(6, gravity * fall), abs=LOCATED)
+    assert plant.output().foot.impact_speed == pytest.approx(
+        np.full(6, gravity * fall), abs=LOCATED
+    )
 
 
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
 @pytest.mark.parametrize("step", [7e-3, 3e-3, 1e-3])
-def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(core: ct.CDLL, method: str, step: float) -> None:
-    """The whole impact takes some 10 ms; the steps are stiff enough for where the approach leads."""
-    plant, fastest = falling(core, changed(rigid(gravity=9.81), solver={"step": step, "method": method}), clearance=0.08), 0.0
+def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(
+    core: ct.CDLL, method: str, step: float
+) -> None:
+    """The whole impact takes some 10 ms; the steps are stiff enough for where the approach
+    leads.
+    """
+    plant, fastest = (
+        falling(
+            core,
+            changed(rigid(gravity=9.81), solver={"step": step, "method": method}),
+            clearance=0.08,
+        ),
+        0.0,
+    )
     for _ in range(14):
         plant.step(plant.time + 0.021)
         fastest = max(fastest, float(plant.output().torso.velocity[2]))
@@ -165,12 +212,18 @@ def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(core: ct.CDLL,
 
 
 def test_feet_of_unequal_height_touch_down_one_after_the_other(core: ct.CDLL) -> None:
-    """Each at its own time, in free fall until the first: the first one's speed is ballistic, all are sampled."""
+    """Each at its own time, in free fall until the first: the first one's speed is ballistic,
+    all are sampled.
+    """
     robot = rigid(gravity=9.81)
     angle = robot.stance.copy()
     angle[:, 1] -= 0.01 * np.arange(6)  # femurs lower: leg RR reaches furthest down
-    feet = foot_contacts(robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, angle, np.zeros((6, 3))))
-    plant = Plant(core, robot, position=[0.0, 0.0, 0.05 + max(foot.penetration for foot in feet)], angle=angle)
+    feet = foot_contacts(
+        robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, angle, np.zeros((6, 3)))
+    )
+    plant = Plant(
+        core, robot, position=[0.0, 0.0, 0.05 + max(foot.penetration for foot in feet)], angle=angle
+    )
     command = type(plant.hold())(angle_ref=angle)
     order: list[int] = []
     while len(order) < 2:
@@ -181,7 +234,9 @@ def test_feet_of_unequal_height_touch_down_one_after_the_other(core: ct.CDLL) ->
     assert foot.impact_speed[5] == pytest.approx(math.sqrt(2.0 * 9.81 * 0.05), abs=LOCATED)
 
 
-def test_the_impact_speed_is_held_until_lift_off_and_the_next_touchdown_samples_anew(core: ct.CDLL) -> None:
+def test_the_impact_speed_is_held_until_lift_off_and_the_next_touchdown_samples_anew(
+    core: ct.CDLL,
+) -> None:
     robot = rigid(gravity=9.81, restitution=0.5)
     plant, damped = falling(core, robot, clearance=0.05), 0
     speeds: list[float] = []
@@ -191,7 +246,11 @@ def test_the_impact_speed_is_held_until_lift_off_and_the_next_touchdown_samples_
         foot = plant.output().foot
         if foot.contact[2]:
             speeds.append(foot.impact_speed[2])
-            law = robot.contact.stiffness * foot.penetration[2] ** 1.5 * (1.0 - chi * foot.velocity[2, 2] / speeds[-1])
+            law = (
+                robot.contact.stiffness
+                * foot.penetration[2] ** 1.5
+                * (1.0 - chi * foot.velocity[2, 2] / speeds[-1])
+            )
             assert foot.normal_force[2] == pytest.approx(law, rel=1e-9)
             damped += 1
     first, second = sorted(set(speeds), reverse=True)[:2]
@@ -209,14 +268,20 @@ def test_a_touchdown_below_the_floor_counts_as_the_floor(core: ct.CDLL) -> None:
         foot = plant.output().foot
         if foot.contact[0]:
             assert foot.impact_speed[0] == pytest.approx(speed, rel=1e-9)
-            law = robot.contact.stiffness * foot.penetration[0] ** 1.5 * (1.0 - chi * foot.velocity[0, 2] / 0.1)
+            law = (
+                robot.contact.stiffness
+                * foot.penetration[0] ** 1.5
+                * (1.0 - chi * foot.velocity[0, 2] / 0.1)
+            )
             assert foot.normal_force[0] == pytest.approx(law, rel=1e-9)
             pressed += 1
     assert pressed > 10
 
 
 def test_the_ground_never_pulls(core: ct.CDLL) -> None:
-    """A foot torn out faster than it came down: its damping force would be larger than its elastic one."""
+    """A foot torn out faster than it came down: its damping force would be larger than its
+    elastic one.
+    """
     robot = changed(rigid(restitution=0.2, gravity=9.81), servo={"mode": "position"})
     plant = falling(core, robot, clearance=0.02)
     up = type(plant.hold())(angle_ref=robot.stance, push_force=np.array([0.0, 0.0, 800.0]))
@@ -226,7 +291,9 @@ def test_the_ground_never_pulls(core: ct.CDLL) -> None:
         plant.step(plant.time + 1e-3, command)
         foot = plant.output(command).foot
         assert np.all(foot.normal_force >= 0.0)
-        cut += int(np.sum((foot.contact == 1) & (foot.penetration > 0.0) & (foot.normal_force == 0.0)))
+        cut += int(
+            np.sum((foot.contact == 1) & (foot.penetration > 0.0) & (foot.normal_force == 0.0))
+        )
     assert cut > 0
 
 
@@ -235,12 +302,30 @@ def test_switching_touches_down_open_feet_and_lifts_off_closed_ones(core: ct.CDL
     plant, state = Plant(core, robot), np.zeros((3, 6))
     core.hx_probe_contact_switch.restype = ct.c_int
     rows = [
-        ([1e-6, -1e-6, 0.0, 2e-6, 3e-6, -1.0], [0.3, 0.2, 0.1, 0.0, -0.1, 1.0], 3, [1, 0, 0, 1, 1, 0], [0.3, 0.0, 0.0, 0.0, -0.1, 0.0]),
-        ([1e-3, 1e-6, 0.0, 0.0, 1e-3, -1.0], [0.9, 0.5, 0.9, 0.9, 0.9, 0.9], 1, [1, 1, 0, 0, 1, 0], [0.3, 0.5, 0.0, 0.0, -0.1, 0.0]),
-    ]  # fmt: skip
+        (
+            [1e-6, -1e-6, 0.0, 2e-6, 3e-6, -1.0],
+            [0.3, 0.2, 0.1, 0.0, -0.1, 1.0],
+            3,
+            [1, 0, 0, 1, 1, 0],
+            [0.3, 0.0, 0.0, 0.0, -0.1, 0.0],
+        ),
+        (
+            [1e-3, 1e-6, 0.0, 0.0, 1e-3, -1.0],
+            [0.9, 0.5, 0.9, 0.9, 0.9, 0.9],
+            1,
+            [1, 1, 0, 0, 1, 0],
+            [0.3, 0.5, 0.0, 0.0, -0.1, 0.0],
+        ),
+    ]
     chi = asked(core.hx_probe_exact_restitution_chi, 0.5)
     for delta, ddelta, touchdowns, closed, speeds in rows:
-        places = [np.array(values).ctypes.data_as(ct.POINTER(ct.c_double)) for values in (delta, ddelta)]
-        count = core.hx_probe_contact_switch(ct.c_void_p(plant.handle), *places, state.ctypes.data_as(ct.POINTER(ct.c_double)))
+        places = [
+            np.array(values).ctypes.data_as(ct.POINTER(ct.c_double)) for values in (delta, ddelta)
+        ]
+        count = core.hx_probe_contact_switch(
+            ct.c_void_p(plant.handle), *places, state.ctypes.data_as(ct.POINTER(ct.c_double))
+        )
         assert (count, list(state[0]), list(state[2])) == (touchdowns, closed, speeds)
-        assert state[1] == pytest.approx(np.where(closed, chi / np.maximum(speeds, robot.contact.impact_speed_floor), 0.0))
+        assert state[1] == pytest.approx(
+            np.where(closed, chi / np.maximum(speeds, robot.contact.impact_speed_floor), 0.0)
+        )

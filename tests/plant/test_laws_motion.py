@@ -18,21 +18,36 @@ from hexapod_cosim.models.energy import kinetic_energy, momentum, potential_ener
 from hexapod_cosim.models.records import Array
 
 ROUNDING = 1e-13  # relative, per quantity: sums of 19 terms over some hundred steps
-CONSTRAINED = 1e-9  # relative, of what is conserved up to the integrator's error at a tolerance of 1e-12
+CONSTRAINED = (
+    1e-9  # relative, of what is conserved up to the integrator's error at a tolerance of 1e-12
+)
 FLIGHT: dict[str, Any] = {"method": "dp54", "tolerance": 1e-12, "step_max": 1.0}
-LOSSLESS: dict[str, Any] = {"mode": "torque", "coulomb_friction": 0.0, "torque_max": 100.0, "speed_max": 1e4}
+LOSSLESS: dict[str, Any] = {
+    "mode": "torque",
+    "coulomb_friction": 0.0,
+    "torque_max": 100.0,
+    "speed_max": 1e4,
+}
 WEIGHTLESS = (0.0, 0.0, 0.0)
 HIGH = 3.0  # m above the ground
 
 
 def tumbling(core: ct.CDLL, robot: Robot, seed: int = 1) -> Plant:
     pose = random_pose(robot, seed)
-    return Plant(core, robot, **pose | {"position": np.array([0.2, -0.1, HIGH]), "angular_velocity": np.array([2.0, -3.0, 1.5])})
+    return Plant(
+        core,
+        robot,
+        **pose
+        | {"position": np.array([0.2, -0.1, HIGH]), "angular_velocity": np.array([2.0, -3.0, 1.5])},
+    )
 
 
 def free(**solver: Any) -> Robot:
     """No gravity, no torque, no friction in the gears."""
-    return replace(changed(load_robot("phantomx_mk4"), servo=LOSSLESS, solver=FLIGHT | solver), gravity=WEIGHTLESS)
+    return replace(
+        changed(load_robot("phantomx_mk4"), servo=LOSSLESS, solver=FLIGHT | solver),
+        gravity=WEIGHTLESS,
+    )
 
 
 # free flight
@@ -40,7 +55,9 @@ def free(**solver: Any) -> Robot:
 
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])
 @pytest.mark.parametrize("method", ["rosw3", "dp54"])
-def test_linear_momentum_changes_by_the_weight_alone_to_rounding(core: ct.CDLL, mode: str, method: str) -> None:
+def test_linear_momentum_changes_by_the_weight_alone_to_rounding(
+    core: ct.CDLL, mode: str, method: str
+) -> None:
     """Whatever the servos do. Every method keeps a linear invariant exactly."""
     robot = changed(load_robot("phantomx_mk4"), servo={"mode": mode}, solver={"method": method})
     plant = tumbling(core, robot)
@@ -49,7 +66,9 @@ def test_linear_momentum_changes_by_the_weight_alone_to_rounding(core: ct.CDLL, 
     plant.step(0.3, replace(plant.hold(), torque_ref=np.full((6, 3), 0.1)))
     gained = momentum(robot, plant.bodies)[0] - before
     weight = robot.total_mass * np.array(robot.gravity)
-    assert float(np.max(np.abs(gained - 0.3 * weight))) < 100.0 * ROUNDING * float(np.max(np.abs(weight)))
+    assert float(np.max(np.abs(gained - 0.3 * weight))) < 100.0 * ROUNDING * float(
+        np.max(np.abs(weight))
+    )
 
 
 def test_angular_momentum_is_conserved_whatever_the_joints_do(core: ct.CDLL) -> None:
@@ -62,15 +81,21 @@ def test_angular_momentum_is_conserved_whatever_the_joints_do(core: ct.CDLL) -> 
     assert float(np.max(np.abs(plant.output().angle - robot.stance))) < 0.5
 
 
-@pytest.mark.parametrize(("method", "order"), [("rosw3", 3), ("ros2", 2), ("dp54", 5), ("bs32", 3), ("rk4", 4)])
-def test_the_energy_of_a_free_robot_is_conserved_at_the_order_of_the_method(core: ct.CDLL, method: str, order: int) -> None:
+@pytest.mark.parametrize(
+    ("method", "order"), [("rosw3", 3), ("ros2", 2), ("dp54", 5), ("bs32", 3), ("rk4", 4)]
+)
+def test_the_energy_of_a_free_robot_is_conserved_at_the_order_of_the_method(
+    core: ct.CDLL, method: str, order: int
+) -> None:
     robot, errors, steps = free(), [], 0.1 / np.array([40.0, 80.0] if order == 5 else [80.0, 160.0])
     for step in steps:
         plant = tumbling(core, changed(robot, solver={"method": method, "step": float(step)}))
         before = kinetic_energy(robot, plant.bodies)
         plant.step(0.1, Command(angle_ref=robot.stance))
         errors.append(abs(kinetic_energy(robot, plant.bodies) - before))
-        assert plant.output().energy.residual == pytest.approx(kinetic_energy(robot, plant.bodies) - before, abs=1e-12)
+        assert plant.output().energy.residual == pytest.approx(
+            kinetic_energy(robot, plant.bodies) - before, abs=1e-12
+        )
     # at least: a method may keep energy better than it keeps the motion
     assert math.log2(errors[0] / errors[1]) > order - 0.3
     assert errors[0] < 1e-2 * before
@@ -88,8 +113,13 @@ def test_a_falling_robot_trades_potential_for_kinetic_energy(core: ct.CDLL) -> N
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_spin_about_a_principal_axis_is_steady(core: ct.CDLL, axis: int) -> None:
-    """Joints locked, legs level: by symmetry the principal axes are the torso's; a turn of seven seconds would show a torque."""
-    robot = replace(changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=FLIGHT), gravity=WEIGHTLESS)
+    """Joints locked, legs level: by symmetry the principal axes are the torso's; a turn of seven
+    seconds would show a torque.
+    """
+    robot = replace(
+        changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=FLIGHT),
+        gravity=WEIGHTLESS,
+    )
     flat, spin = np.zeros((6, 3)), 0.9 * np.eye(3)[axis]
     plant = Plant(core, robot, angle=flat, angular_velocity=spin, position=(0.0, 0.0, HIGH))
     plant.step(7.0, Command(angle_ref=flat))
@@ -101,7 +131,10 @@ def test_a_spin_about_a_principal_axis_is_steady(core: ct.CDLL, axis: int) -> No
 
 
 def test_a_spin_about_a_skew_axis_wobbles_but_keeps_its_momentum_and_energy(core: ct.CDLL) -> None:
-    robot = replace(changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=FLIGHT), gravity=WEIGHTLESS)
+    robot = replace(
+        changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=FLIGHT),
+        gravity=WEIGHTLESS,
+    )
     flat, spin = np.zeros((6, 3)), np.array([2.0, 2.0, 1.0])
     plant = Plant(core, robot, angle=flat, angular_velocity=spin, position=(0.0, 0.0, HIGH))
     before, energy = momentum(robot, plant.bodies)[1], kinetic_energy(robot, plant.bodies)
@@ -113,14 +146,21 @@ def test_a_spin_about_a_skew_axis_wobbles_but_keeps_its_momentum_and_energy(core
 
 # the pendulum
 
-PERIOD = 2.3678419476  # s: 1 kg on 1 m without a rod, let go horizontally, g = 9.81 m/s2; 4 K(sin 45 deg) sqrt(l/g)
+# s: 1 kg on 1 m without a rod, let go horizontally, g = 9.81 m/s2; 4 K(sin 45 deg) sqrt(l/g)
+PERIOD = 2.3678419476
 BOB = (1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0)  # kg m2, of 1 kg m2 about the joint
 HEAVY = (1e6, 1e6, 1e6, 0.0, 0.0, 0.0)
 
 
 def pendulums() -> Robot:
-    """Six 1 kg bobs on 1 m tibias; coxas and femurs too heavy to turn, their joints all at the hips; nothing else rotates."""
-    robot = changed(load_robot("athena"), servo=LOSSLESS | {"rotor_inertia": 0.0}, torso={"mass": 1e9, "inertia": (1e9, 1e9, 1e9, 0, 0, 0)})
+    """Six 1 kg bobs on 1 m tibias; coxas and femurs too heavy to turn, their joints all at the
+    hips; nothing else rotates.
+    """
+    robot = changed(
+        load_robot("athena"),
+        servo=LOSSLESS | {"rotor_inertia": 0.0},
+        torso={"mass": 1e9, "inertia": (1e9, 1e9, 1e9, 0, 0, 0)},
+    )
     for joint in (0, 1):
         robot = with_links(robot, joint, mass=1e3, length=1e-9, com=(0.0, 0.0, 0.0), inertia=HEAVY)
     robot = with_links(robot, 2, mass=1.0, length=1.0, com=(1.0, 0.0, 0.0), inertia=BOB)
@@ -129,7 +169,8 @@ def pendulums() -> Robot:
 
 def test_a_pendulum_let_go_horizontally_has_its_closed_period(core: ct.CDLL) -> None:
     robot, flat = pendulums(), np.zeros((6, 3))
-    # the push that carries everything but swings with nothing: the torso weighs too much to answer the bobs
+    # the push that carries everything but swings with nothing: the torso weighs too much to answer
+    # the bobs
     carry = Command(angle_ref=flat, push_force=np.array([0.0, 0.0, robot.total_mass * 9.81]))
     plant = Plant(core, robot, angle=flat)
     plant.step(PERIOD / 4.0, carry)
@@ -141,7 +182,9 @@ def test_a_pendulum_let_go_horizontally_has_its_closed_period(core: ct.CDLL) -> 
     plant.step(PERIOD, carry)
     back = plant.output(carry)
     assert back.angle[:, 2] == pytest.approx(np.zeros(6), abs=1e-9)
-    late = back.speed[:, 2] / 9.81  # s: at the turning point speed is g/l times the time passed since
+    late = (
+        back.speed[:, 2] / 9.81
+    )  # s: at the turning point speed is g/l times the time passed since
     assert late == pytest.approx(np.zeros(6), abs=2e-8)
 
 
@@ -151,12 +194,21 @@ FIXED: dict[str, Any] = {"method": "rosw3", "step": 1e-4}  # no decisions that r
 MIRRORED = 1e-9  # after 1500 steps with impacts: rounding, grown by the contacts' stiffness
 OTHER_SIDE = [3, 4, 5, 0, 1, 2]
 COXA = np.array([-1.0, 1.0, 1.0])
-POLAR, AXIAL, TURN = np.array([1.0, -1.0, 1.0]), np.array([-1.0, 1.0, -1.0]), np.array([1.0, -1.0, 1.0, -1.0])
+POLAR, AXIAL, TURN = (
+    np.array([1.0, -1.0, 1.0]),
+    np.array([-1.0, 1.0, -1.0]),
+    np.array([1.0, -1.0, 1.0, -1.0]),
+)
 
 
 def mirrored_command(command: Command) -> Command:
-    joints = {name: getattr(command, name)[OTHER_SIDE] * COXA for name in ("angle_ref", "speed_ref", "torque_ref")}
-    return Command(**joints, push_force=command.push_force * POLAR, push_torque=command.push_torque * AXIAL)
+    joints = {
+        name: getattr(command, name)[OTHER_SIDE] * COXA
+        for name in ("angle_ref", "speed_ref", "torque_ref")
+    }
+    return Command(
+        **joints, push_force=command.push_force * POLAR, push_torque=command.push_torque * AXIAL
+    )
 
 
 def landed(plant: Plant, mirror: Any) -> tuple[Any, Any]:
@@ -183,7 +235,9 @@ def test_left_right_mirrored_commands_give_the_mirrored_motion(core: ct.CDLL) ->
     assert here.solver.touchdowns == there.solver.touchdowns >= 3
     assert there.torso.position * POLAR == pytest.approx(here.torso.position, abs=MIRRORED)
     assert there.torso.quaternion * TURN == pytest.approx(here.torso.quaternion, abs=MIRRORED)
-    assert there.torso.angular_velocity * AXIAL == pytest.approx(here.torso.angular_velocity, abs=100.0 * MIRRORED)
+    assert there.torso.angular_velocity * AXIAL == pytest.approx(
+        here.torso.angular_velocity, abs=100.0 * MIRRORED
+    )
     assert there.angle[OTHER_SIDE] * COXA == pytest.approx(here.angle, abs=MIRRORED)
     assert there.torque[OTHER_SIDE] * COXA == pytest.approx(here.torque, abs=1e3 * MIRRORED)
 
@@ -196,7 +250,13 @@ def test_the_order_of_the_legs_does_not_matter(core: ct.CDLL) -> None:
     other = pose | {name: pose[name][order] for name in ("angle", "speed")}
 
     def reordered(command: Command) -> Command:
-        return replace(command, **{name: getattr(command, name)[order] for name in ("angle_ref", "speed_ref", "torque_ref")})
+        return replace(
+            command,
+            **{
+                name: getattr(command, name)[order]
+                for name in ("angle_ref", "speed_ref", "torque_ref")
+            },
+        )
 
     here, bodies = landed(Plant(core, robot, **pose), lambda command: command)
     there, others = landed(Plant(core, shuffled, **other), reordered)
@@ -206,17 +266,29 @@ def test_the_order_of_the_legs_does_not_matter(core: ct.CDLL) -> None:
 
 
 def test_turning_the_world_turns_the_motion(core: ct.CDLL) -> None:
-    """The same robot started turned about the vertical, on flat ground: nothing knows where x points."""
+    """The same robot started turned about the vertical, on flat ground: nothing knows where x
+    points.
+    """
     robot, turn = changed(load_robot("athena"), solver=FIXED), 0.7
     z = np.array([math.cos(turn / 2.0), 0.0, 0.0, math.sin(turn / 2.0)])
-    R = np.array([[math.cos(turn), -math.sin(turn), 0.0], [math.sin(turn), math.cos(turn), 0.0], [0.0, 0.0, 1.0]])
+    R = np.array(
+        [
+            [math.cos(turn), -math.sin(turn), 0.0],
+            [math.sin(turn), math.cos(turn), 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
     pose = landing(robot, 8)
     other = pose | {name: R @ pose[name] for name in ("position", "velocity", "angular_velocity")}
     w, x, y, v = pose["quaternion"]
-    other["quaternion"] = np.array([z[0] * w - z[3] * v, z[0] * x - z[3] * y, z[0] * y + z[3] * x, z[0] * v + z[3] * w])
+    other["quaternion"] = np.array(
+        [z[0] * w - z[3] * v, z[0] * x - z[3] * y, z[0] * y + z[3] * x, z[0] * v + z[3] * w]
+    )
 
     def turned(command: Command) -> Command:
-        return replace(command, push_force=R @ command.push_force, push_torque=R @ command.push_torque)
+        return replace(
+            command, push_force=R @ command.push_force, push_torque=R @ command.push_torque
+        )
 
     here, bodies = landed(Plant(core, robot, **pose), lambda command: command)
     there, others = landed(Plant(core, robot, **other), turned)

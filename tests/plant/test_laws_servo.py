@@ -1,6 +1,7 @@
 """Servos through the whole plant: limits, rotor inertia, gear friction, the kinematic drive.
 
-On legs whose coxas and femurs are too heavy to move, each tibia is a link on a wall: closed forms hold for its joint alone.
+On legs whose coxas and femurs are too heavy to move, each tibia is a link on a wall: closed forms
+hold for its joint alone.
 """
 
 from __future__ import annotations
@@ -20,16 +21,27 @@ from hexapod_cosim.models.contact import standing_damping
 from hexapod_cosim.models.dynamics import Command, accelerations
 from hexapod_cosim.models.statics import standing
 
-CLOSED = 1e-6  # relative, of closed forms: a tibia's inertia over that of its wall is 1e-7; and an error control of 1e-10 a step
+# relative, of closed forms: a tibia's inertia over that of its wall is 1e-7; and an error control
+# of 1e-10 a step
+CLOSED = 1e-6
 WEIGHTLESS = (0.0, 0.0, 0.0)
 FLIGHT: dict[str, Any] = {"method": "dp54", "tolerance": 1e-10, "step_max": 1.0}
-HEAVY: dict[str, Any] = {"mass": 1e5, "inertia": (1e4, 1e4, 1e4, 0.0, 0.0, 0.0), "com": (0.0, 0.0, 0.0)}
+HEAVY: dict[str, Any] = {
+    "mass": 1e5,
+    "inertia": (1e4, 1e4, 1e4, 0.0, 0.0, 0.0),
+    "com": (0.0, 0.0, 0.0),
+}
 STRETCHED = np.zeros((6, 3))
 
 
 def walled(**servo: Any) -> Robot:
     """No gravity; tibias on femurs that do not answer."""
-    robot = changed(load_robot("athena"), servo={"coulomb_friction": 0.0} | servo, torso={"mass": 1e6}, solver=FLIGHT)
+    robot = changed(
+        load_robot("athena"),
+        servo={"coulomb_friction": 0.0} | servo,
+        torso={"mass": 1e6},
+        solver=FLIGHT,
+    )
     robot = changed(robot, torso={"inertia": (1e6, 1e6, 1e6, 0.0, 0.0, 0.0)})
     return replace(with_links(with_links(robot, 0, **HEAVY), 1, **HEAVY), gravity=WEIGHTLESS)
 
@@ -66,35 +78,57 @@ def test_a_damped_servo_decays_as_a_linear_oscillator(core: ct.CDLL) -> None:
 
 def test_a_torque_meets_the_link_and_its_rotor(core: ct.CDLL) -> None:
     robot = walled(mode="torque", torque_max=100.0, speed_max=1e6)
-    plant, command = Plant(core, robot, angle=STRETCHED), Command(angle_ref=STRETCHED, torque_ref=tibias(0.02))
+    plant, command = (
+        Plant(core, robot, angle=STRETCHED),
+        Command(angle_ref=STRETCHED, torque_ref=tibias(0.02)),
+    )
     plant.step(0.3, command)
     rate = 0.02 / tibia_inertia(robot)
     assert plant.output(command).speed[:, 2] == pytest.approx(np.full(6, 0.3 * rate), rel=CLOSED)
-    assert plant.output(command).energy.actuator_work == pytest.approx(6.0 * 0.02 * 0.5 * rate * 0.3**2, rel=CLOSED)
-    assert plant.output(command).energy.kinetic == pytest.approx(plant.output(command).energy.actuator_work, rel=CLOSED)
+    assert plant.output(command).energy.actuator_work == pytest.approx(
+        6.0 * 0.02 * 0.5 * rate * 0.3**2, rel=CLOSED
+    )
+    assert plant.output(command).energy.kinetic == pytest.approx(
+        plant.output(command).energy.actuator_work, rel=CLOSED
+    )
 
 
 def test_torque_is_limited_at_stall_and_by_the_torque_speed_line(core: ct.CDLL) -> None:
-    """Full command from rest: w = w0 (1 - exp(-tau t / (I w0))) along the line, and never faster than no-load."""
+    """Full command from rest: w = w0 (1 - exp(-tau t / (I w0))) along the line, and never faster
+    than no-load.
+    """
     robot = walled(mode="torque")
-    plant, command = Plant(core, robot, angle=STRETCHED), Command(angle_ref=STRETCHED, torque_ref=tibias(50.0))
-    assert plant.output(command).torque[:, 2] == pytest.approx(np.full(6, robot.servo.torque_max), rel=1e-14)
+    plant, command = (
+        Plant(core, robot, angle=STRETCHED),
+        Command(angle_ref=STRETCHED, torque_ref=tibias(50.0)),
+    )
+    assert plant.output(command).torque[:, 2] == pytest.approx(
+        np.full(6, robot.servo.torque_max), rel=1e-14
+    )
     constant = tibia_inertia(robot) * robot.servo.speed_max / robot.servo.torque_max
     for t in (0.5 * constant, constant, 3.0 * constant):
         plant.step(t, command)
         speed = robot.servo.speed_max * (1.0 - math.exp(-t / constant))
         assert plant.output(command).speed[:, 2] == pytest.approx(np.full(6, speed), rel=CLOSED)
         line = robot.servo.torque_max * (1.0 - speed / robot.servo.speed_max)
-        assert plant.output(command).torque[:, 2] == pytest.approx(np.full(6, line), rel=10.0 * CLOSED)
+        assert plant.output(command).torque[:, 2] == pytest.approx(
+            np.full(6, line), rel=10.0 * CLOSED
+        )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_no_torque_is_left_beyond_the_no_load_speed_but_full_braking_is(core: ct.CDLL, sign: float) -> None:
+def test_no_torque_is_left_beyond_the_no_load_speed_but_full_braking_is(
+    core: ct.CDLL, sign: float
+) -> None:
     robot = walled(mode="torque")
     plant = Plant(core, robot, angle=STRETCHED, speed=tibias(sign * 9.0))
-    forward, back = (Command(angle_ref=STRETCHED, torque_ref=tibias(way * sign * 50.0)) for way in (1.0, -1.0))
+    forward, back = (
+        Command(angle_ref=STRETCHED, torque_ref=tibias(way * sign * 50.0)) for way in (1.0, -1.0)
+    )
     assert plant.output(forward).torque[:, 2] == pytest.approx(np.zeros(6), abs=1e-14)
-    assert plant.output(back).torque[:, 2] == pytest.approx(np.full(6, -sign * robot.servo.torque_max), rel=1e-14)
+    assert plant.output(back).torque[:, 2] == pytest.approx(
+        np.full(6, -sign * robot.servo.torque_max), rel=1e-14
+    )
 
 
 def test_gear_friction_stops_a_tibia_at_its_closed_rate(core: ct.CDLL) -> None:
@@ -120,8 +154,12 @@ def driven(robot: Robot) -> Robot:
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(core: ct.CDLL, name: str) -> None:
-    """References that fit together, q + qd h from macro-step to macro-step: the joints are where they are told to be."""
+def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(
+    core: ct.CDLL, name: str
+) -> None:
+    """References that fit together, q + qd h from macro-step to macro-step: the joints are where
+    they are told to be.
+    """
     robot = driven(load_robot(name))
     start = landing(robot)
     angle, speed = start["angle"].copy(), start["speed"]
@@ -142,21 +180,33 @@ def in_flight(**baumgarte: float) -> Robot:
     return changed(driven(load_robot("athena")), solver=FLIGHT, baumgarte=baumgarte)
 
 
-@pytest.mark.parametrize("baumgarte", [{}, {"alpha": 0.0, "beta": 0.0}, {"alpha": 5.0, "beta": 80.0}], ids=str)
-def test_a_drive_told_its_acceleration_stays_on_its_parabola(core: ct.CDLL, baumgarte: dict[str, float]) -> None:
-    """From rest by 30 rad/s2 for 20 ms: 6 mrad and 0.6 rad/s; then from there, with that speed, as far again and two such ways more."""
+@pytest.mark.parametrize(
+    "baumgarte", [{}, {"alpha": 0.0, "beta": 0.0}, {"alpha": 5.0, "beta": 80.0}], ids=str
+)
+def test_a_drive_told_its_acceleration_stays_on_its_parabola(
+    core: ct.CDLL, baumgarte: dict[str, float]
+) -> None:
+    """From rest by 30 rad/s2 for 20 ms: 6 mrad and 0.6 rad/s; then from there, with that speed,
+    as far again and two such ways more.
+    """
     robot = in_flight(**baumgarte)
     plant, way = Plant(core, robot), ACCELERATION / 30.0
     plant.step(0.02, Command(angle_ref=robot.stance, acceleration_ref=ACCELERATION))
     output = plant.output()
     assert output.angle - robot.stance == pytest.approx(0.006 * way, abs=1e-9)
     assert output.speed == pytest.approx(0.6 * way, abs=1e-7)
-    plant.step(0.04, Command(angle_ref=output.angle, speed_ref=output.speed, acceleration_ref=ACCELERATION))
+    plant.step(
+        0.04, Command(angle_ref=output.angle, speed_ref=output.speed, acceleration_ref=ACCELERATION)
+    )
     assert plant.output().angle - robot.stance == pytest.approx(0.024 * way, abs=1e-9)
 
 
-def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared(core: ct.CDLL) -> None:
-    """What importers get that leave acceleration_ref at 0: 30 rad/s2 over (100/s)^2 are 3 mrad, once the drive has settled."""
+def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared(
+    core: ct.CDLL,
+) -> None:
+    """What importers get that leave acceleration_ref at 0: 30 rad/s2 over (100/s)^2 are 3 mrad,
+    once the drive has settled.
+    """
     robot, h = in_flight(alpha=100.0, beta=100.0), 1e-4
     plant, lag = Plant(core, robot), {}
     for k in range(1500):
@@ -178,7 +228,9 @@ def test_a_servo_does_not_look_at_acceleration_ref(core: ct.CDLL, mode: str) -> 
 
 
 def test_a_rate_of_an_input_takes_the_place_of_the_input_above_it(core: ct.CDLL) -> None:
-    """speed_ref that grows is acceleration_ref; acceleration_ref that grows moves the drive by t^3/6 of its rate."""
+    """speed_ref that grows is acceleration_ref; acceleration_ref that grows moves the drive by
+    t^3/6 of its rate.
+    """
     robot = in_flight(alpha=5.0, beta=80.0)
     plants = [Plant(core, robot) for _ in range(3)]
     none, speed = np.zeros((6, 3)), 0.1 * ACCELERATION
@@ -189,8 +241,12 @@ def test_a_rate_of_an_input_takes_the_place_of_the_input_above_it(core: ct.CDLL)
     plants[1].step_ramp(0.02, begin, Command(angle_ref=none, speed_ref=ACCELERATION))
     plants[2].step_ramp(0.02, begin, Command(angle_ref=none, acceleration_ref=ACCELERATION / 0.02))
     way = ACCELERATION / 30.0
-    for plant, parabola in zip(plants, (0.006, 0.006, 0.002), strict=True):  # 30 t^2/2, and 1500 t^3/6
-        assert plant.output().angle - robot.stance == pytest.approx((0.06 + parabola) * way, abs=1e-8)
+    for plant, parabola in zip(
+        plants, (0.006, 0.006, 0.002), strict=True
+    ):  # 30 t^2/2, and 1500 t^3/6
+        assert plant.output().angle - robot.stance == pytest.approx(
+            (0.06 + parabola) * way, abs=1e-8
+        )
 
 
 def test_a_drive_off_its_reference_returns_at_the_rate_of_its_stabilisation(core: ct.CDLL) -> None:
@@ -218,7 +274,9 @@ def test_drive_torque_is_that_of_inverse_dynamics(core: ct.CDLL) -> None:
     assert solved.drive_torque == pytest.approx(dense.drive_torque, rel=1e-9, abs=1e-9)
     assert np.array_equal(plant.output(command).torque, solved.drive_torque)
 
-    strong = Plant(core, changed(robot, servo={"mode": "torque", "torque_max": 1e5, "speed_max": 1e9}))
+    strong = Plant(
+        core, changed(robot, servo={"mode": "torque", "torque_max": 1e5, "speed_max": 1e9})
+    )
     strong.bodies = body
     by_torque = strong.accelerations(replace(command, torque_ref=solved.drive_torque)).dv
     assert float(np.max(np.abs(by_torque - solved.dv))) < 1e-8 * float(np.max(np.abs(solved.dv)))
@@ -234,8 +292,13 @@ def test_drives_that_hold_a_standing_robot_give_the_torques_that_servos_give(cor
 
 
 def test_drive_work_is_what_the_robot_gains(core: ct.CDLL) -> None:
-    """Legs swung in free fall without gravity: the multiplier times the speed is all the power there is."""
-    robot = replace(changed(driven(load_robot("athena")), servo={"coulomb_friction": 0.0}, solver=FLIGHT), gravity=WEIGHTLESS)
+    """Legs swung in free fall without gravity: the multiplier times the speed is all the power
+    there is.
+    """
+    robot = replace(
+        changed(driven(load_robot("athena")), servo={"coulomb_friction": 0.0}, solver=FLIGHT),
+        gravity=WEIGHTLESS,
+    )
     plant = Plant(core, robot)
     command = Command(angle_ref=robot.stance, speed_ref=np.tile([0.5, -1.0, 1.5], (6, 1)))
     plant.step(0.1, command)

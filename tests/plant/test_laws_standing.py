@@ -1,4 +1,6 @@
-"""Standing, creeping, sliding and walking in place through the whole plant: balances, the friction cone, the energy books."""
+"""Standing, creeping, sliding and walking in place through the whole plant: balances, the
+friction cone, the energy books.
+"""
 
 from __future__ import annotations
 
@@ -24,20 +26,31 @@ AT_REST = 1e-9  # relative, and m, m/s, m/s2: the settled pose is in balance to 
 CREEP = 1e-9  # relative, of the creep's speed: settling takes milliseconds
 SLIDE = 1e-5  # relative, of the acceleration: in proportion to the tolerance, 1e-8 leaves 1e-6
 WALK = 1e-3  # of the energy turned over, at the default tolerance of 1e-5 a step
-DRIFT = 2e-6  # m or 1, of all joints: the same tolerance, with Baumgarte's 50 1/s holding against it
+DRIFT = (
+    2e-6  # m or 1, of all joints: the same tolerance, with Baumgarte's 50 1/s holding against it
+)
 ROBOTS = ("athena", "phantomx_mk4")
 ACCURATE: dict[str, Any] = {"tolerance": 1e-8}
 
 
 def stood(core: ct.CDLL, robot: Robot) -> Plant:
     pose = standing(robot)
-    return Plant(core, robot, position=pose.position, quaternion=pose.quaternion, angle=pose.angle, velocity=pose.velocity)
+    return Plant(
+        core,
+        robot,
+        position=pose.position,
+        quaternion=pose.quaternion,
+        angle=pose.angle,
+        velocity=pose.velocity,
+    )
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_a_settled_robot_stays_and_its_foot_forces_carry_its_weight(core: ct.CDLL, name: str, mode: str, law: str) -> None:
+def test_a_settled_robot_stays_and_its_foot_forces_carry_its_weight(
+    core: ct.CDLL, name: str, mode: str, law: str
+) -> None:
     robot = changed(load_robot(name), servo={"mode": mode}, solver=ACCURATE, friction={"law": law})
     plant = stood(core, robot)
     start = plant.bodies
@@ -48,14 +61,21 @@ def test_a_settled_robot_stays_and_its_foot_forces_carry_its_weight(core: ct.CDL
     com = centre_of_mass(robot, plant.bodies)
     pressure = output.foot.normal_force @ output.foot.position / output.foot.normal_force.sum()
     assert pressure[:2] == pytest.approx(com[:2], abs=AT_REST)
-    assert rotation_matrix(output.torso.quaternion) @ output.imu.specific_force == pytest.approx([0.0, 0.0, 9.81], abs=10.0 * AT_REST)
+    assert rotation_matrix(output.torso.quaternion) @ output.imu.specific_force == pytest.approx(
+        [0.0, 0.0, 9.81], abs=10.0 * AT_REST
+    )
     assert output.solver.touchdowns == 0
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_dropped_robot_comes_to_carry_its_weight(core: ct.CDLL, name: str) -> None:
     robot = load_robot(name)
-    plant = Plant(core, robot, **landing(robot) | {"quaternion": np.eye(4)[0], "speed": np.zeros((6, 3)), "angular_velocity": np.zeros(3)})
+    plant = Plant(
+        core,
+        robot,
+        **landing(robot)
+        | {"quaternion": np.eye(4)[0], "speed": np.zeros((6, 3)), "angular_velocity": np.zeros(3)},
+    )
     plant.step(4.0)
     output, weight = plant.output(), robot.total_mass * 9.81
     assert output.foot.normal_force.sum() == pytest.approx(weight, rel=5e-3)
@@ -65,16 +85,22 @@ def test_a_dropped_robot_comes_to_carry_its_weight(core: ct.CDLL, name: str) -> 
 
 
 def test_standing_joint_torques_are_the_statics_of_the_legs(core: ct.CDLL) -> None:
-    """tau = -J^T f with the foot's Jacobian, and the legs' own weight: virtual work by differences."""
+    """tau = -J^T f with the foot's Jacobian, and the legs' own weight: virtual work by
+    differences.
+    """
     robot = changed(load_robot("athena"), solver=ACCURATE)
     pose = standing(robot)
     torque = stood(core, robot).output().torque
 
     def work(angle: Array) -> float:
         """Potential of the legs' weight less the feet's forces, torso held."""
-        body = body_states(robot, pose.position, pose.quaternion, np.zeros(3), np.zeros(3), angle, np.zeros((6, 3)))
+        body = body_states(
+            robot, pose.position, pose.quaternion, np.zeros(3), np.zeros(3), angle, np.zeros((6, 3))
+        )
         feet = np.array([foot.point for foot in foot_contacts(robot, body)])
-        return robot.total_mass * 9.81 * float(centre_of_mass(robot, body)[2]) - float(np.sum(pose.foot_force * feet))
+        return robot.total_mass * 9.81 * float(centre_of_mass(robot, body)[2]) - float(
+            np.sum(pose.foot_force * feet)
+        )
 
     for leg, joint in ((0, 0), (1, 1), (2, 2), (4, 1), (5, 2)):
         change = np.zeros((6, 3))
@@ -86,37 +112,63 @@ def test_standing_joint_torques_are_the_statics_of_the_legs(core: ct.CDLL) -> No
 # the incline, joints locked: a block
 
 
-def block(name: str, *, gravity: Array, terrain: dict[str, Any] | None = None, law: str = "tanh") -> Robot:
-    robot = changed(load_robot(name), servo={"mode": "kinematic"}, solver=ACCURATE, terrain=terrain or {}, friction={"law": law})
+def block(
+    name: str, *, gravity: Array, terrain: dict[str, Any] | None = None, law: str = "tanh"
+) -> Robot:
+    robot = changed(
+        load_robot(name),
+        servo={"mode": "kinematic"},
+        solver=ACCURATE,
+        terrain=terrain or {},
+        friction={"law": law},
+    )
     return replace(robot, gravity=tuple(gravity))
 
 
 def laid(core: ct.CDLL, robot: Robot, quaternion: Array) -> Plant:
     """The stance pressed into the ground as deep as its weight asks for."""
     still, flat = np.zeros(3), np.zeros((6, 3))
-    feet = foot_contacts(robot, body_states(robot, still, quaternion, still, still, robot.stance, flat))
+    feet = foot_contacts(
+        robot, body_states(robot, still, quaternion, still, still, robot.stance, flat)
+    )
     depth = (robot.total_mass * 9.81 / 6.0 / robot.contact.stiffness) ** (2.0 / 3.0)
     rise = (max(foot.penetration for foot in feet) - depth) / float(feet[0].normal[2])
     return Plant(core, robot, position=[0.0, 0.0, rise], quaternion=quaternion)
 
 
-def tilted(core: ct.CDLL, angle: float, heading: float, *, by: str, law: str = "tanh") -> tuple[Plant, Array, Array]:
-    """A block on an incline, made by leaning gravity or by sloping the ground; the way downhill and the ground's normal."""
+def tilted(
+    core: ct.CDLL, angle: float, heading: float, *, by: str, law: str = "tanh"
+) -> tuple[Plant, Array, Array]:
+    """A block on an incline, made by leaning gravity or by sloping the ground; the way downhill
+    and the ground's normal.
+    """
     uphill = np.array([math.cos(heading), math.sin(heading), 0.0])
     if by == "gravity":
         gravity = -9.81 * (math.cos(angle) * np.eye(3)[2] + math.sin(angle) * uphill)
-        return laid(core, block("athena", gravity=gravity, law=law), np.eye(4)[0]), -uphill, np.eye(3)[2]
+        return (
+            laid(core, block("athena", gravity=gravity, law=law), np.eye(4)[0]),
+            -uphill,
+            np.eye(3)[2],
+        )
     terrain = {"kind": "slope", "incline": angle, "heading": heading}
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), terrain=terrain, law=law)
     axis = np.array([math.sin(heading), -math.cos(heading), 0.0])
     turn = np.concatenate([[math.cos(angle / 2.0)], math.sin(angle / 2.0) * axis])
     normal = math.cos(angle) * np.eye(3)[2] - math.sin(angle) * uphill
-    return laid(core, robot, turn), -(math.cos(angle) * uphill + math.sin(angle) * np.eye(3)[2]), normal
+    return (
+        laid(core, robot, turn),
+        -(math.cos(angle) * uphill + math.sin(angle) * np.eye(3)[2]),
+        normal,
+    )
 
 
 @pytest.mark.parametrize("by", ["gravity", "slope"])
-@pytest.mark.parametrize(("angle", "heading"), [(0.1, 0.0), (0.35, 0.0), (0.35, math.pi), (0.5, 0.0)])
-def test_below_the_friction_angle_a_block_creeps_at_its_closed_speed(core: ct.CDLL, by: str, angle: float, heading: float) -> None:
+@pytest.mark.parametrize(
+    ("angle", "heading"), [(0.1, 0.0), (0.35, 0.0), (0.35, math.pi), (0.5, 0.0)]
+)
+def test_below_the_friction_angle_a_block_creeps_at_its_closed_speed(
+    core: ct.CDLL, by: str, angle: float, heading: float
+) -> None:
     plant, downhill, normal = tilted(core, angle, heading, by=by)
     plant.step(1.0)
     torso, friction = plant.output().torso, plant.robot.friction
@@ -129,15 +181,21 @@ def test_below_the_friction_angle_a_block_creeps_at_its_closed_speed(core: ct.CD
 
 @pytest.mark.parametrize("by", ["gravity", "slope"])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_above_the_friction_angle_a_block_accelerates_at_its_closed_rate(core: ct.CDLL, by: str, law: str) -> None:
+def test_above_the_friction_angle_a_block_accelerates_at_its_closed_rate(
+    core: ct.CDLL, by: str, law: str
+) -> None:
     angle = 0.75
     plant, downhill, _ = tilted(core, angle, 0.0, by=by, law=law)
     plant.step(1.0)
     before = float(plant.output().torso.velocity @ downhill)
     plant.step(1.3)
     gained = float(plant.output().torso.velocity @ downhill) - before
-    assert before > 0.2  # tanh(100 s/m v) is 1 to the last digit; bristles have gone some hundred preslidings
-    assert gained / 0.3 == pytest.approx(9.81 * (math.sin(angle) - plant.robot.friction.mu * math.cos(angle)), rel=SLIDE)
+    assert (
+        before > 0.2
+    )  # tanh(100 s/m v) is 1 to the last digit; bristles have gone some hundred preslidings
+    assert gained / 0.3 == pytest.approx(
+        9.81 * (math.sin(angle) - plant.robot.friction.mu * math.cos(angle)), rel=SLIDE
+    )
 
 
 def test_without_friction_a_block_slides_as_if_there_were_none(core: ct.CDLL) -> None:
@@ -145,7 +203,9 @@ def test_without_friction_a_block_slides_as_if_there_were_none(core: ct.CDLL) ->
     robot = changed(plant.robot, friction={"law": "none"})
     plant = laid(core, robot, np.eye(4)[0])
     plant.step(0.5)
-    assert float(plant.output().torso.velocity @ downhill) == pytest.approx(0.5 * 9.81 * math.sin(0.3), rel=AT_REST)
+    assert float(plant.output().torso.velocity @ downhill) == pytest.approx(
+        0.5 * 9.81 * math.sin(0.3), rel=AT_REST
+    )
 
 
 # walking in place
@@ -159,7 +219,9 @@ def marching(robot: Robot, t: float) -> Command:
     return Command(angle_ref=angle, push_force=np.array([2.0 * math.sin(5.0 * t), 1.0, 0.0]))
 
 
-def marched(core: ct.CDLL, robot: Robot, *, duration: float = 1.5, macro: float = 5e-3) -> list[Any]:
+def marched(
+    core: ct.CDLL, robot: Robot, *, duration: float = 1.5, macro: float = 5e-3
+) -> list[Any]:
     plant, seen = stood(core, robot), []
     for k in range(round(duration / macro)):
         command = marching(robot, k * macro)
@@ -185,7 +247,9 @@ def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str,
 
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
 def test_the_books_close_with_the_tolerance(core: ct.CDLL, law: str) -> None:
-    """Steps of an order of 3 shorten by 10 for a tolerance of a thousandth; works of order 2 in the step (eq. 22) gain 100."""
+    """Steps of an order of 3 shorten by 10 for a tolerance of a thousandth; works of order 2 in
+    the step (eq. 22) gain 100.
+    """
     robot, residuals = changed(load_robot("athena"), friction={"law": law}), []
     for tolerance in (1e-3, 1e-6):
         seen = marched(core, changed(robot, solver={"tolerance": tolerance}), duration=0.5)
@@ -196,16 +260,26 @@ def test_the_books_close_with_the_tolerance(core: ct.CDLL, law: str) -> None:
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("terrain", ["flat", "slope"])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_friction_stays_in_its_cone_and_forces_are_their_parts(core: ct.CDLL, name: str, terrain: str, law: str) -> None:
-    robot = changed(load_robot(name), terrain={"kind": terrain, "incline": 0.2, "heading": 0.4}, friction={"law": law})
+def test_friction_stays_in_its_cone_and_forces_are_their_parts(
+    core: ct.CDLL, name: str, terrain: str, law: str
+) -> None:
+    robot = changed(
+        load_robot(name),
+        terrain={"kind": terrain, "incline": 0.2, "heading": 0.4},
+        friction={"law": law},
+    )
     plant, pressed, slid = Plant(core, robot, **landing(robot)), 0, 0.0
     for k in range(60):
         command = random_command(robot, k // 6)
         plant.step((k + 1) * 4e-3, command)
         foot = plant.output(command).foot
-        assert np.all(foot.tangential_force <= robot.friction.mu * foot.normal_force * (1.0 + 1e-12))
+        assert np.all(
+            foot.tangential_force <= robot.friction.mu * foot.normal_force * (1.0 + 1e-12)
+        )
         assert np.all(foot.normal_force >= 0.0)
-        assert np.linalg.norm(foot.force, axis=1) == pytest.approx(np.hypot(foot.normal_force, foot.tangential_force), rel=1e-12)
+        assert np.linalg.norm(foot.force, axis=1) == pytest.approx(
+            np.hypot(foot.normal_force, foot.tangential_force), rel=1e-12
+        )
         assert np.all(foot.normal_force[foot.contact == 0] == 0.0)
         assert np.all(foot.penetration[foot.contact == 0] <= 0.0)
         pressed += int(np.count_nonzero(foot.normal_force))
@@ -218,7 +292,11 @@ def test_friction_stays_in_its_cone_and_forces_are_their_parts(core: ct.CDLL, na
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
 def test_all_methods_agree_on_a_walk(core: ct.CDLL, method: str, law: str) -> None:
     robot = changed(load_robot("athena"), friction={"law": law})
-    last = marched(core, changed(robot, solver={"method": method, "tolerance": 1e-6}), duration=0.3)[-1]
-    exact = marched(core, changed(robot, solver={"method": "dp54", "tolerance": 1e-8}), duration=0.3)[-1]
+    last = marched(
+        core, changed(robot, solver={"method": method, "tolerance": 1e-6}), duration=0.3
+    )[-1]
+    exact = marched(
+        core, changed(robot, solver={"method": "dp54", "tolerance": 1e-8}), duration=0.3
+    )[-1]
     assert last.torso.position == pytest.approx(exact.torso.position, abs=1e-6)
     assert last.angle == pytest.approx(exact.angle, abs=2e-6)

@@ -1,4 +1,5 @@
-"""Static friction above kinetic: the law by itself, pushes, and a mass on a spring that sticks and slips.
+"""Static friction above kinetic: the law by itself, pushes, and a mass on a spring that sticks and
+slips.
 
 That mass is the block on its feet, behind a spring of 100 N/m for each of its kilograms, whose end
 moves at 0.1 m/s. With coefficients 0.6 and 0.4 Coulomb's law sticks until the spring pulls with
@@ -24,14 +25,24 @@ from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
 
 FRICTION = replace(
-    load_robot("athena").friction, law="bristle", mu=0.4, mu_static=0.6, stribeck_speed=0.01, bristle_damping=0.0, presliding=1e-4
+    load_robot("athena").friction,
+    law="bristle",
+    mu=0.4,
+    mu_static=0.6,
+    stribeck_speed=0.01,
+    bristle_damping=0.0,
+    presliding=1e-4,
 )
 ALONG = np.array([0.6, 0.8, 0.0])
 EXACT = 1e-12  # relative: rounding
 
 
-@pytest.mark.parametrize(("speed", "mu"), [(0.0, 0.6), (0.01, 0.5), (0.03, 0.42), (0.07, 0.404), (1e9, 0.4)])
-def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(speed: float, mu: float) -> None:
+@pytest.mark.parametrize(
+    ("speed", "mu"), [(0.0, 0.6), (0.01, 0.5), (0.03, 0.42), (0.07, 0.404), (1e9, 0.4)]
+)
+def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(
+    speed: float, mu: float
+) -> None:
     assert sliding_friction(FRICTION, speed) == pytest.approx(mu, rel=EXACT)
     full = bristle_force(FRICTION, 10.0, speed * ALONG, 1e-4 * ALONG)
     assert full == pytest.approx(-10.0 * mu * ALONG, rel=EXACT)
@@ -39,10 +50,16 @@ def test_friction_falls_from_static_to_kinetic_half_way_at_the_stribeck_speed(sp
 
 @pytest.mark.parametrize("slip", [0.0, 0.3, -0.3])
 def test_a_foot_that_sticks_has_static_friction_however_it_swings(slip: float) -> None:
-    """Half-way up a bristle: 0.6 of the load times u (3 - u^2)/2 = 0.6875; and a sliding foot that turns back sticks."""
-    assert bristle_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(-10.0 * 0.6 * 0.6875 * ALONG, rel=EXACT)
+    """Half-way up a bristle: 0.6 of the load times u (3 - u^2)/2 = 0.6875; and a sliding foot
+    that turns back sticks.
+    """
+    assert bristle_force(FRICTION, 10.0, slip * ALONG, 0.5e-4 * ALONG) == pytest.approx(
+        -10.0 * 0.6 * 0.6875 * ALONG, rel=EXACT
+    )
     if slip <= 0.0:
-        assert bristle_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(-6.0 * ALONG, rel=EXACT)
+        assert bristle_force(FRICTION, 10.0, slip * ALONG, 1e-4 * ALONG) == pytest.approx(
+            -6.0 * ALONG, rel=EXACT
+        )
 
 
 @pytest.mark.parametrize("mu_static", [0.0, 0.4])
@@ -54,7 +71,9 @@ def test_without_static_friction_the_law_has_one_coefficient(mu_static: float) -
 
 def sticky(core: ct.CDLL, **friction: float) -> Plant:
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
-    return laid(core, changed(robot, friction={"mu": 0.4, "mu_static": 0.6} | friction), np.eye(4)[0])
+    return laid(
+        core, changed(robot, friction={"mu": 0.4, "mu_static": 0.6} | friction), np.eye(4)[0]
+    )
 
 
 def pushed(plant: Plant, begin: float, end: float, *, until: float) -> None:
@@ -66,8 +85,12 @@ def pushed(plant: Plant, begin: float, end: float, *, until: float) -> None:
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.45, True), (0.59, True), (0.61, False)])
-def test_a_push_that_grows_is_held_up_to_the_static_coefficient(core: ct.CDLL, share: float, holds: bool) -> None:
-    """On short bristles: those that give way quickly as the limit comes near slide, and lose static friction."""
+def test_a_push_that_grows_is_held_up_to_the_static_coefficient(
+    core: ct.CDLL, share: float, holds: bool
+) -> None:
+    """On short bristles: those that give way quickly as the limit comes near slide, and lose
+    static friction.
+    """
     plant = sticky(core, presliding=1e-5)
     pushed(plant, 0.0, share, until=1.0)
     pushed(plant, share, share, until=2.0)
@@ -75,7 +98,9 @@ def test_a_push_that_grows_is_held_up_to_the_static_coefficient(core: ct.CDLL, s
 
 
 def test_a_block_that_was_set_off_slides_on_with_kinetic_friction(core: ct.CDLL) -> None:
-    """Half its weight does not move it; more sets it off, and under that half again it gains (0.5 - 0.4) g."""
+    """Half its weight does not move it; more sets it off, and under that half again it gains
+    (0.5 - 0.4) g.
+    """
     plant = sticky(core)
     pushed(plant, 0.0, 0.5, until=1.0)
     assert abs(float(plant.output().torso.velocity[0])) < 1e-3
@@ -84,7 +109,9 @@ def test_a_block_that_was_set_off_slides_on_with_kinetic_friction(core: ct.CDLL)
     before = float(plant.output().torso.velocity[0])
     pushed(plant, 0.5, 0.5, until=1.4)
     assert before > 0.1
-    assert (float(plant.output().torso.velocity[0]) - before) / 0.2 == pytest.approx(0.981, rel=2e-3)
+    assert (float(plant.output().torso.velocity[0]) - before) / 0.2 == pytest.approx(
+        0.981, rel=2e-3
+    )
 
 
 def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float], list[float]]:
@@ -97,7 +124,9 @@ def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float],
         command = replace(plant.hold(), push_force=np.array([pull, 0.0, 0.0]))
         rate = 100.0 * mass * (0.1 - torso.velocity[0])
         none = np.zeros((6, 3))
-        plant.step_ramp((k + 1) * h, command, Command(angle_ref=none, push_force=np.array([rate, 0.0, 0.0])))
+        plant.step_ramp(
+            (k + 1) * h, command, Command(angle_ref=none, push_force=np.array([rate, 0.0, 0.0]))
+        )
         speed = float(plant.output().torso.velocity[0])
         if (speed > 1e-3) != moving:
             moving = not moving
@@ -108,18 +137,26 @@ def phases(plant: Plant, *, until: float, h: float = 2e-3) -> tuple[list[float],
 
 
 def test_the_twins_law_sticks_and_slips_by_the_closed_form_too() -> None:
-    """A point of 1 kg on a belt at 0.1 m/s, behind a spring of 100 N/m: it slips where it falls back by more than 1 mm/s."""
+    """A point of 1 kg on a belt at 0.1 m/s, behind a spring of 100 N/m: it slips where it falls
+    back by more than 1 mm/s.
+    """
     friction = replace(FRICTION, presliding=1e-6, stribeck_speed=1e-4, bristle_damping=0.005)
     x_axis = np.array([1.0, 0.0, 0.0])
 
     def rate(_: float, y: Array) -> list[float]:
         slip, bristle = (y[1] - 0.1) * x_axis, y[2] * x_axis
-        return [y[1], bristle_force(friction, 9.81, slip, bristle)[0] - 100.0 * y[0], bristle_rate(friction, slip, bristle)[0]]
+        return [
+            y[1],
+            bristle_force(friction, 9.81, slip, bristle)[0] - 100.0 * y[0],
+            bristle_rate(friction, slip, bristle)[0],
+        ]
 
     def behind(_: float, y: Array) -> float:
         return float(0.1 - y[1] - 1e-3)
 
-    found = solve_ivp(rate, (0.0, 1.9), [0.0, 0.1, 0.0], method="Radau", rtol=1e-7, atol=1e-12, events=behind)
+    found = solve_ivp(
+        rate, (0.0, 1.9), [0.0, 0.1, 0.0], method="Radau", rtol=1e-7, atol=1e-12, events=behind
+    )
     lengths = np.diff(found.t_events[0][found.t_events[0] > 0.3])
     assert lengths[:2] == pytest.approx([0.408432, 0.392400], rel=3e-3)
 

@@ -1,4 +1,6 @@
-"""What a long walk must keep: the energy books, the joints, and its indifference to stiff laws and to how the legs are numbered."""
+"""What a long walk must keep: the energy books, the joints, and its indifference to stiff laws
+and to how the legs are numbered.
+"""
 
 from __future__ import annotations
 
@@ -73,11 +75,15 @@ def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL
     robot = load_robot("athena")
     usual = walk(core, robot, 2.0).output().solver.evaluations
     for changes in ({"friction": {"slope": 1000.0}}, {"contact": {"stiffness": 1e7}}):
-        assert walk(core, changed(robot, **changes), 2.0).output().solver.evaluations < STIFF * usual
+        assert (
+            walk(core, changed(robot, **changes), 2.0).output().solver.evaluations < STIFF * usual
+        )
 
 
 def test_the_books_of_feet_that_stick_balance(core: ct.CDLL) -> None:
-    """To a tenth of the usual at a tenth of the usual tolerance: works are of order 2 in the step (eq. 22)."""
+    """To a tenth of the usual at a tenth of the usual tolerance: works are of order 2 in the
+    step (eq. 22).
+    """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver={"tolerance": 1e-5})
     energy = walk(core, robot, 5.0).output().energy
     assert abs(energy.residual) < 0.1 * BOOKS * energy.actuator_work
@@ -86,7 +92,10 @@ def test_the_books_of_feet_that_stick_balance(core: ct.CDLL) -> None:
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
 def test_feet_that_stick_cost_no_more_steps_than_feet_that_creep(core: ct.CDLL, name: str) -> None:
     robot = load_robot(name)
-    creeping, sticking = (walk(core, changed(robot, friction={"law": law}), 2.0).output().solver.evaluations for law in ("tanh", "bristle"))
+    creeping, sticking = (
+        walk(core, changed(robot, friction={"law": law}), 2.0).output().solver.evaluations
+        for law in ("tanh", "bristle")
+    )
     assert sticking < 1.1 * creeping
 
 
@@ -96,11 +105,17 @@ def test_legs_in_another_order_walk_the_same_way(core: ct.CDLL) -> None:
     renumbered = replace(robot, legs=tuple(robot.legs[leg] for leg in order))
     position, quaternion, angle = settled(robot)
     plants = [Plant(core, robot, position=position, quaternion=quaternion, angle=angle)]
-    plants += [Plant(core, renumbered, position=position, quaternion=quaternion, angle=angle[order])]
+    plants += [
+        Plant(core, renumbered, position=position, quaternion=quaternion, angle=angle[order])
+    ]
     for t, command in walking(robot, 1.0):
         plants[0].step(t, command)
-        plants[1].step(t, Command(angle_ref=command.angle_ref[order], speed_ref=command.speed_ref[order]))
+        plants[1].step(
+            t, Command(angle_ref=command.angle_ref[order], speed_ref=command.speed_ref[order])
+        )
     here, there = (plant.output() for plant in plants)
     assert there.torso.position == pytest.approx(here.torso.position, abs=RENUMBERED)
     assert here.angle[order] == pytest.approx(there.angle, abs=RENUMBERED)
-    assert not np.array_equal(there.torso.position, here.torso.position)  # the sums over the legs round differently: it was another run
+    assert not np.array_equal(
+        there.torso.position, here.torso.position
+    )  # the sums over the legs round differently: it was another run

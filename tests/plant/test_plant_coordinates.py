@@ -18,12 +18,15 @@ from hexapod_cosim.models.kinematics import body_states
 from hexapod_cosim.models.records import Array
 
 SIZE, INPUTS = ct.sizeof(HxCoordinates) // 8, ct.sizeof(HxInput) // 8
-CONTACT = slice(HxOutput.foot.offset // 8 + HxOutput.foot.size // 8 - 3, HxOutput.foot.offset // 8 + HxOutput.foot.size // 8)
+CONTACT = slice(
+    HxOutput.foot.offset // 8 + HxOutput.foot.size // 8 - 3,
+    HxOutput.foot.offset // 8 + HxOutput.foot.size // 8,
+)
 ANGLE, SPEED = slice(13, 31), slice(31, 49)
 ROUNDING = 1e-12  # 1    of sums of some hundred products
 
-# derivatives at nodes -4 .. 4 of the polynomial through them: central differences of order 8, whose error at this step is rounding,
-# some 1e-12 of the largest derivative of its kind
+# derivatives at nodes -4 .. 4 of the polynomial through them: central differences of order 8, whose
+# error at this step is rounding, some 1e-12 of the largest derivative of its kind
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 STEP = 1e-3
 DIFFERENCE = 1e-10  # 1
@@ -38,9 +41,15 @@ VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 
 
 def smooth(robot: Robot) -> Robot:
-    """Without kinks near by: servos that are never at their limits, feet whose force never ends before the contact does."""
+    """Without kinks near by: servos that are never at their limits, feet whose force never ends
+    before the contact does.
+    """
     gentle = changed(robot, servo={"torque_max": 1e4, "speed_max": 1e4})
-    return gentle if gentle.contact.law == "hertz" else changed(gentle, contact={"law": "constant_damping", "damping_factor": 0.2})
+    return (
+        gentle
+        if gentle.contact.law == "hertz"
+        else changed(gentle, contact={"law": "constant_damping", "damping_factor": 0.2})
+    )
 
 
 def moving(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Command]:
@@ -69,7 +78,20 @@ def test_coordinates_are_bodies_on_their_joints(core: ct.CDLL) -> None:
     pose["quaternion"] /= np.linalg.norm(pose["quaternion"])
     plant = Plant(core, robot)
     plant.coordinates = np.concatenate(
-        [*(np.ravel(pose[name]) for name in ("position", "quaternion", "velocity", "angular_velocity", "angle", "speed")), np.zeros(21)]
+        [
+            *(
+                np.ravel(pose[name])
+                for name in (
+                    "position",
+                    "quaternion",
+                    "velocity",
+                    "angular_velocity",
+                    "angle",
+                    "speed",
+                )
+            ),
+            np.zeros(21),
+        ]
     )
     expected = body_states(robot, **pose)
     flipped = np.sign(np.sum(plant.bodies[:, 3:7] * expected[:, 3:7], axis=1))
@@ -87,11 +109,18 @@ def test_coordinates_come_back(core: ct.CDLL) -> None:
 def test_rates_are_those_of_the_bodies(core: ct.CDLL) -> None:
     plant, command = moving(core, lopsided(), 3)
     plant.coordinates = plant.coordinates
-    x, dx, dv, body = plant.coordinates, plant.rates(command), plant.accelerations(command).dv, plant.bodies
+    x, dx, dv, body = (
+        plant.coordinates,
+        plant.rates(command),
+        plant.accelerations(command).dv,
+        plant.bodies,
+    )
     np.testing.assert_allclose(dx[:3], x[7:10], atol=ROUNDING)
     np.testing.assert_allclose(dx[7:13], dv[0], atol=ROUNDING * np.abs(dv).max())
     np.testing.assert_allclose(dx[ANGLE], x[SPEED], atol=ROUNDING)
-    links = np.linalg.norm(np.diff(body[1:4, 10:13], axis=0), axis=1)  # joint speeds of leg LF but for the sign
+    links = np.linalg.norm(
+        np.diff(body[1:4, 10:13], axis=0), axis=1
+    )  # joint speeds of leg LF but for the sign
     np.testing.assert_allclose(np.abs(x[SPEED][1:3]), links, atol=ROUNDING * 10)
 
 
@@ -106,7 +135,9 @@ def test_derivatives_are_those_of_rates_and_outputs(core: ct.CDLL, variant: int,
     d_rate, d_output = plant.tangent(command, pushed, direction)
     rate_sum, output_sum = 0.0, 0.0
     for weight, node in zip(STENCIL, range(-4, 5), strict=True):
-        rate, output = observed(plant, changed_input(command, STEP * node * pushed), x + STEP * node * direction)
+        rate, output = observed(
+            plant, changed_input(command, STEP * node * pushed), x + STEP * node * direction
+        )
         rate_sum, output_sum = rate_sum + weight / STEP * rate, output_sum + weight / STEP * output
     got = np.delete(np.frombuffer(bytes(d_output)), np.r_[CONTACT])
     np.testing.assert_allclose(d_rate, rate_sum, atol=DIFFERENCE * np.abs(rate_sum).max())

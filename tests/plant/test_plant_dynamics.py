@@ -1,4 +1,6 @@
-"""Eq. 1 solved in O(n) by the C plant: against the dense 204 x 204 system, against Pinocchio, and its linearly implicit sibling."""
+"""Eq. 1 solved in O(n) by the C plant: against the dense 204 x 204 system, against Pinocchio,
+and its linearly implicit sibling.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,12 @@ from test_twin_pinocchio import pinocchio_accelerations
 
 from hexapod_cosim.models import CONTACT_LAWS, METHODS, Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction
-from hexapod_cosim.models.contact import contact_damping, foot_contacts, foot_force, standing_damping
+from hexapod_cosim.models.contact import (
+    contact_damping,
+    foot_contacts,
+    foot_force,
+    standing_damping,
+)
 from hexapod_cosim.models.dynamics import (
     Command,
     accelerations,
@@ -37,7 +44,11 @@ MODES = ("position", "torque", "kinematic")
 # the high floor keeps the damping low: feet that recede still press
 ROBOTS = {
     robot.name: changed(robot, contact={"impact_speed_floor": 2.0})
-    for robot in (load_robot("athena"), load_robot("phantomx_mk4"), replace(lopsided(), name="lopsided"))
+    for robot in (
+        load_robot("athena"),
+        load_robot("phantomx_mk4"),
+        replace(lopsided(), name="lopsided"),
+    )
 }
 
 
@@ -50,8 +61,12 @@ def at(core: ct.CDLL, robot: Robot, body: Array) -> Plant:
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("terrain", ["flat", "slope"])
-def test_accelerations_and_multipliers_are_those_of_the_dense_system(core: ct.CDLL, robot: Robot, mode: str, terrain: str) -> None:
-    robot = changed(robot, servo={"mode": mode}, terrain={"kind": terrain, "incline": 0.3, "heading": 2.1})
+def test_accelerations_and_multipliers_are_those_of_the_dense_system(
+    core: ct.CDLL, robot: Robot, mode: str, terrain: str
+) -> None:
+    robot = changed(
+        robot, servo={"mode": mode}, terrain={"kind": terrain, "incline": 0.3, "heading": 2.1}
+    )
     for seed, drift in ((0, 0.0), (1, 0.0), (2, 1e-3), (3, 0.05)):
         body, command = random_bodies(robot, seed, drift=drift), random_command(robot, seed)
         ours = at(core, robot, body).accelerations(command)
@@ -64,8 +79,12 @@ def test_accelerations_and_multipliers_are_those_of_the_dense_system(core: ct.CD
 
 @pytest.mark.parametrize("law", CONTACT_LAWS)
 @pytest.mark.parametrize("friction", ["tanh", "none", "bristle"])
-def test_accelerations_are_those_of_the_dense_system_under_every_law(core: ct.CDLL, law: str, friction: str) -> None:
-    robot = changed(lopsided(4), contact={"law": law, "impact_speed_floor": 2.0}, friction={"law": friction})
+def test_accelerations_are_those_of_the_dense_system_under_every_law(
+    core: ct.CDLL, law: str, friction: str
+) -> None:
+    robot = changed(
+        lopsided(4), contact={"law": law, "impact_speed_floor": 2.0}, friction={"law": friction}
+    )
     body, command = random_bodies(robot, 4, drift=1e-3), random_command(robot, 4)
     dense = accelerations(robot, body, command, standing_damping(robot, body))
     ours = at(core, robot, body).accelerations(command)
@@ -78,10 +97,19 @@ def test_the_accelerations_shown_are_the_rates_that_are_integrated(core: ct.CDLL
     body, command = random_bodies(robot, 5, drift=0.01), random_command(robot, 5)
     plant = at(core, robot, body)
     rate, power = np.zeros((19, 13)), np.zeros(3)
-    core.hx_probe_rate(ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(rate), pointer(power))
+    core.hx_probe_rate(
+        ct.c_void_p(plant.handle),
+        ct.byref(inputs(command)),
+        ct.c_double(0.0),
+        pointer(rate),
+        pointer(power),
+    )
     assert np.array_equal(rate[:, 7:13], plant.accelerations(command).dv)
     assert np.array_equal(rate[:, 0:3], body[:, 7:10])
-    assert distance(rate[:, 3:7], [quaternion_rate(state[3:7], state[10:13]) for state in body]) < 1e-14
+    assert (
+        distance(rate[:, 3:7], [quaternion_rate(state[3:7], state[10:13]) for state in body])
+        < 1e-14
+    )
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -90,32 +118,65 @@ def test_powers_of_motors_push_and_losses_are_forces_times_speeds(core: ct.CDLL,
     body, command = random_bodies(robot, 6), random_command(robot, 6)
     plant = at(core, robot, body)
     rate, power = np.zeros((19, 13)), np.zeros(3)
-    core.hx_probe_rate(ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(rate), pointer(power))
+    core.hx_probe_rate(
+        ct.c_void_p(plant.handle),
+        ct.byref(inputs(command)),
+        ct.c_double(0.0),
+        pointer(rate),
+        pointer(power),
+    )
     speed, lost = joint_speeds(robot, body), 0.0
-    for foot, damping in zip(foot_contacts(robot, body), standing_damping(robot, body), strict=True):
+    for foot, damping in zip(
+        foot_contacts(robot, body), standing_damping(robot, body), strict=True
+    ):
         elastic = robot.contact.stiffness * max(foot.penetration, 0.0) ** 1.5
-        lost -= float(foot_force(robot, foot, damping) @ foot.velocity) + elastic * foot.approach_speed
+        lost -= (
+            float(foot_force(robot, foot, damping) @ foot.velocity) + elastic * foot.approach_speed
+        )
     lost -= float(np.sum(gear_friction(robot.servo, speed) * speed))
     pushed = float(command.push_force @ body[0, 7:10] + command.push_torque @ body[0, 10:13])
-    assert power == pytest.approx([float(np.sum(plant.accelerations(command).drive_torque * speed)), pushed, lost], rel=DENSE)
+    assert power == pytest.approx(
+        [float(np.sum(plant.accelerations(command).drive_torque * speed)), pushed, lost], rel=DENSE
+    )
 
 
 def test_a_kinematic_drive_follows_its_reference_on_from_when_it_was_given(core: ct.CDLL) -> None:
     robot = changed(lopsided(7), servo={"mode": "kinematic"})
-    body, command = random_bodies(robot, 7, drift=1e-3), replace(random_command(robot, 7), age=0.004)
+    body, command = (
+        random_bodies(robot, 7, drift=1e-3),
+        replace(random_command(robot, 7), age=0.004),
+    )
     plant = at(core, robot, body)
     rate, power = np.zeros((19, 13)), np.zeros(3)
-    core.hx_probe_rate(ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(command.age), pointer(rate), pointer(power))
+    core.hx_probe_rate(
+        ct.c_void_p(plant.handle),
+        ct.byref(inputs(command)),
+        ct.c_double(command.age),
+        pointer(rate),
+        pointer(power),
+    )
     dense = accelerations(robot, body, command, standing_damping(robot, body))
     assert distance(rate[:, 7:13], dense.dv) < DENSE
-    assert distance(dense.dv, accelerations(robot, body, replace(command, age=0.0), standing_damping(robot, body)).dv) > 1e3 * DENSE
+    assert (
+        distance(
+            dense.dv,
+            accelerations(robot, body, replace(command, age=0.0), standing_damping(robot, body)).dv,
+        )
+        > 1e3 * DENSE
+    )
 
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
 @pytest.mark.parametrize("mode", ["position", "torque"])
 @pytest.mark.parametrize("terrain", ["flat", "slope"])
-def test_forward_dynamics_agree_with_pinocchio(core: ct.CDLL, robot: Robot, mode: str, terrain: str) -> None:
-    robot = changed(robot, servo={"mode": mode}, terrain={"kind": terrain, "height": 0.01, "incline": 0.2, "heading": 0.6})
+def test_forward_dynamics_agree_with_pinocchio(
+    core: ct.CDLL, robot: Robot, mode: str, terrain: str
+) -> None:
+    robot = changed(
+        robot,
+        servo={"mode": mode},
+        terrain={"kind": terrain, "height": 0.01, "incline": 0.2, "heading": 0.6},
+    )
     for seed in range(4):
         body, command = random_bodies(robot, seed), random_command(robot, seed)
         plant = at(core, robot, body)
@@ -126,7 +187,10 @@ def test_forward_dynamics_agree_with_pinocchio(core: ct.CDLL, robot: Robot, mode
         dv = plant.accelerations(command).dv
         theirs = pinocchio_accelerations(robot, body, motor + gear, forces, push)
         assert np.count_nonzero(foot.normal_force) >= 3
-        assert distance(np.concatenate([dv[0], constraints(robot, body).G @ dv.ravel()]), theirs) < PINOCCHIO
+        assert (
+            distance(np.concatenate([dv[0], constraints(robot, body).G @ dv.ravel()]), theirs)
+            < PINOCCHIO
+        )
 
 
 # the linearly implicit solve: W u + D^T mu = G_v dv + G_x dx, D u = 0, W = M - z G_v - z^2 G_x
@@ -136,8 +200,8 @@ Z = 7e-4  # s: h gamma of a step that the stiff terms rule
 
 
 def implicit(core: ct.CDLL, plant: Plant, command: Command, dx: Array, dv: Array) -> Array:
-    """(114,) u for displacements dx and velocity changes dv (19, 6), linear then angular: what a stage adds to the accelerations a
-    where s_v + z a = dv and s_x + z (v + s_v) + z^2 a = dx.
+    """(114,) u for displacements dx and velocity changes dv (19, 6), linear then angular: what a
+    stage adds to the accelerations a where s_v + z a = dv and s_x + z (v + s_v) + z^2 a = dx.
     """
     body, a = plant.bodies, plant.accelerations(command).dv
     s_v = dv - Z * a
@@ -147,22 +211,47 @@ def implicit(core: ct.CDLL, plant: Plant, command: Command, dx: Array, dv: Array
     reached = body[:, 7:13] + s_v + Z * rate[:, 7:13]
     assert distance(rate[:, 0:3], reached[:, 0:3]) < DENSE
     assert distance(turn, reached[:, 3:6]) < DENSE
-    assert distance(rate[:, 3:7], [quaternion_rate(state[3:7], w) for state, w in zip(body, turn, strict=True)]) < DENSE
+    assert (
+        distance(
+            rate[:, 3:7],
+            [quaternion_rate(state[3:7], w) for state, w in zip(body, turn, strict=True)],
+        )
+        < DENSE
+    )
     return u.ravel()
 
 
-def stage(core: ct.CDLL, plant: Plant, command: Command, s_x: Array, s_v: Array) -> tuple[Array, Array]:
-    """(19, 13) k/h of a stage after the changes (19, 6), and the angular velocities (19, 3) of its quaternion rates."""
+def stage(
+    core: ct.CDLL, plant: Plant, command: Command, s_x: Array, s_v: Array
+) -> tuple[Array, Array]:
+    """(19, 13) k/h of a stage after the changes (19, 6), and the angular velocities (19, 3) of
+    its quaternion rates.
+    """
     rate, turn = np.zeros((19, 13)), np.zeros((19, 3))
-    arguments: list[Any] = [ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(Z), ct.c_double(0.0)]
-    core.hx_probe_stage(*arguments, pointer(np.ascontiguousarray(s_x)), pointer(np.ascontiguousarray(s_v)), pointer(rate), pointer(turn))
+    arguments: list[Any] = [
+        ct.c_void_p(plant.handle),
+        ct.byref(inputs(command)),
+        ct.c_double(Z),
+        ct.c_double(0.0),
+    ]
+    core.hx_probe_stage(
+        *arguments,
+        pointer(np.ascontiguousarray(s_x)),
+        pointer(np.ascontiguousarray(s_v)),
+        pointer(rate),
+        pointer(turn),
+    )
     return rate, turn
 
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("terrain", ["flat", "slope"])
-def test_the_implicit_solve_is_the_dense_one_with_slopes_from_differences(core: ct.CDLL, mode: str, terrain: str) -> None:
-    robot = changed(lopsided(8), servo={"mode": mode}, terrain={"kind": terrain, "incline": 0.2, "heading": 0.5})
+def test_the_implicit_solve_is_the_dense_one_with_slopes_from_differences(
+    core: ct.CDLL, mode: str, terrain: str
+) -> None:
+    robot = changed(
+        lopsided(8), servo={"mode": mode}, terrain={"kind": terrain, "incline": 0.2, "heading": 0.5}
+    )
     body, rng = resting(robot, 8), np.random.default_rng(8)
     # one servo in ten is at its limit: it has no stiffness there
     command = Command(angle_ref=robot.stance + 10.0 * (rng.uniform(size=(6, 3)) < 0.1))
@@ -196,7 +285,9 @@ def test_the_stage_matrix_uses_the_secant_of_friction_when_a_foot_slips(core: ct
             root = robot.contact.stiffness * np.sqrt(foot.penetration)
             rows = slice(18 * (leg + 1), 18 * (leg + 1) + 6)
             wrench = np.vstack([np.eye(3), skew(foot.point - body[3 * (leg + 1), 0:3])])
-            G_v[rows, rows] -= wrench @ np.diag([drag, drag, root * foot.penetration * damping]) @ wrench.T
+            G_v[rows, rows] -= (
+                wrench @ np.diag([drag, drag, root * foot.penetration * damping]) @ wrench.T
+            )
             G_x[rows, rows] -= wrench @ np.diag([0.0, 0.0, 1.5 * root]) @ wrench.T
     D = constraints(robot, body).D
     W = mass_matrix(robot, body) - Z * G_v - Z * Z * G_x
@@ -211,12 +302,15 @@ def test_the_stage_matrix_uses_the_secant_of_friction_when_a_foot_slips(core: ct
 
 @pytest.mark.parametrize("method", METHODS)
 def test_method_coefficients_satisfy_the_order_conditions(core: ct.CDLL, method: str) -> None:
-    """For a Rosenbrock-W method of order p with any A: every tree of order <= p with some of its nodes taken implicitly; for one whose A is
-    formed anew at every stage, A's change along the solution too.
+    """For a Rosenbrock-W method of order p with any A: every tree of order <= p with some of its
+    nodes taken implicitly; for one whose A is formed anew at every stage, A's change along the
+    solution too.
     """
     shape, gamma = (ct.c_int * 3)(), ct.c_double()
     a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
-    core.hx_probe_method(METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e)))
+    core.hx_probe_method(
+        METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e))
+    )
     stages, order, error_order = shape
     full = g + gamma.value * np.diag([1.0] * stages + [0.0] * (7 - stages))
     one, exact = np.ones(7), 1e-14
@@ -224,10 +318,22 @@ def test_method_coefficients_satisfy_the_order_conditions(core: ct.CDLL, method:
     for weights, accuracy in ((b, order), (b - e, error_order)):
         conditions = [(1, weights @ one, 1.0)]
         conditions += [(2, weights @ a @ one, 1.0 / 2.0), (2, weights @ full @ one, 0.0)]
-        conditions += [(3, weights @ c**2, 1.0 / 3.0), (3, weights @ a @ c, 1.0 / 6.0), (3, weights @ a @ full @ one, 0.0)]
-        conditions += [(3, weights @ full @ c, 0.0), (3, weights @ full @ full @ one, 0.0), (3, (weights * c) @ full @ one, 0.0)]
+        conditions += [
+            (3, weights @ c**2, 1.0 / 3.0),
+            (3, weights @ a @ c, 1.0 / 6.0),
+            (3, weights @ a @ full @ one, 0.0),
+        ]
+        conditions += [
+            (3, weights @ full @ c, 0.0),
+            (3, weights @ full @ full @ one, 0.0),
+            (3, (weights * c) @ full @ one, 0.0),
+        ]
         conditions += [(4, weights @ c**3, 1.0 / 4.0), (4, weights @ (c * (a @ c)), 1.0 / 8.0)]
         conditions += [(4, weights @ a @ c**2, 1.0 / 12.0), (4, weights @ a @ a @ c, 1.0 / 24.0)]
-        conditions += [(5, weights @ c**4, 1.0 / 5.0), (5, weights @ a @ c**3, 1.0 / 20.0), (5, weights @ a @ a @ a @ c, 1.0 / 120.0)]
+        conditions += [
+            (5, weights @ c**4, 1.0 / 5.0),
+            (5, weights @ a @ c**3, 1.0 / 20.0),
+            (5, weights @ a @ a @ a @ c, 1.0 / 120.0),
+        ]
         for p, value, wanted in conditions:
             assert p > accuracy or value == pytest.approx(wanted, abs=exact), (p, accuracy)

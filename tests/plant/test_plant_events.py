@@ -1,4 +1,6 @@
-"""Steps that end where a foot touches down or lifts off: going on gives, bit for bit, what one call would have given."""
+"""Steps that end where a foot touches down or lifts off: going on gives, bit for bit, what one
+call would have given.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ def dropped(core: ct.CDLL, robot: Robot) -> Plant:
 
 
 def command_of(robot: Robot) -> Command:
-    """One that moves the joints, so that a kinematic drive's reference depends on when it was given."""
+    """One that moves the joints, so that a kinematic drive's reference depends on when it was
+    given.
+    """
     return Command(angle_ref=robot.stance, speed_ref=np.full((6, 3), 0.2))
 
 
@@ -30,8 +34,15 @@ def command_of(robot: Robot) -> Command:
 @pytest.mark.parametrize("step", [0.0, 2e-4])
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 @pytest.mark.parametrize("friction", ["tanh", "bristle"])
-def test_stops_at_events_leave_no_trace(core: ct.CDLL, method: str, step: float, mode: str, friction: str) -> None:
-    robot = changed(ATHENA, servo={"mode": mode}, solver={"method": method, "step": step}, friction={"law": friction})
+def test_stops_at_events_leave_no_trace(
+    core: ct.CDLL, method: str, step: float, mode: str, friction: str
+) -> None:
+    robot = changed(
+        ATHENA,
+        servo={"mode": mode},
+        solver={"method": method, "step": step},
+        friction={"law": friction},
+    )
     command, whole, broken = command_of(robot), dropped(core, robot), dropped(core, robot)
     whole.step(END, command)
     stops = 0

@@ -1,4 +1,6 @@
-"""The C plant equals the readable twin, function by function, on random states with drifted joints."""
+"""The C plant equals the readable twin, function by function, on random states with drifted
+joints.
+"""
 
 from __future__ import annotations
 
@@ -37,8 +39,11 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.terrain import ground
 
-SAME = 1e-13  # relative: the same formula, its operations in another order, some hundred roundings long
-CONTACT_SAME = 1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+# relative: the same formula, its operations in another order, some hundred roundings long
+SAME = 1e-13
+CONTACT_SAME = (
+    1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+)
 DRIFT = 0.02
 LEG_JOINTS = [(leg, joint) for leg in range(6) for joint in range(3)]
 TERRAINS: dict[str, dict[str, Any]] = {
@@ -76,8 +81,14 @@ def test_the_mirrors_of_the_header_have_the_compilers_layout(core: ct.CDLL) -> N
 def test_rotation_and_quaternion_functions_are_the_twins(core: ct.CDLL) -> None:
     rng = np.random.default_rng(1)
     for p, w in zip(rng.normal(size=(50, 4)), rng.normal(size=(50, 3)), strict=True):
-        assert distance(probed(core.hx_probe_rotation_matrix, p, size=9), rotation_matrix(p).ravel()) < SAME
-        assert distance(probed(core.hx_probe_quaternion_rate, p, w, size=4), quaternion_rate(p, w)) < SAME
+        assert (
+            distance(probed(core.hx_probe_rotation_matrix, p, size=9), rotation_matrix(p).ravel())
+            < SAME
+        )
+        assert (
+            distance(probed(core.hx_probe_quaternion_rate, p, w, size=4), quaternion_rate(p, w))
+            < SAME
+        )
 
 
 def test_axis_normals_are_the_twins(core: ct.CDLL) -> None:
@@ -91,13 +102,20 @@ def test_axis_normals_are_the_twins(core: ct.CDLL) -> None:
 def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) -> None:
     rng = np.random.default_rng(3)
     for _ in range(20):
-        c, U, s, mass = rng.normal(size=3), rng.normal(size=6), float(rng.normal()), float(rng.uniform(0.1, 2.0))
+        c, U, s, mass = (
+            rng.normal(size=3),
+            rng.normal(size=6),
+            float(rng.normal()),
+            float(rng.uniform(0.1, 2.0)),
+        )
         J, A = (root @ root.T for root in rng.normal(size=(2, 3, 3)))
         X = np.eye(6)
         X[3:6, 0:3] = -skew(c)  # v at c = v + w x c
         s = -abs(s)  # what is left stays positive definite
         at_c = np.block([[J, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3) + A]])
-        body, less, whole, inverse = probed(core.hx_probe_inertia, mass, J, A, c, s, U, size=144).reshape(4, 6, 6)
+        body, less, whole, inverse = probed(
+            core.hx_probe_inertia, mass, J, A, c, s, U, size=144
+        ).reshape(4, 6, 6)
         rigid = np.block([[J, np.zeros((3, 3))], [np.zeros((3, 3)), mass * np.eye(3)]])
         expected = X.T @ at_c @ X - s * np.outer(U, U)
         assert distance(body, X.T @ rigid @ X) < SAME
@@ -167,33 +185,46 @@ def test_the_ground_is_the_twins(core: ct.CDLL, terrain: dict[str, Any]) -> None
     plant = Plant(core, robot)
     for point in np.random.default_rng(6).normal(size=(20, 3)):
         height, normal = ground(robot.terrain, point)
-        assert distance(probed(core.hx_probe_ground, plant, point, size=4), [height, *normal]) < SAME
+        assert (
+            distance(probed(core.hx_probe_ground, plant, point, size=4), [height, *normal]) < SAME
+        )
 
 
 @pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
 @pytest.mark.parametrize("law", CONTACT_LAWS)
 @pytest.mark.parametrize("friction", ["tanh", "none", "bristle"])
-def test_foot_kinematics_and_forces_are_the_twins(core: ct.CDLL, terrain: dict[str, Any], law: str, friction: str) -> None:
+def test_foot_kinematics_and_forces_are_the_twins(
+    core: ct.CDLL, terrain: dict[str, Any], law: str, friction: str
+) -> None:
     robot = changed(
-        lopsided(7), terrain=terrain, contact={"law": law, "impact_speed_floor": 2.0, "damping_factor": 0.5}, friction={"law": friction}
+        lopsided(7),
+        terrain=terrain,
+        contact={"law": law, "impact_speed_floor": 2.0, "damping_factor": 0.5},
+        friction={"law": friction},
     )
     plant, body = drifted(core, robot, 7)
     damping, touching = contact_damping(robot.contact, 0.0), 0
     output = plant.output()
     for leg, foot in enumerate(foot_contacts(robot, body)):
         got = probed(core.hx_probe_foot, plant, inputs(plant.hold()), leg, 0.0, size=17)
-        seen = np.concatenate([foot.point, foot.velocity, foot.normal, [foot.penetration, foot.approach_speed]])
+        seen = np.concatenate(
+            [foot.point, foot.velocity, foot.normal, [foot.penetration, foot.approach_speed]]
+        )
         force = foot_force(robot, foot, damping if foot.penetration > 0.0 else math.nan)
         assert distance(got[:11], seen) < SAME
         assert distance(got[11:14], force) < CONTACT_SAME
         assert np.array_equal(output.foot.force[leg], got[11:14])
         touching += foot.penetration > 0.0
     assert touching == np.count_nonzero(output.foot.normal_force) == 3
-    assert list(output.foot.contact) == [foot.penetration > 0.0 for foot in foot_contacts(robot, body)]
+    assert list(output.foot.contact) == [
+        foot.penetration > 0.0 for foot in foot_contacts(robot, body)
+    ]
 
 
 def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) -> None:
-    """The implicit part of a step is to be stiff enough for its end: slopes at delta + h ddelta while the foot approaches."""
+    """The implicit part of a step is to be stiff enough for its end: slopes at delta + h ddelta
+    while the foot approaches.
+    """
     robot = changed(lopsided(7), contact={"impact_speed_floor": 2.0})
     plant, body = drifted(core, robot, 7)
     damping, approaching = contact_damping(robot.contact, 0.0), 0
@@ -201,7 +232,9 @@ def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) 
         got = probed(core.hx_probe_foot, plant, inputs(plant.hold()), leg, 2e-3, size=17)
         delta, ddelta = foot.penetration + 2e-3 * max(foot.approach_speed, 0.0), foot.approach_speed
         closed = 1.0 if foot.penetration > 0.0 else 0.0
-        force, _, stiffness, viscosity = normal_probe(core, plant, damping if closed else 0.0, delta, ddelta, closed=closed)
+        force, _, stiffness, viscosity = normal_probe(
+            core, plant, damping if closed else 0.0, delta, ddelta, closed=closed
+        )
         slip = float(np.linalg.norm(foot.velocity + foot.approach_speed * foot.normal))
         drag = robot.friction.mu * force * asked(core.hx_probe_friction, plant, slip)
         assert got[14:] == pytest.approx([stiffness, viscosity, drag], rel=SAME)
@@ -210,26 +243,45 @@ def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) 
 
 
 @pytest.mark.parametrize("law", CONTACT_LAWS)
-def test_the_normal_force_is_the_twins_and_its_slopes_are_its_derivatives(core: ct.CDLL, law: str) -> None:
-    robot = changed(load_robot("athena"), contact={"law": law, "restitution": 0.6, "damping_factor": 2.0})
+def test_the_normal_force_is_the_twins_and_its_slopes_are_its_derivatives(
+    core: ct.CDLL, law: str
+) -> None:
+    robot = changed(
+        load_robot("athena"), contact={"law": law, "restitution": 0.6, "damping_factor": 2.0}
+    )
     plant, rng = Plant(core, robot), np.random.default_rng(8)
     for impact in (0.0, 0.005, 0.3):
         damping = contact_damping(robot.contact, impact)
-        assert asked(core.hx_probe_contact_damping, plant, impact) == pytest.approx(damping, rel=SAME)
-        for delta, ddelta in zip(rng.uniform(-1e-3, 2e-3, 20).tolist(), rng.normal(0.0, 0.3, 20).tolist(), strict=True):
+        assert asked(core.hx_probe_contact_damping, plant, impact) == pytest.approx(
+            damping, rel=SAME
+        )
+        for delta, ddelta in zip(
+            rng.uniform(-1e-3, 2e-3, 20).tolist(), rng.normal(0.0, 0.3, 20).tolist(), strict=True
+        ):
             force, elastic, stiffness, viscosity = normal_probe(core, plant, damping, delta, ddelta)
-            assert force == pytest.approx(normal_force(robot.contact, damping, delta, ddelta), rel=SAME)
+            assert force == pytest.approx(
+                normal_force(robot.contact, damping, delta, ddelta), rel=SAME
+            )
             assert elastic == pytest.approx(normal_force(robot.contact, 0.0, delta, 0.0), rel=SAME)
             ends = [
-                [normal_force(robot.contact, damping, delta + sign * h, ddelta + sign * k) for sign in (1.0, -1.0)]
+                [
+                    normal_force(robot.contact, damping, delta + sign * h, ddelta + sign * k)
+                    for sign in (1.0, -1.0)
+                ]
                 for h, k in ((1e-9, 0.0), (0.0, 1e-7))
             ]
-            slopes = [(up - down) / width for (up, down), width in zip(ends, (2e-9, 2e-7), strict=True)]
+            slopes = [
+                (up - down) / width for (up, down), width in zip(ends, (2e-9, 2e-7), strict=True)
+            ]
             assert [stiffness, viscosity] == pytest.approx(slopes, rel=1e-5, abs=1e-4)
-            assert normal_probe(core, plant, damping, delta, ddelta, closed=0.0)[:2] == pytest.approx([0.0, 0.0], abs=0.0)
+            assert normal_probe(core, plant, damping, delta, ddelta, closed=0.0)[
+                :2
+            ] == pytest.approx([0.0, 0.0], abs=0.0)
 
 
-def normal_probe(core: ct.CDLL, plant: Plant, damping: float, delta: float, ddelta: float, *, closed: float = 1.0) -> Array:
+def normal_probe(
+    core: ct.CDLL, plant: Plant, damping: float, delta: float, ddelta: float, *, closed: float = 1.0
+) -> Array:
     return probed(core.hx_probe_normal_force, plant, closed, damping, delta, ddelta, size=4)
 
 
@@ -239,50 +291,94 @@ def test_friction_is_the_twins_through_its_limit_at_rest(core: ct.CDLL) -> None:
     for speed in (0.0, 1e-12, 0.99e-5 / 60.0, 1.01e-5 / 60.0, 1e-3, 0.05, 3.0):
         per_speed = asked(core.hx_probe_friction, plant, speed)
         slip = np.array([0.6, -0.8, 0.0]) * speed
-        assert distance(-robot.friction.mu * 10.0 * per_speed * slip, friction_force(robot.friction, 10.0, slip)) < SAME
-        assert per_speed == pytest.approx(math.tanh(60.0 * speed) / speed if speed else 60.0, rel=SAME)
+        assert (
+            distance(
+                -robot.friction.mu * 10.0 * per_speed * slip,
+                friction_force(robot.friction, 10.0, slip),
+            )
+            < SAME
+        )
+        assert per_speed == pytest.approx(
+            math.tanh(60.0 * speed) / speed if speed else 60.0, rel=SAME
+        )
 
 
-@pytest.mark.parametrize("static", [{}, {"mu_static": 1.1, "stribeck_speed": 0.3}], ids=["one coefficient", "static"])
+@pytest.mark.parametrize(
+    "static", [{}, {"mu_static": 1.1, "stribeck_speed": 0.3}], ids=["one coefficient", "static"]
+)
 @pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)
-def test_bristles_and_their_force_are_the_twins(core: ct.CDLL, terrain: dict[str, Any], static: dict[str, float]) -> None:
-    """Slack, stretched, sliding and overstretched bristles, along the slip and against it; an open foot's do not move."""
+def test_bristles_and_their_force_are_the_twins(
+    core: ct.CDLL, terrain: dict[str, Any], static: dict[str, float]
+) -> None:
+    """Slack, stretched, sliding and overstretched bristles, along the slip and against it; an
+    open foot's do not move.
+    """
     robot = changed(
-        lopsided(7), terrain=terrain, contact={"impact_speed_floor": 2.0}, friction={"law": "bristle", "bristle_damping": 1e-3} | static
+        lopsided(7),
+        terrain=terrain,
+        contact={"impact_speed_floor": 2.0},
+        friction={"law": "bristle", "bristle_damping": 1e-3} | static,
     )
     plant, body = drifted(core, robot, 7)
     damping, rng, seen = contact_damping(robot.contact, 0.0), np.random.default_rng(10), set()
     for size in (0.0, 0.3, 0.8, 0.8, 0.99, 0.99, 1.0, 1.2, 1.2):
         feet = foot_contacts(robot, body)
-        z = np.cross(rng.normal(size=(6, 3)), feet[0].normal)  # along the ground, of the size that is due
+        z = np.cross(
+            rng.normal(size=(6, 3)), feet[0].normal
+        )  # along the ground, of the size that is due
         z *= size * robot.friction.presliding / np.linalg.norm(z, axis=1, keepdims=True)
         rate = probed(core.hx_probe_bristles, plant, inputs(plant.hold()), z, size=18).reshape(6, 3)
         output = plant.output()
         for leg, foot in enumerate(feet):
             slip = foot.velocity + foot.approach_speed * foot.normal
             closed = foot.penetration > 0.0
-            assert distance(rate[leg], bristle_rate(robot.friction, slip, z[leg]) if closed else np.zeros(3)) < SAME
-            assert distance(output.foot.force[leg], foot_force(robot, foot, damping if closed else math.nan, z[leg])) < CONTACT_SAME
+            assert (
+                distance(
+                    rate[leg], bristle_rate(robot.friction, slip, z[leg]) if closed else np.zeros(3)
+                )
+                < SAME
+            )
+            assert (
+                distance(
+                    output.foot.force[leg],
+                    foot_force(robot, foot, damping if closed else math.nan, z[leg]),
+                )
+                < CONTACT_SAME
+            )
             seen.add((size, closed, bool(slip @ z[leg] > 0.0)))
         assert np.array_equal(output.foot.bristle, z)
-    assert {(0.99, True, True), (0.99, True, False), (1.2, True, True), (0.8, False, True)} <= seen  # size, closed, slipping on
+    assert {
+        (0.99, True, True),
+        (0.99, True, False),
+        (1.2, True, True),
+        (0.8, False, True),
+    } <= seen  # size, closed, slipping on
 
 
 @pytest.mark.parametrize("e", [1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999, 1.0])
 def test_the_exact_restitution_factor_is_the_twins(core: ct.CDLL, e: float) -> None:
-    rounding = 3e-8  # both sides of its equation are of the size of chi and differ by chi^3: near e = 1 half the digits are lost
-    assert asked(core.hx_probe_exact_restitution_chi, e) == pytest.approx(exact_restitution_chi(e), rel=1e-9, abs=rounding)
+    # both sides of its equation are of the size of chi and differ by chi^3: near e = 1 half the
+    # digits are lost
+    rounding = 3e-8
+    assert asked(core.hx_probe_exact_restitution_chi, e) == pytest.approx(
+        exact_restitution_chi(e), rel=1e-9, abs=rounding
+    )
 
 
 # servos
 
 
 @pytest.mark.parametrize("mode", ["position", "torque"])
-def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(core: ct.CDLL, mode: str) -> None:
+def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(
+    core: ct.CDLL, mode: str
+) -> None:
     robot = changed(load_robot("athena"), servo={"mode": mode})
     servo, plant, rng, clipped = robot.servo, Plant(core, robot), np.random.default_rng(9), 0
     for q, qd, command in zip(
-        rng.normal(0.0, 0.1, 200), rng.normal(0.0, 4.0, 200), rng.normal(0.0, 1.0, (200, 3)) * [0.1, 4.0, 2.0], strict=True
+        rng.normal(0.0, 0.1, 200),
+        rng.normal(0.0, 4.0, 200),
+        rng.normal(0.0, 1.0, (200, 3)) * [0.1, 4.0, 2.0],
+        strict=True,
     ):
 
         def torque(angle: float, speed: float, refs: Array = command) -> float:
@@ -292,9 +388,17 @@ def test_the_servo_is_the_twins_and_its_slopes_are_its_derivatives(core: ct.CDLL
             return torque(angle, speed) + float(gear_friction(servo, np.array([speed]))[0])
 
         got = probed(core.hx_probe_servo, plant, float(q), float(qd), command, size=4)
-        assert got[:2] == pytest.approx([torque(q, qd), float(gear_friction(servo, np.array([qd]))[0])], rel=SAME)
-        assert got[2] == pytest.approx((torque(q - 1e-6, qd) - torque(q + 1e-6, qd)) / 2e-6, rel=1e-6, abs=1e-6)
+        assert got[:2] == pytest.approx(
+            [torque(q, qd), float(gear_friction(servo, np.array([qd]))[0])], rel=SAME
+        )
+        assert got[2] == pytest.approx(
+            (torque(q - 1e-6, qd) - torque(q + 1e-6, qd)) / 2e-6, rel=1e-6, abs=1e-6
+        )
         clipped += got[2] == 0.0
-        if got[2] > 0.0:  # on the torque-speed line the damping is left out on purpose: the line is no spring
-            assert got[3] == pytest.approx((total(qd - 1e-6) - total(qd + 1e-6)) / 2e-6, rel=1e-5, abs=1e-5)
+        if (
+            got[2] > 0.0
+        ):  # on the torque-speed line the damping is left out on purpose: the line is no spring
+            assert got[3] == pytest.approx(
+                (total(qd - 1e-6) - total(qd + 1e-6)) / 2e-6, rel=1e-5, abs=1e-5
+            )
     assert clipped > 20

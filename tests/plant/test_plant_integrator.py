@@ -1,4 +1,6 @@
-"""The integrators: order by regression, error control in proportion to its tolerance, steps as asked for."""
+"""The integrators: order by regression, error control in proportion to its tolerance, steps as
+asked for.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +25,18 @@ ORDER = {"rosw3": 3, "ros2": 2, "dp54": 5, "bs32": 3, "rk4": 4}
 EMBEDDED = ("rosw3", "ros2", "dp54", "bs32")
 SLOPE = 0.1  # of the regression, off the order
 BASE = load_robot("phantomx_mk4")
-WIDE_SERVO: dict[str, Any] = {"torque_max": 100.0, "speed_max": 1e3, "coulomb_friction": 0.0}  # never clipped: smooth
+WIDE_SERVO: dict[str, Any] = {
+    "torque_max": 100.0,
+    "speed_max": 1e3,
+    "coulomb_friction": 0.0,
+}  # never clipped: smooth
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A smooth motion: robot, start, command and duration [s]; steps by order at which the error is asymptotic and above rounding."""
+    """A smooth motion: robot, start, command and duration [s]; steps by order at which the error
+    is asymptotic and above rounding.
+    """
 
     robot: Robot
     start: dict[str, Any]
@@ -49,7 +57,13 @@ def tumbling() -> Problem:
         "speed": rng.normal(0.0, 2.0, (6, 3)),
     }
     robot = changed(BASE, servo=WIDE_SERVO | {"mode": "torque"})
-    return Problem(robot, start, random_command(BASE, 3, size=0.3), 0.1, lambda order: (40, 57, 80) if order == 5 else (128, 181, 256))
+    return Problem(
+        robot,
+        start,
+        random_command(BASE, 3, size=0.3),
+        0.1,
+        lambda order: (40, 57, 80) if order == 5 else (128, 181, 256),
+    )
 
 
 def driven() -> Problem:
@@ -57,46 +71,78 @@ def driven() -> Problem:
     start = {"angle": BASE.stance + 0.05, "angular_velocity": [1.0, -2.0, 1.5]}
     command = Command(angle_ref=BASE.stance, speed_ref=random_command(BASE, 1).speed_ref)
     return Problem(
-        changed(BASE, servo={"mode": "kinematic"}), start, command, 0.1, lambda order: (40, 57, 80) if order == 5 else (128, 181, 256)
+        changed(BASE, servo={"mode": "kinematic"}),
+        start,
+        command,
+        0.1,
+        lambda order: (40, 57, 80) if order == 5 else (128, 181, 256),
     )
 
 
 def pressed() -> Problem:
-    """All feet in soft ground, sliding, servos working: contact and servo enter W, and no foot leaves or lands."""
+    """All feet in soft ground, sliding, servos working: contact and servo enter W, and no foot
+    leaves or lands.
+    """
     robot = changed(
-        BASE, servo=WIDE_SERVO | {"kp": 20.0, "kd": 0.5}, contact={"stiffness": 2e4, "impact_speed_floor": 2.0}, friction={"slope": 3.0}
+        BASE,
+        servo=WIDE_SERVO | {"kp": 20.0, "kd": 0.5},
+        contact={"stiffness": 2e4, "impact_speed_floor": 2.0},
+        friction={"slope": 3.0},
     )
     still, flat = np.zeros(3), np.zeros((6, 3))
-    feet = foot_contacts(robot, body_states(robot, still, np.eye(4)[0], still, still, BASE.stance, flat))
+    feet = foot_contacts(
+        robot, body_states(robot, still, np.eye(4)[0], still, still, BASE.stance, flat)
+    )
     start = {"position": [0.0, 0.0, min(foot.penetration for foot in feet) - 6e-3]}
     rng = np.random.default_rng(0)
-    command = Command(angle_ref=BASE.stance + rng.normal(0.0, 0.02, (6, 3)), push_force=np.array([3.0, 2.0, -10.0]))
-    return Problem(robot, start, command, 0.05, lambda order: (50, 71, 100) if order == 5 else (128, 181, 256))
+    command = Command(
+        angle_ref=BASE.stance + rng.normal(0.0, 0.02, (6, 3)),
+        push_force=np.array([3.0, 2.0, -10.0]),
+    )
+    return Problem(
+        robot, start, command, 0.05, lambda order: (50, 71, 100) if order == 5 else (128, 181, 256)
+    )
 
 
 def stuck() -> Problem:
     """The same on bristles far from letting go."""
     problem = pressed()
     robot = changed(problem.robot, friction={"law": "bristle", "presliding": 0.05})
-    return replace(problem, robot=robot, bristles=0.1, counts=lambda order: (57, 80, 113) if order == 5 else problem.counts(order))
+    return replace(
+        problem,
+        robot=robot,
+        bristles=0.1,
+        counts=lambda order: (57, 80, 113) if order == 5 else problem.counts(order),
+    )
 
 
 def sliding() -> Problem:
     """The same on bristles stretched to the full, the robot sliding on along x."""
     problem, friction = pressed(), {"law": "bristle", "presliding": 2e-3, "mu": 0.2}
     start = problem.start | {"velocity": [0.5, 0.0, 0.0]}
-    return replace(problem, robot=changed(problem.robot, friction=friction), start=start, bristles=1.0)
+    return replace(
+        problem, robot=changed(problem.robot, friction=friction), start=start, bristles=1.0
+    )
 
 
 def weakening() -> Problem:
-    """The same with static friction above kinetic, at speeds at which friction falls from one to the other."""
+    """The same with static friction above kinetic, at speeds at which friction falls from one to
+    the other.
+    """
     problem = sliding()
-    return replace(problem, robot=changed(problem.robot, friction={"mu_static": 0.3, "stribeck_speed": 0.3}))
+    return replace(
+        problem, robot=changed(problem.robot, friction={"mu_static": 0.3, "stribeck_speed": 0.3})
+    )
 
 
 PROBLEMS = {
-    "tumbling": tumbling(), "driven": driven(), "pressed": pressed(), "stuck": stuck(), "sliding": sliding(), "weakening": weakening(),
-}  # fmt: skip
+    "tumbling": tumbling(),
+    "driven": driven(),
+    "pressed": pressed(),
+    "stuck": stuck(),
+    "sliding": sliding(),
+    "weakening": weakening(),
+}
 
 
 def started(core: ct.CDLL, problem: Problem, **solver: Any) -> Plant:
@@ -123,14 +169,22 @@ def slope(x: Any, error: Any) -> float:
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
 def test_each_method_has_its_order(core: ct.CDLL, method: str, problem: Problem) -> None:
-    exact, steps = reference(core, problem), problem.duration / np.array(problem.counts(ORDER[method]))
-    errors = [float(np.max(np.abs(end(core, problem, method=method, step=float(step)) - exact))) for step in steps]
+    exact, steps = (
+        reference(core, problem),
+        problem.duration / np.array(problem.counts(ORDER[method])),
+    )
+    errors = [
+        float(np.max(np.abs(end(core, problem, method=method, step=float(step)) - exact)))
+        for step in steps
+    ]
     assert slope(steps, errors) == pytest.approx(ORDER[method], abs=SLOPE)
     assert errors[-1] < 1e-3
 
 
 @pytest.mark.parametrize("name", ["pressed", "stuck", "sliding", "weakening"])
-def test_no_foot_lands_or_leaves_while_pressed_and_bristles_stay_stuck_or_sliding(core: ct.CDLL, name: str) -> None:
+def test_no_foot_lands_or_leaves_while_pressed_and_bristles_stay_stuck_or_sliding(
+    core: ct.CDLL, name: str
+) -> None:
     """What the order of those problems rests on."""
     problem, stretched = PROBLEMS[name], []
     plant = started(core, problem)
@@ -147,12 +201,21 @@ def test_no_foot_lands_or_leaves_while_pressed_and_bristles_stay_stuck_or_slidin
 
 @pytest.mark.parametrize("method", EMBEDDED)
 @pytest.mark.parametrize("problem", ["tumbling", "pressed"])
-def test_the_error_falls_in_proportion_to_the_tolerance(core: ct.CDLL, method: str, problem: str) -> None:
+def test_the_error_falls_in_proportion_to_the_tolerance(
+    core: ct.CDLL, method: str, problem: str
+) -> None:
     exact, tolerances = reference(core, PROBLEMS[problem]), np.array([1e-5, 1e-6, 1e-7, 1e-8])
     scale = np.array([0.1] * 3 + [1.0] * 7 + [10.0] * 3)
     errors = []
     for tolerance in tolerances:
-        got = end(core, PROBLEMS[problem], method=method, step=0.0, tolerance=float(tolerance), step_max=1.0)
+        got = end(
+            core,
+            PROBLEMS[problem],
+            method=method,
+            step=0.0,
+            tolerance=float(tolerance),
+            step_max=1.0,
+        )
         errors.append(float(np.max(np.abs(got - exact) / scale)))
     # a method of order p estimated at order p - 1 keeps h^p in proportion to the tolerance
     assert slope(tolerances, errors) == pytest.approx(1.0, abs=0.2)
@@ -162,7 +225,9 @@ def test_the_error_falls_in_proportion_to_the_tolerance(core: ct.CDLL, method: s
 @pytest.mark.parametrize("method", METHODS)
 def test_fixed_steps_are_as_long_and_as_many_as_asked_for(core: ct.CDLL, method: str) -> None:
     problem = PROBLEMS["pressed"]
-    plant = Plant(core, changed(problem.robot, solver={"method": method, "step": 1e-3}), **problem.start)
+    plant = Plant(
+        core, changed(problem.robot, solver={"method": method, "step": 1e-3}), **problem.start
+    )
     plant.step(0.01, problem.command)
     plant.step(0.0125, problem.command)
     assert plant.output().solver.steps == 13
@@ -171,13 +236,17 @@ def test_fixed_steps_are_as_long_and_as_many_as_asked_for(core: ct.CDLL, method:
 
 def test_the_longest_step_is_kept_under_error_control(core: ct.CDLL) -> None:
     problem = PROBLEMS["tumbling"]
-    plant = Plant(core, changed(problem.robot, solver={"tolerance": 1.0, "step_max": 2e-3}), **problem.start)
+    plant = Plant(
+        core, changed(problem.robot, solver={"tolerance": 1.0, "step_max": 2e-3}), **problem.start
+    )
     plant.step(0.1, problem.command)
     assert plant.output().solver.steps >= 50
 
 
 def test_an_error_estimate_above_the_tolerance_rejects_the_step(core: ct.CDLL) -> None:
-    """A servo that hits a wall of torque after a long quiet flight: the step grown in flight is too long for it."""
+    """A servo that hits a wall of torque after a long quiet flight: the step grown in flight is
+    too long for it.
+    """
     robot = changed(BASE, solver={"tolerance": 1e-8, "step_max": 1.0})
     plant = Plant(core, robot, position=(0.0, 0.0, 5.0))
     plant.step(0.3)
@@ -188,8 +257,12 @@ def test_an_error_estimate_above_the_tolerance_rejects_the_step(core: ct.CDLL) -
     assert worked.steps - quiet.steps > 20
 
 
-def test_the_step_length_ends_where_the_macro_step_ends_and_the_pieces_add_up(core: ct.CDLL) -> None:
-    """The same fixed steps, taken in one call or in many, give the same bits: inputs and contacts alone tie a step to its call."""
+def test_the_step_length_ends_where_the_macro_step_ends_and_the_pieces_add_up(
+    core: ct.CDLL,
+) -> None:
+    """The same fixed steps, taken in one call or in many, give the same bits: inputs and
+    contacts alone tie a step to its call.
+    """
     problem = PROBLEMS["pressed"]
     robot = changed(problem.robot, solver={"method": "rosw3", "step": 2.0**-10})
     one, many = Plant(core, robot, **problem.start), Plant(core, robot, **problem.start)
@@ -203,7 +276,9 @@ def test_an_explicit_method_that_blows_up_says_so_and_leaves_the_plant_alone(cor
     robot = changed(load_robot("athena"), solver={"method": "rk4", "step": 0.05})
     plant = Plant(core, robot, position=(0.0, 0.0, 0.125))
     before = plant.save()
-    with pytest.raises(PlantError, match=r"not finite any more at t = .*solver\.step = 0") as caught:
+    with pytest.raises(
+        PlantError, match=r"not finite any more at t = .*solver\.step = 0"
+    ) as caught:
         plant.step(20.0)
     assert caught.value.status == NOT_FINITE
     assert plant.save() == before
@@ -211,5 +286,7 @@ def test_an_explicit_method_that_blows_up_says_so_and_leaves_the_plant_alone(cor
 
 @pytest.mark.parametrize("method", METHODS)
 def test_quaternions_keep_their_length(core: ct.CDLL, method: str) -> None:
-    lengths = np.linalg.norm(end(core, PROBLEMS["tumbling"], method=method, step=1e-3)[:, 3:7], axis=1)
+    lengths = np.linalg.norm(
+        end(core, PROBLEMS["tumbling"], method=method, step=1e-3)[:, 3:7], axis=1
+    )
     assert float(np.max(np.abs(lengths - 1.0))) < 1e-15

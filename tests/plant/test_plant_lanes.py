@@ -1,4 +1,6 @@
-"""The lanes' own mathematics (no libm there) against numpy, and that neither lane width nor instruction set changes a motion."""
+"""The lanes' own mathematics (no libm there) against numpy, and that neither lane width nor
+instruction set changes a motion.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +20,25 @@ from hexapod_cosim.models.records import Array
 
 SLOTS = 8
 ULP = 2.0**-52
-TANH_ULPS, EXPM1_ULPS, ANGLE_ULPS = 4.0, 4.0, 4.0  # a handful of roundings each: no error of method may be seen
+TANH_ULPS, EXPM1_ULPS, ANGLE_ULPS = (
+    4.0,
+    4.0,
+    4.0,
+)  # a handful of roundings each: no error of method may be seen
 ROOT = Path(__file__).parents[2]
 BASELINE = "-DHX_BASELINE_ONLY"  # no kernel beside the one whose lanes are asked for
-WIDTHS = {name: [BASELINE, f"-DHX_LANES={lanes}"] for name, lanes in (("scalar", 1), ("two", 2), ("four", 4), ("eight", 8))}
+WIDTHS = {
+    name: [BASELINE, f"-DHX_LANES={lanes}"]
+    for name, lanes in (("scalar", 1), ("two", 2), ("four", 4), ("eight", 8))
+}
 
 
 def mapped(function: Callable[..., None], *arguments: Array) -> Array:
     out = np.empty_like(arguments[0])
     assert len(out) % SLOTS == 0
-    function(*(pointer(np.ascontiguousarray(argument)) for argument in arguments), pointer(out), len(out))
+    function(
+        *(pointer(np.ascontiguousarray(argument)) for argument in arguments), pointer(out), len(out)
+    )
     return out
 
 
@@ -39,7 +50,9 @@ def ulps(got: Array, exact: Array) -> float:
 def logarithmic(low: float, high: float, seed: int) -> Array:
     """4096 numbers of both signs, sizes spread evenly over the decades."""
     rng = np.random.default_rng(seed)
-    sizes: Array = np.exp(rng.uniform(np.log(low), np.log(high), 4096)) * rng.choice([-1.0, 1.0], 4096)
+    sizes: Array = np.exp(rng.uniform(np.log(low), np.log(high), 4096)) * rng.choice(
+        [-1.0, 1.0], 4096
+    )
     return sizes
 
 
@@ -49,7 +62,9 @@ def test_tanh_is_right_to_a_few_last_places(core: ct.CDLL) -> None:
 
 
 def test_tanh_saturates_to_exactly_one_and_is_odd(core: ct.CDLL) -> None:
-    x = np.concatenate([[0.0, 20.0, 50.0, 1e300, np.inf, 1e-300, 19.0, 5.0], logarithmic(1e-6, 50.0, 2)])
+    x = np.concatenate(
+        [[0.0, 20.0, 50.0, 1e300, np.inf, 1e-300, 19.0, 5.0], logarithmic(1e-6, 50.0, 2)]
+    )
     got, mirrored = mapped(core.hx_probe_tanh, x), mapped(core.hx_probe_tanh, -x)
     assert list(got[:5]) == [0.0, 1.0, 1.0, 1.0, 1.0]
     assert np.all(np.abs(got) <= 1.0)
@@ -63,19 +78,30 @@ def test_expm1_is_right_to_a_few_last_places(core: ct.CDLL) -> None:
 
 def test_the_angle_of_a_half_angle_is_right_in_the_whole_turn(core: ct.CDLL) -> None:
     rng = np.random.default_rng(4)
-    half, size = rng.uniform(-np.pi / 2.0, np.pi / 2.0, 4096), rng.uniform(0.1, 10.0, 4096) * rng.choice([-1.0, 1.0], 4096)
+    half, size = (
+        rng.uniform(-np.pi / 2.0, np.pi / 2.0, 4096),
+        rng.uniform(0.1, 10.0, 4096) * rng.choice([-1.0, 1.0], 4096),
+    )
     y, x = size * np.sin(half), size * np.cos(half)
     assert ulps(mapped(core.hx_probe_angle_from_half, y, x), 2.0 * np.arctan(y / x)) <= ANGLE_ULPS
 
 
 def test_a_half_turn_is_plus_or_minus_pi_and_no_turn_is_zero(core: ct.CDLL) -> None:
-    y, x = np.array([1.0, -1.0, 0.0, 0.0, 1.0, -1.0, 1e-300, 1.0]), np.array([0.0, 0.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0])
+    y, x = (
+        np.array([1.0, -1.0, 0.0, 0.0, 1.0, -1.0, 1e-300, 1.0]),
+        np.array([0.0, 0.0, 1.0, -1.0, 1.0, 1.0, 1.0, -1.0]),
+    )
     expected = np.array([np.pi, -np.pi, 0.0, 0.0, np.pi / 2.0, -np.pi / 2.0, 2e-300, -np.pi / 2.0])
-    assert mapped(core.hx_probe_angle_from_half, y, x) == pytest.approx(expected, rel=ANGLE_ULPS * ULP, abs=0.0)
+    assert mapped(core.hx_probe_angle_from_half, y, x) == pytest.approx(
+        expected, rel=ANGLE_ULPS * ULP, abs=0.0
+    )
 
 
 def test_smaller_larger_and_absolute_value_are_taken_lane_by_lane(core: ct.CDLL) -> None:
-    a, b = np.array([1.0, -2.0, 0.0, 5.0, -1.0, np.inf, 3.0, -0.5]), np.array([2.0, -3.0, 0.0, 5.0, 1.0, 1.0, -np.inf, -0.25])
+    a, b = (
+        np.array([1.0, -2.0, 0.0, 5.0, -1.0, np.inf, 3.0, -0.5]),
+        np.array([2.0, -3.0, 0.0, 5.0, 1.0, 1.0, -np.inf, -0.25]),
+    )
     out = np.empty((3, SLOTS))
     core.hx_probe_select(pointer(a), pointer(b), pointer(out))
     assert np.array_equal(out, [np.minimum(a, b), np.maximum(a, b), np.abs(a)])
@@ -89,7 +115,9 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 ) -> None:
     robot = changed(load_robot("phantomx_mk4"), solver={"method": method}, friction={"law": law})
     command, ends = random_command(robot, 5, size=0.3), (0.004, 0.02)
-    plants = [Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])]
+    plants = [
+        Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
+    ]
     for t in ends:
         for plant in plants:
             plant.step(t, command)
@@ -103,10 +131,14 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("garbage", [0x00, 0xFF])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_what_lies_on_the_stack_does_not_matter(core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str) -> None:
+def test_what_lies_on_the_stack_does_not_matter(
+    core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
+) -> None:
     """Slots that no pack covers must not be read before they are written: 0xFF... is a NaN."""
     robot = changed(load_robot("athena"), friction={"law": law})
-    plants = [Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])]
+    plants = [
+        Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
+    ]
     for plant in plants:
         core.hx_probe_stain_stack(garbage)
         plant.step(0.02)
@@ -120,7 +152,9 @@ def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct
     core.hx_probe_kernel.restype = ct.c_char_p
     for index in range(8):
         rate = np.zeros((19, 13))
-        name = core.hx_probe_kernel(index, ct.c_void_p(plant.handle), ct.byref(inputs(command)), pointer(rate))
+        name = core.hx_probe_kernel(
+            index, ct.c_void_p(plant.handle), ct.byref(inputs(command)), pointer(rate)
+        )
         if name:
             seen[name] = rate
     assert b"baseline" in seen
@@ -130,15 +164,32 @@ def test_every_kernel_of_this_build_that_runs_here_gives_the_same_rates(core: ct
 
 @pytest.fixture(scope="session")
 def other_cores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ct.CDLL]:
-    """The plant compiled for other lane widths, and with less optimisation than the one under test."""
+    """The plant compiled for other lane widths, and with less optimisation than the one under
+    test.
+    """
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     assert compiler, "these tests need a C compiler"
     folder, plant = tmp_path_factory.mktemp("widths"), ROOT / "plant_fmu"
-    sources = [str(path) for path in [*sorted((plant / "src").glob("*.c")), plant / "generated" / "defaults.c"]]
-    flags = ["-std=c11", "-O1", "-shared", "-fPIC", "-ffp-contract=off", "-DHX_SHARED", f"-I{plant / 'include'}"]
+    sources = [
+        str(path)
+        for path in [*sorted((plant / "src").glob("*.c")), plant / "generated" / "defaults.c"]
+    ]
+    flags = [
+        "-std=c11",
+        "-O1",
+        "-shared",
+        "-fPIC",
+        "-ffp-contract=off",
+        "-DHX_SHARED",
+        f"-I{plant / 'include'}",
+    ]
     libraries = {}
     for name, extra in WIDTHS.items():
         file = folder / f"{name}.so"
-        subprocess.run([compiler, *flags, *extra, *sources, "-lm", "-o", str(file)], check=True, capture_output=True)
+        subprocess.run(
+            [compiler, *flags, *extra, *sources, "-lm", "-o", str(file)],
+            check=True,
+            capture_output=True,
+        )
         libraries[name] = ct.CDLL(str(file))
     return libraries

@@ -1,6 +1,8 @@
-"""What the plant measures of its own steps: works, losses, slip, impulses and peaks, against closed forms and independent sums.
+"""What the plant measures of its own steps: works, losses, slip, impulses and peaks, against closed
+forms and independent sums.
 
-Where a robot falls flat with its joints locked it is a point mass on a contact of six times a foot's stiffness (test_laws_impact.py).
+Where a robot falls flat with its joints locked it is a point mass on a contact of six times a
+foot's stiffness (test_laws_impact.py).
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ def weight(robot: Robot) -> float:
     return G * (robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links))
 
 
-# ---- closed forms -----------------------------------------------------------------------------------------------------------
+# ---- closed forms
+# -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("e", [0.3, 0.7])
@@ -42,11 +45,15 @@ def test_the_impulse_of_an_impact_is_the_momentum_that_it_gives(core: ct.CDLL, e
     robot = rigid(restitution=e)
     bounced = flown_off(falling(core, robot, speed=0.4), step=2e-3)
     mass = weight(robot) / G
-    assert bounced.foot.impulse == pytest.approx(np.full(6, 1.4 / 6.0 * mass * 0.4 * (1.0 + e) / 1.4), rel=CLOSED)
+    assert bounced.foot.impulse == pytest.approx(
+        np.full(6, 1.4 / 6.0 * mass * 0.4 * (1.0 + e) / 1.4), rel=CLOSED
+    )
 
 
 def test_peak_and_steepest_rise_of_an_elastic_impact_have_their_closed_forms(core: ct.CDLL) -> None:
-    """Hertz: m v^2/2 = 2/5 K d^(5/2) at the peak; K d^(3/2) rises most steeply where d^(5/2) = 5 m v^2/(14 K)."""
+    """Hertz: m v^2/2 = 2/5 K d^(5/2) at the peak; K d^(3/2) rises most steeply where d^(5/2) = 5
+    m v^2/(14 K).
+    """
     robot, speed, stiffness = rigid("hertz", stiffness=1e6), 0.5, 1e6
     mass = weight(robot) / G / 6.0
     plant = falling(core, robot, clearance=1e-4, speed=speed)
@@ -56,7 +63,9 @@ def test_peak_and_steepest_rise_of_an_elastic_impact_have_their_closed_forms(cor
     deepest = (1.25 * mass * speed**2 / stiffness) ** 0.4
     steep = (5.0 * mass * speed**2 / (14.0 * stiffness)) ** 0.4
     approach = math.sqrt(speed**2 - 0.8 * stiffness / mass * steep**2.5)
-    assert bounced.foot.peak_force == pytest.approx(np.full(6, stiffness * deepest**1.5), rel=CLOSED)
+    assert bounced.foot.peak_force == pytest.approx(
+        np.full(6, stiffness * deepest**1.5), rel=CLOSED
+    )
     expected = np.full(6, 1.5 * stiffness * math.sqrt(steep) * approach)
     assert bounced.foot.peak_force_rate == pytest.approx(expected, rel=2 * CLOSED)
     assert bounced.foot.landing_rate == pytest.approx(expected, rel=2 * CLOSED)
@@ -64,7 +73,9 @@ def test_peak_and_steepest_rise_of_an_elastic_impact_have_their_closed_forms(cor
 
 
 def test_the_landing_rate_is_that_of_the_first_20_milliseconds(core: ct.CDLL) -> None:
-    """A soft Hertzian contact, whose force rises ever more steeply for more than 40 ms: m d'' = -K d^(3/2), solved in steps of 1 us."""
+    """A soft Hertzian contact, whose force rises ever more steeply for more than 40 ms: m d'' =
+    -K d^(3/2), solved in steps of 1 us.
+    """
     stiffness, speed = 1200.0, 0.1
     robot = rigid("hertz", stiffness=stiffness)
     mass, depth, approach, rates = weight(robot) / G / 6.0, 0.0, speed, []
@@ -82,12 +93,16 @@ def test_the_loss_of_an_impact_is_the_kinetic_energy_it_takes(core: ct.CDLL) -> 
     robot = rigid(restitution=0.5)
     bounced = flown_off(falling(core, robot, speed=0.4), step=2e-3)
     mass = weight(robot) / G
-    assert bounced.energy.contact_loss == pytest.approx(0.5 * mass * 0.4**2 * (1.0 - 0.25), rel=CLOSED)
+    assert bounced.energy.contact_loss == pytest.approx(
+        0.5 * mass * 0.4**2 * (1.0 - 0.25), rel=CLOSED
+    )
     assert bounced.energy.friction_loss == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_robot_that_slides_to_rest_slips_the_way_of_its_friction(core: ct.CDLL) -> None:
-    """With locked joints and mu = 0.3 from 0.5 m/s: v^2/(2 mu g), and the kinetic energy goes into friction."""
+    """With locked joints and mu = 0.3 from 0.5 m/s: v^2/(2 mu g), and the kinetic energy goes
+    into friction.
+    """
     robot = changed(rigid(gravity=G), friction={"mu": 0.3, "slope": 1e4})
     start = above(robot, 0.0)
     rest = Plant(core, robot, position=start)
@@ -100,10 +115,17 @@ def test_a_robot_that_slides_to_rest_slips_the_way_of_its_friction(core: ct.CDLL
     assert output.energy.friction_loss == pytest.approx(0.5 * mass * 0.25, rel=5e-3)
 
 
-def test_a_torque_that_turns_a_free_joint_does_its_work_and_its_square_adds_up(core: ct.CDLL) -> None:
-    """Torque mode without gravity and gear friction: the works are what is moved, the squared torque's integral is tau^2 t."""
+def test_a_torque_that_turns_a_free_joint_does_its_work_and_its_square_adds_up(
+    core: ct.CDLL,
+) -> None:
+    """Torque mode without gravity and gear friction: the works are what is moved, the squared
+    torque's integral is tau^2 t.
+    """
     free = {"mode": "torque", "coulomb_friction": 0.0, "speed_max": 1e6, "torque_max": 1e3}
-    robot = replace(changed(load_robot("athena"), servo=free, solver={"tolerance": 1e-8}), gravity=(0.0, 0.0, 0.0))
+    robot = replace(
+        changed(load_robot("athena"), servo=free, solver={"tolerance": 1e-8}),
+        gravity=(0.0, 0.0, 0.0),
+    )
     plant = Plant(core, robot, position=(0.0, 0.0, 5.0))
     torque = np.zeros((6, 3))
     torque[0, 0], torque[4, 2] = 0.2, -0.1
@@ -112,7 +134,9 @@ def test_a_torque_that_turns_a_free_joint_does_its_work_and_its_square_adds_up(c
         plant.step(end, command)
     output = plant.output(command)
     assert output.energy.kinetic > 1e-2
-    assert float(np.sum(output.positive_work) - np.sum(output.negative_work)) == pytest.approx(output.energy.kinetic, rel=CLOSED)
+    assert float(np.sum(output.positive_work) - np.sum(output.negative_work)) == pytest.approx(
+        output.energy.kinetic, rel=CLOSED
+    )
     assert output.torque_squared[0, 0] == pytest.approx(0.04 * 0.1, rel=1e-9)
     assert output.torque_squared[4, 2] == pytest.approx(0.01 * 0.1, rel=1e-9)
     assert float(np.delete(output.torque_squared.ravel(), [0, 14]).max()) == 0.0
@@ -120,7 +144,10 @@ def test_a_torque_that_turns_a_free_joint_does_its_work_and_its_square_adds_up(c
 
 def test_gears_take_the_energy_of_joints_that_spin_down(core: ct.CDLL) -> None:
     off = {"mode": "torque", "coulomb_friction": 0.05}
-    robot = replace(changed(load_robot("athena"), servo=off, solver={"tolerance": 1e-7}), gravity=(0.0, 0.0, 0.0))
+    robot = replace(
+        changed(load_robot("athena"), servo=off, solver={"tolerance": 1e-7}),
+        gravity=(0.0, 0.0, 0.0),
+    )
     plant = Plant(core, robot, position=(0.0, 0.0, 5.0), speed=np.full((6, 3), 0.3))
     before = plant.output().energy.kinetic
     plant.step(1.0)
@@ -129,7 +156,8 @@ def test_gears_take_the_energy_of_joints_that_spin_down(core: ct.CDLL) -> None:
     assert energy.gear_loss > 0.5 * before
 
 
-# ---- sums over a walk --------------------------------------------------------------------------------------------------------
+# ---- sums over a walk
+# --------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module", params=["tanh", "bristle"])
@@ -137,9 +165,12 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return changed(load_robot("athena"), friction={"law": request.param})
 
 
-def samples(core: ct.CDLL, robot: Robot, every: float, duration: float = 0.6) -> tuple[list[tuple[Any, Any]], list[Any]]:
-    """Of a walk in holds of 5 ms, whose commands are the same for any `every`: outputs at the beginning and end of every piece of so
-    many seconds, both under the command in force, and at the end of every hold.
+def samples(
+    core: ct.CDLL, robot: Robot, every: float, duration: float = 0.6
+) -> tuple[list[tuple[Any, Any]], list[Any]]:
+    """Of a walk in holds of 5 ms, whose commands are the same for any `every`: outputs at the
+    beginning and end of every piece of so many seconds, both under the command in force, and at the
+    end of every hold.
     """
     plant = standing(core, robot)
     pieces, ends = [], []
@@ -164,7 +195,9 @@ def test_the_parts_add_up_to_the_books(core: ct.CDLL, robot: Robot) -> None:
 
 
 def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: Robot) -> None:
-    """At the default tolerance in holds of 5 ms, against sums of forces, speeds and torques sampled every 0.1 ms."""
+    """At the default tolerance in holds of 5 ms, against sums of forces, speeds and torques
+    sampled every 0.1 ms.
+    """
     fine, _ = samples(core, changed(robot, solver={"tolerance": 1e-7}), 1e-4)
     _, coarse = samples(core, robot, 5e-3)
     least = 0.01 * weight(robot)
@@ -178,17 +211,29 @@ def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: R
 
     force = np.array([after.foot.normal_force for _, after in fine])
     last = coarse[-1]
-    assert float(np.sum(last.positive_work)) == pytest.approx(total(lambda o: np.maximum(o.torque * o.speed, 0.0)), rel=SAMPLED)
-    assert float(np.sum(last.negative_work)) == pytest.approx(total(lambda o: np.maximum(-o.torque * o.speed, 0.0)), rel=2 * SAMPLED)
-    assert float(np.sum(last.torque_squared)) == pytest.approx(total(lambda o: o.torque**2), rel=SAMPLED)
-    assert float(np.sum(last.foot.impulse)) == pytest.approx(total(lambda o: o.foot.normal_force), rel=SAMPLED)
+    assert float(np.sum(last.positive_work)) == pytest.approx(
+        total(lambda o: np.maximum(o.torque * o.speed, 0.0)), rel=SAMPLED
+    )
+    assert float(np.sum(last.negative_work)) == pytest.approx(
+        total(lambda o: np.maximum(-o.torque * o.speed, 0.0)), rel=2 * SAMPLED
+    )
+    assert float(np.sum(last.torque_squared)) == pytest.approx(
+        total(lambda o: o.torque**2), rel=SAMPLED
+    )
+    assert float(np.sum(last.foot.impulse)) == pytest.approx(
+        total(lambda o: o.foot.normal_force), rel=SAMPLED
+    )
     assert float(np.sum(last.foot.slip_distance)) == pytest.approx(total(slip), rel=SAMPLED)
-    assert max(output.foot.peak_force.max() for output in coarse) == pytest.approx(float(force.max()), rel=SAMPLED)
+    assert max(output.foot.peak_force.max() for output in coarse) == pytest.approx(
+        float(force.max()), rel=SAMPLED
+    )
     rise = np.diff(force, axis=0) / 1e-4
     assert max(output.foot.peak_force_rate.max() for output in coarse) > 0.9 * float(rise.max())
 
 
-def test_the_way_of_looking_changes_no_integral_and_loses_no_peak(core: ct.CDLL, robot: Robot) -> None:
+def test_the_way_of_looking_changes_no_integral_and_loses_no_peak(
+    core: ct.CDLL, robot: Robot
+) -> None:
     often = [after for _, after in samples(core, robot, 1e-3)[0]]
     seldom = samples(core, robot, 5e-3)[1]
     for name in ("positive_work", "negative_work", "torque_squared"):
@@ -197,12 +242,16 @@ def test_the_way_of_looking_changes_no_integral_and_loses_no_peak(core: ct.CDLL,
     for name in ("slip_distance", "impulse", "landings"):
         one, other = (float(np.sum(getattr(run[-1].foot, name))) for run in (often, seldom))
         assert one == pytest.approx(other, rel=2e-3)
-    one, other = (max(float(output.foot.peak_force.max()) for output in run) for run in (often, seldom))
+    one, other = (
+        max(float(output.foot.peak_force.max()) for output in run) for run in (often, seldom)
+    )
     assert one == pytest.approx(other, rel=SAMPLED)
 
 
 def test_steps_as_short_as_rounding_make_no_steep_forces(core: ct.CDLL) -> None:
-    """A standing robot in steps down to 1e-11 s, over which depths change by their last bits alone."""
+    """A standing robot in steps down to 1e-11 s, over which depths change by their last bits
+    alone.
+    """
     plant = standing(core, load_robot("athena"))
     for size in (1e-9, 1e-10, 1.1e-11):
         for _ in range(5):
@@ -243,12 +292,17 @@ def test_measures_come_back_with_a_saved_state(core: ct.CDLL, robot: Robot) -> N
     assert ends[0] == ends[1]
 
 
-# ---- the books ---------------------------------------------------------------------------------------------------------------
+# ---- the books
+# ---------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("rosw3", 1e-4), ("ros2", 0.1)])
-def test_the_books_close_where_motors_are_on_their_torque_speed_line(core: ct.CDLL, name: str, tolerance: float) -> None:
-    """Legs swung to and fro so fast that the line limits them; a stage's torque that is clipped after its shift leaves some 1 %."""
+def test_the_books_close_where_motors_are_on_their_torque_speed_line(
+    core: ct.CDLL, name: str, tolerance: float
+) -> None:
+    """Legs swung to and fro so fast that the line limits them; a stage's torque that is clipped
+    after its shift leaves some 1 %.
+    """
     robot = changed(load_robot("athena"), solver={"method": name, "tolerance": tolerance})
     plant = Plant(core, robot, position=(0.0, 0.0, 1.0))
     limited = 0

@@ -1,4 +1,6 @@
-"""Misuse of the plant: every bad call is told what it gave and what was expected, and leaves the plant as it was."""
+"""Misuse of the plant: every bad call is told what it gave and what was expected, and leaves the
+plant as it was.
+"""
 
 from __future__ import annotations
 
@@ -55,20 +57,32 @@ BAD_NUMBERS = (math.nan, math.inf, -math.inf)
 
 
 @pytest.mark.parametrize("number", BAD_NUMBERS)
-@pytest.mark.parametrize("name", ["angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque", "acceleration_ref"])
+@pytest.mark.parametrize(
+    "name",
+    ["angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque", "acceleration_ref"],
+)
 @pytest.mark.parametrize("last", [False, True])
-def test_an_input_that_is_no_number_is_refused(core: ct.CDLL, name: str, number: float, last: bool) -> None:
+def test_an_input_that_is_no_number_is_refused(
+    core: ct.CDLL, name: str, number: float, last: bool
+) -> None:
     plant = midway(core)
     values = {"angle_ref": plant.robot.stance} | {name: np.array(getattr(plant.hold(), name))}
     values[name].ravel()[-1 if last else 0] = number
     pattern = rf"{name}(\[\d\])?: got -?(nan|inf), expected \S+ to \S+ (rad|rad/s2?|N\.m|N)$"
-    refused(plant, lambda: plant.step(plant.time + MACRO, Command(**values)), INVALID_ARGUMENT, pattern)
+    refused(
+        plant, lambda: plant.step(plant.time + MACRO, Command(**values)), INVALID_ARGUMENT, pattern
+    )
 
 
 @pytest.mark.parametrize("end", [0.0, -1.0, 0.0199, *BAD_NUMBERS])
 def test_an_end_that_is_past_or_no_number_is_refused(core: ct.CDLL, end: float) -> None:
     plant = midway(core)
-    refused(plant, lambda: plant.step(end), INVALID_ARGUMENT, r"end of step: got \S+ s, expected a finite time of at least 0\.02\d* s")
+    refused(
+        plant,
+        lambda: plant.step(end),
+        INVALID_ARGUMENT,
+        r"end of step: got \S+ s, expected a finite time of at least 0\.02\d* s",
+    )
 
 
 def test_a_step_to_the_present_time_does_nothing(core: ct.CDLL) -> None:
@@ -79,13 +93,22 @@ def test_a_step_to_the_present_time_does_nothing(core: ct.CDLL) -> None:
 
 
 @pytest.mark.parametrize("number", BAD_NUMBERS)
-def test_bodies_or_a_start_time_that_are_no_numbers_are_refused(core: ct.CDLL, number: float) -> None:
+def test_bodies_or_a_start_time_that_are_no_numbers_are_refused(
+    core: ct.CDLL, number: float
+) -> None:
     plant = midway(core)
     body = plant.bodies
     body[7, 4] = number
-    refused(plant, lambda: setattr(plant, "bodies", body), INVALID_ARGUMENT, "body state: got a number that is not finite")
+    refused(
+        plant,
+        lambda: setattr(plant, "bodies", body),
+        INVALID_ARGUMENT,
+        "body state: got a number that is not finite",
+    )
     start = definition(plant.robot)
-    refused(plant, lambda: plant.reset(start, number), INVALID_ARGUMENT, "start time: got .* not finite")
+    refused(
+        plant, lambda: plant.reset(start, number), INVALID_ARGUMENT, "start time: got .* not finite"
+    )
 
 
 def field(d: Any, path: str) -> tuple[Any, str]:
@@ -101,7 +124,11 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ("torso.mass", 0.0, r"torso\.mass: got 0, expected 1e-09 to 1e\+09 kg$"),
     ("torso.mass", math.nan, r"torso\.mass: got -?nan"),
     ("torso.com", (0.0, math.inf, 0.0), r"torso\.com\[2\]: got inf, expected -100 to 100 m$"),
-    ("torso.inertia", (1.0, 1.0, 2.1, 0.0, 0.0, 0.0), r"torso\.inertia_xx: got 1, expected an inertia that a body can have"),
+    (
+        "torso.inertia",
+        (1.0, 1.0, 2.1, 0.0, 0.0, 0.0),
+        r"torso\.inertia_xx: got 1, expected an inertia that a body can have",
+    ),
     ("torso.inertia", (1.0, 1.0, 1.0, 0.9, 0.9, -0.9), r"torso\.inertia_xx: .* a body can have"),
     ("torso.inertia", (1.0, 1.0, 1.0, 0.0, 0.4, 0.4), r"torso\.inertia_xx: .* a body can have"),
     ("torso.inertia", (-1.0, 1.0, 1.0, 0.0, 0.0, 0.0), r"torso\.inertia_xx: got -1"),
@@ -111,7 +138,11 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ("leg[0].link[0].length", 0.0, r"LF\.coxa\.length: got 0, expected a tip away from the joint"),
     ("leg[1].link[2].offset_z", math.nan, r"LM\.tibia\.offset_z: got -?nan"),
     ("leg[3].link[2].axis", (0.0, 0.0, 0.0), r"RF\.tibia\.axis: got 0, expected a direction"),
-    ("leg[3].link[1].inertia", (1e-4, 1e-4, 3e-4, 0.0, 0.0, 0.0), r"RF\.femur\.inertia_xx: got 0\.0001"),
+    (
+        "leg[3].link[1].inertia",
+        (1e-4, 1e-4, 3e-4, 0.0, 0.0, 0.0),
+        r"RF\.femur\.inertia_xx: got 0\.0001",
+    ),
     ("foot_radius", 0.0, r"foot\.radius: got 0"),
     ("contact.law", 0, r"contact\.law: got 0, expected 1 to 6"),
     ("contact.law", 7, r"contact\.law: got 7, expected 1 to 6"),
@@ -125,7 +156,11 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ("friction.slope", math.nan, r"friction\.slope: got -?nan"),
     ("friction.presliding", 0.0, r"friction\.presliding: got 0, expected 1e-07 to 1 m"),
     ("friction.bristle_damping", -0.1, r"friction\.bristle_damping: got -0\.1"),
-    ("friction.mu_static", 0.1, r"friction\.mu_static: got 0\.1, expected at least friction\.mu, or 0"),
+    (
+        "friction.mu_static",
+        0.1,
+        r"friction\.mu_static: got 0\.1, expected at least friction\.mu, or 0",
+    ),
     (
         "friction.mu_static",
         0.8,
@@ -147,20 +182,38 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     ("solver.step", 2.0, r"solver\.step: got 2"),
     ("solver.tolerance", 0.0, r"solver\.tolerance: got 0"),
     ("solver.step_max", 0.0, r"solver\.step_max: got 0"),
-    ("solver.method", 5, r"solver\.step: got 0, expected a fixed step > 0 with this solver\.method"),
+    (
+        "solver.method",
+        5,
+        r"solver\.step: got 0, expected a fixed step > 0 with this solver\.method",
+    ),
     ("terrain.kind", 3, r"terrain\.kind: got 3, expected 1 to 2"),
     ("terrain.height", math.nan, r"terrain\.height: got -?nan"),
     ("terrain.incline", 1.6, r"terrain\.incline: got 1\.6"),
     ("terrain.heading", math.nan, r"terrain\.heading: got -?nan"),
     ("initial.position", (math.nan, 0.0, 0.0), r"initial\.position\[1\]: got -?nan"),
-    ("initial.quaternion", (0.0, 0.0, 0.0, 0.0), r"initial\.quaternion: got 0, expected a quaternion"),
+    (
+        "initial.quaternion",
+        (0.0, 0.0, 0.0, 0.0),
+        r"initial\.quaternion: got 0, expected a quaternion",
+    ),
     ("initial.velocity", (0.0, math.inf, 0.0), r"initial\.velocity\[2\]: got inf"),
-    ("initial.angular_velocity", (0.0, 0.0, -math.inf), r"initial\.angular_velocity\[3\]: got -inf"),
+    (
+        "initial.angular_velocity",
+        (0.0, 0.0, -math.inf),
+        r"initial\.angular_velocity\[3\]: got -inf",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("path", "value", "pattern"), IMPOSSIBLE, ids=[f"{path}={value}" for path, value, _ in IMPOSSIBLE])
-def test_a_definition_no_robot_can_have_is_refused(core: ct.CDLL, path: str, value: Any, pattern: str) -> None:
+@pytest.mark.parametrize(
+    ("path", "value", "pattern"),
+    IMPOSSIBLE,
+    ids=[f"{path}={value}" for path, value, _ in IMPOSSIBLE],
+)
+def test_a_definition_no_robot_can_have_is_refused(
+    core: ct.CDLL, path: str, value: Any, pattern: str
+) -> None:
     plant = midway(core)
     bad = definition(plant.robot)
     owner, name = field(bad, path)
@@ -180,7 +233,12 @@ def test_every_joint_angle_and_speed_at_start_is_looked_at(core: ct.CDLL) -> Non
     for name in ("angle", "speed"):
         bad = definition(plant.robot)
         getattr(bad.initial, name)[5][2] = math.nan
-        refused(plant, partial(plant.reset, bad), INVALID_MODEL, rf"^initial\.RR\.tibia\.{name}: got -?nan")
+        refused(
+            plant,
+            partial(plant.reset, bad),
+            INVALID_MODEL,
+            rf"^initial\.RR\.tibia\.{name}: got -?nan",
+        )
 
 
 def test_every_status_has_a_name(core: ct.CDLL) -> None:
@@ -191,9 +249,14 @@ def test_every_status_has_a_name(core: ct.CDLL) -> None:
 
 @pytest.mark.parametrize("settings", [{}, {"step": 1e-7}])
 def test_no_call_runs_on_for_ever(core: ct.CDLL, settings: dict[str, float]) -> None:
-    """An absurd push under error control, a step far too small without it: refused within a bounded number of evaluations."""
+    """An absurd push under error control, a step far too small without it: refused within a
+    bounded number of evaluations.
+    """
     plant = Plant(core, changed(load_robot("athena"), solver=settings))
     before = plant.save()
-    with pytest.raises(PlantError, match=r"gives up|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, expected at most"):
+    with pytest.raises(
+        PlantError,
+        match=r"gives up|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, expected at most",
+    ):
         plant.step(0.1, Command(angle_ref=plant.robot.stance, push_force=np.array([1e8, 0.0, 0.0])))
     assert plant.save() == before

@@ -1,4 +1,6 @@
-"""What the plant shows, against the twin: energies, reactions, attitude, errors; and the robot it carries compiled in."""
+"""What the plant shows, against the twin: energies, reactions, attitude, errors; and the robot
+it carries compiled in.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,11 @@ from hexapod_cosim.models.energy import constraint_errors, kinetic_energy, poten
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product, rotation_matrix
 from hexapod_cosim.models.records import Array
 
-SAME = 1e-13  # relative: the same formula, its operations in another order, some hundred roundings long
-CONTACT_SAME = 1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+# relative: the same formula, its operations in another order, some hundred roundings long
+SAME = 1e-13
+CONTACT_SAME = (
+    1e-10  # relative, of forces: a penetration of 1e-5 m is the difference of coordinates of 0.1 m
+)
 DRIFT = 0.02
 SLOPE = {"kind": "slope", "height": -0.02, "incline": 0.3, "heading": 2.1}
 
@@ -34,7 +39,9 @@ def drifted(core: ct.CDLL, robot: Robot, seed: int) -> tuple[Plant, Array]:
 
 
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])
-def test_energies_reactions_torques_and_errors_shown_are_the_twins(core: ct.CDLL, mode: str) -> None:
+def test_energies_reactions_torques_and_errors_shown_are_the_twins(
+    core: ct.CDLL, mode: str
+) -> None:
     robot = changed(lopsided(10), servo={"mode": mode})
     plant, body = drifted(core, robot, 10)
     command = random_command(robot, 10)
@@ -48,7 +55,10 @@ def test_energies_reactions_torques_and_errors_shown_are_the_twins(core: ct.CDLL
     errors = (output.constraint.position_error, output.constraint.velocity_error)
     assert errors == pytest.approx(constraint_errors(robot, body), rel=SAME)
     R = rotation_matrix(body[0, 3:7])
-    assert distance(output.imu.specific_force, R.T @ (solved.dv[0, 0:3] - np.array(robot.gravity))) < SAME
+    assert (
+        distance(output.imu.specific_force, R.T @ (solved.dv[0, 0:3] - np.array(robot.gravity)))
+        < SAME
+    )
     assert distance(output.imu.angular_velocity, R.T @ body[0, 10:13]) < SAME
     assert output.energy.residual == 0.0
 
@@ -56,13 +66,18 @@ def test_energies_reactions_torques_and_errors_shown_are_the_twins(core: ct.CDLL
 def test_roll_pitch_and_yaw_turn_in_the_order_z_y_x(core: ct.CDLL) -> None:
     roll, pitch, yaw = 0.3, -0.5, 2.4
     x, y, z = np.eye(3)
-    turn = quaternion_product(axis_quaternion(z, yaw), quaternion_product(axis_quaternion(y, pitch), axis_quaternion(x, roll)))
+    turn = quaternion_product(
+        axis_quaternion(z, yaw),
+        quaternion_product(axis_quaternion(y, pitch), axis_quaternion(x, roll)),
+    )
     torso = Plant(core, load_robot("athena"), quaternion=turn).output().torso
     assert (torso.roll, torso.pitch, torso.yaw) == pytest.approx((roll, pitch, yaw), rel=SAME)
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
-def test_slip_speed_and_tangential_force_are_the_parts_along_the_ground(core: ct.CDLL, name: str) -> None:
+def test_slip_speed_and_tangential_force_are_the_parts_along_the_ground(
+    core: ct.CDLL, name: str
+) -> None:
     robot = changed(load_robot(name), terrain=SLOPE, contact={"impact_speed_floor": 2.0})
     plant, body = drifted(core, robot, 11)
     foot = plant.output().foot
@@ -70,22 +85,32 @@ def test_slip_speed_and_tangential_force_are_the_parts_along_the_ground(core: ct
         slip = contact.velocity - (contact.velocity @ contact.normal) * contact.normal
         along = foot.force[leg] - (foot.force[leg] @ contact.normal) * contact.normal
         assert foot.slip_speed[leg] == pytest.approx(float(np.linalg.norm(slip)), rel=SAME)
-        assert foot.tangential_force[leg] == pytest.approx(float(np.linalg.norm(along)), rel=1e-9, abs=1e-12)
-        assert foot.normal_force[leg] == pytest.approx(float(foot.force[leg] @ contact.normal), rel=1e-9, abs=1e-12)
+        assert foot.tangential_force[leg] == pytest.approx(
+            float(np.linalg.norm(along)), rel=1e-9, abs=1e-12
+        )
+        assert foot.normal_force[leg] == pytest.approx(
+            float(foot.force[leg] @ contact.normal), rel=1e-9, abs=1e-12
+        )
 
 
 def numbers(value: Any) -> list[float]:
     """All numbers in a structure, in order."""
     if isinstance(value, ct.Structure):
         return [number for field in value._fields_ for number in numbers(getattr(value, field[0]))]
-    return [number for entry in value for number in numbers(entry)] if isinstance(value, ct.Array) else [value]
+    return (
+        [number for entry in value for number in numbers(entry)]
+        if isinstance(value, ct.Array)
+        else [value]
+    )
 
 
 def test_the_compiled_in_robot_is_athena_in_its_settled_pose(core: ct.CDLL) -> None:
     default, athena = HxDefinition(), definition(load_robot("athena"))
     bound(core).hx_definition_default(default)
     plant = Plant(core, load_robot("athena"), **vars(seen(default).initial))
-    assert float(np.max(np.abs(plant.accelerations().dv))) < 1e-3  # m/s2, rad/s2: the pose is given to 1e-10 m
+    assert (
+        float(np.max(np.abs(plant.accelerations().dv))) < 1e-3
+    )  # m/s2, rad/s2: the pose is given to 1e-10 m
     default.initial = athena.initial
     assert numbers(default) == numbers(athena)
 
@@ -111,5 +136,7 @@ def test_a_plant_without_any_setting_stands_where_it_is(core: ct.CDLL) -> None:
 
 
 def test_the_version_is_the_projects(core: ct.CDLL) -> None:
-    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = tomllib.loads(
+        (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    )["project"]
     assert bound(core).hx_version().decode() == project["version"]

@@ -1,4 +1,6 @@
-"""A step of the integrator, stage by stage, against the textbook's formula: the dense system of eq. 15 and 16, bristles of eq. 20."""
+"""A step of the integrator, stage by stage, against the textbook's formula: the dense system of
+eq. 15 and 16, bristles of eq. 20.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ class Tableau:
 def coefficients(core: ct.CDLL, method: str) -> Tableau:
     shape, gamma = (ct.c_int * 3)(), ct.c_double()
     a, g, c, b, e = np.zeros((7, 7)), np.zeros((7, 7)), np.zeros(7), np.zeros(7), np.zeros(7)
-    core.hx_probe_method(METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e)))
+    core.hx_probe_method(
+        METHODS.index(method) + 1, shape, ct.byref(gamma), *map(pointer, (a, g, c, b, e))
+    )
     return Tableau(shape[0], gamma.value, a, g, b, e)
 
 
@@ -45,7 +49,13 @@ def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Ar
     def rate(y: Array) -> Array:
         plant.bodies = y.reshape(19, 13)
         result, power = np.zeros((19, 13)), np.zeros(3)
-        core.hx_probe_rate(ct.c_void_p(plant.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(result), pointer(power))
+        core.hx_probe_rate(
+            ct.c_void_p(plant.handle),
+            ct.byref(inputs(command)),
+            ct.c_double(0.0),
+            pointer(result),
+            pointer(power),
+        )
         return result.ravel()
 
     return rate
@@ -53,7 +63,9 @@ def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Ar
 
 @dataclass
 class DenseStages:
-    """The stages of eq. 15 one after the other, solved as the dense system: nu (114,) that positions advance with, and alpha."""
+    """The stages of eq. 15 one after the other, solved as the dense system: nu (114,) that
+    positions advance with, and alpha.
+    """
 
     robot: Robot
     law: LawSlopes
@@ -61,26 +73,38 @@ class DenseStages:
     z: float
 
     def solve(self, body: Array, s_x: Array, s_v: Array) -> tuple[Array, Array]:
-        """W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0; alpha = a + u, nu = v + s_v + z alpha."""
-        z, v, a = self.z, body[:, 7:13].ravel(), self.rate(body.ravel()).reshape(19, 13)[:, 7:13].ravel()
+        """W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0; alpha = a +
+        u, nu = v + s_v + z alpha.
+        """
+        z, v, a = (
+            self.z,
+            body[:, 7:13].ravel(),
+            self.rate(body.ravel()).reshape(19, 13)[:, 7:13].ravel(),
+        )
         G_x, G_v = assembled(self.robot, body, self.law)
         D = constraints(self.robot, body).D
         W = mass_matrix(self.robot, body) - z * G_v - z * z * G_x
         right = G_v @ (s_v + z * a) + G_x @ (s_x + z * (v + s_v) + z * z * a)
-        u = np.linalg.solve(np.block([[W, D.T], [D, np.zeros((90, 90))]]), np.concatenate([right, np.zeros(90)]))[:114]
+        u = np.linalg.solve(
+            np.block([[W, D.T], [D, np.zeros((90, 90))]]), np.concatenate([right, np.zeros(90)])
+        )[:114]
         return v + s_v + z * (a + u), a + u
 
 
 def body_rates(body: Array, nu: Array, alpha: Array) -> Array:
     """(247,) dy/dt of positions that advance with nu."""
     w = nu.reshape(19, 6)
-    turns = np.array([quaternion_rate(p, turn) for p, turn in zip(body[:, 3:7], w[:, 3:6], strict=True)])
+    turns = np.array(
+        [quaternion_rate(p, turn) for p, turn in zip(body[:, 3:7], w[:, 3:6], strict=True)]
+    )
     return np.hstack([w[:, 0:3], turns, alpha.reshape(19, 6)]).ravel()
 
 
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
 def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str) -> None:
-    """Contact and servo keep the first stage's slopes, masses and joints are each stage's own; h is many of friction's times."""
+    """Contact and servo keep the first stage's slopes, masses and joints are each stage's own; h
+    is many of friction's times.
+    """
     h, robot = 2e-3, changed(load_robot("athena"), solver={"method": method, "step": 2e-3})
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
     body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
@@ -88,7 +112,9 @@ def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str
     plant.bodies = body
 
     m = coefficients(core, method)
-    stages = DenseStages(robot, law_slopes(robot, command, body), rates(core, there, command), h * m.gamma)
+    stages = DenseStages(
+        robot, law_slopes(robot, command, body), rates(core, there, command), h * m.gamma
+    )
     k, nu, alpha = np.zeros((7, 247)), np.zeros((7, 114)), np.zeros((7, 114))
     for i in range(m.stages):
         y = (body.ravel() + h * m.a[i] @ k).reshape(19, 13)
@@ -99,13 +125,21 @@ def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str
     plant.step(h, command)
     moved = np.max(np.abs(exact - body), axis=0)
     assert np.all(np.max(np.abs(plant.bodies - exact), axis=0) < 1e-5 * moved)
-    fastest = np.max(np.abs(np.linalg.eigvals(np.linalg.solve(mass_matrix(robot, body), assembled(robot, body, stages.law)[1]))))
+    fastest = np.max(
+        np.abs(
+            np.linalg.eigvals(
+                np.linalg.solve(mass_matrix(robot, body), assembled(robot, body, stages.law)[1])
+            )
+        )
+    )
     assert h * fastest > 10.0
 
 
 @dataclass
 class StuckStages(DenseStages):
-    """The same on bristles that do not let go, for which eq. 20 has beta = 0. rate leaves their own in bristle_rate."""
+    """The same on bristles that do not let go, for which eq. 20 has beta = 0. rate leaves their
+    own in bristle_rate.
+    """
 
     G_b: Array  # (6,) N/m
     bristle_rate: Array  # (6, 3) m/s
@@ -115,53 +149,96 @@ class StuckStages(DenseStages):
         G = np.zeros((6, 114, 3))
         for leg, foot in enumerate(foot_contacts(self.robot, body)):
             tibia = 3 * (leg + 1)
-            G[leg, 6 * tibia : 6 * tibia + 6] = np.vstack([np.eye(3), skew(foot.point - body[tibia, 0:3])]) @ np.diag([1.0, 1.0, 0.0])
+            G[leg, 6 * tibia : 6 * tibia + 6] = np.vstack(
+                [np.eye(3), skew(foot.point - body[tibia, 0:3])]
+            ) @ np.diag([1.0, 1.0, 0.0])
         return G
 
-    def solve_stuck(self, body: Array, s_x: Array, s_v: Array, s_b: Array) -> tuple[Array, Array, Array]:
-        """W has z^2 G_b at each foot more, the right side G_b (s_b + z (db/dt + s_v + z a)): nu, alpha and k_b/h."""
+    def solve_stuck(
+        self, body: Array, s_x: Array, s_v: Array, s_b: Array
+    ) -> tuple[Array, Array, Array]:
+        """W has z^2 G_b at each foot more, the right side G_b (s_b + z (db/dt + s_v + z a)): nu,
+        alpha and k_b/h.
+        """
         z, grips = self.z, self.grips(body)
         a = self.rate(body.ravel()).reshape(19, 13)[:, 7:13].ravel()
         G_x, G_v = assembled(self.robot, body, self.law)
         moved = s_b + z * (self.bristle_rate + np.einsum("lij,i->lj", grips, s_v + z * a))
-        D, springs = constraints(self.robot, body).D, np.einsum("l,lij,lkj->ik", self.G_b, grips, grips)
+        D, springs = (
+            constraints(self.robot, body).D,
+            np.einsum("l,lij,lkj->ik", self.G_b, grips, grips),
+        )
         W = mass_matrix(self.robot, body) - z * G_v - z * z * (G_x + springs)
         right = G_v @ (s_v + z * a) + G_x @ (s_x + z * (body[:, 7:13].ravel() + s_v) + z * z * a)
         right += np.einsum("l,lij,lj->i", self.G_b, grips, moved)
-        u = np.linalg.solve(np.block([[W, D.T], [D, np.zeros((90, 90))]]), np.concatenate([right, np.zeros(90)]))[:114]
+        u = np.linalg.solve(
+            np.block([[W, D.T], [D, np.zeros((90, 90))]]), np.concatenate([right, np.zeros(90)])
+        )[:114]
         nu = body[:, 7:13].ravel() + s_v + z * (a + u)
         return nu, a + u, self.bristle_rate + np.einsum("lij,i->lj", grips, s_v + z * (a + u))
 
 
 @pytest.mark.parametrize("static", [0.0, 0.9])
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
-def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(core: ct.CDLL, method: str, static: float) -> None:
+def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
+    core: ct.CDLL, method: str, static: float
+) -> None:
     h, friction = 2e-3, {"law": "bristle", "mu_static": static}
     robot = changed(load_robot("athena"), solver={"method": method, "step": h}, friction=friction)
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
     body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
     u = np.random.default_rng(3).uniform(-0.3, 0.3, (6, 3)) * [1.0, 1.0, 0.0]
-    b, plant, there, m = u * robot.friction.presliding, Plant(core, robot), Plant(core, robot), coefficients(core, method)
+    b, plant, there, m = (
+        u * robot.friction.presliding,
+        Plant(core, robot),
+        Plant(core, robot),
+        coefficients(core, method),
+    )
 
     def put(target: Plant, bodies: Array, bristles: Array) -> Array:
         target.bodies = bodies
-        return probed(core.hx_probe_bristles, target, inputs(command), bristles, size=18).reshape(6, 3)
+        return probed(core.hx_probe_bristles, target, inputs(command), bristles, size=18).reshape(
+            6, 3
+        )
 
     def rate(_: Array) -> Array:
         result, power = np.zeros((19, 13)), np.zeros(3)
-        core.hx_probe_rate(ct.c_void_p(there.handle), ct.byref(inputs(command)), ct.c_double(0.0), pointer(result), pointer(power))
+        core.hx_probe_rate(
+            ct.c_void_p(there.handle),
+            ct.byref(inputs(command)),
+            ct.c_double(0.0),
+            pointer(result),
+            pointer(power),
+        )
         return result.ravel()
 
     put(plant, body, b)
     damping = standing_damping(robot, body)
-    load = [normal_force(robot.contact, damping[leg], foot.penetration, 0.0) for leg, foot in enumerate(foot_contacts(robot, body))]
-    G_b = -(static or 0.7) * np.array(load) * (3.0 - np.sum(u * u, axis=1)) / (2.0 * robot.friction.presliding)
-    stages = StuckStages(robot, law_slopes(robot, command, body), rate, h * m.gamma, G_b, np.zeros((6, 3)))
-    k, nu, alpha, k_b = np.zeros((7, 247)), np.zeros((7, 114)), np.zeros((7, 114)), np.zeros((7, 6, 3))
+    load = [
+        normal_force(robot.contact, damping[leg], foot.penetration, 0.0)
+        for leg, foot in enumerate(foot_contacts(robot, body))
+    ]
+    G_b = (
+        -(static or 0.7)
+        * np.array(load)
+        * (3.0 - np.sum(u * u, axis=1))
+        / (2.0 * robot.friction.presliding)
+    )
+    stages = StuckStages(
+        robot, law_slopes(robot, command, body), rate, h * m.gamma, G_b, np.zeros((6, 3))
+    )
+    k, nu, alpha, k_b = (
+        np.zeros((7, 247)),
+        np.zeros((7, 114)),
+        np.zeros((7, 114)),
+        np.zeros((7, 6, 3)),
+    )
     for i in range(m.stages):
         y = (body.ravel() + h * m.a[i] @ k).reshape(19, 13)
         stages.bristle_rate = put(there, y, b + h * np.tensordot(m.a[i], k_b, 1))
-        nu[i], alpha[i], k_b[i] = stages.solve_stuck(y, h * m.g[i] @ nu, h * m.g[i] @ alpha, h * np.tensordot(m.g[i], k_b, 1))
+        nu[i], alpha[i], k_b[i] = stages.solve_stuck(
+            y, h * m.g[i] @ nu, h * m.g[i] @ alpha, h * np.tensordot(m.g[i], k_b, 1)
+        )
         k[i] = body_rates(y, nu[i], alpha[i])
     exact = (body.ravel() + h * m.b @ k).reshape(19, 13)
     exact[:, 3:7] /= np.linalg.norm(exact[:, 3:7], axis=1, keepdims=True)
@@ -171,25 +248,45 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(core: ct.CDLL,
     assert np.all(np.max(np.abs(plant.bodies - exact), axis=0) < 1e-5 * moved)
     closed = plant.output().foot.contact != 0
     assert np.count_nonzero(closed) > 3
-    assert float(np.max(np.abs(plant.output().foot.bristle - b - stretched)[closed])) < 1e-5 * float(np.max(np.abs(stretched)))
+    assert float(
+        np.max(np.abs(plant.output().foot.bristle - b - stretched)[closed])
+    ) < 1e-5 * float(np.max(np.abs(stretched)))
     assert np.all(np.linalg.norm(b + stretched, axis=1) < 0.7 * robot.friction.presliding)
 
 
 @pytest.mark.parametrize("margin", [0.99, 1.01])
-@pytest.mark.parametrize(("size", "deciding"), [(1.0, range(7, 10)), (0.05, range(10, 13))], ids=["velocity", "angular velocity"])
+@pytest.mark.parametrize(
+    ("size", "deciding"),
+    [(1.0, range(7, 10)), (0.05, range(10, 13))],
+    ids=["velocity", "angular velocity"],
+)
 def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
     core: ct.CDLL, size: float, deciding: range, margin: float
 ) -> None:
-    """Scales 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s; the smaller a robot, the more its turning counts. The first step tried is 1e-4 s."""
+    """Scales 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s; the smaller a robot, the more its turning
+    counts. The first step tried is 1e-4 s.
+    """
     h, robot = 1e-4, scaled(PROBLEMS["tumbling"].robot, size)
-    start = PROBLEMS["tumbling"].start | {"speed": 20.0 * np.random.default_rng(1).normal(size=(6, 3))}
+    start = PROBLEMS["tumbling"].start | {
+        "speed": 20.0 * np.random.default_rng(1).normal(size=(6, 3))
+    }
     plant, command = Plant(core, robot, **start), Command(angle_ref=robot.stance)
-    m, k, y0, rate = coefficients(core, "bs32"), np.zeros((7, 247)), plant.bodies.ravel(), rates(core, plant, command)
+    m, k, y0, rate = (
+        coefficients(core, "bs32"),
+        np.zeros((7, 247)),
+        plant.bodies.ravel(),
+        rates(core, plant, command),
+    )
     for i in range(m.stages):
         k[i] = h * rate(y0 + m.a[i] @ k)
     largest = np.max(np.abs(m.e @ k).reshape(19, 13), axis=0) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3)
     assert int(np.argmax(largest)) in deciding
-    solver = {"method": "bs32", "step": 0.0, "tolerance": margin * float(np.max(largest)), "step_max": 1.0}
+    solver = {
+        "method": "bs32",
+        "step": 0.0,
+        "tolerance": margin * float(np.max(largest)),
+        "step_max": 1.0,
+    }
     tried = Plant(core, changed(robot, solver=solver), **start)
     tried.step(h, command)
     assert (tried.output().solver.rejected > 0) == (margin < 1.0)
@@ -197,26 +294,46 @@ def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
 
 @pytest.mark.parametrize("margin", [0.99, 1.01])
 def test_bristles_count_by_their_error_over_ten_preslidings(core: ct.CDLL, margin: float) -> None:
-    """Feet set sliding on slack bristles, short and weak ones: what is first to go wrong. The first step tried is 1e-4 s."""
+    """Feet set sliding on slack bristles, short and weak ones: what is first to go wrong. The
+    first step tried is 1e-4 s.
+    """
     h, m, still = 1e-4, coefficients(core, "bs32"), Command(angle_ref=load_robot("athena").stance)
-    robot = changed(load_robot("athena"), friction={"law": "bristle", "presliding": 1e-5, "mu": 0.01})
+    robot = changed(
+        load_robot("athena"), friction={"law": "bristle", "presliding": 1e-5, "mu": 0.01}
+    )
     body, k, k_b = resting(robot, 1), np.zeros((7, 247)), np.zeros((7, 6, 3))
     body[:, 7:9] += np.array([0.3, 0.1])
 
     def put(target: Plant, bodies: Array, bristles: Array) -> Array:
         target.bodies = bodies
-        return probed(core.hx_probe_bristles, target, inputs(still), bristles, size=18).reshape(6, 3)
+        return probed(core.hx_probe_bristles, target, inputs(still), bristles, size=18).reshape(
+            6, 3
+        )
 
     there = Plant(core, robot)
     for i in range(m.stages):
         y, b = (body.ravel() + m.a[i] @ k).reshape(19, 13), np.tensordot(m.a[i], k_b, 1)
         result, power = np.zeros((19, 13)), np.zeros(3)
         k_b[i] = h * put(there, y, b)
-        core.hx_probe_rate(ct.c_void_p(there.handle), ct.byref(inputs(still)), ct.c_double(0.0), pointer(result), pointer(power))
+        core.hx_probe_rate(
+            ct.c_void_p(there.handle),
+            ct.byref(inputs(still)),
+            ct.c_double(0.0),
+            pointer(result),
+            pointer(power),
+        )
         k[i] = h * result.ravel()
     largest = float(np.max(np.abs(np.tensordot(m.e, k_b, 1)))) / (10.0 * robot.friction.presliding)
-    assert largest > float(np.max(np.abs(m.e @ k).reshape(19, 13) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3)))
-    tried = Plant(core, changed(robot, solver={"method": "bs32", "step": 0.0, "tolerance": margin * largest, "step_max": 1.0}))
+    assert largest > float(
+        np.max(np.abs(m.e @ k).reshape(19, 13) / ([0.1] * 3 + [1.0] * 7 + [10.0] * 3))
+    )
+    tried = Plant(
+        core,
+        changed(
+            robot,
+            solver={"method": "bs32", "step": 0.0, "tolerance": margin * largest, "step_max": 1.0},
+        ),
+    )
     put(tried, body, np.zeros((6, 3)))
     tried.step(h, still)
     assert (tried.output().solver.rejected > 0) == (margin < 1.0)

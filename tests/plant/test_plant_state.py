@@ -15,7 +15,9 @@ from hexapod_cosim.models.statics import settled
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_rerun_gives_the_same_bits(core: ct.CDLL, method: str) -> None:
-    robot = changed(load_robot("athena"), solver={"method": method, "step": 2e-5 if method == "rk4" else 0.0})
+    robot = changed(
+        load_robot("athena"), solver={"method": method, "step": 2e-5 if method == "rk4" else 0.0}
+    )
     one, two = (trail(Plant(core, robot, **landing(robot)), 8) for _ in range(2))
     assert one == two
     assert len(set(one)) == len(one)
@@ -23,8 +25,13 @@ def test_a_rerun_gives_the_same_bits(core: ct.CDLL, method: str) -> None:
 
 @pytest.mark.parametrize("mode", ["position", "torque", "kinematic"])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(core: ct.CDLL, mode: str, law: str) -> None:
-    robot, other = changed(lopsided(), servo={"mode": mode}, friction={"law": law}), load_robot("athena")
+def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(
+    core: ct.CDLL, mode: str, law: str
+) -> None:
+    robot, other = (
+        changed(lopsided(), servo={"mode": mode}, friction={"law": law}),
+        load_robot("athena"),
+    )
     whole = trail(Plant(core, robot, **landing(robot)), 12)
     touching = set()
     for k in (0, 3, 6, 9, 11):
@@ -51,7 +58,11 @@ def test_looking_at_outputs_accelerations_or_bytes_changes_nothing(core: ct.CDLL
 
 
 def test_interleaved_instances_are_as_good_as_alone(core: ct.CDLL) -> None:
-    robots = [load_robot("athena"), lopsided(), changed(load_robot("athena"), solver={"method": "dp54"})]
+    robots = [
+        load_robot("athena"),
+        lopsided(),
+        changed(load_robot("athena"), solver={"method": "dp54"}),
+    ]
     alone = [trail(Plant(core, robot, **landing(robot)), 5) for robot in robots]
     plants = [Plant(core, robot, **landing(robot)) for robot in robots]
     together = [[trail(plant, 1, first=k)[0] for plant in plants] for k in range(5)]
@@ -76,13 +87,20 @@ def test_setting_the_bodies_starts_the_books_anew_at_the_same_time(core: ct.CDLL
     plant.bodies = random_bodies(robot, 4)
     output = plant.output()
     assert output.time == 8 * MACRO
-    assert (output.energy.actuator_work, output.energy.dissipated, output.energy.residual, output.solver.steps) == (0.0, 0.0, 0.0, 0.0)
+    assert (
+        output.energy.actuator_work,
+        output.energy.dissipated,
+        output.energy.residual,
+        output.solver.steps,
+    ) == (0.0, 0.0, 0.0, 0.0)
     assert np.array_equal(output.foot.contact != 0, output.foot.penetration > 0.0)
 
 
 @pytest.mark.parametrize("start", [0.0, 1.0, 64.0, 1000.1])
 def test_a_quiet_call_takes_one_step_whatever_the_clock_says(core: ct.CDLL, start: float) -> None:
-    """step_max is the call's length, which the clock's last bit makes longer in two calls of three."""
+    """step_max is the call's length, which the clock's last bit makes longer in two calls of
+    three.
+    """
     robot = load_robot("athena")
     position, quaternion, angle = settled(robot)
     plant, steps = Plant(core, robot), []
@@ -100,4 +118,6 @@ def test_a_start_time_shifts_the_time_and_nothing_else(core: ct.CDLL) -> None:
     early.step(2.0**-5)
     late.step(64.0 + 2.0**-5)
     assert late.time == 64.0 + 2.0**-5
-    assert float(np.max(np.abs(early.bodies - late.bodies))) < 1e-9  # touch-down is found to 1e-10 m
+    assert (
+        float(np.max(np.abs(early.bodies - late.bodies))) < 1e-9
+    )  # touch-down is found to 1e-10 m

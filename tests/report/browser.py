@@ -12,7 +12,9 @@ from typing import Any
 
 import pytest
 
-REQUIRED = os.environ.get("HEXAPOD_BROWSER", "") != ""  # a missing browser is a failure, not a reason to skip
+REQUIRED = (
+    os.environ.get("HEXAPOD_BROWSER", "") != ""
+)  # a missing browser is a failure, not a reason to skip
 FULL = os.environ.get("HEXAPOD_BROWSER") == "full"  # the 60 s walk too
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -21,14 +23,20 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
 )  # WebGL without a graphics card
-PATIENCE = 120_000  # ms    for a loaded machine without a graphics card; nothing is asserted about it
+PATIENCE = (
+    120_000  # ms    for a loaded machine without a graphics card; nothing is asserted about it
+)
 
 
 def find_chromium() -> str:
-    """Path of a Chromium; skips the test where there is none, or fails it if HEXAPOD_BROWSER is set."""
+    """Path of a Chromium; skips the test where there is none, or fails it if HEXAPOD_BROWSER is
+    set.
+    """
     found = os.environ.get("HEXAPOD_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
-        (pytest.fail if REQUIRED else pytest.skip)("no Chromium: apt-get install chromium, or HEXAPOD_CHROMIUM=/path/to/it")
+        (pytest.fail if REQUIRED else pytest.skip)(
+            "no Chromium: apt-get install chromium, or HEXAPOD_CHROMIUM=/path/to/it"
+        )
     return str(found)
 
 
@@ -48,14 +56,25 @@ def launcher() -> Iterator[Launcher]:
 class Opened:
     """A report in a page of its own, and all that went wrong in it."""
 
-    def __init__(self, browser: Any, file: Path, *, address: str = "", size: tuple[int, int] = (1280, 900), **options: Any) -> None:
+    def __init__(
+        self,
+        browser: Any,
+        file: Path,
+        *,
+        address: str = "",
+        size: tuple[int, int] = (1280, 900),
+        **options: Any,
+    ) -> None:
         self.errors: list[str] = []
         self.requests: list[str] = []
         viewport = {"width": size[0], "height": size[1]}
         self.context = browser.new_context(viewport=viewport, offline=True, **options)
         self.page = self.context.new_page()
         self.page.set_default_timeout(PATIENCE)
-        self.page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        self.page.on(
+            "console",
+            lambda message: self.errors.append(message.text) if message.type == "error" else None,
+        )
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         begin = time.perf_counter()
@@ -70,10 +89,14 @@ class Opened:
 
     def value(self, expression: str) -> Any:
         """Of JavaScript in the page; `clock` is the replay's."""
-        return self.page.evaluate(f"(() => {{ const clock = window.hexapod?.clock; return {expression}; }})()")
+        return self.page.evaluate(
+            f"(() => {{ const clock = window.hexapod?.clock; return {expression}; }})()"
+        )
 
     def wait(self, expression: str) -> None:
-        """Until JavaScript in the page is true; Playwright's own way would need eval, which the page forbids."""
+        """Until JavaScript in the page is true; Playwright's own way would need eval, which the
+        page forbids.
+        """
         end = time.monotonic() + PATIENCE / 1e3
         while not self.value(expression):
             assert time.monotonic() < end, f"never true: {expression}"
@@ -81,8 +104,12 @@ class Opened:
 
     def seek(self, seconds: float) -> None:
         """Stops the replay at a time, drawn."""
-        self.page.evaluate("time => { window.hexapod.clock.pause(); window.hexapod.clock.seek(time); }", seconds)
-        self.page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.page.evaluate(
+            "time => { window.hexapod.clock.pause(); window.hexapod.clock.seek(time); }", seconds
+        )
+        self.page.evaluate(
+            "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
 
     def playheads(self) -> list[float]:
         """Where the cursor stands in each plot, in pixels of it; -1: not in what the plot shows."""

@@ -1,4 +1,6 @@
-"""The report in a real browser, opened from disk without a network. HEXAPOD_BROWSER=full adds a walk of a minute."""
+"""The report in a real browser, opened from disk without a network. HEXAPOD_BROWSER=full adds a
+walk of a minute.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,13 @@ from hexapod_cosim.models.kinematics import foot_positions, rotation_matrix
 DURATION = 60.0 if FULL else 3.0  # s
 LARGEST = 8e6  # bytes of a report of a minute's walk
 PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/65535 of their ranges
-PACKED_FORCE = 1e-3  # body weights    forces in steps of 1/65535 of their ranges, the hardest landing's included
+# body weights    forces in steps of 1/65535 of their ranges, the hardest landing's included
+PACKED_FORCE = 1e-3
 LEAST_FORCE = 0.01  # body weights that have an arrow
 TICK = 1e-6  # s    of the packed times
-PLOTS = 6 + 7 + 4 + 3 + 4 + 2 + 6  # forces, slip, height and attitude, torques, energies, footfall, feet against their plan
+PLOTS = (
+    6 + 7 + 4 + 3 + 4 + 2 + 6
+)  # forces, slip, height and attitude, torques, energies, footfall, feet against their plan
 SMALLEST_TEXT = 11  # px
 TALLEST_BAR = 90  # px    on a phone
 BRIGHT, DIM = 200, 60  # of 255
@@ -34,7 +39,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A comparison's results."""
     find_chromium()
     path = tmp_path_factory.mktemp("browser") / "compare"
-    assert main(["compare", "walk_flat", "--seeds", "1", "--set", f"duration={DURATION}", "-o", str(path)]) == 0
+    assert (
+        main(
+            [
+                "compare",
+                "walk_flat",
+                "--seeds",
+                "1",
+                "--set",
+                f"duration={DURATION}",
+                "-o",
+                str(path),
+            ]
+        )
+        == 0
+    )
     return path
 
 
@@ -57,9 +76,13 @@ def report(folder: Path, browser: Any) -> Iterator[Opened]:
     page.close()
 
 
-def test_a_report_opens_from_disk_without_errors_and_asks_for_nothing_else(report: Opened, folder: Path) -> None:
+def test_a_report_opens_from_disk_without_errors_and_asks_for_nothing_else(
+    report: Opened, folder: Path
+) -> None:
     size = (folder / "report.html").stat().st_size
-    print(f"\n{DURATION:g} s walk: {size / 1e6:.2f} MB, plots after {report.opened:.2f} s, replay after {report.ready:.2f} s")
+    print(
+        f"\n{DURATION:g} s walk: {size / 1e6:.2f} MB, plots after {report.opened:.2f} s, replay after {report.ready:.2f} s"
+    )
     assert report.errors == []
     assert [url.partition("#")[0] for url in report.requests] == [(folder / "report.html").as_uri()]
     assert size < LARGEST * max(DURATION / 60.0, 0.25)
@@ -67,7 +90,9 @@ def test_a_report_opens_from_disk_without_errors_and_asks_for_nothing_else(repor
 
 
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_the_viewers_feet_stand_where_the_plants_do(report: Opened, folder: Path, control: str) -> None:
+def test_the_viewers_feet_stand_where_the_plants_do(
+    report: Opened, folder: Path, control: str
+) -> None:
     recording, robot = read_result(folder / control).view.recording, load_robot("athena")
     for row in (0, 137, len(recording.time) - 1):
         report.seek(float(recording.time[row]))
@@ -76,7 +101,11 @@ def test_the_viewers_feet_stand_where_the_plants_do(report: Opened, folder: Path
         np.testing.assert_allclose(feet - [0.0, 0.0, robot.foot.radius], soles, atol=PACKED)
         turn = rotation_matrix(recording.vector("torso.quaternion", 4)[row])
         origin = recording.vector("torso.position")[row] - turn @ np.array(robot.torso.com)
-        np.testing.assert_allclose(feet, origin + foot_positions(robot, recording.joints("angle")[row]) @ turn.T, atol=PACKED)
+        np.testing.assert_allclose(
+            feet,
+            origin + foot_positions(robot, recording.joints("angle")[row]) @ turn.T,
+            atol=PACKED,
+        )
 
 
 def test_the_robots_move(report: Opened) -> None:
@@ -84,22 +113,32 @@ def test_the_robots_move(report: Opened) -> None:
     for time in (0.5, 1.25):
         report.seek(time)
         pictures.append(report.page.locator("#stage canvas").screenshot())
-        places.append(report.value("['kinematic', 'compliant'].map(label => window.hexapod.feet(label))"))
+        places.append(
+            report.value("['kinematic', 'compliant'].map(label => window.hexapod.feet(label))")
+        )
     assert pictures[0] != pictures[1]
-    assert np.abs(np.subtract(places[1], places[0])).max(axis=(1, 2)).min() > 0.005  # m    both of them
+    assert (
+        np.abs(np.subtract(places[1], places[0])).max(axis=(1, 2)).min() > 0.005
+    )  # m    both of them
 
 
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_arrows_and_lights_tell_what_the_recording_does(report: Opened, folder: Path, control: str) -> None:
+def test_arrows_and_lights_tell_what_the_recording_does(
+    report: Opened, folder: Path, control: str
+) -> None:
     recording = read_result(folder / control).view.recording
-    forces = recording.foot_vectors("force") / robot_weight(read_result(folder / control).view.parameters)
+    forces = recording.foot_vectors("force") / robot_weight(
+        read_result(folder / control).view.parameters
+    )
     arrows, lights = set(), set()
     for row in range(0, len(recording.time) - 1, len(recording.time) // 7):
         share = 0.25  # of the way to the next row, so that rounding does not choose the row
         report.seek(float((1.0 - share) * recording.time[row] + share * recording.time[row + 1]))
         shown = report.value(f"window.hexapod.shown('{control}')")
         assert shown["lit"] == [flag > 0.5 for flag in recording.feet("contact")[row]]
-        for arrow, force in zip(shown["arrows"], (1.0 - share) * forces[row] + share * forces[row + 1], strict=True):
+        for arrow, force in zip(
+            shown["arrows"], (1.0 - share) * forces[row] + share * forces[row + 1], strict=True
+        ):
             if arrow or np.linalg.norm(force) > LEAST_FORCE + PACKED_FORCE:
                 np.testing.assert_allclose(arrow, force, atol=PACKED_FORCE)
             arrows.add(bool(arrow))
@@ -118,11 +157,16 @@ def test_trails_grow_with_time(report: Opened, control: str) -> None:
         before = {kind: trails[kind] for kind in before}
     first = report.value("(clock.seek(0.1), window.hexapod.shown('kinematic').trails)")
     assert before["prints"] > 6  # more than the six of standing there
-    assert report.value("(clock.seek(2.9), window.hexapod.shown('kinematic').trails.pieces)") > first["pieces"]
+    assert (
+        report.value("(clock.seek(2.9), window.hexapod.shown('kinematic').trails.pieces)")
+        > first["pieces"]
+    )
 
 
 @pytest.mark.parametrize("time", [0.3, 1.5])
-def test_a_report_that_opens_standing_shows_nothing_of_what_is_still_to_come(folder: Path, browser: Any, time: float) -> None:
+def test_a_report_that_opens_standing_shows_nothing_of_what_is_still_to_come(
+    folder: Path, browser: Any, time: float
+) -> None:
     page = Opened(browser, folder / "report.html", address=f"#t={time}")
     for control in ("kinematic", "compliant"):
         trails = page.value(f"window.hexapod.shown('{control}').trails")
@@ -138,7 +182,8 @@ def test_both_views_show_a_robot(report: Opened) -> None:
     assert min(share) > 0.01, f"share of each half that is neither ground nor sky: {share}"
 
 
-# of each half of a picture, the share of pixels with a colour (the robots' blue and orange) rather than a grey
+# of each half of a picture, the share of pixels with a colour (the robots' blue and orange) rather
+# than a grey
 COLOURFUL = """async hex => {
   const bytes = Uint8Array.from(hex.match(/../g), pair => parseInt(pair, 16));
   const picture = await createImageBitmap(new Blob([bytes], {type: "image/png"}));
@@ -160,7 +205,9 @@ def test_scrubbing_moves_the_cursor_of_every_plot(report: Opened) -> None:
     slider = report.page.locator("#time").bounding_box()
     seen = [report.playheads()]
     for share in (0.3, 0.6):
-        report.page.mouse.click(slider["x"] + share * slider["width"], slider["y"] + 0.5 * slider["height"])
+        report.page.mouse.click(
+            slider["x"] + share * slider["width"], slider["y"] + 0.5 * slider["height"]
+        )
         assert report.value("clock.time") == pytest.approx(share * DURATION, rel=0.05)
         seen.append(report.playheads())
     for before, after in pairwise(seen):
@@ -206,7 +253,13 @@ def test_the_keyboard_does_it_all(report: Opened) -> None:
     report.seek(1.0)
     report.page.locator("body").focus()
     press = report.page.keyboard.press
-    for key, time in (("ArrowRight", 1.02), ("Shift+ArrowRight", 1.52), ("ArrowLeft", 1.5), ("End", DURATION), ("Home", 0.0)):
+    for key, time in (
+        ("ArrowRight", 1.02),
+        ("Shift+ArrowRight", 1.52),
+        ("ArrowLeft", 1.5),
+        ("End", DURATION),
+        ("Home", 0.0),
+    ):
         press(key)
         assert report.value("clock.time") == pytest.approx(time, abs=1e-6), key
     press("Space")
@@ -250,7 +303,14 @@ def test_there_is_a_light_and_a_dark_theme(report: Opened) -> None:
 
 
 def test_a_phone_shows_all_of_it_in_the_systems_theme(folder: Path, browser: Any) -> None:
-    phone = Opened(browser, folder / "report.html", address="#t=1", size=(360, 740), color_scheme="dark", has_touch=True)
+    phone = Opened(
+        browser,
+        folder / "report.html",
+        address="#t=1",
+        size=(360, 740),
+        color_scheme="dark",
+        has_touch=True,
+    )
     assert phone.value("document.documentElement.scrollWidth") == 360
     assert phone.value("document.getElementById('stage').dataset.layout") == "stacked"
     sizes = (
@@ -260,7 +320,9 @@ def test_a_phone_shows_all_of_it_in_the_systems_theme(folder: Path, browser: Any
     assert min(phone.value(sizes)) >= SMALLEST_TEXT
     assert phone.value("getComputedStyle(document.body).colorScheme") == "dark"
     ends = "[...document.querySelectorAll('tbody td.number')].map(e => e.getBoundingClientRect().right)"
-    assert max(phone.value(ends)) <= 360  # both values, the change and its mark without scrolling sideways
+    assert (
+        max(phone.value(ends)) <= 360
+    )  # both values, the change and its mark without scrolling sideways
     assert phone.value("document.querySelector('.bar').offsetHeight") <= TALLEST_BAR
     assert phone.errors == []
     phone.close()
@@ -275,10 +337,28 @@ def test_a_reader_who_wants_less_motion_gets_a_standing_picture(folder: Path, br
     moving.close()
 
 
-def test_a_single_run_and_one_that_recorded_little_have_pages_too(folder: Path, browser: Any, tmp_path: Path) -> None:
+def test_a_single_run_and_one_that_recorded_little_have_pages_too(
+    folder: Path, browser: Any, tmp_path: Path
+) -> None:
     chosen = "outputs.csv=['torso.*']"
-    for name, settings in (("whole", []), ("little", ["--set", chosen, "--set", "outputs.formats=['csv']"])):
-        assert main(["simulate", "stand", "--set", "duration=0.5", *settings, "-o", str(tmp_path / name)]) == 0
+    for name, settings in (
+        ("whole", []),
+        ("little", ["--set", chosen, "--set", "outputs.formats=['csv']"]),
+    ):
+        assert (
+            main(
+                [
+                    "simulate",
+                    "stand",
+                    "--set",
+                    "duration=0.5",
+                    *settings,
+                    "-o",
+                    str(tmp_path / name),
+                ]
+            )
+            == 0
+        )
         if settings:
             assert main(["report", str(tmp_path / name)]) == 0
         page = Opened(browser, tmp_path / name / "report.html", address="#t=0.2")
@@ -289,7 +369,9 @@ def test_a_single_run_and_one_that_recorded_little_have_pages_too(folder: Path, 
 
 
 def test_without_webgl_the_plots_remain(folder: Path, chromium: Launcher) -> None:
-    page = Opened(chromium("--no-sandbox", "--disable-3d-apis"), folder / "report.html", address="#t=1")
+    page = Opened(
+        chromium("--no-sandbox", "--disable-3d-apis"), folder / "report.html", address="#t=1"
+    )
     assert "needs WebGL" in page.page.locator("#stage").inner_text()
     assert len(page.playheads()) == PLOTS
     page.close()

@@ -18,15 +18,29 @@ from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 
 
-def comparison(after: Mapping[str, float], *, seeds: int = 4, before: Mapping[str, float] | None = None) -> Comparison:
-    """Runs whose metrics are 1 under kinematic control, and under compliant control too where `after` says nothing else."""
-    return compare_runs(_runs("kinematic", before or {}, seeds), _runs("compliant", {**(before or {}), **after}, seeds))
+def comparison(
+    after: Mapping[str, float], *, seeds: int = 4, before: Mapping[str, float] | None = None
+) -> Comparison:
+    """Runs whose metrics are 1 under kinematic control, and under compliant control too where
+    `after` says nothing else.
+    """
+    return compare_runs(
+        _runs("kinematic", before or {}, seeds),
+        _runs("compliant", {**(before or {}), **after}, seeds),
+    )
 
 
-def _runs(control: str, metrics: Mapping[str, float], seeds: int, fallen: int = 0) -> Sequence[Summary]:
+def _runs(
+    control: str, metrics: Mapping[str, float], seeds: int, fallen: int = 0
+) -> Sequence[Summary]:
     """The first `fallen` of them fell."""
     values = dict.fromkeys(METRICS, 1.0) | dict(metrics)
-    return [Summary(control=control, seed=seed, status=COMPLETED, upright=seed >= fallen, metrics=values) for seed in range(seeds)]
+    return [
+        Summary(
+            control=control, seed=seed, status=COMPLETED, upright=seed >= fallen, metrics=values
+        )
+        for seed in range(seeds)
+    ]
 
 
 def sentence(result: Comparison) -> str:
@@ -53,38 +67,68 @@ def test_slip_which_an_assumed_slope_makes_comes_last_and_is_told_to_be_that() -
 
 
 def test_the_headline_of_a_robot_that_turns_on_the_spot_is_per_radian() -> None:
-    turned = dict.fromkeys(("slip_per_metre", "cost_of_transport", "electrical_cost", "heat", "path_error", "yaw_drift"), math.nan)
+    turned = dict.fromkeys(
+        (
+            "slip_per_metre",
+            "cost_of_transport",
+            "electrical_cost",
+            "heat",
+            "path_error",
+            "yaw_drift",
+        ),
+        math.nan,
+    )
     result = comparison(turned | {"slip_per_radian": 0.25, "cost_per_radian": 2.0}, before=turned)
     assert sentence(result) == (
         "Against kinematic control, compliant walks with 75 % less slip, and costs 2.0 times the motor work per radian."
     )
-    assert ("slip per radian", "1.00 → 0.250 mm/rad") not in [(card.name, card.values) for card in cards(result)]
-    assert ("slip per radian", "1000 → 250 mm/rad") in [(card.name, card.values) for card in cards(result)]
+    assert ("slip per radian", "1.00 → 0.250 mm/rad") not in [
+        (card.name, card.values) for card in cards(result)
+    ]
+    assert ("slip per radian", "1000 → 250 mm/rad") in [
+        (card.name, card.values) for card in cards(result)
+    ]
 
 
 def test_the_headline_names_no_gain_where_there_is_none() -> None:
-    assert sentence(comparison({"slip_per_metre": 3.0})) == "Against kinematic control, compliant brings 3.0 times the slip."
+    assert (
+        sentence(comparison({"slip_per_metre": 3.0}))
+        == "Against kinematic control, compliant brings 3.0 times the slip."
+    )
     assert "changes nothing" in sentence(comparison({}))
     assert "changes nothing" in sentence(comparison({"slip_per_metre": 1.0 + 1e-6}))
 
 
 @pytest.mark.parametrize(
     ("fallen", "verdicts"),
-    [((8, 0), {"kinematic": "worse", "compliant": "better"}), ((0, 8), {"kinematic": "better", "compliant": "worse"}), ((8, 8), {})],
+    [
+        ((8, 0), {"kinematic": "worse", "compliant": "better"}),
+        ((0, 8), {"kinematic": "better", "compliant": "worse"}),
+        ((8, 8), {}),
+    ],
 )
-def test_the_headline_tells_falls_before_anything_else(fallen: tuple[int, int], verdicts: dict[str, str]) -> None:
+def test_the_headline_tells_falls_before_anything_else(
+    fallen: tuple[int, int], verdicts: dict[str, str]
+) -> None:
     better = {"slip_per_metre": 0.1}
-    runs = compare_runs(_runs("kinematic", {}, 10, fallen[0]), _runs("compliant", better, 10, fallen[1]))
+    runs = compare_runs(
+        _runs("kinematic", {}, 10, fallen[0]), _runs("compliant", better, 10, fallen[1])
+    )
     assert sentence(runs).startswith(
         f"The robot did not walk to the end under kinematic in {fallen[0]} of 10 and under compliant in {fallen[1]} of 10 runs. "
         "Where both walked, against kinematic control, compliant walks with 90 % less slip"
     )
-    assert {part.text.split()[0]: part.verdict for part in headline(runs)[:4] if part.verdict} == verdicts
+    assert {
+        part.text.split()[0]: part.verdict for part in headline(runs)[:4] if part.verdict
+    } == verdicts
 
 
 @pytest.mark.parametrize("fallen", [(4, 0), (0, 4), (4, 4)])
 def test_the_headline_compares_nothing_where_no_two_walked(fallen: tuple[int, int]) -> None:
-    runs = compare_runs(_runs("kinematic", {}, 4, fallen[0]), _runs("compliant", {"slip_per_metre": 0.1}, 4, fallen[1]))
+    runs = compare_runs(
+        _runs("kinematic", {}, 4, fallen[0]),
+        _runs("compliant", {"slip_per_metre": 0.1}, 4, fallen[1]),
+    )
     assert "less" not in sentence(runs)
     assert "changes nothing" not in sentence(runs)
     assert sentence(runs).endswith("No pair of walks can be compared.")
@@ -97,17 +141,31 @@ def test_the_headline_tells_what_was_too_short_from_what_is_the_same() -> None:
 
 
 def test_cards_show_units_that_people_read_and_the_interval() -> None:
-    before, after = {"slip_per_metre": 0.3, "height_rms": 9.1e-4}, {"slip_per_metre": 0.03, "height_rms": 4.56e-5}
+    before, after = (
+        {"slip_per_metre": 0.3, "height_rms": 9.1e-4},
+        {"slip_per_metre": 0.03, "height_rms": 4.56e-5},
+    )
     height, *_, slip = cards(comparison(after, before=before))
-    assert (slip.change, slip.values, slip.interval) == ("−90.0 %", "300 → 30.0 mm/m", "(−90.0 to −90.0 %)")
-    assert (height.change, height.values, height.verdict) == ("−95.0 %", "0.910 → 0.046 mm", "better")
+    assert (slip.change, slip.values, slip.interval) == (
+        "−90.0 %",
+        "300 → 30.0 mm/m",
+        "(−90.0 to −90.0 %)",
+    )
+    assert (height.change, height.values, height.verdict) == (
+        "−95.0 %",
+        "0.910 → 0.046 mm",
+        "better",
+    )
     assert all(card.interval == "" for card in cards(comparison({"slip_per_metre": 0.5}, seeds=1)))
 
 
 def test_a_single_run_is_told_in_speed_feet_and_cost() -> None:
     facts = {"control": "compliant", "simulated": 10.0, "walk": {"mean_speed": 0.0801}}
     (part,) = plain_headline({"foot_error_stance": 0.00214, "cost_of_transport": 0.4239}, facts)
-    assert part.text == "Compliant control, 10 s: 80.1 mm/s, standing feet 2.14 mm from their plan, cost of transport 0.424."
+    assert (
+        part.text
+        == "Compliant control, 10 s: 80.1 mm/s, standing feet 2.14 mm from their plan, cost of transport 0.424."
+    )
     (part,) = plain_headline({"foot_error_stance": None}, facts | {"walk": {}})
     assert part.text == "Compliant control, 10 s."
 
@@ -137,9 +195,23 @@ def test_a_page_has_nothing_from_elsewhere_and_forbids_it(call: Call, tmp_path: 
     assert "url(" not in markup
 
 
-def test_a_report_made_again_is_the_same_whatever_columns_the_csv_has(call: Call, tmp_path: Path) -> None:
+def test_a_report_made_again_is_the_same_whatever_columns_the_csv_has(
+    call: Call, tmp_path: Path
+) -> None:
     folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2", "--set", "outputs.csv=['torso.*']")[0] == 0
+    assert (
+        call(
+            "simulate",
+            "stand",
+            "-o",
+            folder,
+            "--set",
+            "duration=0.2",
+            "--set",
+            "outputs.csv=['torso.*']",
+        )[0]
+        == 0
+    )
     page = (folder / "report.html").read_bytes()
     assert (folder / "results.csv").read_text(encoding="utf-8").splitlines()[0].count(",") < 40
     assert call("report", folder)[0] == 0
@@ -149,7 +221,9 @@ def test_a_report_made_again_is_the_same_whatever_columns_the_csv_has(call: Call
 def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: Path) -> None:
     changed = ("--set", "duration=0.2", "--set", "robot=phantomx_mk4", "--set", "friction.mu=0.4")
     assert call("simulate", "stand", "-o", tmp_path / "out", *changed)[0] == 0
-    title = re.search("<h1>(.*)</h1>", (tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
+    title = re.search(
+        "<h1>(.*)</h1>", (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    )
     assert title is not None
     assert title[1].endswith(", robot=phantomx_mk4, friction.mu=0.4")
 
@@ -169,7 +243,19 @@ def test_a_damaged_folder_is_told_in_a_paragraph_and_left_as_it_is(
     call: Call, tmp_path: Path, name: str, content: str | None, told: str
 ) -> None:
     folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, "--set", "duration=0.2", "--set", "outputs.plots=false")[0] == 0
+    assert (
+        call(
+            "simulate",
+            "stand",
+            "-o",
+            folder,
+            "--set",
+            "duration=0.2",
+            "--set",
+            "outputs.plots=false",
+        )[0]
+        == 0
+    )
     (folder / name).unlink()
     if content is not None:
         (folder / name).write_text(content, encoding="utf-8")

@@ -38,7 +38,10 @@ def unpacked(packed: dict[str, Any]) -> dict[str, np.ndarray[Any, Any]]:
         for place in range(k * rows, (k + 1) * rows):
             total = (total + raw[place] + 256 * raw[size + place]) % 65536
             steps[name].append(total)
-    columns = {name: offset + scale * np.array(steps[name], dtype=float) for name, scale, offset in packed["columns"]}
+    columns = {
+        name: offset + scale * np.array(steps[name], dtype=float)
+        for name, scale, offset in packed["columns"]
+    }
     ticks = np.array(steps["low"], dtype=float) + 65536.0 * np.array(steps["high"], dtype=float)
     return columns | {"time": packed["start"] + packed["tick"] * ticks}
 
@@ -55,7 +58,9 @@ def columns() -> dict[str, np.ndarray[Any, Any]]:
     }
 
 
-def test_every_column_comes_back_within_half_a_step_of_its_range(columns: dict[str, np.ndarray[Any, Any]]) -> None:
+def test_every_column_comes_back_within_half_a_step_of_its_range(
+    columns: dict[str, np.ndarray[Any, Any]],
+) -> None:
     back = unpacked(pack(times(900), columns))
     for name, values in columns.items():
         bound = np.ptp(values) / 131070 + ROUND_OFF * np.abs(values).max()
@@ -66,7 +71,10 @@ def test_every_column_comes_back_within_half_a_step_of_its_range(columns: dict[s
 def test_times_come_back_to_the_microsecond_also_where_steps_differ() -> None:
     time = 7.0 + np.cumsum(np.random.default_rng(1).uniform(1e-4, 0.9, 900))
     assert np.abs(unpacked(pack(time, {}))["time"] - time).max() <= 0.51e-6
-    assert np.abs(unpacked(pack(1e4 * time, {}))["time"] - 1e4 * time).max() <= 1e4 * np.ptp(time) / 2**31
+    assert (
+        np.abs(unpacked(pack(1e4 * time, {}))["time"] - 1e4 * time).max()
+        <= 1e4 * np.ptp(time) / 2**31
+    )
 
 
 def test_a_column_with_holes_is_left_out(columns: dict[str, np.ndarray[Any, Any]]) -> None:
@@ -93,7 +101,9 @@ def test_a_long_recording_is_thinned_to_the_budget_and_its_peaks_stay() -> None:
     assert np.all(np.diff(chosen.time) > 0.0)
     assert chosen.columns["roll"].max() == pytest.approx(np.degrees(peak), rel=ROUND_OFF)
     exact = np.interp(chosen.time, recording.time, recording.column("torso.position[1]"))
-    np.testing.assert_array_equal(chosen.columns["torso.x"], exact)  # what is replayed is as it was, not an extreme
+    np.testing.assert_array_equal(
+        chosen.columns["torso.x"], exact
+    )  # what is replayed is as it was, not an extreme
 
 
 def test_a_recording_within_the_budget_is_kept_whole() -> None:
@@ -106,8 +116,17 @@ def test_a_recording_within_the_budget_is_kept_whole() -> None:
 def long_recording(rows: int) -> tuple[Recording, float]:
     """A torso that moves and whose roll has a peak of one row, at an odd place."""
     peak, place = 0.7, 2 * rows // 3 + 1
-    names = ("time", *(f"torso.position[{k}]" for k in (1, 2, 3)), *(f"torso.quaternion[{k}]" for k in (1, 2, 3, 4)), "torso.roll")
-    names += ("torso.pitch", "torso.yaw", *(f"{leg}.{joint}.angle" for leg in LEGS for joint in ("coxa", "femur", "tibia")))
+    names = (
+        "time",
+        *(f"torso.position[{k}]" for k in (1, 2, 3)),
+        *(f"torso.quaternion[{k}]" for k in (1, 2, 3, 4)),
+        "torso.roll",
+    )
+    names += (
+        "torso.pitch",
+        "torso.yaw",
+        *(f"{leg}.{joint}.angle" for leg in LEGS for joint in ("coxa", "femur", "tibia")),
+    )
     data = np.zeros((rows, len(names)))
     data[:, 0], data[:, 1] = 0.001 * np.arange(rows), np.sin(0.01 * np.arange(rows))
     data[place, names.index("torso.roll")] = peak

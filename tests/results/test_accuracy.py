@@ -1,4 +1,6 @@
-"""The errors beside metrics: those of independent runs, none where nothing changes, smaller where the solver is more exact."""
+"""The errors beside metrics: those of independent runs, none where nothing changes, smaller
+where the solver is more exact.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,12 @@ from hexapod_cosim.models import HexapodError
 
 CYCLES = ("duration=2.4", "gait.period=0.8")  # the shortest walk with metrics
 SOLVER_METRICS = [name for name in METRICS if name != "realtime_factor"]
-WALKED = [name for name in SOLVER_METRICS if not name.endswith("_per_radian")]  # what a straight walk has
-SHOWN = [name for name in WALKED if name != "slip_net_per_metre"]  # which is kept out of tables under the tanh law
+WALKED = [
+    name for name in SOLVER_METRICS if not name.endswith("_per_radian")
+]  # what a straight walk has
+SHOWN = [
+    name for name in WALKED if name != "slip_net_per_metre"
+]  # which is kept out of tables under the tanh law
 
 
 def walk(*overrides: str) -> Scenario:
@@ -37,7 +43,13 @@ def summaries(*plans: Scenario) -> list[Summary]:
 
 def made(value: float, other: float = 0.0, *, seed: int = 0, upright: bool = True) -> Summary:
     """A run with metrics of any name."""
-    return Summary(control="kinematic", seed=seed, status="completed", upright=upright, metrics={"way": value, "heat": other})
+    return Summary(
+        control="kinematic",
+        seed=seed,
+        status="completed",
+        upright=upright,
+        metrics={"way": value, "heat": other},
+    )
 
 
 # what is run again
@@ -77,11 +89,19 @@ def test_where_nothing_changes_every_error_is_zero(plant_build: Path) -> None:
     runs, again, once_more = (summaries(plan) for _ in range(3))
     found = judge_accuracy(plan, runs, again, once_more)
     assert list(found.solver_error) == SOLVER_METRICS
-    assert {found.solver_error[name] for name in WALKED} == {found.macro_step_effect[name] for name in WALKED} == {0.0}
+    assert (
+        {found.solver_error[name] for name in WALKED}
+        == {found.macro_step_effect[name] for name in WALKED}
+        == {0.0}
+    )
 
 
-def test_a_hundredth_of_the_tolerance_makes_the_errors_smaller_by_a_power_of_ten_at_least(plant_build: Path) -> None:
-    """The sum of all metrics' errors, each relative to its metric, but for the books' residual, which is itself an error."""
+def test_a_hundredth_of_the_tolerance_makes_the_errors_smaller_by_a_power_of_ten_at_least(
+    plant_build: Path,
+) -> None:
+    """The sum of all metrics' errors, each relative to its metric, but for the books' residual,
+    which is itself an error.
+    """
     sizes = []
     for tolerance in ("1e-2", "1e-4"):
         plan = walk(f"solver.tolerance={tolerance}")
@@ -89,7 +109,11 @@ def test_a_hundredth_of_the_tolerance_makes_the_errors_smaller_by_a_power_of_ten
         found = judge_accuracy(plan, [run], reference, [run])
         assert found.reference == f"solver.tolerance={float(tolerance) / 100.0:g}"
         sizes.append(
-            sum(abs(found.solver_error[name] / run.metrics[name]) for name in WALKED if run.metrics[name] and name != "energy_residual")
+            sum(
+                abs(found.solver_error[name] / run.metrics[name])
+                for name in WALKED
+                if run.metrics[name] and name != "energy_residual"
+            )
         )
     assert sizes[0] > 10.0 * sizes[1] > 0.0
 
@@ -102,25 +126,46 @@ def test_errors_of_several_runs_are_of_the_means_over_those_that_walked_each_tim
     assert found.runs == 2
     assert found.solver_error == {"way": pytest.approx(-0.3), "heat": pytest.approx(-0.5)}
     assert found.macro_step_effect == {"way": pytest.approx(0.5), "heat": 0.0}
-    assert found.notes == ("kinematic, seed 2, at solver.tolerance=1e-06 went another way: it walked on",)
+    assert found.notes == (
+        "kinematic, seed 2, at solver.tolerance=1e-06 went another way: it walked on",
+    )
 
 
 def test_a_reference_without_figures_leaves_errors_open_and_is_told() -> None:
-    failed = replace(made(math.nan, math.nan), status="failed", reason="the step is too long", upright=False)
+    failed = replace(
+        made(math.nan, math.nan), status="failed", reason="the step is too long", upright=False
+    )
     found = judge_accuracy(walk(), [made(1.0)], [failed], [made(1.0)])
     assert all(map(math.isnan, found.solver_error.values()))
-    assert found.notes == ("kinematic, seed 0, at solver.tolerance=1e-06 went another way: the step is too long",)
+    assert found.notes == (
+        "kinematic, seed 0, at solver.tolerance=1e-06 went another way: the step is too long",
+    )
 
 
 # the command
 
 
 @pytest.fixture(scope="module")
-def checked(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Mapping[str, Any]]:
+def checked(
+    plant_build: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Mapping[str, Any]]:
     """A comparison of one seed, its accuracy checked."""
     folder = tmp_path_factory.mktemp("checked") / "out"
-    command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "1", "--check-accuracy", "--json", *settings(*CYCLES)]
-    return folder, json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    command = [
+        *COMMAND,
+        "compare",
+        "walk_flat",
+        "-o",
+        str(folder),
+        "--seeds",
+        "1",
+        "--check-accuracy",
+        "--json",
+        *settings(*CYCLES),
+    ]
+    return folder, json.loads(
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    )
 
 
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
@@ -129,24 +174,50 @@ def test_errors_are_the_differences_from_runs_that_one_makes_oneself(
 ) -> None:
     _, printed = checked
     accuracy = printed["accuracy"][control]
-    assert (accuracy["reference"], accuracy["macro_step"], accuracy["runs"]) == ("solver.tolerance=1e-06", 0.0025, 1)
-    plain = ["simulate", "walk_flat", "--control", control, "--json", *settings(*CYCLES, "outputs.plots=false")]
-    fine = json.loads(call(*plain, "--set", "solver.tolerance=1e-6", "-o", tmp_path / "fine")[1])["metrics"]
-    half = json.loads(call(*plain, "--set", "macro_step=2.5 ms", "-o", tmp_path / "half")[1])["metrics"]
+    assert (accuracy["reference"], accuracy["macro_step"], accuracy["runs"]) == (
+        "solver.tolerance=1e-06",
+        0.0025,
+        1,
+    )
+    plain = [
+        "simulate",
+        "walk_flat",
+        "--control",
+        control,
+        "--json",
+        *settings(*CYCLES, "outputs.plots=false"),
+    ]
+    fine = json.loads(call(*plain, "--set", "solver.tolerance=1e-6", "-o", tmp_path / "fine")[1])[
+        "metrics"
+    ]
+    half = json.loads(call(*plain, "--set", "macro_step=2.5 ms", "-o", tmp_path / "half")[1])[
+        "metrics"
+    ]
     assert list(accuracy["solver_error"]) == list(accuracy["macro_step_effect"]) == SOLVER_METRICS
     for name in WALKED:
         value = printed[control][name]
-        assert accuracy["solver_error"][name] == pytest.approx(value - fine[name], rel=1e-6, abs=1e-12 * abs(value))
-        assert accuracy["macro_step_effect"][name] == pytest.approx(half[name] - value, rel=1e-6, abs=1e-12 * abs(value))
+        assert accuracy["solver_error"][name] == pytest.approx(
+            value - fine[name], rel=1e-6, abs=1e-12 * abs(value)
+        )
+        assert accuracy["macro_step_effect"][name] == pytest.approx(
+            half[name] - value, rel=1e-6, abs=1e-12 * abs(value)
+        )
     assert any(accuracy["solver_error"].values())
     assert any(accuracy["macro_step_effect"].values())
 
 
 def accuracy_table(folder: Path) -> str:
-    return (folder / "report.html").read_text(encoding="utf-8").partition("<h2>Accuracy</h2>")[2].partition("</table>")[0]
+    return (
+        (folder / "report.html")
+        .read_text(encoding="utf-8")
+        .partition("<h2>Accuracy</h2>")[2]
+        .partition("</table>")[0]
+    )
 
 
-def test_files_and_report_have_the_errors_and_the_report_can_be_made_again(call: Call, checked: tuple[Path, Mapping[str, Any]]) -> None:
+def test_files_and_report_have_the_errors_and_the_report_can_be_made_again(
+    call: Call, checked: tuple[Path, Mapping[str, Any]]
+) -> None:
     folder, printed = checked
     stored = json.loads((folder / "metrics.json").read_text())
     assert stored == {key: value for key, value in printed.items() if key != "report"}
@@ -161,7 +232,14 @@ def test_files_and_report_have_the_errors_and_the_report_can_be_made_again(call:
 
 
 def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_path: Path) -> None:
-    arguments = ["simulate", "walk_flat", "-o", tmp_path, "--check-accuracy", *settings(*CYCLES, "outputs.plots=false")]
+    arguments = [
+        "simulate",
+        "walk_flat",
+        "-o",
+        tmp_path,
+        "--check-accuracy",
+        *settings(*CYCLES, "outputs.plots=false"),
+    ]
     code, out, _ = call(*arguments)
     lines = {line.split()[0]: line for line in out.split("± is the solver's error")[0].splitlines()}
     assert code == 0
@@ -173,9 +251,18 @@ def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_p
     assert list(stored["accuracy"]["solver_error"]) == SOLVER_METRICS
 
 
-def test_without_the_option_nothing_is_walked_again_and_nothing_said(call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_option_nothing_is_walked_again_and_nothing_said(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delattr("hexapod_cosim.cosim.cli.accuracy_check.run_batch")
-    code, out, _ = call("simulate", "stand", "-o", tmp_path, "--json", *settings("duration=0.2", "outputs.plots=false"))
+    code, out, _ = call(
+        "simulate",
+        "stand",
+        "-o",
+        tmp_path,
+        "--json",
+        *settings("duration=0.2", "outputs.plots=false"),
+    )
     assert code == 0
     assert "accuracy" not in json.loads(out)
     assert "accuracy" not in json.loads((tmp_path / "metrics.json").read_text())
@@ -192,19 +279,46 @@ def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     quick = settings("duration=0.2", "outputs.plots=false")
     code, _, err = call(*command, "stand", "-o", tmp_path / "out", "--check-accuracy", *quick)
     assert code == 130
-    assert f"the results in {tmp_path / 'out'} are whole, their accuracy was not checked; `hexapod report" in err
+    assert (
+        f"the results in {tmp_path / 'out'} are whole, their accuracy was not checked; `hexapod report"
+        in err
+    )
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
     assert "accuracy" not in json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert call("report", tmp_path / "out")[0] == 0
 
 
-def test_a_run_too_long_for_half_the_macro_step_is_refused_before_it_begins(call: Call, tmp_path: Path) -> None:
-    arguments = ["simulate", "stand", "-o", tmp_path / "out", "--check-accuracy", *settings("duration=4000", "macro_step=0.005")]
-    assert_refused(call(*arguments), "too long for --check-accuracy", "got 4000", "2500 s", "shorten")
+def test_a_run_too_long_for_half_the_macro_step_is_refused_before_it_begins(
+    call: Call, tmp_path: Path
+) -> None:
+    arguments = [
+        "simulate",
+        "stand",
+        "-o",
+        tmp_path / "out",
+        "--check-accuracy",
+        *settings("duration=4000", "macro_step=0.005"),
+    ]
+    assert_refused(
+        call(*arguments), "too long for --check-accuracy", "got 4000", "2500 s", "shorten"
+    )
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("table", [{}, [], {"reference": "x", "macro_step": "a", "runs": 1, "solver_error": {}, "macro_step_effect": {}}])
+@pytest.mark.parametrize(
+    "table",
+    [
+        {},
+        [],
+        {
+            "reference": "x",
+            "macro_step": "a",
+            "runs": 1,
+            "solver_error": {},
+            "macro_step_effect": {},
+        },
+    ],
+)
 def test_damaged_errors_are_refused_by_name(table: Any) -> None:
     with pytest.raises(HexapodError, match=r"metrics.json: damaged accuracy.*--check-accuracy"):
         accuracy_of_table(table, where="metrics.json")

@@ -1,4 +1,6 @@
-"""Runs whose energy books do not close, and servos above their rating: told from where to where, in literal numbers."""
+"""Runs whose energy books do not close, and servos above their rating: told from where to where,
+in literal numbers.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +25,24 @@ def books(missing: float) -> Walk:
     return walk
 
 
-@pytest.mark.parametrize(("missing", "told"), [(0.99, ""), (-0.99, ""), (1.01, "1.01%"), (-4.3, "4.30%")])
-def test_books_that_miss_more_than_a_hundredth_of_the_motors_work_are_told(missing: float, told: str) -> None:
+@pytest.mark.parametrize(
+    ("missing", "told"), [(0.99, ""), (-0.99, ""), (1.01, "1.01%"), (-4.3, "4.30%")]
+)
+def test_books_that_miss_more_than_a_hundredth_of_the_motors_work_are_told(
+    missing: float, told: str
+) -> None:
     found = unbalanced_books(View(books(missing).recording, PARAMETERS, PERIOD))
     assert len(found) == (1 if told else 0)
-    assert all(f"the energy books do not explain {told} of the motors' work: tighten solver.tolerance" in text for text in found)
+    assert all(
+        f"the energy books do not explain {told} of the motors' work: tighten solver.tolerance"
+        in text
+        for text in found
+    )
 
 
-def test_books_that_are_wrong_in_the_middle_of_a_run_are_told_though_they_close_at_its_end() -> None:
+def test_books_that_are_wrong_in_the_middle_of_a_run_are_told_though_they_close_at_its_end() -> (
+    None
+):
     walk = books(0.0)
     walk.set("energy.residual", 2.0 * np.sin(np.pi * walk.time / 10.0))
     assert "2.00%" in unbalanced_books(View(walk.recording, PARAMETERS, PERIOD))[0]
@@ -39,7 +51,9 @@ def test_books_that_are_wrong_in_the_middle_of_a_run_are_told_though_they_close_
 def test_a_doubt_of_the_books_is_a_doubt_of_the_run() -> None:
     walk = books(5.0)
     walk.set("torso.position[3]", 0.13)
-    assert any("energy books" in text for text in doubts(View(walk.recording, PARAMETERS, PERIOD), ROBOT))
+    assert any(
+        "energy books" in text for text in doubts(View(walk.recording, PARAMETERS, PERIOD), ROBOT)
+    )
 
 
 @pytest.mark.parametrize(("torque", "told"), [(1.19, False), (1.21, True)])
@@ -48,12 +62,27 @@ def test_a_servo_above_its_rating_over_the_run_is_told(torque: float, told: bool
     walk = Walk()
     walk.grow("LM.femur.torque_squared", torque**2)
     found = hot_servo(walk.recording, ROBOT)
-    assert found == ([f"servo LM.femur works at {torque:.2f} N m RMS, above the 1.2 N m it bears for long"] if told else [])
+    assert found == (
+        [f"servo LM.femur works at {torque:.2f} N m RMS, above the 1.2 N m it bears for long"]
+        if told
+        else []
+    )
 
 
-def test_a_run_at_a_coarse_fixed_step_says_in_terminal_report_and_metrics_that_its_books_do_not_close(call: Call, tmp_path: Path) -> None:
+def test_a_run_at_a_coarse_fixed_step_says_in_terminal_report_and_metrics_that_its_books_do_not_close(
+    call: Call, tmp_path: Path
+) -> None:
     """Steps of 1 ms on stiff ground: an explicit method at the edge of what it can do."""
-    changes = ("--set", "solver.method=rk4", "--set", "solver.step=1e-3", "--set", "duration=0.4", "--set", "macro_step=0.01")
+    changes = (
+        "--set",
+        "solver.method=rk4",
+        "--set",
+        "solver.step=1e-3",
+        "--set",
+        "duration=0.4",
+        "--set",
+        "macro_step=0.01",
+    )
     code, out, err = call("simulate", "stand", "-o", tmp_path / "out", *changes)
     assert code == 0
     told = "the energy books do not explain"

@@ -25,7 +25,10 @@ def walker(plant_build: Path) -> Iterator[Walker]:
 def test_the_books_of_every_shipped_scenario_close(walker: Walker, name: str, control: str) -> None:
     """To 1e-4 of the motors' gross work at the default solver, to 1e-3 at the fastest setting."""
     missing = [
-        walker.simulate(load_scenario(name, overrides=[f"control={control}", *solver])).metrics["energy_residual"] for solver in ((), FAST)
+        walker.simulate(load_scenario(name, overrides=[f"control={control}", *solver])).metrics[
+            "energy_residual"
+        ]
+        for solver in ((), FAST)
     ]
     assert missing[0] < (3e-3 if (name, control) == STANDING else 1e-4)
     assert missing[1] < (3e-3 if (name, control) == STANDING else 1e-3)

@@ -1,4 +1,6 @@
-"""Runs against runs: the statistics against scipy's, verdicts, runs that fell, and the file in which all of them stand."""
+"""Runs against runs: the statistics against scipy's, verdicts, runs that fell, and the file in
+which all of them stand.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,16 @@ from scipy import stats
 
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED
 from hexapod_cosim.cosim.report.report import about, comparison_rows
-from hexapod_cosim.cosim.results.comparison import BETTER, SAME, WORSE, Change, change_of, compare_runs, read_seeds, write_seeds
+from hexapod_cosim.cosim.results.comparison import (
+    BETTER,
+    SAME,
+    WORSE,
+    Change,
+    change_of,
+    compare_runs,
+    read_seeds,
+    write_seeds,
+)
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.models import HexapodError
@@ -22,17 +33,31 @@ ROUNDING = 1e-12
 
 
 def pairs(n: int, *, change: float, noise: float, seed: int = 0) -> list[tuple[float, float]]:
-    """Values around 1 that differ by `change` and noise within a pair, and by much more from pair to pair."""
+    """Values around 1 that differ by `change` and noise within a pair, and by much more from
+    pair to pair.
+    """
     generator = np.random.default_rng(seed)
     before = 1.0 + 0.3 * generator.standard_normal(n)
-    return list(zip(before.tolist(), (before + change + noise * generator.standard_normal(n)).tolist(), strict=True))
+    return list(
+        zip(
+            before.tolist(),
+            (before + change + noise * generator.standard_normal(n)).tolist(),
+            strict=True,
+        )
+    )
 
 
 def runs(control: str, values: Sequence[float], name: str = "slip_per_metre") -> list[Summary]:
     """A completed walk per value of one metric; the rest of them 1."""
     plain = dict.fromkeys(METRICS, 1.0)
     return [
-        Summary(control=control, seed=seed, status=COMPLETED, upright=True, metrics=plain | {name: value})
+        Summary(
+            control=control,
+            seed=seed,
+            status=COMPLETED,
+            upright=True,
+            metrics=plain | {name: value},
+        )
         for seed, value in enumerate(values)
     ]
 
@@ -57,26 +82,36 @@ def test_the_relative_interval_is_that_of_the_ratio_by_its_logarithm(n: int) -> 
     width = stats.t.ppf(0.975, n - 1) * math.sqrt(
         (covariance[0, 0] / a**2 + covariance[1, 1] / b**2 - 2.0 * covariance[0, 1] / (a * b)) / n
     )
-    low, high = change_of("slip_per_metre", [(float(first), float(second)) for first, second in values]).interval
+    low, high = change_of(
+        "slip_per_metre", [(float(first), float(second)) for first, second in values]
+    ).interval
     assert (1.0 + low) == pytest.approx(b / a * math.exp(-width), rel=1e-9)
     assert (1.0 + high) == pytest.approx(b / a * math.exp(width), rel=1e-9)
 
 
 @pytest.mark.parametrize(("ratio", "scatter"), [(0.5, 0.1), (0.05, 0.3), (2.0, 0.3)])
-def test_the_relative_interval_holds_the_true_ratio_in_95_of_100_cases(ratio: float, scatter: float) -> None:
+def test_the_relative_interval_holds_the_true_ratio_in_95_of_100_cases(
+    ratio: float, scatter: float
+) -> None:
     generator = np.random.default_rng(0)
     held = 0
     for _ in range(1000):
         before = np.exp(0.5 * generator.standard_normal(20))
         after = ratio * before * (1.0 + scatter * generator.uniform(-1.0, 1.0, 20))
-        low, high = change_of("slip_per_metre", list(zip(before.tolist(), after.tolist(), strict=True))).interval
+        low, high = change_of(
+            "slip_per_metre", list(zip(before.tolist(), after.tolist(), strict=True))
+        ).interval
         held += low <= ratio - 1.0 <= high
-    assert held / 1000 == pytest.approx(0.95, abs=0.025)  # of 1000 cases: three standard errors, and first order's own error
+    assert held / 1000 == pytest.approx(
+        0.95, abs=0.025
+    )  # of 1000 cases: three standard errors, and first order's own error
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_relative_interval_is_below_minus_a_hundred_per_cent(seed: int) -> None:
-    """Where the first values lie so far apart that the difference's own interval over their mean would be."""
+    """Where the first values lie so far apart that the difference's own interval over their mean
+    would be.
+    """
     generator = np.random.default_rng(seed)
     before = np.exp(2.0 * generator.standard_normal(6))
     after = 0.01 * np.exp(2.0 * generator.standard_normal(6))
@@ -106,7 +141,10 @@ def test_a_mean_that_is_not_positive_has_no_ratio_and_is_judged_by_its_differenc
 
 
 def test_the_interval_holds_the_true_change_in_95_of_100_cases() -> None:
-    cases = [change_of("slip_per_metre", pairs(10, change=-0.2, noise=0.1, seed=seed)) for seed in range(1000)]
+    cases = [
+        change_of("slip_per_metre", pairs(10, change=-0.2, noise=0.1, seed=seed))
+        for seed in range(1000)
+    ]
     held = np.mean([abs(case.difference + 0.2) <= case.half_width for case in cases])
     assert held == pytest.approx(0.95, abs=0.02)  # of 1000 cases: three standard errors
 
@@ -134,7 +172,9 @@ def test_what_all_pairs_share_does_not_widen_the_interval() -> None:
         ("slip_per_metre", [(math.nan, 1.0)], ""),
     ],
 )
-def test_a_verdict_needs_a_change_that_is_sure_and_can_be_measured(name: str, values: list[tuple[float, float]], verdict: str) -> None:
+def test_a_verdict_needs_a_change_that_is_sure_and_can_be_measured(
+    name: str, values: list[tuple[float, float]], verdict: str
+) -> None:
     assert change_of(name, values).verdict == verdict
 
 
@@ -147,11 +187,21 @@ def test_a_change_from_next_to_nothing_has_no_percentage() -> None:
 @pytest.mark.parametrize(
     ("name", "least"),
     [
-        ("slip_per_metre", 1e-4), ("foot_error_stance", 1e-4), ("height_rms", 1e-4), ("roll_rms", 1e-4), ("path_error", 1e-3),
-        ("peak_force", 5e-3), ("loading_rate", 5e-2), ("torque_rms", 5e-3), ("cost_of_transport", 1e-3), ("heat", 0.5),
-        ("electrical_cost", 5e-3), ("slip_per_radian", 1e-4), ("cost_per_radian", 1e-3),
+        ("slip_per_metre", 1e-4),
+        ("foot_error_stance", 1e-4),
+        ("height_rms", 1e-4),
+        ("roll_rms", 1e-4),
+        ("path_error", 1e-3),
+        ("peak_force", 5e-3),
+        ("loading_rate", 5e-2),
+        ("torque_rms", 5e-3),
+        ("cost_of_transport", 1e-3),
+        ("heat", 0.5),
+        ("electrical_cost", 5e-3),
+        ("slip_per_radian", 1e-4),
+        ("cost_per_radian", 1e-3),
     ],
-)  # fmt: skip
+)
 def test_a_change_that_no_one_could_measure_on_the_robot_is_none(name: str, least: float) -> None:
     """However sure it is: three pairs that agree, on either side of what sensors resolve."""
     small, large = [(2.0 * least, (2.0 - share) * least) for share in (0.9, 1.1)]
@@ -159,7 +209,9 @@ def test_a_change_that_no_one_could_measure_on_the_robot_is_none(name: str, leas
     assert change_of(name, [large] * 3).verdict == BETTER
 
 
-@pytest.mark.parametrize(("share", "verdict"), [(0.0045, SAME), (0.0055, BETTER), (-0.0045, SAME), (-0.0055, WORSE)])
+@pytest.mark.parametrize(
+    ("share", "verdict"), [(0.0045, SAME), (0.0055, BETTER), (-0.0045, SAME), (-0.0055, WORSE)]
+)
 def test_a_single_pair_has_to_differ_by_half_a_percent(share: float, verdict: str) -> None:
     assert change_of("torque_rms", [(100.0, 100.0 * (1.0 - share))]).verdict == verdict
 
@@ -189,7 +241,13 @@ def test_a_fall_is_counted_and_told_and_its_figures_left_out() -> None:
 @pytest.mark.parametrize("status", [FAILED, REFUSED])
 def test_a_run_without_figures_is_counted_and_told(status: str) -> None:
     first, second = runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.6])
-    first[0] = Summary(control="kinematic", seed=0, status=status, reason="the step is too long", metrics=NO_FIGURES)
+    first[0] = Summary(
+        control="kinematic",
+        seed=0,
+        status=status,
+        reason="the step is too long",
+        metrics=NO_FIGURES,
+    )
     comparison = compare_runs(first, second)
     assert comparison.means["compliant"]["slip_per_metre"] == 0.6
     assert comparison.losses == ["kinematic, seed 0: the step is too long"]
@@ -197,7 +255,10 @@ def test_a_run_without_figures_is_counted_and_told(status: str) -> None:
 
 
 def test_where_no_pair_walked_the_figures_are_of_all_that_have_any() -> None:
-    first, second = runs("kinematic", [1.0]), [replace(run, upright=False) for run in runs("compliant", [0.5])]
+    first, second = (
+        runs("kinematic", [1.0]),
+        [replace(run, upright=False) for run in runs("compliant", [0.5])],
+    )
     comparison = compare_runs(first, second)
     assert comparison.changes["slip_per_metre"].relative == pytest.approx(-0.5)
     assert comparison.losses
@@ -205,14 +266,18 @@ def test_where_no_pair_walked_the_figures_are_of_all_that_have_any() -> None:
 
 def test_a_single_seed_has_changes_and_no_intervals() -> None:
     rows = comparison_rows(compare_runs(runs("kinematic", [0.3]), runs("compliant", [0.1])))
-    assert [row["name"] for row in rows] == [name for name in METRICS if name != "slip_net_per_metre"]  # of the tanh law
+    assert [row["name"] for row in rows] == [
+        name for name in METRICS if name != "slip_net_per_metre"
+    ]  # of the tanh law
     slip = row_of(rows, "slip_per_metre")
     assert (slip["change"], slip["interval"], slip["verdict"]) == ("-66.7 %", "", BETTER)
     assert row_of(rows, "yaw_drift")["change"] == ""
 
 
 def test_several_seeds_show_the_interval() -> None:
-    rows = comparison_rows(compare_runs(runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.5])))
+    rows = comparison_rows(
+        compare_runs(runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.5]))
+    )
     slip = row_of(rows, "slip_per_metre")
     assert (slip["change"], slip["interval"]) == ("-50.0 %", "-50.0 to -50.0 %")
 
@@ -227,7 +292,15 @@ def test_runs_of_other_seeds_are_not_compared() -> None:
 def test_the_file_of_all_runs_reads_back_bit_for_bit(tmp_path: Path) -> None:
     told = runs("kinematic", [1.0 / 3.0, math.nan])
     told[1] = replace(told[1], warnings=("a, b", 'c "d"'), upright=False, fallback=0.1)
-    told += [Summary(control="compliant", seed=0, status=FAILED, reason="the FMU discards\nthe step", metrics=NO_FIGURES)]
+    told += [
+        Summary(
+            control="compliant",
+            seed=0,
+            status=FAILED,
+            reason="the FMU discards\nthe step",
+            metrics=NO_FIGURES,
+        )
+    ]
     write_seeds(tmp_path / "seeds.csv", told)
     again = read_seeds(tmp_path / "seeds.csv")
     assert list(again) == ["kinematic", "compliant"]
@@ -236,7 +309,9 @@ def test_the_file_of_all_runs_reads_back_bit_for_bit(tmp_path: Path) -> None:
         assert replace(before, metrics={}) == replace(after, metrics={})
 
 
-@pytest.mark.parametrize("text", ["control,seed\nkinematic,0\n", "control,seed,status\nkinematic,x,completed\n"])
+@pytest.mark.parametrize(
+    "text", ["control,seed\nkinematic,0\n", "control,seed,status\nkinematic,x,completed\n"]
+)
 def test_a_damaged_file_of_runs_is_refused_by_name(tmp_path: Path, text: str) -> None:
     (tmp_path / "seeds.csv").write_text(text)
     with pytest.raises(HexapodError, match=r"seeds.csv: damaged file.*hexapod compare"):
@@ -246,7 +321,18 @@ def test_a_damaged_file_of_runs_is_refused_by_name(tmp_path: Path, text: str) ->
 
 
 def test_a_table_for_machines_has_relative_and_plain_figures() -> None:
-    change = Change(before=2.0, after=1.0, half_width=0.2, log_half_width=math.log(1.25), pairs=3, floor=0.1, verdict=BETTER)
+    change = Change(
+        before=2.0,
+        after=1.0,
+        half_width=0.2,
+        log_half_width=math.log(1.25),
+        pairs=3,
+        floor=0.1,
+        verdict=BETTER,
+    )
     told = change.as_table()
     assert (told["relative"], told["difference"], told["half_width"]) == (-0.5, -1.0, 0.2)
-    assert (told["low"], told["high"]) == (pytest.approx(0.5 / 1.25 - 1.0), pytest.approx(0.5 * 1.25 - 1.0))
+    assert (told["low"], told["high"]) == (
+        pytest.approx(0.5 / 1.25 - 1.0),
+        pytest.approx(0.5 * 1.25 - 1.0),
+    )

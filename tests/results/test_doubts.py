@@ -36,15 +36,30 @@ class Run(Walk):
     def lean(self, roll: float, pitch: float, *, when: NDArray[np.bool_] | None = None) -> None:
         """As the FMU tells it, z-y-x."""
         a, b = 0.5 * roll, 0.5 * pitch
-        leaning = [math.cos(a) * math.cos(b), math.sin(a) * math.cos(b), math.cos(a) * math.sin(b), -math.sin(a) * math.sin(b)]
-        for k, (value, upright) in enumerate(zip(leaning, [1.0, 0.0, 0.0, 0.0], strict=True), start=1):
-            self.set(f"torso.quaternion[{k}]", np.where(self.time >= 0.0 if when is None else when, value, upright))
+        leaning = [
+            math.cos(a) * math.cos(b),
+            math.sin(a) * math.cos(b),
+            math.cos(a) * math.sin(b),
+            -math.sin(a) * math.sin(b),
+        ]
+        for k, (value, upright) in enumerate(
+            zip(leaning, [1.0, 0.0, 0.0, 0.0], strict=True), start=1
+        ):
+            self.set(
+                f"torso.quaternion[{k}]",
+                np.where(self.time >= 0.0 if when is None else when, value, upright),
+            )
 
     def lower(self, height: float, begin: float, end: float) -> None:
-        self.set("torso.position[3]", np.where((self.time >= begin) & (self.time < end), height, STANDING))
+        self.set(
+            "torso.position[3]",
+            np.where((self.time >= begin) & (self.time < end), height, STANDING),
+        )
 
     def fall(self, **parameters: float) -> str:
-        changed = PARAMETERS | {name.replace("__", "."): value for name, value in parameters.items()}
+        changed = PARAMETERS | {
+            name.replace("__", "."): value for name, value in parameters.items()
+        }
         return fall(View(self.recording, changed, PERIOD), ROBOT)
 
 
@@ -54,30 +69,58 @@ def test_a_robot_that_stands_has_not_fallen() -> None:
 
 @pytest.mark.parametrize(
     ("roll", "pitch", "falls"),
-    [(0.59, 0.0, False), (-0.59, 0.0, False), (0.0, 0.59, False), (0.61, 0.0, True), (-0.61, 0.0, True), (0.0, 0.61, True),
-     (0.0, -0.61, True), (0.41, 0.41, False), (0.45, 0.45, True)],
-)  # fmt: skip
-def test_a_torso_that_leans_by_more_than_six_tenths_of_a_radian_has_fallen(roll: float, pitch: float, falls: bool) -> None:
+    [
+        (0.59, 0.0, False),
+        (-0.59, 0.0, False),
+        (0.0, 0.59, False),
+        (0.61, 0.0, True),
+        (-0.61, 0.0, True),
+        (0.0, 0.61, True),
+        (0.0, -0.61, True),
+        (0.41, 0.41, False),
+        (0.45, 0.45, True),
+    ],
+)
+def test_a_torso_that_leans_by_more_than_six_tenths_of_a_radian_has_fallen(
+    roll: float, pitch: float, falls: bool
+) -> None:
     """Whatever the direction: 0.41 and 0.41 are 0.57 together, 0.45 and 0.45 are 0.62."""
     run = Run()
     run.lean(roll, pitch, when=run.time >= 3.0)
-    assert run.fall() == ("the robot fell at 3.000 s: its torso leaned by more than 0.6 rad" if falls else "")
+    assert run.fall() == (
+        "the robot fell at 3.000 s: its torso leaned by more than 0.6 rad" if falls else ""
+    )
 
 
-@pytest.mark.parametrize(("heading", "roll", "pitch"), [(0.0, 0.0, -1.0), (math.pi / 2.0, 1.0, 0.0)], ids=["along x", "along y"])
-def test_on_a_slope_a_torso_leans_against_the_slope(heading: float, roll: float, pitch: float) -> None:
-    """On a slope of 0.5 rad a torso along the slope is upright, a level one leans by 0.5, and 0.15 downhill is too much."""
+@pytest.mark.parametrize(
+    ("heading", "roll", "pitch"),
+    [(0.0, 0.0, -1.0), (math.pi / 2.0, 1.0, 0.0)],
+    ids=["along x", "along y"],
+)
+def test_on_a_slope_a_torso_leans_against_the_slope(
+    heading: float, roll: float, pitch: float
+) -> None:
+    """On a slope of 0.5 rad a torso along the slope is upright, a level one leans by 0.5, and
+    0.15 downhill is too much.
+    """
     for angle, falls in ((0.5, False), (0.0, False), (-0.15, True), (1.05, False), (1.15, True)):
         run = Run()
         run.lean(angle * roll, angle * pitch)
         assert bool(run.fall(**SLOPE, terrain__heading=heading)) == falls
 
 
-@pytest.mark.parametrize(("height", "lasts", "falls"), [(0.066, 5.0, False), (0.064, 0.45, False), (0.064, 0.55, True), (0.064, 5.0, True)])
-def test_a_torso_below_half_its_height_for_half_a_second_has_fallen(height: float, lasts: float, falls: bool) -> None:
+@pytest.mark.parametrize(
+    ("height", "lasts", "falls"),
+    [(0.066, 5.0, False), (0.064, 0.45, False), (0.064, 0.55, True), (0.064, 5.0, True)],
+)
+def test_a_torso_below_half_its_height_for_half_a_second_has_fallen(
+    height: float, lasts: float, falls: bool
+) -> None:
     run = Run()
     run.lower(height, 2.0, 2.0 + lasts)
-    assert run.fall() == ("the robot fell at 2.000 s: its torso was only 0.064 m above the ground" if falls else "")
+    assert run.fall() == (
+        "the robot fell at 2.000 s: its torso was only 0.064 m above the ground" if falls else ""
+    )
 
 
 def test_a_torso_that_is_low_when_the_run_ends_has_fallen() -> None:
@@ -87,7 +130,9 @@ def test_a_torso_that_is_low_when_the_run_ends_has_fallen() -> None:
 
 
 def test_the_height_that_counts_is_the_commanded_one() -> None:
-    """Raised by 60 mm to 190 mm, 90 mm are less than half; lowered by 40 mm to 90 mm, 64 mm are more."""
+    """Raised by 60 mm to 190 mm, 90 mm are less than half; lowered by 40 mm to 90 mm, 64 mm are
+    more.
+    """
     run = Run()
     run.set("command.height", 0.06)
     run.lower(0.090, 2.0, 3.0)
@@ -103,14 +148,21 @@ def test_a_torso_that_lies_on_the_ground_has_fallen_at_once(height: float, falls
     """The default torso is 80 mm thick."""
     run = Run()
     run.lower(height, 2.0, 2.05)
-    assert run.fall() == ("the robot fell at 2.000 s: its torso was only 0.0399 m above the ground" if falls else "")
+    assert run.fall() == (
+        "the robot fell at 2.000 s: its torso was only 0.0399 m above the ground" if falls else ""
+    )
 
 
 def dropped() -> Run:
     """From 1 m; its feet are on the ground from 0.5 s on, it bounces up to 0.2 m and stands."""
     run = Run()
     run.touch((run.time >= 0.5) & ((run.time < 0.6) | (run.time >= 0.7)))
-    run.set("torso.position[3]", np.where(run.time < 0.5, 1.0, np.where((run.time >= 0.6) & (run.time < 0.7), 0.2, STANDING)))
+    run.set(
+        "torso.position[3]",
+        np.where(
+            run.time < 0.5, 1.0, np.where((run.time >= 0.6) & (run.time < 0.7), 0.2, STANDING)
+        ),
+    )
     return run
 
 
@@ -128,7 +180,10 @@ def test_a_robot_turns_in_the_air_without_falling_and_falls_when_it_lands_so() -
 
 def test_a_robot_that_is_dropped_and_sinks_has_fallen() -> None:
     run = dropped()
-    run.set("torso.position[3]", np.where(run.time < 0.5, 1.0, np.where(run.time < 2.0, STANDING, 0.064)))
+    run.set(
+        "torso.position[3]",
+        np.where(run.time < 0.5, 1.0, np.where(run.time < 2.0, STANDING, 0.064)),
+    )
     assert "fell at 2.000 s: its torso was only 0.064 m" in run.fall()
 
 
@@ -142,7 +197,9 @@ def test_a_robot_that_never_lands_on_its_feet_falls_when_its_torso_meets_the_gro
 
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_heights_are_above_the_ground_of_a_slope(along: str) -> None:
-    """On ground at 0.3 m that rises by tan 0.5 = 0.5463 along the way, the torso is 0.130 m above it when z says so."""
+    """On ground at 0.3 m that rises by tan 0.5 = 0.5463 along the way, the torso is 0.130 m
+    above it when z says so.
+    """
     run = Run()
     axis, heading = {"x": (1, 0.0), "y": (2, math.pi / 2.0)}[along]
     way = 0.1 * run.time
@@ -170,9 +227,13 @@ def test_static_friction_holds_a_robot_where_the_law_has_it() -> None:
     assert slipping_ground(parameters(**SLOPE, **between, friction__law=1.0)) != []
 
 
-@pytest.mark.parametrize("changes", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["mu = 0", "none"])
+@pytest.mark.parametrize(
+    "changes", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["mu = 0", "none"]
+)
 def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> None:
-    assert slipping_ground(parameters(**changes)) == ["the ground has no friction: feet cannot push, and the robot does not get ahead"]
+    assert slipping_ground(parameters(**changes)) == [
+        "the ground has no friction: feet cannot push, and the robot does not get ahead"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -180,8 +241,15 @@ def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> Non
     [
         ({"friction__mu": 0.0}, "at 4.7 m/s2, without friction"),  # g sin 0.5
         ({"friction__law": 2.0}, "at 4.7 m/s2, without friction"),
-        ({"friction__mu": 0.3}, "at 2.12 m/s2, which friction (mu = 0.3) does not hold"),  # g (sin 0.5 - 0.3 cos 0.5)
+        (
+            {"friction__mu": 0.3},
+            "at 2.12 m/s2, which friction (mu = 0.3) does not hold",
+        ),  # g (sin 0.5 - 0.3 cos 0.5)
     ],
 )
-def test_a_slope_that_friction_does_not_hold_is_told_with_the_acceleration(changes: dict[str, float], says: str) -> None:
-    assert slipping_ground(parameters(**SLOPE, **changes)) == [f"the robot slides: the ground's slope pulls it downhill {says}"]
+def test_a_slope_that_friction_does_not_hold_is_told_with_the_acceleration(
+    changes: dict[str, float], says: str
+) -> None:
+    assert slipping_ground(parameters(**SLOPE, **changes)) == [
+        f"the robot slides: the ground's slope pulls it downhill {says}"
+    ]

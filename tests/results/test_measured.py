@@ -1,4 +1,6 @@
-"""What the plant measures against sums over samples of 0.1 ms, made by driving it again: two ways to the same figures."""
+"""What the plant measures against sums over samples of 0.1 ms, made by driving it again: two
+ways to the same figures.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +37,15 @@ class Twice:
 
 @pytest.fixture(scope="module", params=CONTROLS)
 def twice(request: pytest.FixtureRequest, plant_build: Path) -> Twice:
-    """At a tight tolerance: what both ways differ in is how they measure, not how they integrate."""
-    settings = (f"control={request.param}", "macro_step=0.005", f"gait.period={PERIOD}", "solver.tolerance=1e-6")
+    """At a tight tolerance: what both ways differ in is how they measure, not how they
+    integrate.
+    """
+    settings = (
+        f"control={request.param}",
+        "macro_step=0.005",
+        f"gait.period={PERIOD}",
+        "solver.tolerance=1e-6",
+    )
     plan = load_scenario("walk_flat", overrides=[*settings, f"duration={CYCLES * PERIOD}"])
     gains = None if request.param == "kinematic" else make_gains(load_robot("athena"), period=0.005)
     result = simulate(plan, gains=gains)
@@ -47,17 +56,25 @@ def twice(request: pytest.FixtureRequest, plant_build: Path) -> Twice:
 
 
 def test_slip_is_the_way_of_loaded_feet_along_the_ground(twice: Twice) -> None:
-    assert twice.told["slip_per_metre"] == pytest.approx(slipped(twice.samples, twice.walk.weight) / twice.walk.distance, rel=AGREED)
+    assert twice.told["slip_per_metre"] == pytest.approx(
+        slipped(twice.samples, twice.walk.weight) / twice.walk.distance, rel=AGREED
+    )
 
 
 def test_cost_of_transport_is_the_positive_power_of_the_motors(twice: Twice) -> None:
-    assert twice.told["cost_of_transport"] == pytest.approx(driven(twice.samples) / (twice.walk.weight * twice.walk.distance), rel=AGREED)
+    assert twice.told["cost_of_transport"] == pytest.approx(
+        driven(twice.samples) / (twice.walk.weight * twice.walk.distance), rel=AGREED
+    )
 
 
 def test_torques_are_squared_over_all_time(twice: Twice) -> None:
     squares, servo = integral(twice.samples.torque**2), load_robot("athena").servo
-    assert twice.told["torque_rms"] == pytest.approx(np.sqrt(squares.sum() / (18.0 * PERIOD)), rel=AGREED)
-    assert twice.told["servo_load_max"] == pytest.approx(np.sqrt(squares.max() / PERIOD) / 1.2, rel=AGREED)
+    assert twice.told["torque_rms"] == pytest.approx(
+        np.sqrt(squares.sum() / (18.0 * PERIOD)), rel=AGREED
+    )
+    assert twice.told["servo_load_max"] == pytest.approx(
+        np.sqrt(squares.max() / PERIOD) / 1.2, rel=AGREED
+    )
     assert twice.told["heat"] == pytest.approx(squares.sum() / twice.walk.distance, rel=AGREED)
     copper = squares.sum() / servo.motor_constant**2
     paid = (driven(twice.samples) + copper) / (twice.walk.weight * twice.walk.distance)
@@ -65,11 +82,15 @@ def test_torques_are_squared_over_all_time(twice: Twice) -> None:
 
 
 def test_the_peak_is_the_largest_force_of_all_samples(twice: Twice) -> None:
-    assert twice.told["peak_force"] == pytest.approx(twice.samples.normal.max() / twice.walk.weight, rel=AGREED)
+    assert twice.told["peak_force"] == pytest.approx(
+        twice.samples.normal.max() / twice.walk.weight, rel=AGREED
+    )
 
 
 def test_landings_are_counted_and_as_steep_as_sampled(twice: Twice) -> None:
-    """Of each landing but the steepest, whose rise changes within 0.1 ms: differences of samples flatten it."""
+    """Of each landing but the steepest, whose rise changes within 0.1 ms: differences of samples
+    flatten it.
+    """
     told = np.sort(told_rates(twice.walk))
     seen = np.sort(landing_rates(twice.before, apart=0.5 * PERIOD, after=2.0 * PERIOD))
     assert len(told) == len(seen) == 6

@@ -20,20 +20,52 @@ from hexapod_cosim.cosim.results.walk import View, body_height, commanded_path, 
 
 Array = NDArray[np.float64]
 
-PER_METRE = ("slip_per_metre", "path_error", "yaw_drift", "heat", "cost_of_transport", "electrical_cost")
+PER_METRE = (
+    "slip_per_metre",
+    "path_error",
+    "yaw_drift",
+    "heat",
+    "cost_of_transport",
+    "electrical_cost",
+)
 TWINS = (
-    "slip_per_radian", "path_error_per_radian", "yaw_drift_per_radian", "heat_per_radian", "cost_per_radian", "electrical_cost_per_radian",
-)  # fmt: skip
+    "slip_per_radian",
+    "path_error_per_radian",
+    "yaw_drift_per_radian",
+    "heat_per_radian",
+    "cost_per_radian",
+    "electrical_cost_per_radian",
+)
 JUDGED = 8.0  # s    of ten cycles of 1 s
 
 
 def test_the_metrics_are_those_of_the_contract_in_its_order() -> None:
     assert list(METRICS) == [
-        "slip_per_metre", "slip_net_per_metre", "cone_use_p50", "cone_use_p95", "cone_use_over_90", "foot_error_stance",
-        "foot_error_swing", "path_error", "yaw_drift", "height_rms", "roll_rms", "pitch_rms", "peak_force", "force_p95", "loading_rate",
-        "torque_rms", "servo_load_max", "heat", "cost_of_transport", "electrical_cost", *TWINS, "stability_margin", "energy_residual",
+        "slip_per_metre",
+        "slip_net_per_metre",
+        "cone_use_p50",
+        "cone_use_p95",
+        "cone_use_over_90",
+        "foot_error_stance",
+        "foot_error_swing",
+        "path_error",
+        "yaw_drift",
+        "height_rms",
+        "roll_rms",
+        "pitch_rms",
+        "peak_force",
+        "force_p95",
+        "loading_rate",
+        "torque_rms",
+        "servo_load_max",
+        "heat",
+        "cost_of_transport",
+        "electrical_cost",
+        *TWINS,
+        "stability_margin",
+        "energy_residual",
         "realtime_factor",
-    ]  # fmt: skip
+    ]
     assert list(Walk().metrics()) == list(METRICS)
 
 
@@ -52,7 +84,9 @@ def test_slip_is_what_the_plant_counted_per_metre_walked() -> None:
 
 @pytest.mark.parametrize("h", [0.005, 0.02, 0.03])  # of 0.03 s no row is at 2 s
 def test_cumulative_figures_depend_on_no_row(h: float) -> None:
-    """What grows steadily grows by the same in the judged time, whether rows are at its ends or not."""
+    """What grows steadily grows by the same in the judged time, whether rows are at its ends or
+    not.
+    """
     walk = Walk(h=h)
     walk.grow("LF.foot.slip_distance", 0.010)
     walk.grow("LF.femur.positive_work", 3.0)
@@ -71,7 +105,9 @@ def test_the_creep_of_the_tanh_law_is_no_net_slip(share: float) -> None:
     walk.set("LF.foot.normal_force", normal)
     walk.set("LF.foot.tangential_force", share * mu * normal)
     walk.set("LF.foot.slip_speed", math.atanh(share) / slope)
-    assert walk.metrics(friction__mu=mu, friction__slope=slope)["slip_net_per_metre"] == pytest.approx(0.0, abs=1e-12)
+    assert walk.metrics(friction__mu=mu, friction__slope=slope)[
+        "slip_net_per_metre"
+    ] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_net_slip_is_what_exceeds_the_largest_creep() -> None:
@@ -82,12 +118,21 @@ def test_net_slip_is_what_exceeds_the_largest_creep() -> None:
     walk.set("LF.foot.slip_speed", 0.5)
     walk.set("RM.foot.slip_speed", 0.5)  # in the air
     net = 0.5 - math.atanh(0.999) / slope
-    assert walk.metrics(friction__mu=mu, friction__slope=slope)["slip_net_per_metre"] == pytest.approx(net / SPEED)
+    assert walk.metrics(friction__mu=mu, friction__slope=slope)[
+        "slip_net_per_metre"
+    ] == pytest.approx(net / SPEED)
 
 
-@pytest.mark.parametrize(("stretched", "turn", "net"), [(0.5, 1.0, 0.0), (1.0, 1.0, 1.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)])
-def test_net_slip_of_bristles_is_what_they_do_not_give_back(stretched: float, turn: float, net: float) -> None:
-    """A spring below break-away, sliding when full, elastic again on the way back; the normal velocity is no slip."""
+@pytest.mark.parametrize(
+    ("stretched", "turn", "net"),
+    [(0.5, 1.0, 0.0), (1.0, 1.0, 1.0), (1.0, -1.0, 0.0), (0.0, 1.0, 0.0)],
+)
+def test_net_slip_of_bristles_is_what_they_do_not_give_back(
+    stretched: float, turn: float, net: float
+) -> None:
+    """A spring below break-away, sliding when full, elastic again on the way back; the normal
+    velocity is no slip.
+    """
     walk = Walk()
     walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
     for axis, part in (("1", 0.6), ("2", 0.8)):
@@ -99,12 +144,16 @@ def test_net_slip_of_bristles_is_what_they_do_not_give_back(stretched: float, tu
 
 
 def test_cone_use_is_over_the_time_that_feet_bear_load() -> None:
-    """One foot at 10 %, one at 20 % and for a quarter of the time at 95 % of the cone; what hardly touches does not count."""
+    """One foot at 10 %, one at 20 % and for a quarter of the time at 95 % of the cone; what
+    hardly touches does not count.
+    """
     walk, normal = Walk(), 0.3 * WEIGHT
     for leg in ("LF", "RM"):
         walk.set(f"{leg}.foot.normal_force", normal)
     walk.set("LF.foot.tangential_force", 0.10 * 0.7 * normal)
-    walk.set("RM.foot.tangential_force", np.where(walk.time % PERIOD < 0.25, 0.95, 0.20) * 0.7 * normal)
+    walk.set(
+        "RM.foot.tangential_force", np.where(walk.time % PERIOD < 0.25, 0.95, 0.20) * 0.7 * normal
+    )
     walk.set("LR.foot.normal_force", 0.009 * WEIGHT)
     walk.set("LR.foot.tangential_force", 0.009 * WEIGHT)
     metrics = walk.metrics(friction__mu=0.7)
@@ -142,21 +191,29 @@ def test_a_foot_stands_on_a_hundredth_of_the_weight(load: float, counts: bool) -
     assert math.isfinite(metrics["force_p95"]) == counts
 
 
-@pytest.mark.parametrize("ground", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["no friction", "no law"])
+@pytest.mark.parametrize(
+    "ground", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["no friction", "no law"]
+)
 def test_a_cone_that_is_not_there_is_not_used(ground: dict[str, float]) -> None:
     walk = Walk()
     walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
     metrics = walk.metrics(**ground)
-    assert all(math.isnan(metrics[name]) for name in ("cone_use_p50", "cone_use_p95", "cone_use_over_90"))
+    assert all(
+        math.isnan(metrics[name]) for name in ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
+    )
 
 
 def test_feet_are_compared_with_their_plan_in_the_torsos_frame() -> None:
-    """The torso is turned, tilted and away from the origin; each foot 3 mm off its plan while it stands, one 6 mm in the air."""
+    """The torso is turned, tilted and away from the origin; each foot 3 mm off its plan while it
+    stands, one 6 mm in the air.
+    """
     walk = Walk(planned=True)
     yaw, com = 0.9, np.array([0.02, -0.01, 0.03])
     walk.set("torso.quaternion[1]", math.cos(yaw / 2.0))
     walk.set("torso.quaternion[4]", math.sin(yaw / 2.0))
-    turn = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+    turn = np.array(
+        [[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
+    )
     torso = walk.recording.vector("torso.position")
     swinging = walk.time % PERIOD < 0.5
     walk.set("controller.LF.swinging", swinging)
@@ -176,11 +233,21 @@ def test_feet_are_compared_with_their_plan_in_the_torsos_frame() -> None:
 def test_feet_on_a_slope_have_their_centres_above_the_ground_along_its_normal() -> None:
     walk, incline, heading = Walk(planned=True), 0.2, 0.7
     for leg in ("LF", "LM", "LR", "RF", "RM", "RR"):
-        for i, part in enumerate([-math.sin(incline) * math.cos(heading), -math.sin(incline) * math.sin(heading), math.cos(incline)]):
+        for i, part in enumerate(
+            [
+                -math.sin(incline) * math.cos(heading),
+                -math.sin(incline) * math.sin(heading),
+                math.cos(incline),
+            ]
+        ):
             walk.set(f"controller.{leg}.planned[{i + 1}]", 0.015 * part)
-            walk.set(f"{leg}.foot.position[{i + 1}]", walk.recording.column(f"torso.position[{i + 1}]"))
+            walk.set(
+                f"{leg}.foot.position[{i + 1}]", walk.recording.column(f"torso.position[{i + 1}]")
+            )
     ground = {"terrain__incline": incline, "terrain__heading": heading}
-    assert walk.metrics(terrain__kind=2, **ground)["foot_error_stance"] == pytest.approx(0.0, abs=1e-12)
+    assert walk.metrics(terrain__kind=2, **ground)["foot_error_stance"] == pytest.approx(
+        0.0, abs=1e-12
+    )
     assert walk.metrics(terrain__kind=1, **ground)["foot_error_stance"] > 1e-3
 
 
@@ -205,7 +272,9 @@ def test_the_commanded_path_sets_out_along_the_robots_own_heading() -> None:
 
 
 def test_the_commanded_path_sets_out_along_the_mean_heading_of_a_cycle() -> None:
-    """A torso that swings by 0.1 rad about its way walks along that way, not where it happens to look in the first row."""
+    """A torso that swings by 0.1 rad about its way walks along that way, not where it happens to
+    look in the first row.
+    """
     walk = Walk()
     walk.set("torso.yaw", 0.1 * np.cos(2.0 * np.pi * walk.time / PERIOD + 0.7))
     assert walk.metrics()["path_error"] == pytest.approx(0.0, abs=1e-6)
@@ -220,7 +289,9 @@ def test_a_commanded_circle_is_followed_without_error() -> None:
     walk.set("torso.position[1]", SPEED / rate * np.sin(yaw))
     walk.set("torso.position[2]", SPEED / rate * (1.0 - np.cos(yaw)))
     metrics = walk.metrics()
-    assert metrics["path_error"] == pytest.approx(0.0, abs=rate * H)  # the held command turns in steps
+    assert metrics["path_error"] == pytest.approx(
+        0.0, abs=rate * H
+    )  # the held command turns in steps
     assert metrics["yaw_drift"] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -239,31 +310,48 @@ def test_the_torso_bobbing_within_a_cycle_walks_no_metre() -> None:
 
 @pytest.mark.parametrize("h", [0.005, 0.02])
 @pytest.mark.parametrize(
-    ("column", "metric"), [("torso.position[3]", "height_rms"), ("torso.roll", "roll_rms"), ("torso.pitch", "pitch_rms")]
+    ("column", "metric"),
+    [("torso.position[3]", "height_rms"), ("torso.roll", "roll_rms"), ("torso.pitch", "pitch_rms")],
 )
-def test_an_oscillation_has_the_rms_of_a_sine_whatever_its_mean(column: str, metric: str, h: float) -> None:
+def test_an_oscillation_has_the_rms_of_a_sine_whatever_its_mean(
+    column: str, metric: str, h: float
+) -> None:
     walk = Walk(h=h)
     walk.set(column, 0.2 + 0.01 * np.sin(2.0 * np.pi * walk.time / PERIOD))
     metrics = walk.metrics()
     assert metrics[metric] == pytest.approx(0.01 / math.sqrt(2.0), rel=1e-9)
-    others = [metrics[other] for other in ("height_rms", "roll_rms", "pitch_rms") if other != metric]
+    others = [
+        metrics[other] for other in ("height_rms", "roll_rms", "pitch_rms") if other != metric
+    ]
     assert others == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
 def test_height_is_above_the_ground_that_rises() -> None:
     walk = Walk()
     walk.set("torso.position[3]", 0.13 + math.tan(0.1) * SPEED * walk.time)
-    assert walk.metrics(terrain__kind=2, terrain__incline=0.1)["height_rms"] == pytest.approx(0.0, abs=1e-12)
+    assert walk.metrics(terrain__kind=2, terrain__incline=0.1)["height_rms"] == pytest.approx(
+        0.0, abs=1e-12
+    )
     assert walk.metrics(terrain__kind=1, terrain__incline=0.1)["height_rms"] > 0.01
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.6, math.pi / 2.0, -0.6, 2.5])
 def test_height_above_a_slope_is_the_same_wherever_on_it(heading: float) -> None:
-    """A slope that rises by tan(incline) along its heading, through height 0.4 m at the origin; the torso 0.13 m above it."""
+    """A slope that rises by tan(incline) along its heading, through height 0.4 m at the origin;
+    the torso 0.13 m above it.
+    """
     x, y = np.array([0.0, 1.0, 0.0, -2.0]), np.array([0.0, 0.0, 1.0, 3.0])
     z = 0.4 + math.tan(0.2) * (x * math.cos(heading) + y * math.sin(heading)) + 0.13
-    part = Recording(("time", "torso.position[1]", "torso.position[2]", "torso.position[3]"), np.column_stack([x, x, y, z]))
-    ground = {"terrain.kind": 2.0, "terrain.incline": 0.2, "terrain.heading": heading, "terrain.height": 0.4}
+    part = Recording(
+        ("time", "torso.position[1]", "torso.position[2]", "torso.position[3]"),
+        np.column_stack([x, x, y, z]),
+    )
+    ground = {
+        "terrain.kind": 2.0,
+        "terrain.incline": 0.2,
+        "terrain.heading": heading,
+        "terrain.height": 0.4,
+    }
     assert body_height(part, ground) == pytest.approx([0.13] * 4)
     flat = {"terrain.kind": 1.0, "terrain.incline": 0.2, "terrain.height": 0.4}
     assert body_height(part, flat) == pytest.approx(z - 0.4)
@@ -273,10 +361,14 @@ def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> No
     walk = Walk()
     force = np.linspace(0.0, 1.0, len(walk.time))
     walk.set("LF.foot.normal_force", force * WEIGHT)
-    walk.set("LF.foot.peak_force", np.where(np.abs(walk.time - 5.0) < 0.3 * H, 1.7, 0.0) * WEIGHT)  # between two rows
+    walk.set(
+        "LF.foot.peak_force", np.where(np.abs(walk.time - 5.0) < 0.3 * H, 1.7, 0.0) * WEIGHT
+    )  # between two rows
     metrics = walk.metrics()
     assert metrics["peak_force"] == pytest.approx(1.7)
-    assert metrics["force_p95"] == pytest.approx(0.2 + 0.95 * 0.8, abs=1e-3)  # of what rises from 0.2 to 1
+    assert metrics["force_p95"] == pytest.approx(
+        0.2 + 0.95 * 0.8, abs=1e-3
+    )  # of what rises from 0.2 to 1
 
 
 def test_a_peak_before_the_judged_cycles_does_not_count() -> None:
@@ -286,7 +378,9 @@ def test_a_peak_before_the_judged_cycles_does_not_count() -> None:
     assert walk.metrics()["peak_force"] == pytest.approx(0.4)
 
 
-def landings(walk: Walk, leg: str, times: list[float], rates: list[float], *, rising: float = 0.020) -> None:
+def landings(
+    walk: Walk, leg: str, times: list[float], rates: list[float], *, rising: float = 0.020
+) -> None:
     """Touch-downs whose rate grows to its end within `rising` [s], in body weights per second."""
     count, rate = np.zeros_like(walk.time), np.zeros_like(walk.time)
     for time, steepest in zip(times, rates, strict=True):
@@ -299,7 +393,9 @@ def landings(walk: Walk, leg: str, times: list[float], rates: list[float], *, ri
 
 def test_loading_rate_is_a_percentile_over_landings() -> None:
     walk = Walk()
-    landings(walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)])  # the first two cycles do not count
+    landings(
+        walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)]
+    )  # the first two cycles do not count
     assert walk.metrics()["loading_rate"] == pytest.approx(1.0 + 0.95 * 7.0)
 
 
@@ -310,7 +406,9 @@ def test_a_foot_that_bounces_lands_once_with_the_steeper_rise() -> None:
 
 
 @pytest.mark.parametrize(("apart", "rate"), [(0.45, 60.0), (0.55, 59.0)])
-def test_touch_downs_more_than_half_a_cycle_apart_are_two_landings(apart: float, rate: float) -> None:
+def test_touch_downs_more_than_half_a_cycle_apart_are_two_landings(
+    apart: float, rate: float
+) -> None:
     """The 95th percentile of one landing of 60, or of one of 40 and one of 60."""
     walk = Walk()
     landings(walk, "LF", [4.0, 4.0 + apart], [40.0, 60.0])
@@ -330,7 +428,9 @@ def test_torque_rms_is_over_all_joints_and_time() -> None:
     assert walk.metrics()["torque_rms"] == pytest.approx(3.0 / math.sqrt(18.0))
 
 
-def test_heat_is_the_squared_torque_of_all_servos_per_metre_and_the_load_that_of_the_hottest() -> None:
+def test_heat_is_the_squared_torque_of_all_servos_per_metre_and_the_load_that_of_the_hottest() -> (
+    None
+):
     walk = Walk()
     walk.grow("LF.femur.torque_squared", 9.0)
     walk.grow("RR.tibia.torque_squared", 16.0)
@@ -404,7 +504,9 @@ def test_a_robot_that_gets_no_further_than_a_centimetre_stands(way: float, walke
 
 
 @pytest.mark.parametrize(("angle", "turned"), [(0.048, False), (0.052, True)])
-def test_a_robot_that_turns_by_less_than_a_twentieth_of_a_radian_stands(angle: float, turned: bool) -> None:
+def test_a_robot_that_turns_by_less_than_a_twentieth_of_a_radian_stands(
+    angle: float, turned: bool
+) -> None:
     walk = turning(angle / JUDGED)
     walk.set("torso.position[1]", 0.0)
     assert math.isfinite(walk.metrics()["slip_per_radian"]) == turned
@@ -413,9 +515,18 @@ def test_a_robot_that_turns_by_less_than_a_twentieth_of_a_radian_stands(angle: f
 def test_the_first_two_cycles_do_not_count() -> None:
     clean, dirty = Walk(), Walk()
     early = dirty.time < 2.0 * PERIOD - H / 2
-    for name in (*foot_names("normal_force"), *foot_names("peak_force"), "torso.roll", "torso.position[3]"):
+    for name in (
+        *foot_names("normal_force"),
+        *foot_names("peak_force"),
+        "torso.roll",
+        "torso.position[3]",
+    ):
         dirty.set(name, np.where(early, 7.0, 0.0))
-    for name in (*joint_names("positive_work"), *joint_names("torque_squared"), *foot_names("slip_distance")):
+    for name in (
+        *joint_names("positive_work"),
+        *joint_names("torque_squared"),
+        *foot_names("slip_distance"),
+    ):
         dirty.set(name, np.where(early, 7.0 * dirty.time, 14.0))
     assert dirty.metrics() == pytest.approx(clean.metrics(), nan_ok=True)
 
@@ -424,7 +535,12 @@ def test_a_cycle_begun_does_not_count() -> None:
     walk = Walk()
     walk.set("torso.roll", np.where(walk.time > 9.0 + 1e-9, 0.5, 0.0))
     shorter = Recording(walk.names, walk.data[walk.time < 9.7])
-    assert compute_metrics(View(shorter, PARAMETERS, PERIOD), servo=SERVO, realtime_factor=1.0)["roll_rms"] == 0.0
+    assert (
+        compute_metrics(View(shorter, PARAMETERS, PERIOD), servo=SERVO, realtime_factor=1.0)[
+            "roll_rms"
+        ]
+        == 0.0
+    )
 
 
 def test_a_standing_robot_has_no_figures_per_metre_and_json_says_null() -> None:
@@ -443,7 +559,9 @@ def test_fewer_than_three_cycles_have_no_figures_but_those_of_the_run(cycles: in
 
 
 def test_a_command_between_two_rows_is_the_one_before_it() -> None:
-    """Rows 30 ms apart: at 2 s, between two of them, 0.2 m/s are in force, though the next row says 0.08."""
+    """Rows 30 ms apart: at 2 s, between two of them, 0.2 m/s are in force, though the next row
+    says 0.08.
+    """
     walk = Walk(h=0.03)
     speed = np.where(np.abs(walk.time - 1.98) < 0.01, 0.2, 0.08)
     walk.set("command.vx", speed)
@@ -470,7 +588,10 @@ def test_a_command_to_the_side_leads_to_the_left_of_the_heading(heading: float) 
     walk.set("command.vy", 0.04)
     end = commanded_path(walk.recording)[-1] - walk.recording.vector("torso.position")[0, :2]
     forward, left = 0.3, 0.4  # m in 10 s
-    expected = [forward * math.cos(heading) - left * math.sin(heading), forward * math.sin(heading) + left * math.cos(heading)]
+    expected = [
+        forward * math.cos(heading) - left * math.sin(heading),
+        forward * math.sin(heading) + left * math.cos(heading),
+    ]
     assert end == pytest.approx(expected)
 
 
@@ -480,7 +601,9 @@ def test_the_commanded_path_turns_with_the_command() -> None:
     walk.set("command.vy", np.where(walk.time < 5.0 - H / 2, 0.0, 0.1))
     path = commanded_path(walk.recording)
     assert path[-1] == pytest.approx([0.5, 0.5])
-    assert held_integral(np.array([0.0, 1.0, 4.0]), np.array([2.0, 5.0, 100.0])) == pytest.approx([0.0, 2.0, 17.0])
+    assert held_integral(np.array([0.0, 1.0, 4.0]), np.array([2.0, 5.0, 100.0])) == pytest.approx(
+        [0.0, 2.0, 17.0]
+    )
 
 
 def test_the_energy_residual_is_the_largest_over_all_the_work_that_motors_did_and_took() -> None:
@@ -500,10 +623,21 @@ def test_the_energy_residual_of_a_robot_at_rest_is_measured_by_a_lift_of_a_milli
 def test_what_is_too_small_to_be_measured_is_stated_metric_by_metric() -> None:
     """A tenth of a millimetre and of a milliradian, and what force and torque sensing resolve."""
     assert set(FLOORS) == set(METRICS)
-    millis = ("height_rms", "roll_rms", "pitch_rms", "foot_error_stance", "foot_error_swing", "stability_margin", "slip_per_metre")
+    millis = (
+        "height_rms",
+        "roll_rms",
+        "pitch_rms",
+        "foot_error_stance",
+        "foot_error_swing",
+        "stability_margin",
+        "slip_per_metre",
+    )
     assert [FLOORS[name] for name in millis] == [1e-4] * 7
     assert [FLOORS[name] for name in ("path_error", "yaw_drift", "cost_of_transport")] == [1e-3] * 3
-    assert [FLOORS[name] for name in ("peak_force", "force_p95", "torque_rms", "servo_load_max", "cone_use_p50")] == [5e-3] * 5
+    assert [
+        FLOORS[name]
+        for name in ("peak_force", "force_p95", "torque_rms", "servo_load_max", "cone_use_p50")
+    ] == [5e-3] * 5
     assert (FLOORS["loading_rate"], FLOORS["heat"], FLOORS["electrical_cost"]) == (5e-2, 0.5, 5e-3)
 
 

@@ -1,4 +1,6 @@
-"""Rows further apart than macro-steps: figures stay, peaks are kept, and both masters record the same."""
+"""Rows further apart than macro-steps: figures stay, peaks are kept, and both masters record the
+same.
+"""
 
 from __future__ import annotations
 
@@ -28,21 +30,39 @@ from hexapod_cosim.models import load_robot
 FOLDED = (*foot_names("peak_force"), *foot_names("peak_force_rate"), *foot_names("landing_rate"))
 # of rows 20 ms apart alone: what the plant measures, and what changes slowly
 OF_ROWS = (
-    "slip_per_metre", "path_error", "height_rms", "peak_force", "loading_rate", "torque_rms", "servo_load_max", "heat",
-    "cost_of_transport", "electrical_cost",
-)  # fmt: skip
+    "slip_per_metre",
+    "path_error",
+    "height_rms",
+    "peak_force",
+    "loading_rate",
+    "torque_rms",
+    "servo_load_max",
+    "heat",
+    "cost_of_transport",
+    "electrical_cost",
+)
 NEAR = 0.01  # of a figure, between rows 1 ms and 20 ms apart
 
 pytestmark = pytest.mark.usefixtures("plant_build")
 
 
 def walk_of(control: str, interval: float) -> Scenario:
-    settings = (f"control={control}", "macro_step=0.001", "duration=2.4", "gait.period=0.8", "outputs.plots=false")
+    settings = (
+        f"control={control}",
+        "macro_step=0.001",
+        "duration=2.4",
+        "gait.period=0.8",
+        "outputs.plots=false",
+    )
     return load_scenario("walk_flat", overrides=[*settings, f"outputs.interval={interval}"])
 
 
 def gains_of(scenario: Scenario) -> Gains | None:
-    return None if scenario.control == "kinematic" else make_gains(load_robot("athena"), period=scenario.macro_step)
+    return (
+        None
+        if scenario.control == "kinematic"
+        else make_gains(load_robot("athena"), period=scenario.macro_step)
+    )
 
 
 @pytest.fixture(scope="module", params=CONTROLS)
@@ -53,7 +73,9 @@ def runs(request: pytest.FixtureRequest, plant_build: Path) -> tuple[Result, Res
     return every, coarse
 
 
-def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(runs: tuple[Result, Result]) -> None:
+def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(
+    runs: tuple[Result, Result],
+) -> None:
     every, coarse = runs
     assert len(every.outcome.recording.time) == 2401
     assert len(coarse.outcome.recording.time) == 121
@@ -63,7 +85,9 @@ def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(runs: tupl
     assert coarse.facts["warnings"] == every.facts["warnings"]
 
 
-def test_what_the_plant_measures_can_be_had_from_rows_far_apart(runs: tuple[Result, Result]) -> None:
+def test_what_the_plant_measures_can_be_had_from_rows_far_apart(
+    runs: tuple[Result, Result],
+) -> None:
     """Of the rows that are kept, and no others, within 1 %."""
     every, coarse = runs
     view = View(coarse.outcome.recording, coarse.parameters, 0.8)
@@ -81,14 +105,25 @@ def test_rows_are_left_out_and_their_peaks_are_not(runs: tuple[Result, Result]) 
         values = every.column(name)
         largest = [values[0], *values[1:].reshape(-1, 20).max(axis=1)]
         np.testing.assert_array_equal(coarse.column(name), largest)
-    assert (coarse.columns(foot_names("peak_force")) > every.columns(foot_names("peak_force"))[::20]).any()
+    assert (
+        coarse.columns(foot_names("peak_force")) > every.columns(foot_names("peak_force"))[::20]
+    ).any()
 
 
 def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -> None:
     names = ("time", "LF.foot.peak_force", "LF.foot.landing_rate", "LF.foot.landings")
     peaks, shown = Peaks(names), []
-    #        a row kept   between                          a row     a row          nothing new   a row
-    moments = [(5.0, 9.0, 1), (7.0, 9.0, 1), (1.0, 2.0, 2), (2.0, 4.0, 2), (3.0, 4.0, 2), (0.0, 1.0, 3), (0.0, 3.0, 3)]
+    #        a row kept   between                          a row     a row          nothing new   a
+    #        row
+    moments = [
+        (5.0, 9.0, 1),
+        (7.0, 9.0, 1),
+        (1.0, 2.0, 2),
+        (2.0, 4.0, 2),
+        (3.0, 4.0, 2),
+        (0.0, 1.0, 3),
+        (0.0, 3.0, 3),
+    ]
     kept = (0, 3, 4, 6)
     for k, (force, rate, count) in enumerate(moments):
         row = np.array([0.0, force, rate, float(count)])
@@ -102,14 +137,21 @@ def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -
 def test_bounces_between_two_rows_leave_the_steepest_landing() -> None:
     peaks = Peaks(("time", "RM.foot.landing_rate", "RM.foot.landings"))
     row = np.zeros(3)
-    for rate, count in ((80.0, 1), (50.0, 2), (10.0, 3)):  # before them the rate of an older landing was 90
+    for rate, count in (
+        (80.0, 1),
+        (50.0, 2),
+        (10.0, 3),
+    ):  # before them the rate of an older landing was 90
         row[:] = 0.0, rate, count
         peaks.see(row)
     peaks.show(row)
     assert row[1] == 80.0
 
 
-@pytest.mark.parametrize(("rows", "every", "kept"), [(7, 3, [0, 3, 6]), (9, 3, [0, 3, 6, 8]), (1, 4, [0]), (3, 1, [0, 1, 2])])
+@pytest.mark.parametrize(
+    ("rows", "every", "kept"),
+    [(7, 3, [0, 3, 6]), (9, 3, [0, 3, 6, 8]), (1, 4, [0]), (3, 1, [0, 1, 2])],
+)
 def test_the_last_row_is_always_kept(rows: int, every: int, kept: list[int]) -> None:
     assert kept_moments(rows, every).tolist() == kept
 
@@ -141,8 +183,13 @@ def same(found: Recording, expected: Recording) -> None:
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_masters_keep_the_same_rows(control: str) -> None:
-    """Bit for bit; 43 macro-steps are no whole number of intervals, so the last row is an extra one."""
-    plan = load_scenario("walk_flat", overrides=[f"control={control}", "duration=0.86", "gait.period=0.4", "macro_step=0.01"])
+    """Bit for bit; 43 macro-steps are no whole number of intervals, so the last row is an extra
+    one.
+    """
+    plan = load_scenario(
+        "walk_flat",
+        overrides=[f"control={control}", "duration=0.86", "gait.period=0.4", "macro_step=0.01"],
+    )
     plan = replace(plan, duration=0.87, outputs=Outputs(interval=0.04))
     with Walker(everything=True) as walker:
         expected = in_python(plan, walker)
@@ -157,18 +204,36 @@ def test_both_masters_keep_the_same_rows(control: str) -> None:
 
 
 def test_a_walker_that_keeps_what_is_judged_keeps_it_of_every_macro_step() -> None:
-    plan = load_scenario("walk_flat", overrides=["duration=1.2", "gait.period=0.4", "macro_step=0.01", "outputs.interval=0.04"])
+    plan = load_scenario(
+        "walk_flat",
+        overrides=["duration=1.2", "gait.period=0.4", "macro_step=0.01", "outputs.interval=0.04"],
+    )
     with Walker() as walker:
         found = walker.simulate(plan)
     assert len(found.outcome.recording.time) == 121
     expected = simulate(plan)
-    assert found.metrics["slip_per_metre"] == pytest.approx(expected.metrics["slip_per_metre"], rel=1e-6)
+    assert found.metrics["slip_per_metre"] == pytest.approx(
+        expected.metrics["slip_per_metre"], rel=1e-6
+    )
 
 
-def test_commands_are_written_only_where_all_of_them_are_recorded(call: Call, tmp_path: Path) -> None:
+def test_commands_are_written_only_where_all_of_them_are_recorded(
+    call: Call, tmp_path: Path
+) -> None:
     changes = ("--set", "duration=0.2", "--set", "outputs.plots=false")
     assert call("simulate", "stand", "-o", tmp_path / "all", *changes)[0] == 0
-    assert call("simulate", "stand", "-o", tmp_path / "some", *changes, "--set", "outputs.interval=20 ms")[0] == 0
+    assert (
+        call(
+            "simulate",
+            "stand",
+            "-o",
+            tmp_path / "some",
+            *changes,
+            "--set",
+            "outputs.interval=20 ms",
+        )[0]
+        == 0
+    )
     assert (tmp_path / "all" / "commands.csv").is_file()
     assert not (tmp_path / "some" / "commands.csv").exists()
     assert len((tmp_path / "some" / "results.csv").read_text(encoding="utf-8").splitlines()) == 12

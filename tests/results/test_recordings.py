@@ -1,4 +1,6 @@
-"""Recordings as files: the same bits from Parquet and CSV, units of every column, commands that importers take."""
+"""Recordings as files: the same bits from Parquet and CSV, units of every column, commands that
+importers take.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +20,31 @@ from fmpy.util import read_csv as fmpy_read_csv
 from hexapod_cosim.cosim.interface.descriptions import read_description
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.columns import bare_name, heading, known_columns
-from hexapod_cosim.cosim.results.recordings import read_csv, read_parquet, read_recording, write_csv, write_parquet, write_recording
+from hexapod_cosim.cosim.results.recordings import (
+    read_csv,
+    read_parquet,
+    read_recording,
+    write_csv,
+    write_parquet,
+    write_recording,
+)
 from hexapod_cosim.cosim.results.results import RESULTS, read_result
 from hexapod_cosim.models import HexapodError
 
-AWKWARD = [0.0, -0.0, 1.0, 1.0 / 3.0, 0.1, -1e-300, 5e-324, 1.7976931348623157e308, 123456789.123456789, np.nan, np.inf, -np.inf]
+AWKWARD = [
+    0.0,
+    -0.0,
+    1.0,
+    1.0 / 3.0,
+    0.1,
+    -1e-300,
+    5e-324,
+    1.7976931348623157e308,
+    123456789.123456789,
+    np.nan,
+    np.inf,
+    -np.inf,
+]
 TABLES = {"csv": read_csv, "parquet": read_parquet}
 
 
@@ -38,7 +60,9 @@ def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def numbers() -> Recording:
     rng = np.random.default_rng(1)
-    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(np.float64)  # any double there is
+    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(
+        np.float64
+    )  # any double there is
     data = np.vstack([np.tile(AWKWARD, (3, 1)).T, np.where(np.isnan(bits), np.nan, bits)])
     return Recording(("time", "torso.position[1]", "LF.foot.contact"), data)
 
@@ -66,14 +90,23 @@ def test_units_are_those_of_the_fmu(folder: Path, athena_fmu: Path) -> None:
     shared = set(told) & set(plant) - {"time"}
     assert len(shared) > 300
     assert {name: told[name] for name in shared} == {name: plant[name] for name in shared}
-    assert (told["time"], told["controller.LF.shift[1]"], told["command.yaw_rate"]) == ("s", "m", "rad/s")
+    assert (told["time"], told["controller.LF.shift[1]"], told["command.yaw_rate"]) == (
+        "s",
+        "m",
+        "rad/s",
+    )
 
 
 def test_the_header_of_the_csv_file_names_the_units(folder: Path) -> None:
     with (folder / "results.csv").open(encoding="utf-8", newline="") as file:
         header = next(csv.reader(file))
     assert header[0] == "time [s]"
-    assert {"torso.position[1] [m]", "solver.steps [1]", "LF.coxa.torque [N.m]", "LF.foot.contact [1]"} <= set(header)
+    assert {
+        "torso.position[1] [m]",
+        "solver.steps [1]",
+        "LF.coxa.torque [N.m]",
+        "LF.foot.contact [1]",
+    } <= set(header)
     assert header == [heading(name) for name in read_parquet(folder / "results.parquet").names]
 
 
@@ -98,11 +131,16 @@ def test_a_row_of_a_table_is_a_row_of_the_recording(folder: Path) -> None:
     assert {str(field.type) for field in table.schema} == {"double"}
     assert sum(column.null_count for column in table.columns) == 0
     rows = table.slice(7, 1).to_pylist()[0]
-    assert rows["torso.position[3]"] == read_csv(folder / "results.csv").column("torso.position[3]")[7]
+    assert (
+        rows["torso.position[3]"] == read_csv(folder / "results.csv").column("torso.position[3]")[7]
+    )
 
 
 def test_equal_runs_leave_equal_files(call: Call, folder: Path, tmp_path: Path) -> None:
-    assert call("simulate", "walk_flat", "--control", "compliant", "-o", tmp_path / "again", *QUICK)[0] == 0
+    assert (
+        call("simulate", "walk_flat", "--control", "compliant", "-o", tmp_path / "again", *QUICK)[0]
+        == 0
+    )
     for name in ("results.parquet", "results.csv", "commands.csv"):
         assert (tmp_path / "again" / name).read_bytes() == (folder / name).read_bytes()
 
@@ -118,7 +156,9 @@ def test_other_readers_take_the_csv_file(folder: Path) -> None:
     assert np.array_equal(np.column_stack(plain.columns), ours.data)
 
 
-def test_the_commands_are_the_fmus_inputs_under_their_own_names(folder: Path, athena_fmu: Path) -> None:
+def test_the_commands_are_the_fmus_inputs_under_their_own_names(
+    folder: Path, athena_fmu: Path
+) -> None:
     commands, inputs = (
         read_csv(folder / "commands.csv"),
         [one for one in read_description(athena_fmu).modelVariables if one.causality == "input"],
@@ -130,8 +170,12 @@ def test_the_commands_are_the_fmus_inputs_under_their_own_names(folder: Path, at
 
 def test_fmpy_told_the_commands_walks_the_recorded_walk(folder: Path, athena_fmu: Path) -> None:
     walk, height = fmpy_read_csv(folder / "commands.csv"), "torso.position[3]"
-    result = fmpy.simulate_fmu(str(athena_fmu), stop_time=0.2, output_interval=0.005, input=walk, output=[height])
-    assert result[height] == pytest.approx(read_recording(folder, RESULTS).column(height), abs=1e-12)
+    result = fmpy.simulate_fmu(
+        str(athena_fmu), stop_time=0.2, output_interval=0.005, input=walk, output=[height]
+    )
+    assert result[height] == pytest.approx(
+        read_recording(folder, RESULTS).column(height), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("units", [True, False], ids=["units", "bare"])
@@ -154,7 +198,9 @@ def test_both_headers_are_read(tmp_path: Path, units: bool) -> None:
         ("a.parquet", "", "not a recording"),
     ],
 )
-def test_a_file_that_is_no_recording_is_refused(tmp_path: Path, name: str, text: str, said: str) -> None:
+def test_a_file_that_is_no_recording_is_refused(
+    tmp_path: Path, name: str, text: str, said: str
+) -> None:
     path = tmp_path / name
     path.write_text(text, encoding="utf-8")
     with pytest.raises(HexapodError, match=said) as refused:
@@ -181,14 +227,30 @@ def test_a_recording_without_rows_is_one(tmp_path: Path) -> None:
     empty = Recording(("time", "torso.roll"), np.zeros((0, 2)))
     write_parquet(empty, tmp_path / "a.parquet", about={})
     write_csv(empty, tmp_path / "a.csv")
-    assert read_parquet(tmp_path / "a.parquet").data.shape == read_csv(tmp_path / "a.csv").data.shape == (0, 2)
+    assert (
+        read_parquet(tmp_path / "a.parquet").data.shape
+        == read_csv(tmp_path / "a.csv").data.shape
+        == (0, 2)
+    )
 
 
-@pytest.mark.parametrize(("formats", "left"), [("['parquet']", {"results.parquet"}), ("['csv']", {"results.csv", "commands.csv"})])
-def test_formats_can_be_chosen_and_either_is_read_back(call: Call, tmp_path: Path, formats: str, left: set[str]) -> None:
+@pytest.mark.parametrize(
+    ("formats", "left"),
+    [("['parquet']", {"results.parquet"}), ("['csv']", {"results.csv", "commands.csv"})],
+)
+def test_formats_can_be_chosen_and_either_is_read_back(
+    call: Call, tmp_path: Path, formats: str, left: set[str]
+) -> None:
     folder = tmp_path / "out"
-    assert call("simulate", "stand", "-o", folder, *QUICK, "--set", f"outputs.formats={formats}")[0] == 0
-    assert {path.name for path in folder.iterdir()} == {"metrics.json", "run.json", "scenario.toml"} | left
+    assert (
+        call("simulate", "stand", "-o", folder, *QUICK, "--set", f"outputs.formats={formats}")[0]
+        == 0
+    )
+    assert {path.name for path in folder.iterdir()} == {
+        "metrics.json",
+        "run.json",
+        "scenario.toml",
+    } | left
     assert len(read_result(folder).view.recording.time) == 41
 
 

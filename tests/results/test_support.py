@@ -36,7 +36,9 @@ ALL = [True] * 6
         ([False] * 6, (0.0, 0.0), math.nan),
     ],
 )
-def test_the_margin_is_the_distance_to_the_nearest_edge(standing: list[bool], centre: tuple[float, float], margin: float) -> None:
+def test_the_margin_is_the_distance_to_the_nearest_edge(
+    standing: list[bool], centre: tuple[float, float], margin: float
+) -> None:
     got = polygon_margins(SQUARE[..., None], np.array([standing]), np.array(centre)[:, None])
     assert got == pytest.approx([margin], nan_ok=True)
 
@@ -46,28 +48,43 @@ def test_the_margin_does_not_depend_on_the_order_of_the_feet() -> None:
     feet = generator.normal(size=(6, 2, 50))
     centre, standing = 0.3 * generator.normal(size=(2, 50)), generator.random((50, 6)) < 0.7
     order = generator.permutation(6)
-    first, second = polygon_margins(feet, standing, centre), polygon_margins(feet[order], standing[:, order], centre)
+    first, second = (
+        polygon_margins(feet, standing, centre),
+        polygon_margins(feet[order], standing[:, order], centre),
+    )
     np.testing.assert_allclose(first, second, atol=1e-12)
 
 
 def poses(robot: Robot, rows: int) -> tuple[Recording, list[Array]]:
     """Random poses as a recording, and the twin's body states of them."""
     generator = np.random.default_rng(7)
-    names = ("time", *joint_names("angle"), *vector_names("torso.position"), *vector_names("torso.quaternion", 4))
+    names = (
+        "time",
+        *joint_names("angle"),
+        *vector_names("torso.position"),
+        *vector_names("torso.quaternion", 4),
+    )
     angle, position = 0.5 * generator.normal(size=(rows, 6, 3)), generator.normal(size=(rows, 3))
     quaternion = generator.normal(size=(rows, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
     zero = np.zeros(3)
     bodies = [
-        body_states(robot, r, p, zero, zero, joints, np.zeros((6, 3))) for r, p, joints in zip(position, quaternion, angle, strict=True)
+        body_states(robot, r, p, zero, zero, joints, np.zeros((6, 3)))
+        for r, p, joints in zip(position, quaternion, angle, strict=True)
     ]
-    return Recording(names, np.column_stack([np.arange(rows), angle.reshape(rows, -1), position, quaternion])), bodies
+    return Recording(
+        names, np.column_stack([np.arange(rows), angle.reshape(rows, -1), position, quaternion])
+    ), bodies
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
 def test_the_centre_of_mass_is_the_twins(name: str) -> None:
     robot = load_robot(name)
-    parameters = {entry.name: float(entry.start or 0.0) for entry in load_interface(robot).variables if entry.causality == "parameter"}
+    parameters = {
+        entry.name: float(entry.start or 0.0)
+        for entry in load_interface(robot).variables
+        if entry.causality == "parameter"
+    }
     recording, bodies = poses(robot, 5)
     expected = [twin.centre_of_mass(robot, body) for body in bodies]
     np.testing.assert_allclose(centre_of_mass(recording, parameters), expected, atol=1e-12)
@@ -80,8 +97,14 @@ def test_a_robot_on_a_slope_is_judged_along_gravity() -> None:
         walk.set(f"{leg}.foot.position[2]", y)
         walk.set(f"{leg}.foot.contact", 1.0)
     walk.set("torso.position[3]", 1.0)
-    massless = PARAMETERS | {name: 0.0 for name in PARAMETERS if name.endswith(".mass")} | {"torso.mass": 1.0}
+    massless = (
+        PARAMETERS
+        | {name: 0.0 for name in PARAMETERS if name.endswith(".mass")}
+        | {"torso.mass": 1.0}
+    )
     tilted = massless | {"gravity[1]": 9.81 * math.sin(0.1), "gravity[3]": -9.81 * math.cos(0.1)}
     assert stability_margins(walk.recording, massless) == pytest.approx([1.0])
     # the projection falls tan(0.1) ahead of the torso, and the square is seen foreshortened
-    assert stability_margins(walk.recording, tilted) == pytest.approx([(1.0 - math.tan(0.1)) * math.cos(0.1)])
+    assert stability_margins(walk.recording, tilted) == pytest.approx(
+        [(1.0 - math.tan(0.1)) * math.cos(0.1)]
+    )

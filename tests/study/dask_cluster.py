@@ -1,4 +1,6 @@
-"""A Dask cluster on loopback: a scheduler and workers, each a process of its own group, gone when the test is."""
+"""A Dask cluster on loopback: a scheduler and workers, each a process of its own group, gone
+when the test is.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,13 @@ ONE_THREAD = ("--nthreads", "1")
 def running(*words: str, cwd: Path) -> Iterator[subprocess.Popen[bytes]]:
     """A Python module as a process, killed with all its children when the block ends."""
     process = subprocess.Popen(
-        [sys.executable, "-m", *words], cwd=cwd, env={**os.environ, "PYTHONPATH": HELPERS}, stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        [sys.executable, "-m", *words],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": HELPERS},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         yield process
     finally:
@@ -43,9 +49,20 @@ def kill(process: subprocess.Popen[bytes]) -> None:
 def scheduling(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """The address of a scheduler without workers, and its process."""
     file = folder / "scheduler.json"
-    with running("distributed.cli.dask_scheduler", "--port", "0", *COMMON, "--scheduler-file", str(file), cwd=folder) as process:
+    with running(
+        "distributed.cli.dask_scheduler",
+        "--port",
+        "0",
+        *COMMON,
+        "--scheduler-file",
+        str(file),
+        cwd=folder,
+    ) as process:
         deadline = time.monotonic() + PATIENCE
-        while not (file.exists() and file.read_text().rstrip().endswith("}")) and time.monotonic() < deadline:
+        while (
+            not (file.exists() and file.read_text().rstrip().endswith("}"))
+            and time.monotonic() < deadline
+        ):
             time.sleep(0.05)
         yield str(json.loads(file.read_text())["address"]), process
 
@@ -53,12 +70,22 @@ def scheduling(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 @contextmanager
 def lasting_workers(address: str, count: int, folder: Path) -> Iterator[None]:
     """Workers that are begun anew when they die."""
-    with running("distributed.cli.dask_worker", address, "--nworkers", str(count), *ONE_THREAD, *COMMON, cwd=folder):
+    with running(
+        "distributed.cli.dask_worker",
+        address,
+        "--nworkers",
+        str(count),
+        *ONE_THREAD,
+        *COMMON,
+        cwd=folder,
+    ):
         yield
 
 
 @contextmanager
-def mortal_workers(address: str, count: int, folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
+def mortal_workers(
+    address: str, count: int, folder: Path
+) -> Iterator[list[subprocess.Popen[bytes]]]:
     """Workers that stay dead; a process each."""
     with ExitStack() as opened:
         words = ("distributed.cli.dask_worker", address, "--no-nanny", *ONE_THREAD, *COMMON)

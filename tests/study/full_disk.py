@@ -1,4 +1,6 @@
-"""`hexapod` on a disk that is full after some files: FILES are flushed to it, and then nothing more. Run by the tests."""
+"""`hexapod` on a disk that is full after some files: FILES are flushed to it, and then nothing
+more. Run by the tests.
+"""
 
 from __future__ import annotations
 

@@ -17,7 +17,11 @@ from hexapod_cosim.cosim.study.store.manifest import RESULTS, RUNS
 from hexapod_cosim.cosim.study.store.store import Store
 
 FAKE, SLOW, BRIEF = "study_engines:Fake", "study_engines:Slow", "study_engines:Brief"
-SMALL: dict[str, Any] = {"scenario": "walk_flat", "seeds": 3, "factors": {"friction.mu": [0.3, 0.6, 0.9]}}
+SMALL: dict[str, Any] = {
+    "scenario": "walk_flat",
+    "seeds": 3,
+    "factors": {"friction.mu": [0.3, 0.6, 0.9]},
+}
 KINEMATIC = {"controls": ["kinematic"]}
 
 
@@ -31,7 +35,9 @@ def quiet(_total: int, _done: int) -> Any:
 
 def run_quietly(study: Study, folder: Path, **options: Any) -> list[dict[str, Any]]:
     """The rows of the results."""
-    run_study(study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), begun=quiet)
+    run_study(
+        study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), begun=quiet
+    )
     return rows(folder)
 
 
@@ -45,8 +51,12 @@ def digest(folder: Path) -> str:
     return hashlib.sha256((folder / RESULTS).read_bytes()).hexdigest()
 
 
-def store_instead(study: Study, folder: Path, kept: Callable[[dict[str, Any]], dict[str, Any] | None]) -> None:
-    """Puts what `kept` makes of each stored run in its place, None taking it away: as another past would have left the folder."""
+def store_instead(
+    study: Study, folder: Path, kept: Callable[[dict[str, Any]], dict[str, Any] | None]
+) -> None:
+    """Puts what `kept` makes of each stored run in its place, None taking it away: as another
+    past would have left the folder.
+    """
     store = Store(folder / RUNS, schema_of(study))
     stored = [row for table in store.sorted_rows() for row in table.to_pylist()]
     for part in store.parts():

@@ -1,4 +1,6 @@
-"""Engines that make figures of nothing but the scenario, at once: for tests of what lies around them. A module that workers import."""
+"""Engines that make figures of nothing but the scenario, at once: for tests of what lies around
+them. A module that workers import.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,12 @@ from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.scenario.records import Scenario
 
-DEADLY, REFUSING, FALLING, SLOW = 0.13, 0.17, 0.19, 0.02  # friction.mu that ends the process, is refused, falls; s a run takes
+DEADLY, REFUSING, FALLING, SLOW = (
+    0.13,
+    0.17,
+    0.19,
+    0.02,
+)  # friction.mu that ends the process, is refused, falls; s a run takes
 
 DEATHS_FILE = "HEXAPOD_TEST_DEATHS"
 
@@ -51,15 +58,25 @@ class Fake:
         if mu == DEADLY:
             die(f"{control} {seed}")
         if mu == REFUSING:
-            return Summary(control=control, seed=seed, status=REFUSED, reason=f"no walk with {seed}", metrics=NO_FIGURES)
+            return Summary(
+                control=control,
+                seed=seed,
+                status=REFUSED,
+                reason=f"no walk with {seed}",
+                metrics=NO_FIGURES,
+            )
         time.sleep(self.pause)
         try:
             progress(0.0)
         except KeyboardInterrupt:
             return Summary(control=control, seed=seed, status=INTERRUPTED, metrics=NO_FIGURES)
         kp = 1.0 if gains is None else gains.slip.kp
-        metrics = {name: figure(seed, mu, control, place) * kp for place, name in enumerate(METRICS)}
-        return Summary(control=control, seed=seed, status=COMPLETED, upright=mu != FALLING, metrics=metrics)
+        metrics = {
+            name: figure(seed, mu, control, place) * kp for place, name in enumerate(METRICS)
+        }
+        return Summary(
+            control=control, seed=seed, status=COMPLETED, upright=mu != FALLING, metrics=metrics
+        )
 
     def close(self) -> None:
         """Nothing to free."""
@@ -71,7 +88,11 @@ class Brief(Fake):
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
         """As Engine says."""
         found = super().summary(scenario, gains=gains, progress=progress)
-        return replace(found, metrics=NO_FIGURES) if scenario.settings["gait"]["name"] == "ripple" else found
+        return (
+            replace(found, metrics=NO_FIGURES)
+            if scenario.settings["gait"]["name"] == "ripple"
+            else found
+        )
 
 
 class SourError(Exception):

@@ -1,4 +1,6 @@
-"""Whatever a study file says, it is a study or refused with a reason: files changed at random, seeded."""
+"""Whatever a study file says, it is a study or refused with a reason: files changed at random,
+seeded.
+"""
 
 from __future__ import annotations
 
@@ -24,37 +26,141 @@ SEEDS, EACH = 8, 60  # files per seed: 480 in all, of which one in fourteen is a
 CHANGES = 3  # to a file, at most
 NAN, INF = float("nan"), float("inf")
 ODD: list[Any] = [
-    0, 1, -1, 2, 10**20, 2**63, 0.0, -0.5, 1e308, -1e308, 5e-324, NAN, INF, True, False, "", "x", "a\0b", "é" * 300,
-    "walk_flat", "WALK_FLAT", "ripple", ".", "/", "..", "~", "3 kg", "5 deg", [], {}, [[]], [{}], {"": 1}, {"a": {"b": {"c": []}}},
+    0,
+    1,
+    -1,
+    2,
+    10**20,
+    2**63,
+    0.0,
+    -0.5,
+    1e308,
+    -1e308,
+    5e-324,
+    NAN,
+    INF,
+    True,
+    False,
+    "",
+    "x",
+    "a\0b",
+    "é" * 300,
+    "walk_flat",
+    "WALK_FLAT",
+    "ripple",
+    ".",
+    "/",
+    "..",
+    "~",
+    "3 kg",
+    "5 deg",
+    [],
+    {},
+    [[]],
+    [{}],
+    {"": 1},
+    {"a": {"b": {"c": []}}},
     [1, "1"],
-    [0.5, 0.5], [1, 1.0, True], {"values": []}, {"uniform": [0, 1]}, {"uniform": [1, 0]}, {"uniform": ["a", "b"]}, {"normal": [0, 1e300]},
-    {"loguniform": [1e-300, 1e300]}, {"integers": [0, 1e300]}, {"linspace": [0, 1, 1e7]}, {"linspace": [0, 1, 3], "unit": "furlong"},
-    {"logspace": [-1, 1, 3]}, {"values": [1, 2], "relative": True}, {"first": -1}, {"first": 3, "count": 10**9}, {"at_most": "low"},
-    ["kinematic"], ["compliant", "compliant"], ["walk_flat", "walk_flat"], {"time": 1}, [{"time": "1 s"}], None, b"bytes", 1j,
-]  # fmt: skip
+    [0.5, 0.5],
+    [1, 1.0, True],
+    {"values": []},
+    {"uniform": [0, 1]},
+    {"uniform": [1, 0]},
+    {"uniform": ["a", "b"]},
+    {"normal": [0, 1e300]},
+    {"loguniform": [1e-300, 1e300]},
+    {"integers": [0, 1e300]},
+    {"linspace": [0, 1, 1e7]},
+    {"linspace": [0, 1, 3], "unit": "furlong"},
+    {"logspace": [-1, 1, 3]},
+    {"values": [1, 2], "relative": True},
+    {"first": -1},
+    {"first": 3, "count": 10**9},
+    {"at_most": "low"},
+    ["kinematic"],
+    ["compliant", "compliant"],
+    ["walk_flat", "walk_flat"],
+    {"time": 1},
+    [{"time": "1 s"}],
+    None,
+    b"bytes",
+    1j,
+]
 NAMES = [
-    "", ".", "a.b", "friction.mu", "friction", "mu", "gains.slip.kp", "gains.", "gains.slip", "gains.margins.binding", "parameters",
-    "parameters.torso.mass", "torso.mass", "scenario", "robot", "seed", "control", "command.vx", "command", "gait.name", "variation",
-    "variation.height", "outputs", "outputs.csv", "terrain.incline", "duration", "macro_step", "solver.method", "events", "set", "factors",
-    "optimise", "training", "held_out", "scenarios", "seeds", "values", "uniform", "unit", "relative", "title", "design", "points",
-]  # fmt: skip
+    "",
+    ".",
+    "a.b",
+    "friction.mu",
+    "friction",
+    "mu",
+    "gains.slip.kp",
+    "gains.",
+    "gains.slip",
+    "gains.margins.binding",
+    "parameters",
+    "parameters.torso.mass",
+    "torso.mass",
+    "scenario",
+    "robot",
+    "seed",
+    "control",
+    "command.vx",
+    "command",
+    "gait.name",
+    "variation",
+    "variation.height",
+    "outputs",
+    "outputs.csv",
+    "terrain.incline",
+    "duration",
+    "macro_step",
+    "solver.method",
+    "events",
+    "set",
+    "factors",
+    "optimise",
+    "training",
+    "held_out",
+    "scenarios",
+    "seeds",
+    "values",
+    "uniform",
+    "unit",
+    "relative",
+    "title",
+    "design",
+    "points",
+]
 BEGUN: list[dict[str, Any]] = [
     {"seeds": 2, "factors": {"friction": {"mu": [0.3, 0.6]}, "gait.name": ["tripod", "wave"]}},
     {
-        "design": "sobol", "points": 4, "set": {"duration": 2.0, "torso": {"mass": 2.5}},
-        "factors": {"friction.mu": {"uniform": [0.3, 0.9]}, "gains.slip.kp": {"loguniform": [0.5, 2.0], "relative": True}},
+        "design": "sobol",
+        "points": 4,
+        "set": {"duration": 2.0, "torso": {"mass": 2.5}},
+        "factors": {
+            "friction.mu": {"uniform": [0.3, 0.9]},
+            "gains.slip.kp": {"loguniform": [0.5, 2.0], "relative": True},
+        },
     },
-    {"scenario": {"robot": "athena", "command": {"vx": 0.05}, "events": []}, "design": "list", "factors": {"terrain.incline": [0.0, 0.1]}},
+    {
+        "scenario": {"robot": "athena", "command": {"vx": 0.05}, "events": []},
+        "design": "list",
+        "factors": {"terrain.incline": [0.0, 0.1]},
+    },
     {"factors": {"scenario": ["walk_flat", "turn"]}, "controls": ["kinematic"]},
-]  # fmt: skip
+]
 
 
 def places(table: Any) -> list[tuple[Any, Any]]:
     """Every container in a table with one of its keys."""
     if isinstance(table, dict):
-        return [(table, key) for key in table] + [pair for value in table.values() for pair in places(value)]
+        return [(table, key) for key in table] + [
+            pair for value in table.values() for pair in places(value)
+        ]
     if isinstance(table, list):
-        return [(table, k) for k in range(len(table))] + [pair for value in table for pair in places(value)]
+        return [(table, k) for k in range(len(table))] + [
+            pair for value in table for pair in places(value)
+        ]
     return []
 
 
@@ -88,15 +194,30 @@ def test_a_file_changed_at_random_is_a_study_or_refused_with_a_reason(seed: int)
         schema_of(study)
         source = json.loads(to_json(study.source))  # as a folder keeps it
         assert to_toml(source)
-        again = study_from_table(source, where="manifest.json", scenarios={name: case.table for name, case in study.cases.items()})
-        assert (again.factors, again.optimise, list(again.seeds)[:3]) == (study.factors, study.optimise, list(study.seeds)[:3])
+        again = study_from_table(
+            source,
+            where="manifest.json",
+            scenarios={name: case.table for name, case in study.cases.items()},
+        )
+        assert (again.factors, again.optimise, list(again.seeds)[:3]) == (
+            study.factors,
+            study.optimise,
+            list(study.seeds)[:3],
+        )
         if study.optimise is None:
             sweep = Sweep(study)
             assert len(list(sweep.orders(iter([0, sweep.count - 1])))) == 2
 
 
 @pytest.mark.parametrize(
-    "text", ["a = " + "[" * 10_000, "[factors]\n" + "a." * 5000 + "b = [1]", "\ufeffseeds = 1", "seeds = 1\0", "x" * 10**6]
+    "text",
+    [
+        "a = " + "[" * 10_000,
+        "[factors]\n" + "a." * 5000 + "b = [1]",
+        "\ufeffseeds = 1",
+        "seeds = 1\0",
+        "x" * 10**6,
+    ],
 )
 def test_a_file_that_is_hardly_toml_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "odd.toml").write_text(text)

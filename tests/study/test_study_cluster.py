@@ -30,7 +30,12 @@ from hexapod_cosim.cosim.study.plan.reading import load_study
 from hexapod_cosim.cosim.study.plan.records import StudyError
 
 TABLE: dict[str, Any] = {**KINEMATIC, "seeds": 60, "factors": {"friction.mu": [0.3, 0.5]}}
-REAL: dict[str, Any] = {**KINEMATIC, "seeds": 100, "set": {"duration": 0.6}, "factors": {"friction.mu": [0.3, 0.4, 0.5]}}
+REAL: dict[str, Any] = {
+    **KINEMATIC,
+    "seeds": 100,
+    "set": {"duration": 0.6},
+    "factors": {"friction.mu": [0.3, 0.4, 0.5]},
+}
 SHORT = 3.0  # s    without workers, in place of a minute
 
 
@@ -43,7 +48,9 @@ def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture
 def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., list[str]]:
-    """Runs the study on the cluster into tmp_path/out and does something once, after the first runs came in. Returns what was said."""
+    """Runs the study on the cluster into tmp_path/out and does something once, after the first
+    runs came in. Returns what was said.
+    """
 
     def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
         said: list[str] = []
@@ -65,14 +72,20 @@ def assert_whole(folder: Path, fmu: Path) -> None:
     assert digest(folder) == digest(folder.with_name("alone"))
 
 
-def test_a_killed_worker_costs_no_run(study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_killed_worker_costs_no_run(
+    study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path
+) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
         study_on(lambda: kill(workers[0]))
     assert_whole(tmp_path / "out", athena_fmu)
 
 
 def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
-    study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    study_on: Callable[..., Any],
+    scheduler: str,
+    athena_fmu: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
         monkeypatch.setattr(cluster, "PATIENCE", PATIENCE)
@@ -82,7 +95,10 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
             for worker in workers:
                 kill(worker)
 
-        with pytest.raises(StudyError, match=r"the cluster has no workers.*dask worker tcp://.*stored so far are kept"):
+        with pytest.raises(
+            StudyError,
+            match=r"the cluster has no workers.*dask worker tcp://.*stored so far are kept",
+        ):
             study_on(kill_all)
     assert list((tmp_path / "out" / "runs").glob("*.parquet"))
     run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, engine=SLOW)
@@ -103,7 +119,9 @@ def test_workers_that_come_when_all_are_gone_get_the_job_and_go_on(
     assert_whole(tmp_path / "out", athena_fmu)
 
 
-def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(study_on: Callable[..., Any], athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
+    study_on: Callable[..., Any], athena_fmu: Path, tmp_path: Path
+) -> None:
     with (
         scheduling(tmp_path) as (address, process),
         lasting_workers(address, 1, tmp_path),
@@ -114,10 +132,22 @@ def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(study_on: Call
     assert_whole(tmp_path / "out", athena_fmu)
 
 
-def test_ctrl_c_is_heard_while_workers_are_waited_for(scheduler: str, athena_fmu: Path, tmp_path: Path) -> None:
+def test_ctrl_c_is_heard_while_workers_are_waited_for(
+    scheduler: str, athena_fmu: Path, tmp_path: Path
+) -> None:
     file = tmp_path / "study.toml"
     file.write_text('controls = ["kinematic"]\nseeds = 30\n')
-    words = [*COMMAND, "study", str(file), "-o", str(tmp_path / "out"), "--engine", SLOW, "--fmu", str(athena_fmu)]
+    words = [
+        *COMMAND,
+        "study",
+        str(file),
+        "-o",
+        str(tmp_path / "out"),
+        "--engine",
+        SLOW,
+        "--fmu",
+        str(athena_fmu),
+    ]
     with subprocess.Popen(
         [*words, "--scheduler", scheduler],
         env={**os.environ, "PYTHONPATH": HELPERS},
@@ -138,25 +168,49 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
 ) -> None:
     file, folder = tmp_path / "study.toml", tmp_path / "out"
     file.write_text(to_toml(REAL))
-    words = [*COMMAND, "study", str(file), "-o", str(folder), "--fmu", str(athena_fmu), "--scheduler", scheduler]
+    words = [
+        *COMMAND,
+        "study",
+        str(file),
+        "-o",
+        str(folder),
+        "--fmu",
+        str(athena_fmu),
+        "--scheduler",
+        scheduler,
+    ]
     with lasting_workers(scheduler, 2, tmp_path):
-        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+        process = subprocess.Popen(
+            words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
         deadline = time.monotonic() + PATIENCE
-        while not list(folder.glob("runs/*.parquet")) and time.monotonic() < deadline and process.poll() is None:
+        while (
+            not list(folder.glob("runs/*.parquet"))
+            and time.monotonic() < deadline
+            and process.poll() is None
+        ):
             time.sleep(0.02)
         kill(process)
         assert not (folder / "results.parquet").exists()
         study, options = load_study(str(file)), {"engine": "compiled", "fmu": athena_fmu}
         run_quietly(study, folder, scheduler=scheduler, **options)
         with Client(scheduler, set_as_default=False) as client:
-            left = client.run_on_scheduler(lambda dask_scheduler: list(dask_scheduler.worker_plugins))
+            left = client.run_on_scheduler(
+                lambda dask_scheduler: list(dask_scheduler.worker_plugins)
+            )
         assert not [name for name in left if name.startswith(cluster.OURS)]
     run_quietly(study, tmp_path / "alone", **options)
     assert digest(folder) == digest(tmp_path / "alone")
 
 
-def test_studies_that_share_a_cluster_do_not_disturb_each_other(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:
-    tables = [TABLE, {**TABLE, "seeds": {"first": 500, "count": 20}}, TABLE]  # the same FMU, scenario and factors
+def test_studies_that_share_a_cluster_do_not_disturb_each_other(
+    athena_fmu: Path, tmp_path: Path, scheduler: str
+) -> None:
+    tables = [
+        TABLE,
+        {**TABLE, "seeds": {"first": 500, "count": 20}},
+        TABLE,
+    ]  # the same FMU, scenario and factors
 
     def run(k: int) -> None:
         options = Options(engine=SLOW, fmu=athena_fmu, scheduler=scheduler)

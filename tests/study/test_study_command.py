@@ -32,19 +32,47 @@ def study_file(folder: Path, text: str) -> Path:
 
 def test_it_says_when_no_run_walked_at_all(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
     file = study_file(tmp_path, KINEMATIC + "seeds = 4\n[factors]\nfriction.mu = [0.17]\n")
-    code, out, err = call("study", file, "-o", tmp_path / "out", "--engine", FAKE, "--fmu", athena_fmu, "--workers", "0")
+    code, out, err = call(
+        "study",
+        file,
+        "-o",
+        tmp_path / "out",
+        "--engine",
+        FAKE,
+        "--fmu",
+        athena_fmu,
+        "--workers",
+        "0",
+    )
     assert code == 0
     assert "4 x kinematic refused" in out
-    assert err == "warning: none of 4 kinematic runs walked to its end; all refused: no walk with #\n"
+    assert (
+        err == "warning: none of 4 kinematic runs walked to its end; all refused: no walk with #\n"
+    )
 
 
-def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
+def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(
+    call: Call, athena_fmu: Path, tmp_path: Path
+) -> None:
     mixed = '[factors]\ngait.name = ["tripod", "ripple"]\nscenario = ["walk_flat", "turn"]\n'
     file = study_file(tmp_path, KINEMATIC + GRIP + mixed)
-    words = ["study", file, "-o", tmp_path / "out", "--engine", BRIEF, "--fmu", athena_fmu, "--workers", "0"]
+    words = [
+        "study",
+        file,
+        "-o",
+        tmp_path / "out",
+        "--engine",
+        BRIEF,
+        "--fmu",
+        athena_fmu,
+        "--workers",
+        "0",
+    ]
     code, _, err = call(*words)
     assert (code, err) == (0, "")  # each scenario has walks with figures
-    file = study_file(tmp_path, KINEMATIC + GRIP + '[factors]\nscenario = ["walk_flat", "ripple"]\n')
+    file = study_file(
+        tmp_path, KINEMATIC + GRIP + '[factors]\nscenario = ["walk_flat", "ripple"]\n'
+    )
     code, _, err = call(*words[:3], tmp_path / "short", *words[4:])
     told = "All 2 kinematic walks of ripple are too short for figures"
     assert code == 0
@@ -52,13 +80,19 @@ def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(call: 
     assert told in (tmp_path / "short" / "report.html").read_text()
     assert told in call("report", tmp_path / "short")[2]
     file = study_file(tmp_path, KINEMATIC + 'scenario = "ripple"\n' + GRIP)
-    assert call(*words[:3], tmp_path / "none", *words[4:])[2].startswith("warning: The walks are too short for figures")
+    assert call(*words[:3], tmp_path / "none", *words[4:])[2].startswith(
+        "warning: The walks are too short for figures"
+    )
 
 
-def test_one_fmu_for_several_robots_is_refused(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
+def test_one_fmu_for_several_robots_is_refused(
+    call: Call, athena_fmu: Path, tmp_path: Path
+) -> None:
     file = study_file(tmp_path, KINEMATIC + '[factors]\nrobot = ["athena", "phantomx_mk4"]\n')
     outcome = call("study", file, "-o", tmp_path / "out", "--engine", FAKE, "--fmu", athena_fmu)
-    assert_refused(outcome, "--fmu", "one FMU for several robots", "athena, phantomx_mk4", "leave --fmu out")
+    assert_refused(
+        outcome, "--fmu", "one FMU for several robots", "athena, phantomx_mk4", "leave --fmu out"
+    )
 
 
 def test_a_number_of_workers_that_is_none_is_refused(call: Call, tmp_path: Path) -> None:
@@ -68,14 +102,19 @@ def test_a_number_of_workers_that_is_none_is_refused(call: Call, tmp_path: Path)
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
-    """A file system of its own, whose size can be changed: mounted by root where that is allowed."""
+    """A file system of its own, whose size can be changed: mounted by root where that is
+    allowed.
+    """
     place = tmp_path / "disk"
     place.mkdir()
 
     def sized(size: str) -> Path:
         again = ["-o", f"{'remount,' if os.path.ismount(place) else ''}size={size}"]
         words = ["mount", "-t", "tmpfs", *again, "none", str(place)]
-        if shutil.which("mount") is None or subprocess.run(words, check=False, capture_output=True).returncode:
+        if (
+            shutil.which("mount") is None
+            or subprocess.run(words, check=False, capture_output=True).returncode
+        ):
             pytest.skip("no file system can be mounted here")
         return place
 
@@ -85,12 +124,25 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
 
 
 def stored_runs(folder: Path) -> int:
-    return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / "runs").glob("*.parquet"))
+    return sum(
+        pq.ParquetFile(path).metadata.num_rows for path in (folder / "runs").glob("*.parquet")
+    )
 
 
 def fake_study(tmp_path: Path, fmu: Path, out: Path) -> list[str]:
     file = study_file(tmp_path, KINEMATIC + MANY + ONE_FACTOR)
-    return ["study", str(file), "-o", str(out), "--engine", FAKE, "--fmu", str(fmu), "--workers", "0"]
+    return [
+        "study",
+        str(file),
+        "-o",
+        str(out),
+        "--engine",
+        FAKE,
+        "--fmu",
+        str(fmu),
+        "--workers",
+        "0",
+    ]
 
 
 def assert_full_disk(done: subprocess.CompletedProcess[str]) -> None:
@@ -102,7 +154,13 @@ def assert_full_disk(done: subprocess.CompletedProcess[str]) -> None:
 
 
 def run_in(words: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(words, check=False, env={**os.environ, "PYTHONPATH": HELPERS}, capture_output=True, text=True)
+    return subprocess.run(
+        words,
+        check=False,
+        env={**os.environ, "PYTHONPATH": HELPERS},
+        capture_output=True,
+        text=True,
+    )
 
 
 def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
@@ -121,7 +179,9 @@ def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
     assert digest(out) == digest(tmp_path / "roomy")
 
 
-def test_a_disk_that_takes_no_more_stops_the_command_and_what_it_took_stays(athena_fmu: Path, tmp_path: Path, call: Call) -> None:
+def test_a_disk_that_takes_no_more_stops_the_command_and_what_it_took_stays(
+    athena_fmu: Path, tmp_path: Path, call: Call
+) -> None:
     out = tmp_path / "out"
     words = fake_study(tmp_path, athena_fmu, out)
     assert_full_disk(run_in([sys.executable, str(HERE / "full_disk.py"), *words]))

@@ -1,4 +1,6 @@
-"""The points of a study: the product of a grid, strata that are filled, and the same whatever is asked first."""
+"""The points of a study: the product of a grid, strata that are filled, and the same whatever is
+asked first.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,23 @@ from studies import study_of
 
 from hexapod_cosim.cosim.study.plan.factors import at_quantile
 from hexapod_cosim.cosim.study.plan.points import Design, Sweep
-from hexapod_cosim.cosim.study.plan.records import INTEGERS, LOGUNIFORM, NORMAL, UNIFORM, VALUES, Factor, Study
+from hexapod_cosim.cosim.study.plan.records import (
+    INTEGERS,
+    LOGUNIFORM,
+    NORMAL,
+    UNIFORM,
+    VALUES,
+    Factor,
+    Study,
+)
 
 TWO = {"friction.mu": {"uniform": [0.0, 1.0]}, "command.vx": {"uniform": [0.0, 1.0]}}
 STRATA = 64
 
 
-def drawn(design: str, *, points: int = STRATA, seed: int = 0, factors: Mapping[str, Any] = TWO) -> Study:
+def drawn(
+    design: str, *, points: int = STRATA, seed: int = 0, factors: Mapping[str, Any] = TWO
+) -> Study:
     return study_of({"design": design, "points": points, "seed": seed, "factors": factors})
 
 
@@ -29,16 +41,27 @@ def table(study: Study) -> np.ndarray[Any, Any]:
 
 
 def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
-    factors = {"friction.mu": [0.3, 0.6], "command.vx": {"linspace": [0.0, 0.1, 3]}, "gait.name": ["tripod", "wave"]}
+    factors = {
+        "friction.mu": [0.3, 0.6],
+        "command.vx": {"linspace": [0.0, 0.1, 3]},
+        "gait.name": ["tripod", "wave"],
+    }
     design = Design(study_of({"factors": factors}))
     expected = list(itertools.product([0.3, 0.6], [0.0, 0.05, 0.1], ["tripod", "wave"]))
     assert [design.point(index) for index in range(design.count)] == expected
 
 
 def test_a_list_takes_the_factors_side_by_side() -> None:
-    factors = {"friction.mu": [0.3, 0.6, 0.3], "gait.name": ["tripod", "wave", "wave"]}  # in a list a value may come again
+    factors = {
+        "friction.mu": [0.3, 0.6, 0.3],
+        "gait.name": ["tripod", "wave", "wave"],
+    }  # in a list a value may come again
     design = Design(study_of({"design": "list", "factors": factors}))
-    assert [design.point(index) for index in range(design.count)] == [(0.3, "tripod"), (0.6, "wave"), (0.3, "wave")]
+    assert [design.point(index) for index in range(design.count)] == [
+        (0.3, "tripod"),
+        (0.6, "wave"),
+        (0.3, "wave"),
+    ]
 
 
 @pytest.mark.parametrize("design", ["latin_hypercube", "sobol"])
@@ -48,7 +71,10 @@ def test_every_stratum_of_every_factor_has_one_point(design: str) -> None:
 
 
 def test_sobol_points_fill_squares_too_and_random_ones_do_not() -> None:
-    cells = {design: len({tuple(cell) for cell in (table(drawn(design)) * 8).astype(int).tolist()}) for design in ("sobol", "random")}
+    cells = {
+        design: len({tuple(cell) for cell in (table(drawn(design)) * 8).astype(int).tolist()})
+        for design in ("sobol", "random")
+    }
     assert cells["sobol"] == STRATA
     assert cells["random"] < STRATA
 
@@ -106,5 +132,7 @@ def test_a_plan_of_a_hundred_million_runs_is_not_made_beforehand() -> None:
 
 
 def test_scenarios_are_a_factor_too() -> None:
-    sweep = Sweep(study_of({"factors": {"scenario": ["walk_flat", "turn"]}, "controls": ["kinematic"]}))
+    sweep = Sweep(
+        study_of({"factors": {"scenario": ["walk_flat", "turn"]}, "controls": ["kinematic"]})
+    )
     assert [order.case for order in sweep.orders(iter(range(2)))] == ["walk_flat", "turn"]

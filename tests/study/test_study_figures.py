@@ -1,4 +1,6 @@
-"""What people see of a study: nothing that was not run, nothing of falls among walks, and every interval by its name."""
+"""What people see of a study: nothing that was not run, nothing of falls among walks, and every
+interval by its name.
+"""
 
 from __future__ import annotations
 
@@ -27,27 +29,67 @@ from hexapod_cosim.cosim.study.store.trials import Trial
 from hexapod_cosim.models import load_robot
 
 GRID = {"factors": {"friction.mu": [0.3, 0.5], "command.vx": [0.05, 0.08]}}
-LIST = {"design": "list", "factors": {"friction.mu": [0.3, 0.5, 0.5], "gait.name": ["tripod", "tripod", "wave"]}}
-DRAWN = {"design": "random", "points": 3, "factors": {"friction.mu": {"uniform": [0.3, 0.9]}, "gait.name": ["tripod", "wave"]}}
-ONE: dict[str, Any] = {"trials": 3, "metric": "slip_per_metre", "variables": {"friction.mu": {"uniform": [0.3, 0.9]}}}
-SPLIT = {"training": {"scenarios": ["walk_flat"], "seeds": [1]}, "held_out": {"scenarios": ["ripple"], "seeds": [2]}}
+LIST = {
+    "design": "list",
+    "factors": {"friction.mu": [0.3, 0.5, 0.5], "gait.name": ["tripod", "tripod", "wave"]},
+}
+DRAWN = {
+    "design": "random",
+    "points": 3,
+    "factors": {"friction.mu": {"uniform": [0.3, 0.9]}, "gait.name": ["tripod", "wave"]},
+}
+ONE: dict[str, Any] = {
+    "trials": 3,
+    "metric": "slip_per_metre",
+    "variables": {"friction.mu": {"uniform": [0.3, 0.9]}},
+}
+SPLIT = {
+    "training": {"scenarios": ["walk_flat"], "seeds": [1]},
+    "held_out": {"scenarios": ["ripple"], "seeds": [2]},
+}
 
 
-def point(number: int, values: Mapping[str, Any], slips: Mapping[str, float], *, runs: int = 2, walked: int = 2, pairs: int = 2) -> Point:
+def point(
+    number: int,
+    values: Mapping[str, Any],
+    slips: Mapping[str, float],
+    *,
+    runs: int = 2,
+    walked: int = 2,
+    pairs: int = 2,
+) -> Point:
     """Of a slip by control, other figures 1."""
     means = {
-        name: {figure: Mean(slip if figure == "slip_per_metre" else 1.0, math.nan, walked) for figure in FIGURES}
+        name: {
+            figure: Mean(slip if figure == "slip_per_metre" else 1.0, math.nan, walked)
+            for figure in FIGURES
+        }
         for name, slip in slips.items()
     }
-    before, after = (slips.get(name, math.nan) if pairs else math.nan for name in ("kinematic", "compliant"))
+    before, after = (
+        slips.get(name, math.nan) if pairs else math.nan for name in ("kinematic", "compliant")
+    )
     return Point(
-        number=number, case="walk_flat", values=values, held_out=False, pairs=pairs, means=means,
-        runs=dict.fromkeys(slips, runs), walked=dict.fromkeys(slips, walked),
+        number=number,
+        case="walk_flat",
+        values=values,
+        held_out=False,
+        pairs=pairs,
+        means=means,
+        runs=dict.fromkeys(slips, runs),
+        walked=dict.fromkeys(slips, walked),
         changes={
-            name: made_change(name, before=before, after=after, half_width=math.nan, log_half_width=math.nan, pairs=pairs)
+            name: made_change(
+                name,
+                before=before,
+                after=after,
+                half_width=math.nan,
+                log_half_width=math.nan,
+                pairs=pairs,
+            )
             for name in FIGURES
         },
-    )  # fmt: skip
+    )
 
 
 def shown(figure: Figure) -> np.ndarray[Any, Any]:
@@ -58,7 +100,10 @@ def shown(figure: Figure) -> np.ndarray[Any, Any]:
 
 
 def walked_points(study: Study, settings: Sequence[Mapping[str, Any]]) -> list[Point]:
-    return [point(k, values, dict.fromkeys(study.run_controls, 0.1 * (k + 1))) for k, values in enumerate(settings)]
+    return [
+        point(k, values, dict.fromkeys(study.run_controls, 0.1 * (k + 1)))
+        for k, values in enumerate(settings)
+    ]
 
 
 def test_a_heat_map_is_of_grids_alone_whose_cells_are_all_run() -> None:
@@ -68,7 +113,11 @@ def test_a_heat_map_is_of_grids_alone_whose_cells_are_all_run() -> None:
     ]
     for table, name in ((GRID, "heat_map"), (LIST, "effects"), (DRAWN, "effects")):
         study = study_of(table)
-        assert set(drawings(study, walked_points(study, settings), [])) == {name, "parallel", "pareto"}
+        assert set(drawings(study, walked_points(study, settings), [])) == {
+            name,
+            "parallel",
+            "pareto",
+        }
 
 
 def test_a_cell_without_a_figure_says_why() -> None:
@@ -81,7 +130,10 @@ def test_a_cell_without_a_figure_says_why() -> None:
     ]  # and a cell of which nothing is run
     figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
     for axes in figure.axes[:3]:
-        marks = {tuple(np.asarray(line.get_xydata())[0].astype(int).tolist()): line.get_marker() for line in axes.lines}
+        marks = {
+            tuple(np.asarray(line.get_xydata())[0].astype(int).tolist()): line.get_marker()
+            for line in axes.lines
+        }
         assert marks == {(0, 1): "x", (1, 0): "_", (1, 1): "."}
     assert shown(figure)[0, 0] == pytest.approx(-75.0)
 
@@ -90,7 +142,10 @@ def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
     """Of two points in one cell one has no pair: its means do not count."""
     study = study_of({"factors": {**GRID["factors"], "gait.name": ["tripod", "wave"]}})
     place = {"friction.mu": 0.3, "command.vx": 0.05}
-    points = [point(0, place, {"kinematic": 0.4, "compliant": 0.2}), point(1, place, {"kinematic": 9.0, "compliant": 0.2}, pairs=0)]
+    points = [
+        point(0, place, {"kinematic": 0.4, "compliant": 0.2}),
+        point(1, place, {"kinematic": 9.0, "compliant": 0.2}, pairs=0),
+    ]
     figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
     assert shown(figure)[0, 0] == pytest.approx(-50.0)
 
@@ -98,7 +153,13 @@ def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
 def test_trials_are_counted_in_whole_numbers() -> None:
     study = study_of({"optimise": {**ONE, **SPLIT}})
     trials = [
-        Trial(number=k, values=(0.3,), means={"slip_per_metre": (0.1, math.nan, 0.2)[k], "walked": 1.0}, feasible=k != 1) for k in range(3)
+        Trial(
+            number=k,
+            values=(0.3,),
+            means={"slip_per_metre": (0.1, math.nan, 0.2)[k], "walked": 1.0},
+            feasible=k != 1,
+        )
+        for k in range(3)
     ]
     axes = history(study, trials, 0.15).axes[0]
     ticks = axes.get_xticks()
@@ -112,7 +173,9 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
     def made(table: Mapping[str, Any], *, lost: int = 0, pictures: bool = False) -> str:
         if not pictures:
-            monkeypatch.setattr("hexapod_cosim.cosim.study.report.report.drawings", lambda *_, **__: {})
+            monkeypatch.setattr(
+                "hexapod_cosim.cosim.study.report.report.drawings", lambda *_, **__: {}
+            )
         out = tmp_path / "out"
         run_quietly(study_of(table), out, fmu=athena_fmu, gains=make_gains(load_robot("athena")))
         if lost:
@@ -127,15 +190,24 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.filterwarnings("error")
 def test_where_nothing_walks_there_are_no_figures_and_the_page_says_why(folder: Any) -> None:
-    page = folder(pictures=True, table={"seeds": 2, "factors": {"friction.mu": [0.17, 0.19], "command.vx": [0.05, 0.08]}})
+    page = folder(
+        pictures=True,
+        table={"seeds": 2, "factors": {"friction.mu": [0.17, 0.19], "command.vx": [0.05, 0.08]}},
+    )
     assert "No run walked to its end" in page
     assert "<img" not in page
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("table", [LIST, {**GRID, "seeds": 2}, {"seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}}])
-def test_figures_of_all_designs_are_drawn_without_a_warning(athena_fmu: Path, tmp_path: Path, table: dict[str, Any]) -> None:
-    run_quietly(study_of(table), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
+@pytest.mark.parametrize(
+    "table", [LIST, {**GRID, "seeds": 2}, {"seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}}]
+)
+def test_figures_of_all_designs_are_drawn_without_a_warning(
+    athena_fmu: Path, tmp_path: Path, table: dict[str, Any]
+) -> None:
+    run_quietly(
+        study_of(table), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena"))
+    )
     results = read_results(tmp_path / "out")
     found = drawings(results.study, results.points, results.trials)
     assert len(found) >= 2
@@ -143,7 +215,9 @@ def test_figures_of_all_designs_are_drawn_without_a_warning(athena_fmu: Path, tm
         item.draw().draw_without_rendering()
 
 
-def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pairs_where_there_are_two_controls(folder: Any) -> None:
+def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pairs_where_there_are_two_controls(
+    folder: Any,
+) -> None:
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})
     assert "<h1>test</h1>" in page
     assert "pair" not in page.partition("<h2>Over all runs</h2>")[2]
@@ -151,13 +225,17 @@ def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pa
 
 
 def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
-    page = folder({"design": "sobol", "points": 3, "factors": {"friction.mu": {"uniform": [0.3, 0.9]}}})
+    page = folder(
+        {"design": "sobol", "points": 3, "factors": {"friction.mu": {"uniform": [0.3, 0.9]}}}
+    )
     assert "3 Sobol points are no power of two: only 2 or 4" in page
 
 
 def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder: Any) -> None:
     page = folder({"seeds": 3, **GRID}).partition("<h2>")[0]
-    assert re.search(r"([+-]\d+%) \.\. \1 by point", page)  # the fake engine changes all figures by one share
+    assert re.search(
+        r"([+-]\d+%) \.\. \1 by point", page
+    )  # the fake engine changes all figures by one share
     assert "95 %" not in page
     assert "no interval of how sure" in page
 
@@ -170,5 +248,10 @@ def test_the_headline_of_one_point_has_its_interval(folder: Any) -> None:
 
 def test_a_page_of_an_unfinished_study_says_what_its_figures_are_of(folder: Any) -> None:
     page = folder({"seeds": 2, **GRID}, lost=5)
-    for text in ("11 of 16 runs", "not done yet", "Not all runs are there.", "over the 5 pairs in which both walked"):
+    for text in (
+        "11 of 16 runs",
+        "not done yet",
+        "Not all runs are there.",
+        "over the 5 pairs in which both walked",
+    ):
         assert text in page

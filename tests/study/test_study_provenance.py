@@ -1,4 +1,6 @@
-"""A file of results away from its folder says what made it, and in the same bytes however it was made."""
+"""A file of results away from its folder says what made it, and in the same bytes however it was
+made.
+"""
 
 from __future__ import annotations
 
@@ -21,39 +23,70 @@ from hexapod_cosim.cosim.study.store.manifest import RESULTS, RUNS
 from hexapod_cosim.cosim.study.store.results import POINTS, read_results
 from hexapod_cosim.models import load_robot
 
-TABLE: dict[str, Any] = {"title": "Größe", "seeds": [3, 8], "factors": {"friction.mu": [0.3, 0.6], "scenario": ["walk_flat", "turn"]}}
+TABLE: dict[str, Any] = {
+    "title": "Größe",
+    "seeds": [3, 8],
+    "factors": {"friction.mu": [0.3, 0.6], "scenario": ["walk_flat", "turn"]},
+}
 
 
 @pytest.fixture
 def facts(athena_fmu: Path, tmp_path: Path) -> Mapping[str, str]:
     """The metadata of a small study's results, by name; its folder is `out`."""
-    run_quietly(study_of(TABLE), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
+    run_quietly(
+        study_of(TABLE), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena"))
+    )
     return read_facts(tmp_path / "out" / RESULTS)
 
 
 def read_facts(path: Path) -> dict[str, str]:
     found = pq.read_metadata(path).metadata
-    return {name.decode().removeprefix("hexapod."): text.decode() for name, text in found.items() if name.startswith(b"hexapod.")}
+    return {
+        name.decode().removeprefix("hexapod."): text.decode()
+        for name, text in found.items()
+        if name.startswith(b"hexapod.")
+    }
 
 
 def test_a_file_by_itself_holds_the_study_its_scenarios_and_seeds(facts: Mapping[str, str]) -> None:
     study = study_of(TABLE)
-    again = study_from_table(json.loads(facts["study"]), where="results.parquet", scenarios=json.loads(facts["scenarios"]))
-    assert (again.factors, list(again.seeds), again.controls, again.title) == (study.factors, [3, 8], study.controls, "Größe")
-    assert {name: case.table for name, case in again.cases.items()} == {name: case.table for name, case in study.cases.items()}
+    again = study_from_table(
+        json.loads(facts["study"]),
+        where="results.parquet",
+        scenarios=json.loads(facts["scenarios"]),
+    )
+    assert (again.factors, list(again.seeds), again.controls, again.title) == (
+        study.factors,
+        [3, 8],
+        study.controls,
+        "Größe",
+    )
+    assert {name: case.table for name, case in again.cases.items()} == {
+        name: case.table for name, case in study.cases.items()
+    }
     assert (json.loads(facts["seeds"]), facts["runs"]) == ([3, 8, 2], "16")
 
 
-def test_a_file_by_itself_names_versions_fmus_and_gains(facts: Mapping[str, str], athena_fmu: Path) -> None:
-    assert json.loads(facts["fmus"]) == {"athena": hashlib.sha256(athena_fmu.read_bytes()).hexdigest()}
+def test_a_file_by_itself_names_versions_fmus_and_gains(
+    facts: Mapping[str, str], athena_fmu: Path
+) -> None:
+    assert json.loads(facts["fmus"]) == {
+        "athena": hashlib.sha256(athena_fmu.read_bytes()).hexdigest()
+    }
     assert len(facts["controller"]) == 64
-    assert (json.loads(facts["environment"])["numpy"], facts["engine"]) == (version("numpy"), FAKE) == (np.__version__, FAKE)
+    assert (
+        (json.loads(facts["environment"])["numpy"], facts["engine"])
+        == (version("numpy"), FAKE)
+        == (np.__version__, FAKE)
+    )
     slip = asdict(make_gains(load_robot("athena")))["slip"]
     assert json.loads(facts["gains"])["slip"] == slip
     assert facts["gains_sha256"] == hashlib.sha256(facts["gains"].encode()).hexdigest()
 
 
-def test_the_bytes_are_the_same_by_other_workers_and_after_a_loss(facts: Mapping[str, str], athena_fmu: Path, tmp_path: Path) -> None:
+def test_the_bytes_are_the_same_by_other_workers_and_after_a_loss(
+    facts: Mapping[str, str], athena_fmu: Path, tmp_path: Path
+) -> None:
     assert facts
     common: dict[str, Any] = {"fmu": athena_fmu, "gains": make_gains(load_robot("athena"))}
     run_quietly(study_of(TABLE), tmp_path / "two", workers=2, **common)
@@ -63,6 +96,8 @@ def test_the_bytes_are_the_same_by_other_workers_and_after_a_loss(facts: Mapping
     assert digest(tmp_path / "two") == digest(tmp_path / "out")
 
 
-def test_the_table_of_points_says_the_same_of_itself(facts: Mapping[str, str], tmp_path: Path) -> None:
+def test_the_table_of_points_says_the_same_of_itself(
+    facts: Mapping[str, str], tmp_path: Path
+) -> None:
     read_results(tmp_path / "out")
     assert read_facts(tmp_path / "out" / POINTS) == facts

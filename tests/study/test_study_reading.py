@@ -30,16 +30,25 @@ def test_studies_that_come_with_the_package_can_be_read(name: str) -> None:
 
 def test_names_with_dots_need_no_quotes_and_units_are_kept(tmp_path: Path) -> None:
     file = tmp_path / "one.toml"
-    file.write_text('[set]\ngait.period = 0.5\n[factors]\nfriction.mu = [0.3]\nterrain.incline = {linspace = [0, 10, 3], unit = "deg"}\n')
+    file.write_text(
+        '[set]\ngait.period = 0.5\n[factors]\nfriction.mu = [0.3]\nterrain.incline = {linspace = [0, 10, 3], unit = "deg"}\n'
+    )
     study = load_study(file)
     assert [factor.name for factor in study.factors] == ["friction.mu", "terrain.incline"]
-    assert [study.factors[1].setting(value) for value in study.factors[1].values] == ["0.0 deg", "5.0 deg", "10.0 deg"]
+    assert [study.factors[1].setting(value) for value in study.factors[1].values] == [
+        "0.0 deg",
+        "5.0 deg",
+        "10.0 deg",
+    ]
     assert study.cases["walk_flat"].table["gait"] == {"name": "tripod", "period": 0.5}
 
 
 def test_a_scenario_may_be_a_file_beside_the_study_or_stand_in_it(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("duration = 3.0\n[command]\nvx = 0.05\n")
-    for text in ('scenario = "mine.toml"\n', "[scenario]\nduration = 3.0\n[scenario.command]\nvx = 0.05\n"):
+    for text in (
+        'scenario = "mine.toml"\n',
+        "[scenario]\nduration = 3.0\n[scenario.command]\nvx = 0.05\n",
+    ):
         (tmp_path / "study.toml").write_text(text)
         (case,) = load_study(tmp_path / "study.toml").cases.values()
         assert (case.table["duration"], case.table["command"]) == (3.0, {"vx": 0.05})
@@ -62,83 +71,213 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ({"seeds": 0}, ["seeds", "got 0", "whole number >= 1"]),
         ({"controls": ["kinetic"]}, ["kinetic", "did you mean 'kinematic'"]),
         ({"design": "sobel", "points": 4}, ["sobel", "did you mean 'sobol'"]),
-        ({"design": "sobol", "factors": {"friction.mu": {"uniform": [0.1, 0.9]}}}, ["points = 100"]),
+        (
+            {"design": "sobol", "factors": {"friction.mu": {"uniform": [0.1, 0.9]}}},
+            ["points = 100"],
+        ),
         ({"points": 4}, ["points", "got 4", "leave it out"]),
         ({"factors": {"friction.my": [0.3]}}, ["factors.friction.my", "did you mean"]),
         ({"factors": {"friction.mu": [-0.3]}}, ["factors.friction.mu", "got -0.3", ">= 0"]),
         ({"factors": {"friction.mu": ["much"]}}, ["factors.friction.mu", "got 'much'"]),
-        ({"factors": {"command.vx": {"linspace": [1, 2, 3], "unit": "kg"}}}, ["factors.command.vx", "wrong unit", "km/h"]),
-        ({"factors": {"friction.mu": {"unifrom": [0.1, 0.9]}}}, ["unknown key", "did you mean 'uniform'"]),
+        (
+            {"factors": {"command.vx": {"linspace": [1, 2, 3], "unit": "kg"}}},
+            ["factors.command.vx", "wrong unit", "km/h"],
+        ),
+        (
+            {"factors": {"friction.mu": {"unifrom": [0.1, 0.9]}}},
+            ["unknown key", "did you mean 'uniform'"],
+        ),
         ({"factors": {"friction.mu": {"uniform": [0.9, 0.1]}}}, ["lower end first"]),
-        ({"factors": {"friction.mu": {"uniform": [0.1, 0.9]}}}, ["a distribution in a design 'grid'", "points = 100"]),
+        (
+            {"factors": {"friction.mu": {"uniform": [0.1, 0.9]}}},
+            ["a distribution in a design 'grid'", "points = 100"],
+        ),
         ({"factors": {"friction.mu": [0.1, 0.1]}}, ["different values"]),
         ({"factors": {"control": ["kinematic"]}}, ["not a factor", "controls = "]),
         ({"factors": {"seed": [1]}}, ["not a factor", "seeds = 10"]),
         ({"factors": {"gait.nmae": ["tripod"]}}, ["factors.gait.nmae", "did you mean 'name'"]),
         ({"factors": {"torso.maas": [2.0]}}, ["factors.torso.maas", "torso.mass"]),
         ({"factors": {"gains.slip.kq": [1.0]}}, ["unknown gain", "gains.slip.k"]),
-        ({"factors": {"gains.slip.kp": [1.0]}, "controls": ["kinematic"]}, ["a gain that no run has", 'add "compliant"']),
+        (
+            {"factors": {"gains.slip.kp": [1.0]}, "controls": ["kinematic"]},
+            ["a gain that no run has", 'add "compliant"'],
+        ),
         ({"factors": {"friction.mu": {"values": [1.0], "relative": True}}}, ["relative to what?"]),
-        ({"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}}, ["different lengths", 'design = "grid"']),
+        (
+            {"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}},
+            ["different lengths", 'design = "grid"'],
+        ),
         ({"variation": "yes"}, ["variation", "got 'yes'", "write variation = true"]),
-        ({"factors": {"gains.slip.kp": {"values": [1.0], "unit": "s"}}}, ["not a gain's value", "leave the unit out"]),
-        ({"set": {"friction.mu": 0.5}, "factors": {"friction.mu": [0.3]}}, ["set.friction.mu", "set and varied", "take one of them away"]),
-        ({"factors": {"scenario": ["walk_falt"]}}, ["test.toml: factors.scenario", "unknown scenario"]),
-        (optimisation(held_out={"scenarios": ["riple"], "seeds": 2}), ["test.toml: optimise.held_out.scenarios", "'ripple'"]),
-        ({"scenario": "walk_falt"}, ["test.toml: scenario", "unknown scenario", "did you mean 'walk_flat'"]),
+        (
+            {"factors": {"gains.slip.kp": {"values": [1.0], "unit": "s"}}},
+            ["not a gain's value", "leave the unit out"],
+        ),
+        (
+            {"set": {"friction.mu": 0.5}, "factors": {"friction.mu": [0.3]}},
+            ["set.friction.mu", "set and varied", "take one of them away"],
+        ),
+        (
+            {"factors": {"scenario": ["walk_falt"]}},
+            ["test.toml: factors.scenario", "unknown scenario"],
+        ),
+        (
+            optimisation(held_out={"scenarios": ["riple"], "seeds": 2}),
+            ["test.toml: optimise.held_out.scenarios", "'ripple'"],
+        ),
+        (
+            {"scenario": "walk_falt"},
+            ["test.toml: scenario", "unknown scenario", "did you mean 'walk_flat'"],
+        ),
         ({"set": {"friction.mu": -1}}, ["set.friction.mu", "got -1"]),
-        (optimisation(metric="slip_per_meter"), ["optimise.metric", "did you mean 'slip_per_metre'"]),
-        (optimisation(constraints={"torque_rms": {"at_mots": 1.0}}), ["not a constraint", "at_most = 1.0"]),
-        (optimisation(variables={"gains.slip.kp": {"normal": [1, 1]}}), ["a variable without bounds"]),
-        (optimisation(held_out={"scenarios": ["ripple"], "seeds": {"first": 12, "count": 5}}),
-         ["held-out seeds that are trained on", "got [12]", "first = 13"]),
-        (optimisation(training={"seeds": 3}), ["optimise.training.scenarios", "missing key", 'scenarios = ["walk_flat"]']),
-        (optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
-         ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "incline"']),
-        ({"factors": {"gains.slip.kp": [math.nan]}}, ["factors.gains.slip.kp[0]", "got nan", "finite number"]),
-        ({"factors": {"gains.slip.kp": {"uniform": [0.5, math.inf]}}}, ["factors.gains.slip.kp.uniform[1]", "got inf"]),
+        (
+            optimisation(metric="slip_per_meter"),
+            ["optimise.metric", "did you mean 'slip_per_metre'"],
+        ),
+        (
+            optimisation(constraints={"torque_rms": {"at_mots": 1.0}}),
+            ["not a constraint", "at_most = 1.0"],
+        ),
+        (
+            optimisation(variables={"gains.slip.kp": {"normal": [1, 1]}}),
+            ["a variable without bounds"],
+        ),
+        (
+            optimisation(held_out={"scenarios": ["ripple"], "seeds": {"first": 12, "count": 5}}),
+            ["held-out seeds that are trained on", "got [12]", "first = 13"],
+        ),
+        (
+            optimisation(training={"seeds": 3}),
+            ["optimise.training.scenarios", "missing key", 'scenarios = ["walk_flat"]'],
+        ),
+        (
+            optimisation(held_out={"scenarios": ["ripple", "walk_flat"]}),
+            ["trained on", "got 'walk_flat'", 'scenarios = ["amble", "incline"'],
+        ),
+        (
+            {"factors": {"gains.slip.kp": [math.nan]}},
+            ["factors.gains.slip.kp[0]", "got nan", "finite number"],
+        ),
+        (
+            {"factors": {"gains.slip.kp": {"uniform": [0.5, math.inf]}}},
+            ["factors.gains.slip.kp.uniform[1]", "got inf"],
+        ),
         ({"factors": {"gains.slip.kp": [-1.0]}}, ["not a gain's value", "got -1.0", ">= 0"]),
         ({"factors": {"gains.slip.filter_time": [0.0]}}, ["not a gain's value", "got 0.0", "> 0"]),
         ({"seeds": 1e20}, ["seeds", "whole number"]),
         ({"seeds": [10**20]}, ["seeds[0]", "64 bits"]),
         ({"seeds": {"first": 2**63 - 2, "count": 5}}, ["seeds.first", "<="]),
         ({"seed": 2**40}, ["seed", "<= 4294967295"]),
-        ({"factors": {"friction.mu": [0.3], "friction": {"mu": [0.4]}}}, ["given twice", "friction.mu", "take one away"]),
-        ({"factors": {"torso.mass": [2.0], "parameters.torso.mass": [2.5]}}, ["given twice", "torso.mass"]),
-        ({"set": {"friction.mu": 0.3, "friction": {"mu": 0.4}}}, ["set.friction.mu", "given twice"]),
+        (
+            {"factors": {"friction.mu": [0.3], "friction": {"mu": [0.4]}}},
+            ["given twice", "friction.mu", "take one away"],
+        ),
+        (
+            {"factors": {"torso.mass": [2.0], "parameters.torso.mass": [2.5]}},
+            ["given twice", "torso.mass"],
+        ),
+        (
+            {"set": {"friction.mu": 0.3, "friction": {"mu": 0.4}}},
+            ["set.friction.mu", "given twice"],
+        ),
         ({"factors": {"torso.mass": [2.7, "3 kg"]}}, ["factors.torso.mass", "values of one kind"]),
         ({"factors": {"gait.name": ["tripod", True]}}, ["factors.gait.name", "values of one kind"]),
-        ({"factors": {"torso.mass": ["2.7 kg", "3 kg"]}}, ["factors.torso.mass", "a number in a text", 'unit = "deg"']),
-        ({"factors": {"torso.mass": {"values": [2.7], "unit": "kg"}}}, ["factors.torso.mass", "got '2.7 kg'", "plain numbers"]),
-        ({"factors": {"gait.name": {"values": ["tripod"], "unit": "s"}}}, ["factors.gait.name", "there is a unit"]),
+        (
+            {"factors": {"torso.mass": ["2.7 kg", "3 kg"]}},
+            ["factors.torso.mass", "a number in a text", 'unit = "deg"'],
+        ),
+        (
+            {"factors": {"torso.mass": {"values": [2.7], "unit": "kg"}}},
+            ["factors.torso.mass", "got '2.7 kg'", "plain numbers"],
+        ),
+        (
+            {"factors": {"gait.name": {"values": ["tripod"], "unit": "s"}}},
+            ["factors.gait.name", "there is a unit"],
+        ),
         ({"factors": {"torso.mass": [2.7, -1.0]}}, ["factors.torso.mass", "got -1.0", ">="]),
         ({"set": {"torso.mass": "heavy"}}, ["set.torso.mass", "got 'heavy'", "kg"]),
         ({"factors": {"contact.law": ["hertz", "herz"]}}, ["factors.contact.law", "herz"]),
-        ({"design": "sobol", "points": 4, "factors": {"robot": ["athena", "athana"]}}, ["factors.robot", "did you mean 'athena'"]),
-        ({"design": "list", "factors": {"robot": ["athena", "athana"]}}, ["factors.robot", "did you mean 'athena'"]),
+        (
+            {"design": "sobol", "points": 4, "factors": {"robot": ["athena", "athana"]}},
+            ["factors.robot", "did you mean 'athena'"],
+        ),
+        (
+            {"design": "list", "factors": {"robot": ["athena", "athana"]}},
+            ["factors.robot", "did you mean 'athena'"],
+        ),
         ({"set": {"robot": "athana"}}, ["set.robot", "did you mean 'athena'"]),
-        ({"design": "random", "points": 4, "factors": {"friction.mu": {"uniform": [-0.1, 0.5]}}}, ["factors.friction.mu", "got -0.1"]),
-        ({"design": "random", "points": 4, "factors": {"friction.mu": {"normal": [0.1, 0.5]}}}, ["factors.friction.mu", "got -0.4"]),
-        ({"design": "random", "points": 4, "factors": {"friction.mu": {"uniform": [0.1, 1e308]}}}, ["friction.mu", "so far apart"]),
-        ({"factors": {"friction.mu": {"linspace": [0.3, 0.3, 2]}}}, ["friction.mu", "different ends"]),
-        ({"factors": {f"torso.inertia[{k}]": {"linspace": [1, 2, 10**6]} for k in range(3)}}, ["too many runs", "2e+18", "100,000,000"]),
-        ({"design": "sobol", "points": 10**8, "seeds": 10, "factors": {"friction.mu": [0.3]}},
-         ["too many runs", "2,000,000,000 runs", "split"]),
-        ({"design": "latin_hypercube", "points": 10**7, "factors": {"friction.mu": {"uniform": [0.1, 1]},
-          "command.vx": {"uniform": [0, 0.1]}}}, ["too large a Latin hypercube", 'design = "sobol"']),
-        (optimisation(trials=10**5, training={**TRAINING, "seeds": 5000}, held_out={"scenarios": ["ripple"], "seeds": [9999]}),
-         ["too many runs", "split"]),
+        (
+            {"design": "random", "points": 4, "factors": {"friction.mu": {"uniform": [-0.1, 0.5]}}},
+            ["factors.friction.mu", "got -0.1"],
+        ),
+        (
+            {"design": "random", "points": 4, "factors": {"friction.mu": {"normal": [0.1, 0.5]}}},
+            ["factors.friction.mu", "got -0.4"],
+        ),
+        (
+            {
+                "design": "random",
+                "points": 4,
+                "factors": {"friction.mu": {"uniform": [0.1, 1e308]}},
+            },
+            ["friction.mu", "so far apart"],
+        ),
+        (
+            {"factors": {"friction.mu": {"linspace": [0.3, 0.3, 2]}}},
+            ["friction.mu", "different ends"],
+        ),
+        (
+            {"factors": {f"torso.inertia[{k}]": {"linspace": [1, 2, 10**6]} for k in range(3)}},
+            ["too many runs", "2e+18", "100,000,000"],
+        ),
+        (
+            {"design": "sobol", "points": 10**8, "seeds": 10, "factors": {"friction.mu": [0.3]}},
+            ["too many runs", "2,000,000,000 runs", "split"],
+        ),
+        (
+            {
+                "design": "latin_hypercube",
+                "points": 10**7,
+                "factors": {
+                    "friction.mu": {"uniform": [0.1, 1]},
+                    "command.vx": {"uniform": [0, 0.1]},
+                },
+            },
+            ["too large a Latin hypercube", 'design = "sobol"'],
+        ),
+        (
+            optimisation(
+                trials=10**5,
+                training={**TRAINING, "seeds": 5000},
+                held_out={"scenarios": ["ripple"], "seeds": [9999]},
+            ),
+            ["too many runs", "split"],
+        ),
         ({"set": {"seed": 3}}, ["set.seed", "not a setting", "seeds = 10"]),
         ({"set": {"control": "compliant"}}, ["set.control", "not a setting", "controls ="]),
-        ({"set": {"outputs": {"plots": True}}}, ["set.outputs.plots", "not a setting", "no recordings"]),
+        (
+            {"set": {"outputs": {"plots": True}}},
+            ["set.outputs.plots", "not a setting", "no recordings"],
+        ),
         ({"factors": {"outputs.plots": [True]}}, ["factors.outputs.plots", "not a factor"]),
         ({"title": "two\nlines"}, ["title", "printable"]),
-        ({"title": "walk_flat", "factors": {"scenario": ["walk_flat"]}, "scenario": {"duration": 1.0}}, ["two scenarios of one name"]),
+        (
+            {
+                "title": "walk_flat",
+                "factors": {"scenario": ["walk_flat"]},
+                "scenario": {"duration": 1.0},
+            },
+            ["two scenarios of one name"],
+        ),
         ({"scenario": "x" * 300}, ["scenario", "255"]),
-        ({**optimisation(), "factors": {"friction.mu": [0.3]}}, ["not a key of an optimisation", "factors"]),
+        (
+            {**optimisation(), "factors": {"friction.mu": [0.3]}},
+            ["not a key of an optimisation", "factors"],
+        ),
     ],
-)  # fmt: skip
-def test_a_mistake_is_named_with_its_place_and_a_way_out(table: dict[str, Any], parts: list[str]) -> None:
+)
+def test_a_mistake_is_named_with_its_place_and_a_way_out(
+    table: dict[str, Any], parts: list[str]
+) -> None:
     with pytest.raises(HexapodError) as refused:
         study_of(table)
     for part in ["test.toml" if "scenario" not in table else "scenario", *parts]:
@@ -146,8 +285,20 @@ def test_a_mistake_is_named_with_its_place_and_a_way_out(table: dict[str, Any], 
 
 
 def test_numbers_of_a_parameter_are_in_its_own_unit_and_its_choices_are_names() -> None:
-    study = study_of({"factors": {"torso.mass": [2.7, 3], "parameters.torso.com[1]": [0.0], "contact.law": ["hertz", "flores"]}})
-    assert [factor.name for factor in study.factors] == ["torso.mass", "torso.com[1]", "contact.law"]
+    study = study_of(
+        {
+            "factors": {
+                "torso.mass": [2.7, 3],
+                "parameters.torso.com[1]": [0.0],
+                "contact.law": ["hertz", "flores"],
+            }
+        }
+    )
+    assert [factor.name for factor in study.factors] == [
+        "torso.mass",
+        "torso.com[1]",
+        "contact.law",
+    ]
 
 
 def test_the_ends_of_long_lists_are_tried_too() -> None:
@@ -189,12 +340,21 @@ name = "tripod"
         ('[parameters]\n"torso.mass" = 2.6\n', {}),
     ],
 )
-def test_a_held_out_scenario_is_told_from_training_by_its_walk_not_by_its_name(tmp_path: Path, more: str, changes: dict[str, Any]) -> None:
-    """A file that names the robot by a path, seconds by a unit, and settings that the study puts the same in either walk."""
-    (tmp_path / "own.toml").write_text((Path(load_robot.__code__.co_filename).parent / "athena.toml").read_text())
+def test_a_held_out_scenario_is_told_from_training_by_its_walk_not_by_its_name(
+    tmp_path: Path, more: str, changes: dict[str, Any]
+) -> None:
+    """A file that names the robot by a path, seconds by a unit, and settings that the study puts
+    the same in either walk.
+    """
+    (tmp_path / "own.toml").write_text(
+        (Path(load_robot.__code__.co_filename).parent / "athena.toml").read_text()
+    )
     mine = tmp_path / "Mine.toml"
     mine.write_text(SAME + more)
-    table = optimisation(held_out={"scenarios": ["ripple", str(mine)]}, **{key: value for key, value in changes.items() if key != "set"})
+    table = optimisation(
+        held_out={"scenarios": ["ripple", str(mine)]},
+        **{key: value for key, value in changes.items() if key != "set"},
+    )
     table |= {key: value for key, value in changes.items() if key == "set"}
     with pytest.raises(StudyError, match=r"Mine.toml, the same walk as walk_flat"):
         study_of(table)

@@ -1,4 +1,6 @@
-"""What a study keeps: nothing is lost and nothing is torn, whatever happens, and the result is the same bytes."""
+"""What a study keeps: nothing is lost and nothing is torn, whatever happens, and the result is
+the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -33,20 +35,30 @@ from hexapod_cosim.cosim.study.store.store import MANY, Store, write_durably, wr
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 180.0  # s    for what takes a few on an idle machine
-MANY_RUNS: dict[str, Any] = {**KINEMATIC, "seeds": 10, "factors": {"friction.mu": {"linspace": [0.3, 0.9, 20]}}}
+MANY_RUNS: dict[str, Any] = {
+    **KINEMATIC,
+    "seeds": 10,
+    "factors": {"friction.mu": {"linspace": [0.3, 0.9, 20]}},
+}
 
 
 @pytest.fixture
 def small(athena_fmu: Path, tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
     """Runs a study of few kinematic walks into a folder of the test's."""
 
-    def run(name: str = "out", table: dict[str, Any] = SMALL, **options: Any) -> list[dict[str, Any]]:
-        return run_quietly(study_of({**table, **KINEMATIC}), tmp_path / name, **{"fmu": athena_fmu, **options})
+    def run(
+        name: str = "out", table: dict[str, Any] = SMALL, **options: Any
+    ) -> list[dict[str, Any]]:
+        return run_quietly(
+            study_of({**table, **KINEMATIC}), tmp_path / name, **{"fmu": athena_fmu, **options}
+        )
 
     return run
 
 
-def test_a_finished_study_is_left_as_it_is_when_started_again(small: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_finished_study_is_left_as_it_is_when_started_again(
+    small: Callable[..., Any], tmp_path: Path
+) -> None:
     small()
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / RUNS).iterdir()}
     first = digest(tmp_path / "out")
@@ -55,22 +67,39 @@ def test_a_finished_study_is_left_as_it_is_when_started_again(small: Callable[..
     assert digest(tmp_path / "out") == first
 
 
-def test_results_do_not_depend_on_workers_or_chunks(small: Callable[..., Any], tmp_path: Path) -> None:
+def test_results_do_not_depend_on_workers_or_chunks(
+    small: Callable[..., Any], tmp_path: Path
+) -> None:
     small("none", MANY_RUNS, workers=0)
     small("one", MANY_RUNS, workers=1)
     small("two", MANY_RUNS, workers=2)
     small("slow", MANY_RUNS, workers=2, engine=SLOW)
     assert digest(tmp_path / "none") == digest(tmp_path / "one") == digest(tmp_path / "two")
-    assert rows(tmp_path / "one") == rows(tmp_path / "slow")  # another engine's name is in the manifest and the file's metadata
+    assert rows(tmp_path / "one") == rows(
+        tmp_path / "slow"
+    )  # another engine's name is in the manifest and the file's metadata
 
 
 def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[..., Any]) -> None:
-    table = {**SMALL, "seeds": 1, "factors": {"friction.mu": [0.17, 0.19, 0.5], "gait.name": ["tripod"]}}
+    table = {
+        **SMALL,
+        "seeds": 1,
+        "factors": {"friction.mu": [0.17, 0.19, 0.5], "gait.name": ["tripod"]},
+    }
     refused, fallen, walked = small(table=table)
-    assert (refused["status"], refused["reason"], refused["walked"]) == ("refused", "no walk with 0", False)
+    assert (refused["status"], refused["reason"], refused["walked"]) == (
+        "refused",
+        "no walk with 0",
+        False,
+    )
     assert refused["slip_per_metre"] is None
     assert (fallen["status"], fallen["upright"], fallen["walked"]) == ("completed", False, False)
-    assert (walked["friction.mu"], walked["gait.name"], walked["slip_per_metre"], walked["walked"]) == (0.5, "tripod", 1.25, True)
+    assert (
+        walked["friction.mu"],
+        walked["gait.name"],
+        walked["slip_per_metre"],
+        walked["walked"],
+    ) == (0.5, "tripod", 1.25, True)
     assert len({row["identity"] for row in (refused, fallen, walked)}) == 3
     assert not {"wall", "realtime_factor"} & set(walked)
 
@@ -80,22 +109,44 @@ REAL_RUNS = 2000
 
 
 def command(folder: Path, fmu: Path, *more: str, study: Path) -> subprocess.Popen[str]:
-    words = [*COMMAND, "study", str(study), "-o", str(folder), "--fmu", str(fmu), "--workers", "2", *more]
-    return subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    words = [
+        *COMMAND,
+        "study",
+        str(study),
+        "-o",
+        str(folder),
+        "--fmu",
+        str(fmu),
+        "--workers",
+        "2",
+        *more,
+    ]
+    return subprocess.Popen(
+        words,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
 
 
 def stored_runs(folder: Path) -> int:
     return sum(pq.ParquetFile(path).metadata.num_rows for path in (folder / RUNS).glob("*.parquet"))
 
 
-def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupted_ones(athena_fmu: Path, tmp_path: Path) -> None:
+def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupted_ones(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     file = tmp_path / "study.toml"
     file.write_text(REAL)
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     for least in (1, random.randint(100, 500)):
         process = command(killed, athena_fmu, study=file)
         deadline = time.monotonic() + PATIENCE
-        while stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None:
+        while (
+            stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None
+        ):
             time.sleep(0.005)
         time.sleep(random.uniform(0.0, 0.02))
         os.killpg(process.pid, signal.SIGKILL)
@@ -115,14 +166,20 @@ def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupte
     assert all(row["status"] == "completed" for row in rows(whole))
 
 
-def test_a_study_does_not_go_on_with_other_code(small: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_study_does_not_go_on_with_other_code(
+    small: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     small("out", SMALL)
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.job.code_hash", lambda: "0123456789abcdef")
+    monkeypatch.setattr(
+        "hexapod_cosim.cosim.study.execute.job.code_hash", lambda: "0123456789abcdef"
+    )
     with pytest.raises(StudyError, match=r"environment.code was .*, is \"0123456789abcdef\""):
         small("out", SMALL)
 
 
-def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     room = [3]
 
     def filling(path: Path, content: bytes) -> None:
@@ -136,7 +193,9 @@ def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(store_module, "FLUSH_ROWS", 20)
         patch.setattr("hexapod_cosim.cosim.study.execute.conduct.MAX_CHUNK", 10)
-        with pytest.raises(StudyError, match=r"the disk is full.*make room and start the study again"):
+        with pytest.raises(
+            StudyError, match=r"the disk is full.*make room and start the study again"
+        ):
             run_study(study, folder, options=options, begun=quiet)
     stored = stored_runs(folder)
     assert 0 < stored < 200
@@ -146,7 +205,9 @@ def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(athena
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
-def test_a_file_that_does_not_fit_leaves_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_does_not_fit_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = tmp_path / "results.parquet"
     place.write_bytes(b"old")
     unfinished = tmp_path / ".results.parquet.new"
@@ -173,7 +234,9 @@ def flipped(content: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    "damage", [cut, flipped, lambda _: b"", lambda _: b"PAR1 garbage PAR1"], ids=["cut", "flipped", "empty", "garbage"]
+    "damage",
+    [cut, flipped, lambda _: b"", lambda _: b"PAR1 garbage PAR1"],
+    ids=["cut", "flipped", "empty", "garbage"],
 )
 def test_a_damaged_part_is_set_aside_and_its_runs_are_run_again(
     small: Callable[..., Any], tmp_path: Path, damage: Callable[[bytes], bytes]
@@ -183,10 +246,16 @@ def test_a_damaged_part_is_set_aside_and_its_runs_are_run_again(
     (part,) = (tmp_path / "out" / RUNS).glob("*.parquet")
     content = damage(part.read_bytes())
     part.write_bytes(content)
-    assert (read_results(tmp_path / "out").overall.runs, read_results(tmp_path / "out").damaged) == (9, [])  # of results.parquet
+    assert (
+        read_results(tmp_path / "out").overall.runs,
+        read_results(tmp_path / "out").damaged,
+    ) == (9, [])  # of results.parquet
     (tmp_path / "out" / "results.parquet").unlink()
     found = read_results(tmp_path / "out")
-    assert (found.overall.runs, [text.partition(" ")[0] for text in found.damaged]) == (0, [part.name])
+    assert (found.overall.runs, [text.partition(" ")[0] for text in found.damaged]) == (
+        0,
+        [part.name],
+    )
     small(say=said.append)
     assert digest(tmp_path / "out") == first
     assert part.with_name(part.name + ".damaged").read_bytes() == content
@@ -218,7 +287,9 @@ def test_what_is_not_a_part_is_left_alone(small: Callable[..., Any], tmp_path: P
     assert (tmp_path / "out" / RUNS / "part-mine.parquet").read_bytes() == b"mine"
 
 
-def test_a_reader_finds_every_run_while_parts_are_put_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reader_finds_every_run_while_parts_are_put_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(store_module, "ROWS_AT_ONCE", 10)
     monkeypatch.setattr(store_module, "MANY", 4)
     schema = schema_of(study_of())
@@ -237,9 +308,13 @@ def test_a_reader_finds_every_run_while_parts_are_put_together(tmp_path: Path, m
     assert found == list(range(62))
 
 
-def test_files_that_others_may_write_just_now_are_left_alone_for_a_while(small: Callable[..., Any], tmp_path: Path) -> None:
+def test_files_that_others_may_write_just_now_are_left_alone_for_a_while(
+    small: Callable[..., Any], tmp_path: Path
+) -> None:
     small()
-    young, old = (tmp_path / "out" / f".summary.json.{name}.new" for name in ("12345678", "87654321"))
+    young, old = (
+        tmp_path / "out" / f".summary.json.{name}.new" for name in ("12345678", "87654321")
+    )
     for path in (young, old):
         path.touch()
     os.utime(old, (0.0, 0.0))
@@ -250,7 +325,9 @@ def test_files_that_others_may_write_just_now_are_left_alone_for_a_while(small: 
 
 def rows_from(schema: pa.Schema, runs: list[int]) -> list[dict[str, Any]]:
     zero = {pa.int64(): 0, pa.float64(): 0.5, pa.bool_(): True, pa.string(): "x"}
-    return [{**{item.name: zero[item.type] for item in schema}, "run": run, "seed": run} for run in runs]
+    return [
+        {**{item.name: zero[item.type] for item in schema}, "run": run, "seed": run} for run in runs
+    ]
 
 
 def test_many_parts_become_one_and_a_run_in_two_parts_counts_once(tmp_path: Path) -> None:
@@ -262,7 +339,9 @@ def test_many_parts_become_one_and_a_run_in_two_parts_counts_once(tmp_path: Path
         store.add(rows_from(schema, [run]))
         store.flush()
     assert len(store.parts()) == 3
-    store.add(rows_from(schema, [7, 8]))  # as if a kill had come between writing one part and taking the others away
+    store.add(
+        rows_from(schema, [7, 8])
+    )  # as if a kill had come between writing one part and taking the others away
     store.flush()
     (table,) = store.sorted_rows()
     assert table["run"].to_pylist() == list(range(3 * MANY))
@@ -278,10 +357,16 @@ def test_sorting_goes_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyP
     for part in ([25, 3, 11], [4, 19, 3], [12]):
         store.add(rows_from(schema, part))
         store.flush()
-    assert [table["run"].to_pylist() for table in store.sorted_rows()] == [[3, 4], [11, 12, 19], [25]]
+    assert [table["run"].to_pylist() for table in store.sorted_rows()] == [
+        [3, 4],
+        [11, 12, 19],
+        [25],
+    ]
     write_whole(tmp_path / "whole.parquet", store.sorted_rows(), result_schema(schema))
     assert pq.read_table(tmp_path / "whole.parquet")["run"].to_pylist() == [3, 4, 11, 12, 19, 25]
-    assert pq.read_schema(tmp_path / "whole.parquet").field("slip_per_metre").metadata == {b"unit": b"m/m"}
+    assert pq.read_schema(tmp_path / "whole.parquet").field("slip_per_metre").metadata == {
+        b"unit": b"m/m"
+    }
     assert set(FIGURES) < set(schema.names)
 
 
@@ -312,17 +397,25 @@ def test_a_folder_of_something_else_is_refused(small: Callable[..., Any], tmp_pa
 
 
 def test_two_processes_do_not_share_a_folder(small: Callable[..., Any], tmp_path: Path) -> None:
-    with locked(tmp_path / "out"), pytest.raises(StudyError, match="another process runs a study into this folder"):
+    with (
+        locked(tmp_path / "out"),
+        pytest.raises(StudyError, match="another process runs a study into this folder"),
+    ):
         small()
     small()
 
 
 @pytest.mark.parametrize("held", [True, False], ids=["held", "no-locks-there"])
-def test_windows_has_its_own_lock(held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_has_its_own_lock(
+    held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def locking(_file: int, _mode: int, _size: int) -> None:
         raise OSError(errno.EACCES if held else errno.ENOTSUP, "no")
 
     monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
     monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(StudyError, match="another process") if held else nullcontext(), locked(tmp_path):
+    with (
+        pytest.raises(StudyError, match="another process") if held else nullcontext(),
+        locked(tmp_path),
+    ):
         pass

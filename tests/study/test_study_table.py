@@ -1,4 +1,6 @@
-"""What people read of a study: means, intervals and paired changes are those of the textbook, failures are counted by reason."""
+"""What people read of a study: means, intervals and paired changes are those of the textbook,
+failures are counted by reason.
+"""
 
 from __future__ import annotations
 
@@ -32,13 +34,21 @@ Call = Callable[..., tuple[int, str, str]]
 def compared(athena_fmu: Path, tmp_path: Path) -> Path:
     """The folder of a study of both controls, 4 points and 3 seeds."""
     gains = make_gains(load_robot("athena"))
-    run_quietly(study_of({"seeds": 3, "factors": FACTORS}), tmp_path / "out", fmu=athena_fmu, gains=gains)
+    run_quietly(
+        study_of({"seeds": 3, "factors": FACTORS}), tmp_path / "out", fmu=athena_fmu, gains=gains
+    )
     return tmp_path / "out"
 
 
 def values(folder: Path, control: str, **where: Any) -> np.ndarray[Any, Any]:
-    chosen = [row for row in rows(folder) if row["control"] == control and all(row[key] == value for key, value in where.items())]
-    return np.array([row[METRIC] for row in sorted(chosen, key=lambda row: (row["point"], row["seed"]))])
+    chosen = [
+        row
+        for row in rows(folder)
+        if row["control"] == control and all(row[key] == value for key, value in where.items())
+    ]
+    return np.array(
+        [row[METRIC] for row in sorted(chosen, key=lambda row: (row["point"], row["seed"]))]
+    )
 
 
 def half_width(sample: np.ndarray[Any, Any]) -> float:
@@ -52,11 +62,17 @@ def test_means_intervals_and_changes_of_a_point_are_by_hand(compared: Path) -> N
     pair = [values(compared, control, point=3) for control in ("kinematic", "compliant")]
     for control, sample in zip(("kinematic", "compliant"), pair, strict=True):
         assert point[f"{control}.{METRIC}"] == pytest.approx(sample.mean(), rel=1e-12)
-        assert point[f"{control}.{METRIC}.half_width"] == pytest.approx(half_width(sample), rel=1e-9)
+        assert point[f"{control}.{METRIC}.half_width"] == pytest.approx(
+            half_width(sample), rel=1e-9
+        )
     assert point[f"change.{METRIC}"] == pytest.approx((pair[1] - pair[0]).mean(), rel=1e-12)
-    assert point[f"change.{METRIC}.half_width"] == pytest.approx(half_width(pair[1] - pair[0]), rel=1e-9)
+    assert point[f"change.{METRIC}.half_width"] == pytest.approx(
+        half_width(pair[1] - pair[0]), rel=1e-9
+    )
     assert point[f"change.{METRIC}.verdict"] == "better"
-    assert pq.read_schema(compared / POINTS).field(f"kinematic.{METRIC}").metadata == {b"unit": b"1"}
+    assert pq.read_schema(compared / POINTS).field(f"kinematic.{METRIC}").metadata == {
+        b"unit": b"1"
+    }
 
 
 def test_totals_are_over_all_pairs(compared: Path) -> None:
@@ -70,29 +86,56 @@ def test_totals_are_over_all_pairs(compared: Path) -> None:
     assert summary["means"]["compliant"][METRIC]["mean"] == pytest.approx(after.mean(), rel=1e-12)
 
 
-def test_failures_are_counted_by_reason_and_keep_out_of_the_means(athena_fmu: Path, tmp_path: Path) -> None:
+def test_failures_are_counted_by_reason_and_keep_out_of_the_means(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     study = study_of({**KINEMATIC, "seeds": 3, "factors": {"friction.mu": [0.17, 0.19, 0.5]}})
     run_quietly(study, tmp_path / "out", fmu=athena_fmu)
     results = read_results(tmp_path / "out")
     assert dict(results.overall.failures) == {
-        ("kinematic", "refused", "no walk with #"): 3, ("kinematic", "completed", "the robot fell"): 3,
-    }  # fmt: skip
-    assert results.overall.means["kinematic"][METRIC].value == pytest.approx(values(tmp_path / "out", "kinematic", point=2).mean())
+        ("kinematic", "refused", "no walk with #"): 3,
+        ("kinematic", "completed", "the robot fell"): 3,
+    }
+    assert results.overall.means["kinematic"][METRIC].value == pytest.approx(
+        values(tmp_path / "out", "kinematic", point=2).mean()
+    )
     assert math.isnan(results.points[0].means["kinematic"][METRIC].value)
 
 
 def test_the_front_is_what_no_point_betters_in_both() -> None:
     pairs = np.random.default_rng(0).random((200, 2))
     edge = {tuple(pair) for pair in front(pairs).tolist()}
-    by_hand = {tuple(pair) for pair in pairs.tolist() if not np.any(np.all(pairs <= pair, axis=1) & np.any(pairs < pair, axis=1))}
+    by_hand = {
+        tuple(pair)
+        for pair in pairs.tolist()
+        if not np.any(np.all(pairs <= pair, axis=1) & np.any(pairs < pair, axis=1))
+    }
     assert edge == by_hand
 
 
-def test_the_command_runs_a_study_and_its_report_holds_everything(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
+def test_the_command_runs_a_study_and_its_report_holds_everything(
+    call: Call, athena_fmu: Path, tmp_path: Path
+) -> None:
     file, gains, out = tmp_path / "mine.toml", tmp_path / "gains.toml", tmp_path / "out"
-    file.write_text('title = "Mine <&>"\nseeds = 2\n[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n')
+    file.write_text(
+        'title = "Mine <&>"\nseeds = 2\n[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n'
+    )
     save_gains(make_gains(load_robot("athena")), gains)
-    code, told, err = call("study", file, "-o", out, "--engine", FAKE, "--fmu", athena_fmu, "--gains", gains, "--workers", "1", "--json")
+    code, told, err = call(
+        "study",
+        file,
+        "-o",
+        out,
+        "--engine",
+        FAKE,
+        "--fmu",
+        athena_fmu,
+        "--gains",
+        gains,
+        "--workers",
+        "1",
+        "--json",
+    )
     assert code == 0, err
     summary = json.loads(told)
     assert (summary["runs"], summary["walked"]) == (24, {"kinematic": 8, "compliant": 8})
@@ -124,20 +167,31 @@ def test_a_study_that_is_not_done_has_a_report_that_says_so(call: Call, compared
     assert "not done yet" in (compared / "report.html").read_text()
 
 
-def test_a_damaged_part_of_a_finished_study_leaves_its_report_whole_and_of_another_is_named(call: Call, compared: Path) -> None:
+def test_a_damaged_part_of_a_finished_study_leaves_its_report_whole_and_of_another_is_named(
+    call: Call, compared: Path
+) -> None:
     assert call("report", compared)[0] == 0
     whole, summary = (compared / "report.html").read_text(), (compared / SUMMARY).read_bytes()
     (part,) = (compared / "runs").iterdir()
     part.write_bytes(part.read_bytes()[:-7])
     code, _, err = call("report", compared)
     assert (code, err) == (0, "")
-    assert ((compared / "report.html").read_text(), (compared / SUMMARY).read_bytes()) == (whole, summary)
-    (compared / "run.json").write_text((compared / "run.json").read_text().replace('"completed"', '"running"'))
+    assert ((compared / "report.html").read_text(), (compared / SUMMARY).read_bytes()) == (
+        whole,
+        summary,
+    )
+    (compared / "run.json").write_text(
+        (compared / "run.json").read_text().replace('"completed"', '"running"')
+    )
     code, _, err = call("report", compared)
     assert code == 0
-    assert f"Damaged parts of the results are left out, and their runs with them: {part.name}" in err
+    assert (
+        f"Damaged parts of the results are left out, and their runs with them: {part.name}" in err
+    )
     assert part.name in (compared / "report.html").read_text()
-    (compared / "run.json").write_text((compared / "run.json").read_text().replace('"running"', '"completed"'))
+    (compared / "run.json").write_text(
+        (compared / "run.json").read_text().replace('"running"', '"completed"')
+    )
     results = bytearray((compared / "results.parquet").read_bytes())
     results[4:400] = bytes(396)
     (compared / "results.parquet").write_bytes(results)
@@ -154,16 +208,24 @@ def test_other_commands_leave_a_studys_folder_alone(call: Call, compared: Path) 
 
 def optimisation(**changes: Any) -> dict[str, Any]:
     question = {
-        "metric": "slip_per_metre", "trials": 12, "batch": 3, "sampler": "random",
-        "variables": {"friction.mu": {"uniform": [0.3, 0.9]}, "gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True}},
+        "metric": "slip_per_metre",
+        "trials": 12,
+        "batch": 3,
+        "sampler": "random",
+        "variables": {
+            "friction.mu": {"uniform": [0.3, 0.9]},
+            "gains.slip.kp": {"uniform": [0.5, 2.0], "relative": True},
+        },
         "training": {"scenarios": ["walk_flat", "push"], "seeds": {"first": 10, "count": 2}},
         "held_out": {"scenarios": ["ripple", "turn"], "seeds": 3},
-    }  # fmt: skip
+    }
     return {"set": {"friction.mu": 0.5}, "optimise": {**question, **changes}}
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "random"])
-def test_an_optimisation_stopped_and_started_again_asks_and_finds_the_same(athena_fmu: Path, tmp_path: Path, sampler: str) -> None:
+def test_an_optimisation_stopped_and_started_again_asks_and_finds_the_same(
+    athena_fmu: Path, tmp_path: Path, sampler: str
+) -> None:
     gains, study = make_gains(load_robot("athena")), study_of(optimisation(sampler=sampler))
     run_quietly(study, tmp_path / "whole", fmu=athena_fmu, gains=gains)
     run_quietly(study, tmp_path / "parted", fmu=athena_fmu, gains=gains)
@@ -174,34 +236,58 @@ def test_an_optimisation_stopped_and_started_again_asks_and_finds_the_same(athen
         assert (tmp_path / "parted" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(athena_fmu: Path, tmp_path: Path) -> None:
+def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     study = study_of(optimisation())
-    found = run_quietly(study, tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
-    training, held = [row for row in found if row["seed"] >= 10], [row for row in found if row["seed"] < 10]
+    found = run_quietly(
+        study, tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena"))
+    )
+    training, held = (
+        [row for row in found if row["seed"] >= 10],
+        [row for row in found if row["seed"] < 10],
+    )
     assert max(row["run"] for row in training) < min(row["run"] for row in held)
-    means = {point: np.mean([row["slip_per_metre"] for row in training if row["point"] == point]) for point in range(12)}
+    means = {
+        point: np.mean([row["slip_per_metre"] for row in training if row["point"] == point])
+        for point in range(12)
+    }
     (best,) = json.loads((tmp_path / "out" / OPTIMUM).read_text())["best"]
     assert best["trial"] == min(means, key=lambda point: means[point])
     assert best["training"]["slip_per_metre"] == pytest.approx(means[best["trial"]], rel=1e-12)
     assert {row["case"] for row in held} == {"ripple", "turn"}
     assert {row["case"] for row in training} == {"walk_flat", "push"}
     assert {row["point"] for row in held} == {12, best["trial"]}
-    assert {row["friction.mu"] for row in found if row["point"] == 12} == {None}  # before: nothing is set
+    assert {row["friction.mu"] for row in found if row["point"] == 12} == {
+        None
+    }  # before: nothing is set
 
 
 def test_what_the_best_trial_gains_is_paired_and_by_hand(athena_fmu: Path, tmp_path: Path) -> None:
-    found = run_quietly(study_of(optimisation()), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
+    found = run_quietly(
+        study_of(optimisation()),
+        tmp_path / "out",
+        fmu=athena_fmu,
+        gains=make_gains(load_robot("athena")),
+    )
     (best,) = json.loads((tmp_path / "out" / OPTIMUM).read_text())["best"]
 
     def sample(point: int, *, held_out: bool) -> np.ndarray[Any, Any]:
         chosen = [row for row in found if row["point"] == point and (row["seed"] < 10) == held_out]
-        return np.array([row["slip_per_metre"] for row in sorted(chosen, key=lambda row: (row["case"], row["seed"]))])
+        return np.array(
+            [
+                row["slip_per_metre"]
+                for row in sorted(chosen, key=lambda row: (row["case"], row["seed"]))
+            ]
+        )
 
     for part, held_out, pairs in (("training", False, 4), ("held_out", True, 6)):
         before, after = sample(12, held_out=held_out), sample(best["trial"], held_out=held_out)
         change = best["change"][part]["slip_per_metre"]
         assert (change["pairs"], change["verdict"]) == (pairs, "better")
-        assert change["relative"] == pytest.approx((after - before).mean() / before.mean(), rel=1e-12)
+        assert change["relative"] == pytest.approx(
+            (after - before).mean() / before.mean(), rel=1e-12
+        )
         assert change["half_width"] == pytest.approx(half_width(after - before), rel=1e-9)
     report_on(tmp_path / "out")
     row = optimum_changes(read_results(tmp_path / "out"))[0]
@@ -211,10 +297,20 @@ def test_what_the_best_trial_gains_is_paired_and_by_hand(athena_fmu: Path, tmp_p
         assert text in page
 
 
-def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(athena_fmu: Path, tmp_path: Path) -> None:
-    """The store is left with the first batch and with held-out runs whose figures would turn any search and any choice."""
-    gains, study, out = make_gains(load_robot("athena")), study_of(optimisation(sampler="tpe", trials=15)), tmp_path / "out"
-    whole = [row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10]
+def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
+    """The store is left with the first batch and with held-out runs whose figures would turn any
+    search and any choice.
+    """
+    gains, study, out = (
+        make_gains(load_robot("athena")),
+        study_of(optimisation(sampler="tpe", trials=15)),
+        tmp_path / "out",
+    )
+    whole = [
+        row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10
+    ]
     best = json.loads((out / OPTIMUM).read_text())["best"]
 
     def other(row: dict[str, Any]) -> dict[str, Any] | None:
@@ -223,18 +319,30 @@ def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(
         return {**row, "slip_per_metre": row["slip_per_metre"] - 1e6}
 
     store_instead(study, out, other)
-    assert [row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10] == whole
+    assert [
+        row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10
+    ] == whole
     (again,) = json.loads((out / OPTIMUM).read_text())["best"]
-    assert (again["trial"], again["values"], again["training"]) == (best[0]["trial"], best[0]["values"], best[0]["training"])
+    assert (again["trial"], again["values"], again["training"]) == (
+        best[0]["trial"],
+        best[0]["values"],
+        best[0]["training"],
+    )
     assert again["held_out"]["slip_per_metre"] < -1e5  # they were there, and read for the report
 
 
-def test_a_fall_leaves_a_trial_without_figures_and_out_of_the_choice(athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_fall_leaves_a_trial_without_figures_and_out_of_the_choice(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     variables = {"friction.mu": [0.17, 0.19, 0.5, 0.7]}  # refused, falls, walks, walks
     study = study_of(optimisation(variables=variables, metric="stability_margin"))  # more is better
     run_quietly(study, tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena")))
     (best,) = json.loads((tmp_path / "out" / OPTIMUM).read_text())["best"]
-    assert (best["values"], best["feasible"], best["held_out"]["walked"]) == ({"friction.mu": 0.7}, True, 1.0)
+    assert (best["values"], best["feasible"], best["held_out"]["walked"]) == (
+        {"friction.mu": 0.7},
+        True,
+        1.0,
+    )
     assert {trial.feasible for trial in read_results(tmp_path / "out").trials} == {True, False}
 
 

@@ -34,7 +34,10 @@ from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.cosim.study.store.columns import FIGURES
 from hexapod_cosim.models import load_robot
 
-WALK: dict[str, Any] = {"set": {"duration": 1.2, "gait.period": 0.4}, "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]}}
+WALK: dict[str, Any] = {
+    "set": {"duration": 1.2, "gait.period": 0.4},
+    "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]},
+}
 
 WAIT = 120.0  # s    a busy machine may take
 LONG = """
@@ -54,7 +57,9 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory, deaths: Path) -> Iterator[str]:
-    """The address of a Dask scheduler with two worker processes on loopback, which are begun anew when they die."""
+    """The address of a Dask scheduler with two worker processes on loopback, which are begun
+    anew when they die.
+    """
     folder = tmp_path_factory.mktemp("dask")
     with scheduling(folder) as (address, _), lasting_workers(address, 2, folder):
         yield address
@@ -74,19 +79,37 @@ def test_real_walks_on_a_cluster_are_those_on_this_machine_bit_for_bit(
 
 
 def test_a_run_of_a_study_is_the_run_by_itself(athena_fmu: Path, tmp_path: Path) -> None:
-    table = {**WALK, **KINEMATIC, "seeds": {"first": 4, "count": 1}, "factors": {"friction.mu": [0.5]}}
+    table = {
+        **WALK,
+        **KINEMATIC,
+        "seeds": {"first": 4, "count": 1},
+        "factors": {"friction.mu": [0.5]},
+    }
     (row,) = run_quietly(study_of(table), tmp_path / "out", engine="python", fmu=athena_fmu)
-    plan = load_scenario("walk_flat", overrides=["duration=1.2", "gait.period=0.4", "friction.mu=0.5", "seed=4"])
+    plan = load_scenario(
+        "walk_flat", overrides=["duration=1.2", "gait.period=0.4", "friction.mu=0.5", "seed=4"]
+    )
     (summary,) = run_batch([plan], fmu=athena_fmu, workers=1)
-    figures = {name: value if math.isfinite(value) else None for name, value in summary.metrics.items() if name in FIGURES}
+    figures = {
+        name: value if math.isfinite(value) else None
+        for name, value in summary.metrics.items()
+        if name in FIGURES
+    }
     assert {name: row[name] for name in FIGURES} == figures
 
 
-def test_a_study_goes_from_this_machine_to_a_cluster_and_back(athena_fmu: Path, tmp_path: Path, scheduler: str) -> None:
+def test_a_study_goes_from_this_machine_to_a_cluster_and_back(
+    athena_fmu: Path, tmp_path: Path, scheduler: str
+) -> None:
     study = study_of({**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5, 0.7]}})
     for place in ({"workers": 2}, {"scheduler": scheduler}, {"workers": 1}):
         with pytest.raises(KeyboardInterrupt):
-            run_study(study, tmp_path / "moved", options=Options(engine=SLOW, fmu=athena_fmu, **place), begun=_stop_after(20))
+            run_study(
+                study,
+                tmp_path / "moved",
+                options=Options(engine=SLOW, fmu=athena_fmu, **place),
+                begun=_stop_after(20),
+            )
     run_quietly(study, tmp_path / "moved", engine=SLOW, fmu=athena_fmu)
     run_quietly(study, tmp_path / "stayed", engine=SLOW, fmu=athena_fmu)
     assert digest(tmp_path / "moved") == digest(tmp_path / "stayed")
@@ -118,7 +141,8 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
     assert [row["run"] for row in found] == list(range(8))
     counted = Counter(deaths.read_text().splitlines())
     assert set(counted) == {"kinematic 0", "kinematic 1"}
-    # by itself; before that among others, or unnoticed: a worker that ends right after a run may take that one's result with it
+    # by itself; before that among others, or unnoticed: a worker that ends right after a run may
+    # take that one's result with it
     assert all(DEATHS <= number <= 2 * DEATHS for number in counted.values())
 
 
@@ -132,13 +156,20 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
             os.kill(victim, signal.SIGKILL)
             killed.append(victim)
 
-    run_study(study, tmp_path / "out", options=Options(engine=SLOW, fmu=athena_fmu, workers=2), begun=lambda _total, _done: tell)
+    run_study(
+        study,
+        tmp_path / "out",
+        options=Options(engine=SLOW, fmu=athena_fmu, workers=2),
+        begun=lambda _total, _done: tell,
+    )
     assert len(killed) == 2
     assert all(row["walked"] for row in rows(tmp_path / "out"))
     assert len(rows(tmp_path / "out")) == 200
 
 
-def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(athena_fmu: Path, tmp_path: Path) -> None:
+def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     study = study_of({**KINEMATIC, "seeds": 10, "factors": {"friction.mu": [0.3, 0.5]}})
     killed: set[int] = set()
     end = Event()
@@ -151,7 +182,12 @@ def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(athena
             time.sleep(0.001)
 
     killer = Thread(target=kill_on_sight, daemon=True)
-    runner = Thread(target=run_quietly, args=(study, tmp_path / "out"), kwargs={"fmu": athena_fmu, "workers": 2}, daemon=True)
+    runner = Thread(
+        target=run_quietly,
+        args=(study, tmp_path / "out"),
+        kwargs={"fmu": athena_fmu, "workers": 2},
+        daemon=True,
+    )
     killer.start()
     runner.start()
     runner.join(timeout=WAIT)
@@ -161,7 +197,9 @@ def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(athena
     assert [row["reason"] for row in rows(tmp_path / "out") if not row["walked"]] == []
 
 
-def test_nothing_is_left_of_what_workers_unpacked(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_left_of_what_workers_unpacked(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = tmp_path / "temporary"
     place.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(place))
@@ -173,18 +211,34 @@ def test_nothing_is_left_of_what_workers_unpacked(athena_fmu: Path, tmp_path: Pa
         assert not dead.exists()
         run_quietly(study_of(KINEMATIC), tmp_path / "out", fmu=athena_fmu, workers=1)
         assert alive.exists()
-        assert {path.name for path in place.iterdir() if path.name.startswith(PREFIX)} == {alive.name, young.name}
+        assert {path.name for path in place.iterdir() if path.name.startswith(PREFIX)} == {
+            alive.name,
+            young.name,
+        }
     assert [path.name for path in place.iterdir()] == [young.name]
 
 
-def test_a_workers_folder_goes_with_it_when_its_program_is_killed(athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_workers_folder_goes_with_it_when_its_program_is_killed(
+    athena_fmu: Path, tmp_path: Path
+) -> None:
     place, file = tmp_path / "temporary", tmp_path / "study.toml"
     place.mkdir()
     file.write_text(LONG)
     process = subprocess.Popen(
-        [sys.executable, "-m", "hexapod_cosim.cosim.cli", "study", str(file), "-o", str(tmp_path / "out"), "--fmu", str(athena_fmu)],
-        env={**os.environ, "TMPDIR": str(place)}, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "hexapod_cosim.cosim.cli",
+            "study",
+            str(file),
+            "-o",
+            str(tmp_path / "out"),
+            "--fmu",
+            str(athena_fmu),
+        ],
+        env={**os.environ, "TMPDIR": str(place)},
+        stderr=subprocess.DEVNULL,
+    )
     _wait_until(lambda: any(place.glob(f"{PREFIX}*/hexapod-job-*")))
     process.kill()
     process.wait()
@@ -202,7 +256,9 @@ def _children() -> set[int]:
     return {child.pid for child in multiprocessing.active_children() if child.pid is not None}
 
 
-def test_workers_that_cannot_work_at_all_end_the_study(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_cannot_work_at_all_end_the_study(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("hexapod_cosim.cosim.study.execute.conduct.USELESS", 1)
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
     with pytest.raises(StudyError, match="no worker lives to finish a run"):
@@ -210,20 +266,35 @@ def test_workers_that_cannot_work_at_all_end_the_study(athena_fmu: Path, tmp_pat
     assert not list((tmp_path / "out" / "runs").iterdir())
 
 
-def test_a_scheduler_that_is_not_there_is_named(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_named(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("hexapod_cosim.cosim.study.execute.cluster.CONNECT", "1s")
     with pytest.raises(StudyError, match=r"--scheduler: no scheduler answers.*tcp://127.0.0.1:9"):
-        run_study(study_of({**SMALL, **KINEMATIC}), tmp_path, options=Options(fmu=athena_fmu, scheduler="tcp://127.0.0.1:9"), begun=quiet)
+        run_study(
+            study_of({**SMALL, **KINEMATIC}),
+            tmp_path,
+            options=Options(fmu=athena_fmu, scheduler="tcp://127.0.0.1:9"),
+            begun=quiet,
+        )
 
 
-def test_a_worker_with_other_versions_is_refused(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9")  # here, not in the worker
-    with pytest.raises(StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"):
+def test_a_worker_with_other_versions_is_refused(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9"
+    )  # here, not in the worker
+    with pytest.raises(
+        StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"
+    ):
         run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu, workers=2)
 
 
 @pytest.mark.parametrize("workers", [0, 1])
-def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(athena_fmu: Path, tmp_path: Path, workers: int) -> None:
+def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(
+    athena_fmu: Path, tmp_path: Path, workers: int
+) -> None:
     mistakes = {
         0.21: "LinAlgError: Singular matrix",
         0.22: "ValueError: operands could not be broadcast",
@@ -234,7 +305,9 @@ def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(athena_fmu: Pat
         0.27: "TypeError: the engine gave str, expected a Summary",
     }
     study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *mistakes, 0.5]}})
-    first, *bad, last = run_quietly(study, tmp_path / "out", engine="study_engines:Buggy", fmu=athena_fmu, workers=workers)
+    first, *bad, last = run_quietly(
+        study, tmp_path / "out", engine="study_engines:Buggy", fmu=athena_fmu, workers=workers
+    )
     assert first["walked"]
     assert last["walked"]
     for row, expected in zip(bad, mistakes.values(), strict=True):
@@ -244,11 +317,20 @@ def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(athena_fmu: Pat
     assert "(study_engines.py, line" in bad[2]["reason"]
 
 
-def test_a_run_that_was_made_before_is_not_made_again(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_that_was_made_before_is_not_made_again(
+    athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     table = {"seeds": 2, "factors": {"gains.slip.kp": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]}}
-    options = {"engine": "study_engines:Counting", "fmu": athena_fmu, "gains": make_gains(load_robot("athena"))}
+    options = {
+        "engine": "study_engines:Counting",
+        "fmu": athena_fmu,
+        "gains": make_gains(load_robot("athena")),
+    }
     kept = run_quietly(study_of(table), tmp_path / "kept", **options)
-    assert Counter(control for control, _ in Counting.asked) == {"kinematic": 2 * 2, "compliant": 3 * 2 * 2}
+    assert Counter(control for control, _ in Counting.asked) == {
+        "kinematic": 2 * 2,
+        "compliant": 3 * 2 * 2,
+    }
     Counting.asked.clear()
     monkeypatch.setattr("hexapod_cosim.cosim.study.execute.worker.MOST_KNOWN", 0)
     assert run_quietly(study_of(table), tmp_path / "made", **options) == kept

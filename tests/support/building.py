@@ -1,4 +1,6 @@
-"""The plant built for tests: one incremental CMake build in build/test, also installed to where the exporter packs from."""
+"""The plant built for tests: one incremental CMake build in build/test, also installed to where
+the exporter packs from.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,14 @@ class BuildError(Exception):
 
 
 def built() -> Path:
-    """build/test, up to date; also installed to build/plant. Of the processes of one test run the first builds. Raises BuildError."""
+    """build/test, up to date; also installed to build/plant. Of the processes of one test run
+    the first builds. Raises BuildError.
+    """
     BUILD.parent.mkdir(exist_ok=True)
-    session, last = os.environ.get("PYTEST_XDIST_TESTRUNUID", ""), BUILD.parent / f".{PRESET}.session"
+    session, last = (
+        os.environ.get("PYTEST_XDIST_TESTRUNUID", ""),
+        BUILD.parent / f".{PRESET}.session",
+    )
     with FileLock(BUILD.parent / f".{PRESET}.lock"):
         if not session or not last.exists() or last.read_text(encoding="utf-8") != session:
             _build()
@@ -33,14 +40,18 @@ def built() -> Path:
 
 def _build() -> None:
     if _configure().returncode != 0:
-        shutil.rmtree(BUILD, ignore_errors=True)  # configured by a CMake, Python or generator that is gone
+        shutil.rmtree(
+            BUILD, ignore_errors=True
+        )  # configured by a CMake, Python or generator that is gone
         _succeed(_configure())
     _succeed(_cmake("--build", "--preset", PRESET))
     _succeed(_cmake("--install", str(BUILD), "--prefix", str(PACKED)))
 
 
 def shared_library(build: Path, component: str, name: str) -> Path:
-    """A shared library of a component's folder in the build, whatever this system ends its name with."""
+    """A shared library of a component's folder in the build, whatever this system ends its name
+    with.
+    """
     return next((build / component).glob(f"{name}.[sd]*"))
 
 
@@ -54,8 +65,13 @@ def _cmake(*arguments: str) -> subprocess.CompletedProcess[str]:
     cmake = shutil.which("cmake", path=_search_path())
     if cmake is None:
         raise BuildError("no cmake: run `pip install -e .[test]`")
-    environment = os.environ | {"PATH": _search_path(), "LD_PRELOAD": ""}  # sanitizers are for the tests, not for the build
-    return subprocess.run([cmake, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    environment = os.environ | {
+        "PATH": _search_path(),
+        "LD_PRELOAD": "",
+    }  # sanitizers are for the tests, not for the build
+    return subprocess.run(
+        [cmake, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
 
 
 def _search_path() -> str:

@@ -16,7 +16,9 @@ def settings(*pairs: str) -> list[str]:
 
 
 def assert_refused(outcome: tuple[int, str, str], *parts: str) -> None:
-    """Exit code not 0, nothing on stdout, one paragraph without a traceback on stderr that holds the parts."""
+    """Exit code not 0, nothing on stdout, one paragraph without a traceback on stderr that holds
+    the parts.
+    """
     code, out, err = outcome
     assert code not in (0, None)
     assert out == ""

@@ -9,15 +9,31 @@ from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement,
 from hexapod_cosim.models import load_robot
 
 
-def make(name: str = "athena", *, gait: Gait | None = None, compliant: bool = False, parts: Parts | None = None) -> Controller:
+def make(
+    name: str = "athena",
+    *,
+    gait: Gait | None = None,
+    compliant: bool = False,
+    parts: Parts | None = None,
+) -> Controller:
     robot = load_robot(name)
     return Controller(
-        robot, period=PERIOD, gait=make_gait(robot) if gait is None else gait, gains=make_gains(robot) if compliant else None,
+        robot,
+        period=PERIOD,
+        gait=make_gait(robot) if gait is None else gait,
+        gains=make_gains(robot) if compliant else None,
         parts=Parts() if parts is None else parts,
-    )  # fmt: skip
+    )
 
 
-def run(controller: Controller, command: BodyCommand, steps: int, *, first: int = 0, measurement: Measurement | None = None) -> np.ndarray:
+def run(
+    controller: Controller,
+    command: BodyCommand,
+    steps: int,
+    *,
+    first: int = 0,
+    measurement: Measurement | None = None,
+) -> np.ndarray:
     """(steps, 3, 6, 3) angle_ref, speed_ref and torque_ref of consecutive steps."""
     found = []
     for k in range(first, first + steps):
@@ -27,7 +43,9 @@ def run(controller: Controller, command: BodyCommand, steps: int, *, first: int 
 
 
 def squeezed(generator: np.random.Generator | None = None) -> Measurement:
-    """A measurement with all feet on the ground, unequal forces, joints off the stance and a torso that leans."""
+    """A measurement with all feet on the ground, unequal forces, joints off the stance and a
+    torso that leans.
+    """
     generator = generator or np.random.default_rng(4)
     measurement = Measurement(contact=np.ones(6, dtype=bool))
     measurement.foot_force[:] = generator.normal(size=(6, 3)) * 2.0 + [0.0, 0.0, 9.0]
@@ -37,8 +55,14 @@ def squeezed(generator: np.random.Generator | None = None) -> Measurement:
 
 
 def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray:
-    """As `run`, of a robot that does all that is planned: its feet feel the planned shares, its joints are where they were told to be."""
-    measurement, compliant, found = Measurement(angle=controller.stance.copy()), controller.compliant, []
+    """As `run`, of a robot that does all that is planned: its feet feel the planned shares, its
+    joints are where they were told to be.
+    """
+    measurement, compliant, found = (
+        Measurement(angle=controller.stance.copy()),
+        controller.compliant,
+        [],
+    )
     for k in range(steps):
         out = controller.step(k * PERIOD, command, measurement)
         found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))

@@ -1,4 +1,6 @@
-"""The FMI 3.0 side of the FMU's shared library through bare ctypes: statuses as they come, messages as they are logged."""
+"""The FMI 3.0 side of the FMU's shared library through bare ctypes: statuses as they come,
+messages as they are logged.
+"""
 
 from __future__ import annotations
 
@@ -40,9 +42,18 @@ class Plant3:
     """One instance; `handle` is None when instantiation was refused."""
 
     def __init__(
-        self, library: Path, *, kind: str = "CoSimulation", token: str | None = GUID, resources: str | None = None,
-        name: str | None = "plant", events: bool = False, early: bool = False, logger: bool = True, logging: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        library: Path,
+        *,
+        kind: str = "CoSimulation",
+        token: str | None = GUID,
+        resources: str | None = None,
+        name: str | None = "plant",
+        events: bool = False,
+        early: bool = False,
+        logger: bool = True,
+        logging: bool = False,
+    ) -> None:
         self.messages: list[tuple[int, str, str]] = []
         self._logger = _LOGGER(self._log) if logger else _LOGGER()
         self._library = ctypes.CDLL(str(library))
@@ -59,7 +70,12 @@ class Plant3:
     def __enter__(self) -> Plant3:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._library.fmi3FreeInstance(ctypes.c_void_p(self.handle))
 
     def _log(self, _environment: int, status: int, category: bytes, text: bytes) -> None:
@@ -71,7 +87,9 @@ class Plant3:
         return self.messages[-1][2]
 
     def call(self, function: str, *arguments: object) -> int:
-        """Calls a function of the instance and returns its status. Floats go as double, bools as bool, ints as size_t."""
+        """Calls a function of the instance and returns its status. Floats go as double, bools as
+        bool, ints as size_t.
+        """
         converted = [_argument(value) for value in arguments]
         return int(getattr(self._library, function)(ctypes.c_void_p(self.handle), *converted))
 
@@ -81,7 +99,9 @@ class Plant3:
         assert self.call("fmi3ExitInitializationMode") == OK
         return self
 
-    def enter_initialization(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> int:
+    def enter_initialization(
+        self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None
+    ) -> int:
         """fmi3EnterInitializationMode."""
         given = [tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0]
         return self.call("fmi3EnterInitializationMode", *given)
@@ -89,40 +109,64 @@ class Plant3:
     def step(self, time: float, size: float) -> Step:
         """fmi3DoStep."""
         flags, reached = [ctypes.c_bool() for _ in range(3)], ctypes.c_double()
-        status = self.call("fmi3DoStep", float(time), float(size), True, *map(ctypes.byref, flags), ctypes.byref(reached))
+        status = self.call(
+            "fmi3DoStep",
+            float(time),
+            float(size),
+            True,
+            *map(ctypes.byref, flags),
+            ctypes.byref(reached),
+        )
         event, terminate, early = (flag.value for flag in flags)
         return Step(status, event, terminate, early, reached.value)
 
     def update(self) -> tuple[int, list[bool]]:
         """fmi3UpdateDiscreteStates: the status and its flags."""
         flags, time = [ctypes.c_bool(True) for _ in range(5)], ctypes.c_double()
-        status = self.call("fmi3UpdateDiscreteStates", *map(ctypes.byref, flags), ctypes.byref(time))
+        status = self.call(
+            "fmi3UpdateDiscreteStates", *map(ctypes.byref, flags), ctypes.byref(time)
+        )
         return status, [flag.value for flag in flags]
 
     def get_raw(self, kind: str, references: Sequence[int], count: int) -> tuple[int, list[Any]]:
         """A getter by references: status and values."""
         ctype = next(ctype for name, ctype in TYPES.values() if name == kind)
         values = (ctype * count)()
-        return self.call(f"fmi3Get{kind}", _uints(references), len(references), values, count), list(values)
+        return self.call(
+            f"fmi3Get{kind}", _uints(references), len(references), values, count
+        ), list(values)
 
     def set_raw(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> int:
         """A setter by references."""
         ctype = next(ctype for name, ctype in TYPES.values() if name == kind)
-        return self.call(f"fmi3Set{kind}", _uints(references), len(references), (ctype * len(values))(*values), len(values))
+        return self.call(
+            f"fmi3Set{kind}",
+            _uints(references),
+            len(references),
+            (ctype * len(values))(*values),
+            len(values),
+        )
 
     def get(self, *names: str) -> list[NDArray[Any]]:
         """Values of variables of one type, as arrays."""
         chosen = [ARRAYS[name] for name in names]
-        status, values = self.get_raw(TYPES[chosen[0].first.type][0], [array.reference for array in chosen], _size(chosen))
+        status, values = self.get_raw(
+            TYPES[chosen[0].first.type][0], [array.reference for array in chosen], _size(chosen)
+        )
         assert status == OK, self.last_message
         ends = np.cumsum([len(array.elements) for array in chosen])[:-1]
-        return [part.reshape(array.shape) for part, array in zip(np.split(np.array(values), ends), chosen, strict=True)]
+        return [
+            part.reshape(array.shape)
+            for part, array in zip(np.split(np.array(values), ends), chosen, strict=True)
+        ]
 
     def set(self, values: Mapping[str, Any]) -> int:
         """Sets variables of one type, in one call."""
         chosen = [ARRAYS[name] for name in values]
         flat = [element for value in values.values() for element in np.ravel(value).tolist()]
-        return self.set_raw(TYPES[chosen[0].first.type][0], [array.reference for array in chosen], flat)
+        return self.set_raw(
+            TYPES[chosen[0].first.type][0], [array.reference for array in chosen], flat
+        )
 
     def everything(self) -> NDArray[np.float64]:
         """All Float64 variables, one after the other."""

@@ -1,4 +1,6 @@
-"""The FMU's shared library through bare ctypes: statuses as they come, messages as they are logged."""
+"""The FMU's shared library through bare ctypes: statuses as they come, messages as they are
+logged.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,9 @@ DO_STEP_STATUS, PENDING_STATUS, LAST_SUCCESSFUL_TIME, TERMINATED = 0, 1, 2, 3
 ATHENA: Interface = load_interface(load_robot("athena"))
 GUID = render_fmi2(ATHENA).guid
 
-_LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
+_LOGGER = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
+)
 
 
 class Callbacks(ctypes.Structure):
@@ -37,24 +41,40 @@ class Plant:
     """One instance; `component` is None when instantiation was refused."""
 
     def __init__(
-        self, library: Path, *, guid: str | None = GUID, resources: str | None = None, name: str | None = "plant",
-        kind: int = CO_SIMULATION, logging: bool = False, callbacks: bool = True,
-    ) -> None:  # fmt: skip
+        self,
+        library: Path,
+        *,
+        guid: str | None = GUID,
+        resources: str | None = None,
+        name: str | None = "plant",
+        kind: int = CO_SIMULATION,
+        logging: bool = False,
+        callbacks: bool = True,
+    ) -> None:
         self.messages: list[tuple[int, str, str]] = []
         self.speakers: set[str] = set()  # instance names that came with messages
         self._functions = Callbacks(logger=_LOGGER(self._log))
         self._library = ctypes.CDLL(str(library))
         self._library.fmi2Instantiate.restype = ctypes.c_void_p
         given = ctypes.byref(self._functions) if callbacks else None
-        self.component = self._library.fmi2Instantiate(_bytes(name), kind, _bytes(guid), _bytes(resources), given, 0, int(logging))
+        self.component = self._library.fmi2Instantiate(
+            _bytes(name), kind, _bytes(guid), _bytes(resources), given, 0, int(logging)
+        )
 
     def __enter__(self) -> Plant:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._library.fmi2FreeInstance(ctypes.c_void_p(self.component))
 
-    def _log(self, _environment: int, name: bytes, status: int, category: bytes, text: bytes) -> None:
+    def _log(
+        self, _environment: int, name: bytes, status: int, category: bytes, text: bytes
+    ) -> None:
         self.speakers.add(name.decode())
         self.messages.append((status, category.decode(), text.decode()))
 
@@ -64,8 +84,12 @@ class Plant:
         return self.messages[-1][2]
 
     def call(self, function: str, *arguments: object) -> int:
-        """Calls a function of the instance and returns its status. Floats go as double, ints as int."""
-        converted = [ctypes.c_double(value) if isinstance(value, float) else value for value in arguments]
+        """Calls a function of the instance and returns its status. Floats go as double, ints as
+        int.
+        """
+        converted = [
+            ctypes.c_double(value) if isinstance(value, float) else value for value in arguments
+        ]
         return int(getattr(self._library, function)(ctypes.c_void_p(self.component), *converted))
 
     def initialize(self, *, start: float = 0.0) -> Plant:
@@ -83,10 +107,16 @@ class Plant:
         """fmi2SetReal by name, one batch."""
         return self.set_references("fmi2SetReal", ATHENA.references(values), list(values.values()))
 
-    def set_references(self, function: str, references: Sequence[int], values: Sequence[float]) -> int:
+    def set_references(
+        self, function: str, references: Sequence[int], values: Sequence[float]
+    ) -> int:
         """A setter by reference."""
         n = len(references)
-        array = (ctypes.c_double * n)(*values) if function == "fmi2SetReal" else (ctypes.c_int * n)(*map(int, values))
+        array = (
+            (ctypes.c_double * n)(*values)
+            if function == "fmi2SetReal"
+            else (ctypes.c_int * n)(*map(int, values))
+        )
         return self.call(function, (ctypes.c_uint * n)(*references), ctypes.c_size_t(n), array)
 
     def get_references(self, function: str, references: Sequence[int]) -> tuple[int, list[float]]:
@@ -108,7 +138,9 @@ class Plant:
 
     def everything(self) -> list[float]:
         """All Real variables."""
-        return self.reals([variable.name for variable in ATHENA.variables if variable.type == "Real"])
+        return self.reals(
+            [variable.name for variable in ATHENA.variables if variable.type == "Real"]
+        )
 
     def save(self) -> ctypes.c_void_p:
         """fmi2GetFMUstate."""
@@ -127,7 +159,9 @@ class Plant:
     def deserialize(self, data: bytes) -> tuple[int, ctypes.c_void_p]:
         """Status and state."""
         state = ctypes.c_void_p()
-        return self.call("fmi2DeSerializeFMUstate", data, ctypes.c_size_t(len(data)), ctypes.byref(state)), state
+        return self.call(
+            "fmi2DeSerializeFMUstate", data, ctypes.c_size_t(len(data)), ctypes.byref(state)
+        ), state
 
     def free(self, state: ctypes.c_void_p) -> None:
         """fmi2FreeFMUstate."""

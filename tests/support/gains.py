@@ -10,16 +10,37 @@ from hexapod_cosim.models import Robot
 
 PERIOD = 0.005  # s
 MARGINS = Margins(
-    slip_crossover=20.0, slip_phase_margin=60.0, slip_gain_margin=8.0, slip_delay_margin=0.02, slip_rejection=0.1,
-    suspension_phase_margin=60.0, suspension_gain_margin=8.0, support_torque=0.0, spectral_radius=0.99, binding="none",
-)  # fmt: skip
+    slip_crossover=20.0,
+    slip_phase_margin=60.0,
+    slip_gain_margin=8.0,
+    slip_delay_margin=0.02,
+    slip_rejection=0.1,
+    suspension_phase_margin=60.0,
+    suspension_gain_margin=8.0,
+    support_torque=0.0,
+    spectral_radius=0.99,
+    binding="none",
+)
 SLIP = SlipGains(
-    kp=0.2, ki=20.0, kd=0.0, derivative_time=0.01, filter_time=0.01, load_time=0.03, tracking_time=0.02, limit=1.0
-)  # fmt: skip
+    kp=0.2,
+    ki=20.0,
+    kd=0.0,
+    derivative_time=0.01,
+    filter_time=0.01,
+    load_time=0.03,
+    tracking_time=0.02,
+    limit=1.0,
+)
 HOLD = HoldGains(
-    attitude_rate=2.0, height_rate=2.0, ground_time=2.0, angle_limit=0.05, height_limit=0.01, path_rate=0.5, speed_limit=0.02,
+    attitude_rate=2.0,
+    height_rate=2.0,
+    ground_time=2.0,
+    angle_limit=0.05,
+    height_limit=0.01,
+    path_rate=0.5,
+    speed_limit=0.02,
     turn_limit=0.05,
-)  # fmt: skip
+)
 
 
 def weight(robot: Robot) -> float:
@@ -27,17 +48,28 @@ def weight(robot: Robot) -> float:
     return robot.total_mass * math.hypot(*robot.gravity)
 
 
-def suspension(robot: Robot, *, deflection: float = 0.003, frequency: float = 5.0) -> SuspensionGains:
+def suspension(
+    robot: Robot, *, deflection: float = 0.003, frequency: float = 5.0
+) -> SuspensionGains:
     """Critically damped: so far under a third of the weight [m], at this natural frequency [Hz]."""
     stiffness, omega = weight(robot) / TRIPOD_LEGS / deflection, 2.0 * math.pi * frequency
-    return SuspensionGains(mass=stiffness / omega**2, damping=2.0 * stiffness / omega, stiffness=stiffness, limit=0.015)
+    return SuspensionGains(
+        mass=stiffness / omega**2, damping=2.0 * stiffness / omega, stiffness=stiffness, limit=0.015
+    )
 
 
 def make_gains(robot: Robot, *, period: float = PERIOD) -> Gains:
     """A plausible set for this robot and period."""
     servo = robot.servo
     return Gains(
-        robot=robot.name, robot_hash=robot.hash, period=period, requirements=Requirements(), slip=SLIP, suspension=suspension(robot),
-        support=SupportGains(handover_time=0.05, weight_time=0.5), hold=HOLD,
-        limits=LimitGains(speed=0.5 * servo.speed_max, torque=0.9 * servo.torque_max), margins=MARGINS,
-    )  # fmt: skip
+        robot=robot.name,
+        robot_hash=robot.hash,
+        period=period,
+        requirements=Requirements(),
+        slip=SLIP,
+        suspension=suspension(robot),
+        support=SupportGains(handover_time=0.05, weight_time=0.5),
+        hold=HOLD,
+        limits=LimitGains(speed=0.5 * servo.speed_max, torque=0.9 * servo.torque_max),
+        margins=MARGINS,
+    )

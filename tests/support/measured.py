@@ -1,4 +1,6 @@
-"""What the plant measures, measured again: a walk driven in steps of 0.1 ms, and sums over samples of force, velocity, torque, speed."""
+"""What the plant measures, measured again: a walk driven in steps of 0.1 ms, and sums over
+samples of force, velocity, torque, speed.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +21,18 @@ FINE = 1e-4  # s
 LOADED = 0.01  # of the weight
 AFTER = 0.020  # s    after touch-down
 QUANTITIES = {
-    "torque": joint_names("torque"), "speed": joint_names("speed"), "normal": foot_names("normal_force"),
+    "torque": joint_names("torque"),
+    "speed": joint_names("speed"),
+    "normal": foot_names("normal_force"),
     "velocity": foot_vector_names("velocity"),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
 class Samples:
-    """A walk on flat ground in intervals of 0.1 ms: at their begins, under the new command, and at their ends, under the same one."""
+    """A walk on flat ground in intervals of 0.1 ms: at their begins, under the new command, and
+    at their ends, under the same one.
+    """
 
     time: Array  # s    (n,) of the begins
     torque: Array  # N m    (2, n, 18)
@@ -42,10 +48,16 @@ class Samples:
 
 
 def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Samples:
-    """Drives the scenario's plant again by the recorded commands, each held for a macro-step; from a time [s] on samples are kept."""
+    """Drives the scenario's plant again by the recorded commands, each held for a macro-step;
+    from a time [s] on samples are kept.
+    """
     names = [name for names in QUANTITIES.values() for name in names]
     joints = [name for names in COMMANDED.values() for name in names]
-    commands, plan, per_step = recording.columns(joints), make_plan(scenario), round(scenario.macro_step / FINE)
+    commands, plan, per_step = (
+        recording.columns(joints),
+        make_plan(scenario),
+        round(scenario.macro_step / FINE),
+    )
     count, first = round(scenario.duration / FINE), round(begin / FINE)
     rows = np.empty((2, count - first, len(names)))
     with open_plant(scenario) as plant:
@@ -62,8 +74,16 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
             if k >= first:
                 seen.get()
                 rows[1, k - first] = seen.values
-    torque, speed, normal, velocity = np.split(rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2)
-    return Samples(FINE * np.arange(first, count, dtype=np.float64), torque, speed, normal, velocity.reshape(2, -1, 6, 3))
+    torque, speed, normal, velocity = np.split(
+        rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2
+    )
+    return Samples(
+        FINE * np.arange(first, count, dtype=np.float64),
+        torque,
+        speed,
+        normal,
+        velocity.reshape(2, -1, 6, 3),
+    )
 
 
 def integral(values: Array) -> Array:
@@ -83,7 +103,8 @@ def driven(samples: Samples) -> float:
 
 
 def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float]:
-    """Steepest rise [N/s] of each landing in the 20 ms after its touch-downs, of landings after a time [s].
+    """Steepest rise [N/s] of each landing in the 20 ms after its touch-downs, of landings after a
+    time [s].
 
     Touch-downs of a foot less than `apart` [s] after another are one landing.
     """

@@ -1,4 +1,6 @@
-"""hexapod.h in ctypes: its structures, constants and statuses. test_plant_functions.py compares them with the compiler's layout."""
+"""hexapod.h in ctypes: its structures, constants and statuses. test_plant_functions.py compares
+them with the compiler's layout.
+"""
 
 from __future__ import annotations
 
@@ -26,19 +28,54 @@ def reals(names: str) -> list[tuple[str, Any]]:
     return [(name, Real) for name in names.split()]
 
 
-HxLink = record("HxLink", *reals("mass length offset_y offset_z"), ("com", Vector3), ("inertia", Vector6), ("axis", Vector3))
+HxLink = record(
+    "HxLink",
+    *reals("mass length offset_y offset_z"),
+    ("com", Vector3),
+    ("inertia", Vector6),
+    ("axis", Vector3),
+)
 HxLeg = record("HxLeg", ("hip_position", Vector3), ("hip_yaw", Real), ("link", HxLink * JOINTS))
 HxDefinition = record(
     "HxDefinition",
     ("torso", record("Torso", ("mass", Real), ("com", Vector3), ("inertia", Vector6))),
     ("leg", HxLeg * LEGS),
     ("foot_radius", Real),
-    ("contact", record("Contact", ("law", ct.c_int), *reals("stiffness restitution damping_factor impact_speed_floor"))),
-    ("friction", record("Friction", ("law", ct.c_int), *reals("mu slope presliding bristle_damping mu_static stribeck_speed"))),
-    ("servo", record("Servo", ("mode", ct.c_int), *reals("kp kd torque_max speed_max rotor_inertia coulomb_friction"))),
+    (
+        "contact",
+        record(
+            "Contact",
+            ("law", ct.c_int),
+            *reals("stiffness restitution damping_factor impact_speed_floor"),
+        ),
+    ),
+    (
+        "friction",
+        record(
+            "Friction",
+            ("law", ct.c_int),
+            *reals("mu slope presliding bristle_damping mu_static stribeck_speed"),
+        ),
+    ),
+    (
+        "servo",
+        record(
+            "Servo",
+            ("mode", ct.c_int),
+            *reals("kp kd torque_max speed_max rotor_inertia coulomb_friction"),
+        ),
+    ),
     ("baumgarte", record("Baumgarte", *reals("alpha beta"))),
     ("gravity", Vector3),
-    ("solver", record("Solver", ("method", ct.c_int), *reals("step tolerance step_max"), ("projection", ct.c_int))),
+    (
+        "solver",
+        record(
+            "Solver",
+            ("method", ct.c_int),
+            *reals("step tolerance step_max"),
+            ("projection", ct.c_int),
+        ),
+    ),
     ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading"))),
     (
         "initial",
@@ -122,7 +159,9 @@ HxOutput = record(
         "energy",
         record(
             "EnergyOutput",
-            *reals("kinetic potential actuator_work push_work dissipated contact_loss friction_loss gear_loss residual"),
+            *reals(
+                "kinetic potential actuator_work push_work dissipated contact_loss friction_loss gear_loss residual"
+            ),
         ),
     ),
     ("constraint", record("ConstraintOutput", *reals("position_error velocity_error"))),

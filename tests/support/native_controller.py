@@ -1,4 +1,6 @@
-"""The C controller from Python: one instance that steps like `Controller`, set up through the C library's own table of ranges."""
+"""The C controller from Python: one instance that steps like `Controller`, set up through the C
+library's own table of ranges.
+"""
 
 from __future__ import annotations
 
@@ -9,21 +11,42 @@ import numpy as np
 from mirror import LEGS, OK, PerJoint, Real, record
 
 from hexapod_cosim.controller import BodyCommand, Measurement
-from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup, load_controller_interface
+from hexapod_cosim.cosim.interface.controller_interface import (
+    ControllerSetup,
+    load_controller_interface,
+)
 
 Flags = ct.c_int * LEGS
 COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
 HxRange = record(
-    "HxRange", ("name", ct.c_char_p), ("unit", ct.c_char_p), ("min", Real), ("max", Real), ("offset", ct.c_size_t), ("is_int", ct.c_int)
+    "HxRange",
+    ("name", ct.c_char_p),
+    ("unit", ct.c_char_p),
+    ("min", Real),
+    ("max", Real),
+    ("offset", ct.c_size_t),
+    ("is_int", ct.c_int),
 )
 HxControllerInput = record(
-    "HxControllerInput", ("command", Real * 6), ("angle", PerJoint), ("foot_force", PerJoint), ("quaternion", Real * 4)
+    "HxControllerInput",
+    ("command", Real * 6),
+    ("angle", PerJoint),
+    ("foot_force", PerJoint),
+    ("quaternion", Real * 4),
 )
 HxControllerOutput = record(
-    "HxControllerOutput", ("angle_ref", PerJoint), ("speed_ref", PerJoint), ("torque_ref", PerJoint), ("swinging", Flags),
-    ("unreachable", Flags), ("fallback", Flags), ("shift", (Real * 2) * LEGS), ("lift", Real * LEGS), ("planned", (Real * 3) * LEGS),
+    "HxControllerOutput",
+    ("angle_ref", PerJoint),
+    ("speed_ref", PerJoint),
+    ("torque_ref", PerJoint),
+    ("swinging", Flags),
+    ("unreachable", Flags),
+    ("fallback", Flags),
+    ("shift", (Real * 2) * LEGS),
+    ("lift", Real * LEGS),
+    ("planned", (Real * 3) * LEGS),
     ("acceleration_ref", PerJoint),
-)  # fmt: skip
+)
 
 
 class NativeError(Exception):
@@ -45,8 +68,14 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_controller_create": (controller, []),
         "hx_controller_destroy": (None, [controller]),
         "hx_controller_reset": (status, [controller, ct.c_void_p, Real]),
-        "hx_controller_output": (None, [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerOutput)]),
-        "hx_controller_step": (status, [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerInput), Real]),
+        "hx_controller_output": (
+            None,
+            [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerOutput)],
+        ),
+        "hx_controller_step": (
+            status,
+            [controller, ct.POINTER(HxControllerInput), ct.POINTER(HxControllerInput), Real],
+        ),
         "hx_controller_time": (Real, [controller]),
         "hx_controller_message": (ct.c_char_p, [controller]),
         "hx_controller_state_size": (ct.c_size_t, []),
@@ -87,7 +116,11 @@ class NativeController:
     """One C controller. `step` is that of `Controller`; `out` holds the last commands."""
 
     def __init__(self, core: ct.CDLL, setup: ControllerSetup, *, start: float = 0.0) -> None:
-        self._core, self.period, self.definition = bound(core), setup.period, Definition(core, setup)
+        self._core, self.period, self.definition = (
+            bound(core),
+            setup.period,
+            Definition(core, setup),
+        )
         self._handle = core.hx_controller_create()
         self.input, self.out = HxControllerInput(), HxControllerOutput()
         self.reset(start)
@@ -110,11 +143,22 @@ class NativeController:
 
     def go(self, t_end: float, *, rate: Any = None) -> None:
         """To t_end under the input as it stands, which changes at a rate [1/s]."""
-        self._checked(self._core.hx_controller_step(self._handle, ct.byref(self.input), None if rate is None else ct.byref(rate), t_end))
+        self._checked(
+            self._core.hx_controller_step(
+                self._handle, ct.byref(self.input), None if rate is None else ct.byref(rate), t_end
+            )
+        )
 
     def sense(self, command: BodyCommand, measurement: Measurement) -> None:
         """Sets the input."""
-        values = (command.vx, command.vy, command.yaw_rate, command.height, command.roll, command.pitch)
+        values = (
+            command.vx,
+            command.vy,
+            command.yaw_rate,
+            command.height,
+            command.roll,
+            command.pitch,
+        )
         self.input.command[:] = values
         for name in ("angle", "foot_force"):
             np.ctypeslib.as_array(getattr(self.input, name))[...] = getattr(measurement, name)

@@ -1,4 +1,6 @@
-"""The C plant from Python: `Plant` around one instance, robots made into definitions, and calls of the probe's functions."""
+"""The C plant from Python: `Plant` around one instance, robots made into definitions, and calls
+of the probe's functions.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,20 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from mirror import BODIES, BODY_STATE, JOINTS, LEGS, MULTIPLIERS, OK, Doubles, HxCoordinates, HxDefinition, HxInput, HxOutput, Real
+from mirror import (
+    BODIES,
+    BODY_STATE,
+    JOINTS,
+    LEGS,
+    MULTIPLIERS,
+    OK,
+    Doubles,
+    HxCoordinates,
+    HxDefinition,
+    HxInput,
+    HxOutput,
+    Real,
+)
 
 from hexapod_cosim.models import (
     CONTACT_LAWS,
@@ -51,7 +66,10 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_plant_time": (Real, [plant]),
         "hx_plant_message": (ct.c_char_p, [plant]),
         "hx_plant_state_size": (ct.c_size_t, []),
-        "hx_plant_step_to_event": (status, [plant, ct.POINTER(HxInput), Real, ct.c_int, ct.POINTER(ct.c_int)]),
+        "hx_plant_step_to_event": (
+            status,
+            [plant, ct.POINTER(HxInput), Real, ct.c_int, ct.POINTER(ct.c_int)],
+        ),
         "hx_plant_get_state": (None, [plant, ct.c_char_p]),
         "hx_plant_set_state": (status, [plant, ct.c_char_p, ct.c_size_t]),
         "hx_plant_get_bodies": (None, [plant, Doubles]),
@@ -61,7 +79,16 @@ def bound(core: ct.CDLL) -> ct.CDLL:
         "hx_plant_rates": (None, [plant, ct.POINTER(HxInput), ct.POINTER(HxCoordinates)]),
         "hx_plant_indicators": (None, [plant, Doubles]),
         "hx_plant_update_contacts": (ct.c_int, [plant]),
-        "hx_plant_tangent": (status, [plant, *[ct.POINTER(kind) for kind in (HxInput, HxInput, HxCoordinates, HxCoordinates, HxOutput)]]),
+        "hx_plant_tangent": (
+            status,
+            [
+                plant,
+                *[
+                    ct.POINTER(kind)
+                    for kind in (HxInput, HxInput, HxCoordinates, HxCoordinates, HxOutput)
+                ],
+            ],
+        ),
         "hx_plant_accelerations": (None, [plant, ct.POINTER(HxInput), Doubles, Doubles, Doubles]),
     }
     for name, (result, arguments) in signatures.items():
@@ -124,7 +151,8 @@ def seen(value: Any) -> Any:
 def definition(robot: Robot, **initial: Any) -> Any:
     """The HxDefinition of a robot, whether or not it could exist.
 
-    initial: position, quaternion, velocity, angular_velocity, angle, speed; at rest in the stance 1 m up unless given.
+    initial: position, quaternion, velocity, angular_velocity, angle, speed; at rest in the stance 1
+    m up unless given.
     """
     d: Any = HxDefinition()
     d.torso.mass = robot.torso.mass
@@ -134,7 +162,11 @@ def definition(robot: Robot, **initial: Any) -> Any:
         _put_leg(target, leg)
     d.foot_radius = robot.foot.radius
     _put_settings(d, robot)
-    start = {"position": (0.0, 0.0, 1.0), "quaternion": (1.0, 0.0, 0.0, 0.0), "angle": robot.stance} | initial
+    start = {
+        "position": (0.0, 0.0, 1.0),
+        "quaternion": (1.0, 0.0, 0.0, 0.0),
+        "angle": robot.stance,
+    } | initial
     for name, values in start.items():
         put(getattr(d.initial, name), values)
     return d
@@ -148,7 +180,12 @@ def _put_leg(target: Any, leg: Leg) -> None:
 
 
 def _put_link(target: Any, link: Link) -> None:
-    target.mass, target.length, target.offset_y, target.offset_z = link.mass, link.length, link.offset_y, link.offset_z
+    target.mass, target.length, target.offset_y, target.offset_z = (
+        link.mass,
+        link.length,
+        link.offset_y,
+        link.offset_z,
+    )
     put(target.com, link.com)
     put(target.inertia, link.inertia)
     put(target.axis, link.axis)
@@ -172,7 +209,14 @@ def _put_settings(d: Any, robot: Robot) -> None:
 def inputs(command: Command) -> Any:
     """The HxInput of a command; its age is the plant's business."""
     i: Any = HxInput()
-    for name in ("angle_ref", "speed_ref", "torque_ref", "push_force", "push_torque", "acceleration_ref"):
+    for name in (
+        "angle_ref",
+        "speed_ref",
+        "torque_ref",
+        "push_force",
+        "push_torque",
+        "acceleration_ref",
+    ):
         put(getattr(i, name), getattr(command, name))
     return i
 
@@ -222,7 +266,9 @@ class Plant:
     def step_to_event(self, t_end: float, command: Command, *, stop: bool = True) -> bool:
         """Integrates to t_end [s], or to the next event if `stop`; whether there was one."""
         event = ct.c_int()
-        self._check(self.core.hx_plant_step_to_event(self.handle, inputs(command), t_end, stop, event))
+        self._check(
+            self.core.hx_plant_step_to_event(self.handle, inputs(command), t_end, stop, event)
+        )
         return bool(event.value)
 
     def output_record(self, command: Command | None = None) -> Any:
@@ -265,7 +311,11 @@ class Plant:
 
     @coordinates.setter
     def coordinates(self, x: Array) -> None:
-        self._check(self.core.hx_plant_set_coordinates(self.handle, self.time, HxCoordinates.from_buffer_copy(x.tobytes())))
+        self._check(
+            self.core.hx_plant_set_coordinates(
+                self.handle, self.time, HxCoordinates.from_buffer_copy(x.tobytes())
+            )
+        )
 
     def rates(self, command: Command | None = None) -> Array:
         """(70,) d/dt of the coordinates under a command."""
@@ -274,14 +324,26 @@ class Plant:
         return flat(dx)
 
     def tangent(self, command: Command, d_input: Array, dx: Array) -> tuple[Array, Any]:
-        """What a change of the input (60,) and of the coordinates (70,) makes of the rates (70,) and of the HxOutput."""
-        change, d_rate, d_output = HxInput.from_buffer_copy(d_input.tobytes()), HxCoordinates(), HxOutput()
+        """What a change of the input (60,) and of the coordinates (70,) makes of the rates (70,)
+        and of the HxOutput.
+        """
+        change, d_rate, d_output = (
+            HxInput.from_buffer_copy(d_input.tobytes()),
+            HxCoordinates(),
+            HxOutput(),
+        )
         moved = HxCoordinates.from_buffer_copy(dx.tobytes())
-        self._check(self.core.hx_plant_tangent(self.handle, inputs(command), change, moved, d_rate, d_output))
+        self._check(
+            self.core.hx_plant_tangent(
+                self.handle, inputs(command), change, moved, d_rate, d_output
+            )
+        )
         return flat(d_rate), d_output
 
     def accelerations(self, command: Command | None = None) -> Accelerations:
-        """Eq. 1 solved at the present state; the gear torque, which the plant does not tell, is left at 0."""
+        """Eq. 1 solved at the present state; the gear torque, which the plant does not tell, is
+        left at 0.
+        """
         dv, multipliers = np.zeros((BODIES, 6)), np.zeros((BODIES - 1, MULTIPLIERS))
         drive, gear = np.zeros((LEGS, JOINTS)), np.zeros((LEGS, JOINTS))
         places = [pointer(array) for array in (dv, multipliers, drive)]

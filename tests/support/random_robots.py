@@ -97,18 +97,42 @@ def draw_table(number: int) -> dict[str, Any]:
     """The tables of its robot file."""
     draw = np.random.default_rng((SEED, number))
     mass = math.exp(draw.uniform(math.log(0.5), math.log(30.0)))
-    length = 0.32 * (mass / 5.6) ** (1.0 / 3.0) * math.exp(draw.uniform(math.log(0.75), math.log(1.35)))
+    length = (
+        0.32 * (mass / 5.6) ** (1.0 / 3.0) * math.exp(draw.uniform(math.log(0.75), math.log(1.35)))
+    )
     links, height = _links(draw, length)
     legs = _legs(draw, length, links)
     table = {
-        "name": f"random_{number}", "gravity": [0.0, 0.0, -GRAVITY], "legs": legs, "torso": _torso(draw, length, mass, legs),
-        "foot": {"radius": draw.uniform(0.04, 0.06) * length, "youngs_modulus": draw.uniform(3e6, 8e6), "poisson": 0.49},
-        "contact": {"law": "exact_restitution", "restitution": 0.5, "damping_factor": 1.5, "impact_speed_floor": 0.01},
-        "baumgarte": {"alpha": 50.0, "beta": 50.0}, "terrain": {"kind": "flat"},
-        "solver": {"method": "rosw3", "step": 0.0, "tolerance": 1e-4, "step_max": 5e-3}, "gait": _gait(draw, height),
-        "servo": {"mode": "position", "kp": 1.0, "kd": 1.0, "torque_max": 1.0, "speed_max": 1.0, "rotor_inertia": 1.0,
-                  "coulomb_friction": 0.0, "torque_continuous": 1.0},
-    }  # fmt: skip
+        "name": f"random_{number}",
+        "gravity": [0.0, 0.0, -GRAVITY],
+        "legs": legs,
+        "torso": _torso(draw, length, mass, legs),
+        "foot": {
+            "radius": draw.uniform(0.04, 0.06) * length,
+            "youngs_modulus": draw.uniform(3e6, 8e6),
+            "poisson": 0.49,
+        },
+        "contact": {
+            "law": "exact_restitution",
+            "restitution": 0.5,
+            "damping_factor": 1.5,
+            "impact_speed_floor": 0.01,
+        },
+        "baumgarte": {"alpha": 50.0, "beta": 50.0},
+        "terrain": {"kind": "flat"},
+        "solver": {"method": "rosw3", "step": 0.0, "tolerance": 1e-4, "step_max": 5e-3},
+        "gait": _gait(draw, height),
+        "servo": {
+            "mode": "position",
+            "kp": 1.0,
+            "kd": 1.0,
+            "torque_max": 1.0,
+            "speed_max": 1.0,
+            "rotor_inertia": 1.0,
+            "coulomb_friction": 0.0,
+            "torque_continuous": 1.0,
+        },
+    }
     mu = draw.uniform(0.5, 0.9)
     table["friction"] = {"law": "tanh", "mu": mu, "mu_static": mu, "slope": 100.0}
     _load(draw, table, length, mass)
@@ -132,11 +156,17 @@ def _links(draw: Draw, length: float) -> tuple[dict[str, float], float]:
 
 def _legs(draw: Draw, length: float, links: Mapping[str, float]) -> dict[str, Any]:
     """The legs without their masses."""
-    along, across, middle = draw.uniform([0.8, 0.4, 0.0], [1.3, 0.8, 0.15]) * length / [2.0, 2.0, 1.0]
+    along, across, middle = (
+        draw.uniform([0.8, 0.4, 0.0], [1.3, 0.8, 0.15]) * length / [2.0, 2.0, 1.0]
+    )
     legs = {}
     for k, name in enumerate(LEG_NAMES):
         side, row = 1.0 if k < 3 else -1.0, k % 3
-        yaw = math.radians((draw.uniform(40.0, 70.0), draw.uniform(80.0, 100.0), 180.0 - draw.uniform(40.0, 70.0))[row])
+        yaw = math.radians(
+            (draw.uniform(40.0, 70.0), draw.uniform(80.0, 100.0), 180.0 - draw.uniform(40.0, 70.0))[
+                row
+            ]
+        )
         x, y, z = draw.uniform(-0.03, 0.03, 3) * length + [
             along * (1 - row),
             side * (across + (middle if row == 1 else 0.0)),
@@ -174,9 +204,12 @@ def _joints(links: Mapping[str, float], rise: float) -> dict[str, Any]:
 def _gait(draw: Draw, height: float) -> dict[str, Any]:
     period, stride, step = draw.uniform([0.8, 0.45, 0.25], [1.25, 0.75, 0.4])
     return {
-        "name": "tripod", "period": float(period * math.sqrt(height / 0.12)), "duty": 0.5, "stride": float(stride * height),
+        "name": "tripod",
+        "period": float(period * math.sqrt(height / 0.12)),
+        "duty": 0.5,
+        "stride": float(stride * height),
         "step_height": float(step * height),
-    }  # fmt: skip
+    }
 
 
 def _torso(draw: Draw, length: float, mass: float, legs: Mapping[str, Any]) -> dict[str, Any]:
@@ -221,7 +254,9 @@ def centre_of_mass(robot: Robot) -> Array:
     """m    (2,) of the whole robot in its stance, torso frame"""
     level, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     body = body_states(robot, still, level, still, still, robot.stance, np.zeros((6, 3)))
-    return np.asarray((masses(robot) @ body[:, :2]) / robot.total_mass + np.array(robot.torso.com)[:2])
+    return np.asarray(
+        (masses(robot) @ body[:, :2]) / robot.total_mass + np.array(robot.torso.com)[:2]
+    )
 
 
 def tripod_margin(robot: Robot) -> float:
@@ -266,9 +301,15 @@ def _servo(draw: Draw, robot: Robot, height: float) -> dict[str, Any]:
         draw.uniform(0.6, 1.0),
     )
     return {
-        "mode": "position", "kp": kp, "kd": 2.0 * ratio * rotor_time * kp, "torque_max": stall, "speed_max": speed,
-        "rotor_inertia": kp * rotor_time**2, "coulomb_friction": draw.uniform(0.005, 0.05) * stall, "torque_continuous": continuous,
-    }  # fmt: skip
+        "mode": "position",
+        "kp": kp,
+        "kd": 2.0 * ratio * rotor_time * kp,
+        "torque_max": stall,
+        "speed_max": speed,
+        "rotor_inertia": kp * rotor_time**2,
+        "coulomb_friction": draw.uniform(0.005, 0.05) * stall,
+        "torque_continuous": continuous,
+    }
 
 
 def fastest_joint(robot: Robot) -> float:
@@ -279,5 +320,8 @@ def fastest_joint(robot: Robot) -> float:
         BodyCommand(vx=robot.gait.stride / robot.gait.period),
         round(3.0 * robot.gait.period / PERIOD),
     )
-    speeds = [np.abs(controller.step(k * PERIOD, command, measurement).speed_ref).max() for k in range(steps)]
+    speeds = [
+        np.abs(controller.step(k * PERIOD, command, measurement).speed_ref).max()
+        for k in range(steps)
+    ]
     return float(max(speeds))

@@ -34,7 +34,9 @@ def scaled_robot(robot: Robot, by: float) -> Robot:
 
     def leg(of: Leg) -> Leg:
         coxa, femur, tibia = of.links
-        return replace(of, hip_position=long(of.hip_position), links=(link(coxa), link(femur), link(tibia)))
+        return replace(
+            of, hip_position=long(of.hip_position), links=(link(coxa), link(femur), link(tibia))
+        )
 
     torso, servo, contact, friction, gait = (
         robot.torso,
@@ -46,23 +48,50 @@ def scaled_robot(robot: Robot, by: float) -> Robot:
     return replace(
         robot,
         name=f"{robot.name}_times_{by:g}",
-        torso=replace(torso, mass=by**3 * torso.mass, size=long(torso.size), com=long(torso.com), inertia=heavy(torso.inertia)),
+        torso=replace(
+            torso,
+            mass=by**3 * torso.mass,
+            size=long(torso.size),
+            com=long(torso.com),
+            inertia=heavy(torso.inertia),
+        ),
         legs=tuple(map(leg, robot.legs)),
-        foot=replace(robot.foot, radius=by * robot.foot.radius, youngs_modulus=by * robot.foot.youngs_modulus),
+        foot=replace(
+            robot.foot, radius=by * robot.foot.radius, youngs_modulus=by * robot.foot.youngs_modulus
+        ),
         # K of F = K d^1.5: sqrt(R) E
         contact=replace(
-            contact, stiffness=by**1.5 * contact.stiffness, damping_factor=contact.damping_factor / time,
+            contact,
+            stiffness=by**1.5 * contact.stiffness,
+            damping_factor=contact.damping_factor / time,
             impact_speed_floor=contact.impact_speed_floor * time,
         ),
         friction=replace(
-            friction, slope=friction.slope / time, presliding=by * friction.presliding, bristle_damping=time * friction.bristle_damping
+            friction,
+            slope=friction.slope / time,
+            presliding=by * friction.presliding,
+            bristle_damping=time * friction.bristle_damping,
         ),
         servo=replace(
-            servo, kp=by**4 * servo.kp, kd=by**4 * time * servo.kd, torque_max=by**4 * servo.torque_max, speed_max=servo.speed_max / time,
-            rotor_inertia=by**5 * servo.rotor_inertia, coulomb_friction=by**4 * servo.coulomb_friction,
+            servo,
+            kp=by**4 * servo.kp,
+            kd=by**4 * time * servo.kd,
+            torque_max=by**4 * servo.torque_max,
+            speed_max=servo.speed_max / time,
+            rotor_inertia=by**5 * servo.rotor_inertia,
+            coulomb_friction=by**4 * servo.coulomb_friction,
             torque_continuous=by**4 * servo.torque_continuous,
         ),
-        baumgarte=replace(robot.baumgarte, alpha=robot.baumgarte.alpha / time, beta=robot.baumgarte.beta / time),
-        solver=replace(robot.solver, step=time * robot.solver.step, step_max=time * robot.solver.step_max),
-        gait=replace(gait, period=time * gait.period, stride=by * gait.stride, step_height=by * gait.step_height),
-    )  # fmt: skip
+        baumgarte=replace(
+            robot.baumgarte, alpha=robot.baumgarte.alpha / time, beta=robot.baumgarte.beta / time
+        ),
+        solver=replace(
+            robot.solver, step=time * robot.solver.step, step_max=time * robot.solver.step_max
+        ),
+        gait=replace(
+            gait,
+            period=time * gait.period,
+            stride=by * gait.stride,
+            step_height=by * gait.step_height,
+        ),
+    )

@@ -26,26 +26,55 @@ def rest(robot: Robot) -> Demand:
     return InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
 
 
-def make_laws(robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None) -> Compliance:
+def make_laws(
+    robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None
+) -> Compliance:
     """The laws at rest, with no plan yet."""
     gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
     return Compliance(
-        gains, Parts() if parts is None else parts, weight=weight(robot), cycle=gait.period, kp=robot.servo.kp,
-        step_height=gait.step_height, period=PERIOD,
-    )  # fmt: skip
+        gains,
+        Parts() if parts is None else parts,
+        weight=weight(robot),
+        cycle=gait.period,
+        kp=robot.servo.kp,
+        step_height=gait.step_height,
+        period=PERIOD,
+    )
 
 
-def plan(laws: Compliance, steps: int, *, robot: Robot = ROBOT, standing: str = ALL, height: float = RAISED, rise: float = 0.0) -> None:
-    """Lays out steps in which these legs stand and the others are in the air, so high [m] and rising so fast [m/s]."""
+def plan(
+    laws: Compliance,
+    steps: int,
+    *,
+    robot: Robot = ROBOT,
+    standing: str = ALL,
+    height: float = RAISED,
+    rise: float = 0.0,
+) -> None:
+    """Lays out steps in which these legs stand and the others are in the air, so high [m] and
+    rising so fast [m/s].
+    """
     still = rest(robot)
-    demand = Demand(*(np.repeat(getattr(still, name), steps, axis=0) for name in ("torque", "lever", "push", "weight", "moment", "twist")))
+    demand = Demand(
+        *(
+            np.repeat(getattr(still, name), steps, axis=0)
+            for name in ("torque", "lever", "push", "weight", "moment", "twist")
+        )
+    )
     stands = np.array([flag == "1" for flag in standing])
     home = LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
     support = Support(robot, make_gait(robot), make_gains(robot).support, rest=still)
     rows = np.tile(stands.astype(float), (steps, 1))
     shares = support.shares(np.tile(home, (steps, 1)), rows, demand)
     air = 1.0 - rows
-    laws.plan(demand, shares, feet=np.tile(home, (steps, 1)), height=height * air, rise=rise * air, swinging=~stands)
+    laws.plan(
+        demand,
+        shares,
+        feet=np.tile(home, (steps, 1)),
+        height=height * air,
+        rise=rise * air,
+        swinging=~stands,
+    )
 
 
 def shared(laws: Compliance) -> np.ndarray:
@@ -62,8 +91,14 @@ def squeezing(size: float = 2.0) -> np.ndarray:
 
 
 def run(
-    laws: Compliance, force: np.ndarray, steps: int, *, robot: Robot = ROBOT, standing: str = ALL, height: float = RAISED
-) -> None:  # fmt: skip
+    laws: Compliance,
+    force: np.ndarray,
+    steps: int,
+    *,
+    robot: Robot = ROBOT,
+    standing: str = ALL,
+    height: float = RAISED,
+) -> None:
     """Plans and takes so many steps under the same forces."""
     plan(laws, steps, robot=robot, standing=standing, height=height)
     for _ in range(steps):

@@ -1,4 +1,6 @@
-"""Robots, motions and commands for the plant's tests: random but seeded, and as general as the equations allow."""
+"""Robots, motions and commands for the plant's tests: random but seeded, and as general as the
+equations allow.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,13 @@ MACRO = 0.004  # s  of a trail
 
 
 def changed(robot: Robot, **sections: dict[str, Any]) -> Robot:
-    """The robot with fields of some of its sections replaced: changed(robot, servo={"mode": "torque"})."""
-    return replace(robot, **{name: replace(getattr(robot, name), **fields) for name, fields in sections.items()})
+    """The robot with fields of some of its sections replaced: changed(robot, servo={"mode":
+    "torque"}).
+    """
+    return replace(
+        robot,
+        **{name: replace(getattr(robot, name), **fields) for name, fields in sections.items()},
+    )
 
 
 def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
@@ -35,7 +42,9 @@ def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
 
 
 def scaled(robot: Robot, size: float) -> Robot:
-    """The robot with every length in proportion, and inertias with lengths squared; masses are kept."""
+    """The robot with every length in proportion, and inertias with lengths squared; masses are
+    kept.
+    """
 
     def lengths(values: Vector3) -> Vector3:
         return (size * values[0], size * values[1], size * values[2])
@@ -46,28 +55,48 @@ def scaled(robot: Robot, size: float) -> Robot:
 
     def link(part: Link) -> Link:
         x, y, z = lengths(part.tip)
-        return replace(part, length=x, offset_y=y, offset_z=z, com=lengths(part.com), inertia=inertia(part.inertia))
+        return replace(
+            part,
+            length=x,
+            offset_y=y,
+            offset_z=z,
+            com=lengths(part.com),
+            inertia=inertia(part.inertia),
+        )
 
     legs = []
     for leg in robot.legs:
         coxa, femur, tibia = (link(part) for part in leg.links)
-        legs.append(replace(leg, hip_position=lengths(leg.hip_position), links=(coxa, femur, tibia)))
+        legs.append(
+            replace(leg, hip_position=lengths(leg.hip_position), links=(coxa, femur, tibia))
+        )
     torso = replace(robot.torso, com=lengths(robot.torso.com), inertia=inertia(robot.torso.inertia))
     rotor = size * size * robot.servo.rotor_inertia
     return changed(replace(robot, torso=torso, legs=tuple(legs)), servo={"rotor_inertia": rotor})
 
 
 def lopsided(seed: int = 0) -> Robot:
-    """A robot no two parts of which are alike: skew axes, offsets, products of inertia, a centre of mass off the torso's origin."""
+    """A robot no two parts of which are alike: skew axes, offsets, products of inertia, a centre
+    of mass off the torso's origin.
+    """
     robot, rng = load_robot("phantomx_mk4"), np.random.default_rng(seed)
-    torso = replace(robot.torso, com=tuple(rng.normal(0.0, 0.02, 3)), inertia=random_inertia(rng, robot.torso.mass, 0.08))
+    torso = replace(
+        robot.torso,
+        com=tuple(rng.normal(0.0, 0.02, 3)),
+        inertia=random_inertia(rng, robot.torso.mass, 0.08),
+    )
     return replace(robot, torso=torso, legs=tuple(_lopsided_leg(leg, rng) for leg in robot.legs))
 
 
 def _lopsided_leg(leg: Leg, rng: np.random.Generator) -> Leg:
     coxa, femur, tibia = (_lopsided_link(link, rng) for link in leg.links)
     hip = tuple(np.add(leg.hip_position, rng.normal(0.0, 0.02, 3)))
-    return replace(leg, links=(coxa, femur, tibia), hip_position=hip, hip_yaw=leg.hip_yaw + rng.normal(0.0, 0.2))
+    return replace(
+        leg,
+        links=(coxa, femur, tibia),
+        hip_position=hip,
+        hip_yaw=leg.hip_yaw + rng.normal(0.0, 0.2),
+    )
 
 
 def _lopsided_link(link: Link, rng: np.random.Generator) -> Link:
@@ -85,7 +114,9 @@ def _lopsided_link(link: Link, rng: np.random.Generator) -> Link:
 
 
 def random_inertia(rng: np.random.Generator, mass: float, size: float) -> Vector6:
-    """Entries xx yy zz xy xz yz of the inertia of a random cloud of mass points of this size [m]."""
+    """Entries xx yy zz xy xz yz of the inertia of a random cloud of mass points of this size
+    [m].
+    """
     points = rng.normal(0.0, size, (8, 3))
     second = mass / 8.0 * points.T @ points
     J = np.trace(second) * np.eye(3) - second
@@ -93,7 +124,9 @@ def random_inertia(rng: np.random.Generator, mass: float, size: float) -> Vector
 
 
 def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
-    """Initial state near the stance, moving, three of its feet in the ground, the third by half a millimetre."""
+    """Initial state near the stance, moving, three of its feet in the ground, the third by half
+    a millimetre.
+    """
     rng = np.random.default_rng(seed)
     pose = {
         "position": np.array([0.3, -0.2, 0.0]),
@@ -108,13 +141,17 @@ def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
 
 
 def lift(robot: Robot, body: Array) -> float:
-    """How far up [m] bodies must go for the third deepest foot to be half a millimetre in the ground."""
+    """How far up [m] bodies must go for the third deepest foot to be half a millimetre in the
+    ground.
+    """
     depth = sorted(foot.penetration for foot in foot_contacts(robot, body))
     return (depth[-3] - 5e-4) / float(ground_normal(robot.terrain)[2])
 
 
 def random_bodies(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
-    """(19, 13) bodies of a random pose, pulled off their joints by about `drift` (m, m/s and so on)."""
+    """(19, 13) bodies of a random pose, pulled off their joints by about `drift` (m, m/s and so
+    on).
+    """
     body = body_states(robot, **random_pose(robot, seed))
     body = body + drift * np.random.default_rng(seed + 500).normal(0.0, 1.0, body.shape)
     body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
@@ -123,7 +160,9 @@ def random_bodies(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
 
 
 def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:
-    """A command near the stance, some of whose torques are beyond the servos' limit; pushes in every direction."""
+    """A command near the stance, some of whose torques are beyond the servos' limit; pushes in
+    every direction.
+    """
     rng = np.random.default_rng(seed + 1000)
     return Command(
         angle_ref=robot.stance + size * rng.normal(0.0, 0.1, (LEGS, JOINTS)),
@@ -136,7 +175,9 @@ def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:
 
 
 def landing(robot: Robot, seed: int = 3) -> dict[str, Array]:
-    """A start with the lowest foot 2 mm above the ground, falling: feet touch down one after the other within some 50 ms."""
+    """A start with the lowest foot 2 mm above the ground, falling: feet touch down one after the
+    other within some 50 ms.
+    """
     pose = random_pose(robot, seed) | {"velocity": np.array([0.1, 0.0, -0.5])}
     clearance = -max(foot.penetration for foot in foot_contacts(robot, body_states(robot, **pose)))
     pose["position"][2] += 2e-3 - clearance
@@ -153,5 +194,7 @@ def trail(plant: Plant, count: int, *, first: int = 0) -> list[bytes]:
 
 
 def distance(a: Any, b: Any) -> float:
-    """Largest difference of two arrays over the largest entry of the second, or over 1 where that is less."""
+    """Largest difference of two arrays over the largest entry of the second, or over 1 where
+    that is less.
+    """
     return float(np.max(np.abs(np.subtract(a, b)))) / max(1.0, float(np.max(np.abs(b))))

@@ -1,4 +1,6 @@
-"""A planned motion of the multibody twin: what force and torque it needs, body by body, by virtual work."""
+"""A planned motion of the multibody twin: what force and torque it needs, body by body, by
+virtual work.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,12 @@ import numpy as np
 
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.dynamics import Command, applied_forces, mass_matrix
-from hexapod_cosim.models.kinematics import axis_quaternion, body_states, quaternion_product, rotation_matrix
+from hexapod_cosim.models.kinematics import (
+    axis_quaternion,
+    body_states,
+    quaternion_product,
+    rotation_matrix,
+)
 
 HIGH = 1.0  # m    of the twin over the ground: what its feet feel is given, not found
 NONE = np.full(6, np.nan)  # no foot in contact
@@ -17,7 +24,9 @@ X, Y, Z = np.eye(3)
 
 @dataclass(frozen=True)
 class Motion:
-    """Rows are steps: where the torso's origin is on the ground, how it is turned, and the joints."""
+    """Rows are steps: where the torso's origin is on the ground, how it is turned, and the
+    joints.
+    """
 
     period: float  # s    between rows
     way: np.ndarray  # m    (n,) x + i y
@@ -33,13 +42,18 @@ class Motion:
         turn = quaternion_product(axis_quaternion(Z, self.yaw[at]), turn)
         origin = np.array([self.way[at].real, self.way[at].imag, HIGH + height])
         centre = origin + rotation_matrix(turn) @ np.array(robot.torso.com)
-        return body_states(robot, centre, turn, np.zeros(3), np.zeros(3), self.angle[at], np.zeros((6, 3)))
+        return body_states(
+            robot, centre, turn, np.zeros(3), np.zeros(3), self.angle[at], np.zeros((6, 3))
+        )
 
 
 def velocities(robot: Robot, body: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """(114, 24) of all bodies by the torso's v and w and the joints' speeds."""
     still = (robot, body[0, :3], body[0, 3:7])
-    moving = (body_states(*still, unit[:3], unit[3:6], angle, unit[6:].reshape(6, 3)) for unit in np.eye(24))
+    moving = (
+        body_states(*still, unit[:3], unit[3:6], angle, unit[6:].reshape(6, 3))
+        for unit in np.eye(24)
+    )
     return np.array([state[:, 7:].ravel() for state in moving]).T
 
 
@@ -49,18 +63,27 @@ def turned_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     for p, q in zip(before, after, strict=True):
         w, *xyz = quaternion_product(q, p * [1.0, -1.0, -1.0, -1.0])
         size = np.linalg.norm(xyz)
-        found.append(np.array(xyz) * np.sign(w) * (2.0 * np.arctan2(size, abs(w)) / size if size > 0.0 else 2.0))
+        found.append(
+            np.array(xyz)
+            * np.sign(w)
+            * (2.0 * np.arctan2(size, abs(w)) / size if size > 0.0 else 2.0)
+        )
     return np.array(found)
 
 
 def twin_needs(robot: Robot, motion: Motion, at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(24,) force and moment at the torso's centre of mass and torques of the joints; the bodies (19, 13); their velocities (114, 24)."""
+    """(24,) force and moment at the torso's centre of mass and torques of the joints; the bodies
+    (19, 13); their velocities (114, 24).
+    """
     before, body, after = (motion.bodies(robot, k) for k in (at - 1, at, at + 1))
     dv = np.zeros((19, 6))
     dv[:, :3] = (after[:, :3] - 2.0 * body[:, :3] + before[:, :3]) / motion.period**2
     coming, going = turned_by(before[:, 3:7], body[:, 3:7]), turned_by(body[:, 3:7], after[:, 3:7])
     dv[:, 3:] = (going - coming) / motion.period**2
     body[:, 10:13] = (going + coming) / (2.0 * motion.period)
-    forces = mass_matrix(robot, body) @ dv.ravel() - applied_forces(robot, body, Command(angle_ref=motion.angle[at]), NONE).ravel()
+    forces = (
+        mass_matrix(robot, body) @ dv.ravel()
+        - applied_forces(robot, body, Command(angle_ref=motion.angle[at]), NONE).ravel()
+    )
     reach = velocities(robot, body, motion.angle[at])
     return reach.T @ forces, body, reach

@@ -19,23 +19,34 @@ Numbers = NDArray[np.floating[Any]] | NDArray[np.bool_]
 H, PERIOD, CYCLES = 0.005, 1.0, 10
 SPEED = 0.08  # m/s
 ROBOT = load_robot("athena")
-PARAMETERS = {entry.name: float(entry.start or 0.0) for entry in load_interface(ROBOT).variables if entry.causality == "parameter"}
+PARAMETERS = {
+    entry.name: float(entry.start or 0.0)
+    for entry in load_interface(ROBOT).variables
+    if entry.causality == "parameter"
+}
 SERVO = replace(ROBOT.servo, torque_continuous=1.2, motor_constant=0.8)
 WEIGHT = robot_weight(PARAMETERS)
 DISTANCE = SPEED * PERIOD * (CYCLES - 2)  # m    in the judged cycles
 
 
 class Walk:
-    """A synthetic recording: everything zero until a test says otherwise; the torso moves along x at the commanded speed.
+    """A synthetic recording: everything zero until a test says otherwise; the torso moves along x
+    at the commanded speed.
 
     h: between rows [s]; planned: whether the controller tells where it plans the feet.
     """
 
-    def __init__(self, *, cycles: float = CYCLES, speed: float = SPEED, h: float = H, planned: bool = False) -> None:
-        outputs = [entry.name for entry in load_interface(ROBOT).variables if entry.causality == "output"]
+    def __init__(
+        self, *, cycles: float = CYCLES, speed: float = SPEED, h: float = H, planned: bool = False
+    ) -> None:
+        outputs = [
+            entry.name for entry in load_interface(ROBOT).variables if entry.causality == "output"
+        ]
         told = (*PLANNED, *(f"controller.{leg}.swinging" for leg in LEG_NAMES)) if planned else ()
         self.names = ("time", *outputs, *told, *COMMAND_COLUMNS)
-        self.time: NDArray[np.float64] = h * np.arange(round(cycles * PERIOD / h) + 1, dtype=np.float64)
+        self.time: NDArray[np.float64] = h * np.arange(
+            round(cycles * PERIOD / h) + 1, dtype=np.float64
+        )
         self.data = np.zeros((len(self.time), len(self.names)))
         self.set("time", self.time)
         self.set("torso.quaternion[1]", 1.0)
@@ -55,5 +66,9 @@ class Walk:
         return Recording(self.names, self.data)
 
     def metrics(self, **changes: float) -> dict[str, float]:
-        parameters = PARAMETERS | {name.replace("__", "."): value for name, value in changes.items()}
-        return compute_metrics(View(self.recording, parameters, PERIOD), servo=SERVO, realtime_factor=42.0)
+        parameters = PARAMETERS | {
+            name.replace("__", "."): value for name, value in changes.items()
+        }
+        return compute_metrics(
+            View(self.recording, parameters, PERIOD), servo=SERVO, realtime_factor=42.0
+        )

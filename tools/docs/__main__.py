@@ -14,10 +14,12 @@ from tools.docs.stage import DOCS, ROOT, Stage, pages
 
 
 def build(out: Path, *, work: Path, computed: bool = True) -> int:
-    """Builds the site into `out`, by way of pages put together in `work`; returns Sphinx's exit code, 0 without a warning.
+    """Builds the site into `out`, by way of pages put together in `work`; returns Sphinx's exit
+    code, 0 without a warning.
 
     Args:
-        computed: with the validation's figures computed and the notebooks run; else without them, for a look at a page.
+        computed: with the validation's figures computed and the notebooks run; else without them,
+            for a look at a page.
     """
     shutil.rmtree(work, ignore_errors=True)
     stage = Stage(work)
@@ -29,27 +31,48 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
         with notebooks.running(work / "notebooks"):
             validation.fill(work)
     options = ["-W", "--keep-going", "-q", "-n", "-E", "-j", "auto"]
-    return int(sphinx([*options, "-c", str(DOCS), "-d", str(work / ".doctrees"), str(work), str(out)]))
+    return int(
+        sphinx([*options, "-c", str(DOCS), "-d", str(work / ".doctrees"), str(work), str(out)])
+    )
 
 
 def generated() -> list[tuple[str, str]]:
     """The pages of the reference."""
-    fmus = [(f"reference/{name}.md", variables.page(interface)) for name, interface in variables.interfaces().items()]
-    return [*fmus, ("reference/commands.md", commands.page()), ("reference/c.md", c_api.page()), *python_api.pages()]
+    fmus = [
+        (f"reference/{name}.md", variables.page(interface))
+        for name, interface in variables.interfaces().items()
+    ]
+    return [
+        *fmus,
+        ("reference/commands.md", commands.page()),
+        ("reference/c.md", c_api.page()),
+        *python_api.pages(),
+    ]
 
 
 def main() -> int:
     """The command."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "docs", help="folder of the site")
-    parser.add_argument("--quick", action="store_true", help="neither runs notebooks nor computes the validation")
-    parser.add_argument("--work", type=Path, default=ROOT / "build" / "docs-pages", help="folder in which its pages are put together")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=ROOT / "build" / "docs", help="folder of the site"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="neither runs notebooks nor computes the validation"
+    )
+    parser.add_argument(
+        "--work",
+        type=Path,
+        default=ROOT / "build" / "docs-pages",
+        help="folder in which its pages are put together",
+    )
     arguments = parser.parse_args()
     began = time.monotonic()
     code = build(arguments.output, work=arguments.work, computed=not arguments.quick)
     if code == 0:
         count = len(list(arguments.output.rglob("*.html")))
-        print(f"{arguments.output / 'index.html'}: {count} pages in {time.monotonic() - began:.0f} s")
+        print(
+            f"{arguments.output / 'index.html'}: {count} pages in {time.monotonic() - began:.0f} s"
+        )
     return code
 
 

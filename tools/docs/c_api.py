@@ -1,4 +1,6 @@
-"""The reference of the C API: the public headers, declaration by declaration, with their comments."""
+"""The reference of the C API: the public headers, declaration by declaration, with their
+comments.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-HEADERS = ("plant_fmu/include/hexapod/hexapod.h", "controller_fmu/include/hexapod/controller.h", "plant_fmu/include/hexapod/status.h",
-           "plant_fmu/include/hexapod/legs.h", "plant_fmu/include/hexapod/checker.h", "plant_fmu/include/hexapod/inside.h")  # fmt: skip
+HEADERS = (
+    "plant_fmu/include/hexapod/hexapod.h",
+    "controller_fmu/include/hexapod/controller.h",
+    "plant_fmu/include/hexapod/status.h",
+    "plant_fmu/include/hexapod/legs.h",
+    "plant_fmu/include/hexapod/checker.h",
+    "plant_fmu/include/hexapod/inside.h",
+)
 COMMENT = re.compile(r"/\*(.*?)\*/", flags=re.DOTALL)
 NOISE = re.compile(r'^(#.*|extern "C" \{|\}|)$')
 TYPE = re.compile(r"^(?:typedef )?(struct|enum)\s*(\w*)")
@@ -73,7 +81,9 @@ def _functions(comment: str, code: str) -> Iterator[str]:
     """Functions that share a comment; a comment behind one is its own."""
     if comment:
         yield comment + "\n"
-    for prototype, own in re.findall(r"(?:HX_API )?(.*?\));((?:[ \t]*/\*.*?\*/)?)", code, flags=re.DOTALL):
+    for prototype, own in re.findall(
+        r"(?:HX_API )?(.*?\));((?:[ \t]*/\*.*?\*/)?)", code, flags=re.DOTALL
+    ):
         inner = " ".join(COMMENT.sub("", prototype).replace("HX_API ", "").split())
         notes = [_prose(text) for text in COMMENT.findall(prototype + own)]
         yield f"```{{c:function}} {inner}\n{'. '.join(note for note in notes if note)}\n```\n"

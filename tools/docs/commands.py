@@ -1,11 +1,24 @@
-"""The reference of the `hexapod` command: what its --help says, written down by typer's own tool."""
+"""The reference of the `hexapod` command: what its --help says, written down by typer's own
+tool.
+"""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 
-DOCUMENT = [sys.executable, "-m", "typer", "hexapod_cosim.cosim.cli.app", "utils", "docs", "--name", "hexapod", "--title", "Commands"]
+DOCUMENT = [
+    sys.executable,
+    "-m",
+    "typer",
+    "hexapod_cosim.cosim.cli.app",
+    "utils",
+    "docs",
+    "--name",
+    "hexapod",
+    "--title",
+    "Commands",
+]
 
 
 def page() -> str:

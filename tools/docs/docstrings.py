@@ -1,6 +1,6 @@
-"""Docstrings as Sphinx takes them. Ours are plain text with formulas in it (|v_t|, f_n, x*y): what reStructuredText would read as markup is
-escaped, `names` become code, indented formulas stay as they are typed, Args become fields. A comment at a field's right is what the field
-means.
+"""Docstrings as Sphinx takes them. Ours are plain text with formulas in it (|v_t|, f_n, x*y): what
+reStructuredText would read as markup is escaped, `names` become code, indented formulas stay as
+they are typed, Args become fields. A comment at a field's right is what the field means.
 """
 
 from __future__ import annotations
@@ -51,10 +51,15 @@ def _field(line: str, section: str) -> Iterator[str]:
 def escaped(line: str) -> str:
     """A line without markup but for code."""
     parts = re.split(r"``?([^`]+)``?", line)
-    return "".join(f"``{part}``" if place % 2 else re.sub(r"([\\*|_])", r"\\\1", part) for place, part in enumerate(parts))
+    return "".join(
+        f"``{part}``" if place % 2 else re.sub(r"([\\*|_])", r"\\\1", part)
+        for place, part in enumerate(parts)
+    )
 
 
-def process(_app: Any, _what: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+def process(
+    _app: Any, _what: str, name: str, _object: Any, _options: Any, lines: list[str]
+) -> None:
     """Converts a docstring in place."""
     if name.startswith(OURS):
         lines[:] = converted(lines)

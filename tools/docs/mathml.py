@@ -1,6 +1,8 @@
-"""Formulas as MathML, which browsers show by themselves: no script, nothing fetched at reading time.
+"""Formulas as MathML, which browsers show by themselves: no script, nothing fetched at reading
+time.
 
-The font that brackets and accents need comes with the site, inside a style sheet: pages opened from a disk may not load font files.
+The font that brackets and accents need comes with the site, inside a style sheet: pages opened from
+a disk may not load font files.
 """
 
 from __future__ import annotations
@@ -19,9 +21,21 @@ from fontTools.ttLib import TTFont
 from latex2mathml.converter import convert
 
 STYLE = "mathfont.css"
-# letters and signs, accents, Greek, punctuation and primes, arrows, operators, brackets and their pieces, italic letters
-SHOWN = ((0x20, 0x7E), (0xA0, 0xFF), (0x300, 0x338), (0x370, 0x3FF), (0x2010, 0x2064), (0x2190, 0x21FF), (0x2200, 0x22FF), (0x2308, 0x230B),
-         (0x239B, 0x23B1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B))  # fmt: skip
+# letters and signs, accents, Greek, punctuation and primes, arrows, operators, brackets and their
+# pieces, italic letters
+SHOWN = (
+    (0x20, 0x7E),
+    (0xA0, 0xFF),
+    (0x300, 0x338),
+    (0x370, 0x3FF),
+    (0x2010, 0x2064),
+    (0x2190, 0x21FF),
+    (0x2200, 0x22FF),
+    (0x2308, 0x230B),
+    (0x239B, 0x23B1),
+    (0x1D434, 0x1D467),
+    (0x1D6E2, 0x1D71B),
+)
 BAR = re.compile(r"<mo([^>]*)>(?=&#x0007C;)")  # of a norm: no operator
 TAG = re.compile(r"\s*\\tag\{(\w+)\}\s*$")
 
@@ -40,7 +54,9 @@ def split_tag(latex: str) -> tuple[str, str]:
 
 def visit_math(translator: Any, node: nodes.math) -> None:
     """A formula in a line of text."""
-    translator.body.append(f'<span class="formula">{mathml(node.astext(), display="inline")}</span>')
+    translator.body.append(
+        f'<span class="formula">{mathml(node.astext(), display="inline")}</span>'
+    )
     raise nodes.SkipNode
 
 
@@ -49,15 +65,21 @@ def visit_math_block(translator: Any, node: nodes.math_block) -> None:
     latex, number = split_tag(node.astext())
     anchor = f' id="eq-{number}"' if number else ""
     label = f'<a class="formula-number" href="#eq-{number}">({number})</a>' if number else ""
-    translator.body.append(f'<div class="formula-block"{anchor}><div>{mathml(latex, display="block")}</div>{label}</div>\n')
+    translator.body.append(
+        f'<div class="formula-block"{anchor}><div>{mathml(latex, display="block")}</div>{label}</div>\n'
+    )
     raise nodes.SkipNode
 
 
 def font_style() -> str:
-    """The style sheet with the font: STIX Two Math (SIL Open Font Licence), as ziamath brings it, without what no page shows."""
+    """The style sheet with the font: STIX Two Math (SIL Open Font Licence), as ziamath brings
+    it, without what no page shows.
+    """
     path = Path(ziamath.__file__).parent / "fonts" / "STIXTwoMath-Regular.ttf"
     font, bytes_out = TTFont(path), io.BytesIO()
-    chosen = subset.Subsetter(subset.Options(layout_features=["ssty", "dtls", "flac"], notdef_outline=True))
+    chosen = subset.Subsetter(
+        subset.Options(layout_features=["ssty", "dtls", "flac"], notdef_outline=True)
+    )
     chosen.populate(unicodes=[code for start, end in SHOWN for code in range(start, end + 1)])
     chosen.subset(font)
     font.save(bytes_out)
@@ -74,5 +96,7 @@ def setup(app: Any) -> dict[str, bool]:
     """Tells Sphinx."""
     app.add_css_file(STYLE)
     app.connect("build-finished", write_font)
-    app.add_html_math_renderer("mathml", inline_renderers=(visit_math, None), block_renderers=(visit_math_block, None))
+    app.add_html_math_renderer(
+        "mathml", inline_renderers=(visit_math, None), block_renderers=(visit_math_block, None)
+    )
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -19,7 +19,12 @@ def run(path: Path) -> float:
     """Runs one and writes its results into it; the time it took [s]. Raises what a cell raised."""
     began = time.monotonic()
     notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(notebook, timeout=TIMEOUT, kernel_name="python3", resources={"metadata": {"path": str(path.parent)}})
+    client = NotebookClient(
+        notebook,
+        timeout=TIMEOUT,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(path.parent)}},
+    )
     client.execute()
     nbformat.write(notebook, path)
     return time.monotonic() - began

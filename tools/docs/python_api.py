@@ -1,4 +1,6 @@
-"""The reference of the Python API: a page per module, which Sphinx fills from its docstrings, and one per package that lists them."""
+"""The reference of the Python API: a page per module, which Sphinx fills from its docstrings,
+and one per package that lists them.
+"""
 
 from __future__ import annotations
 
@@ -42,13 +44,18 @@ def _module_page(dotted: str) -> str:
 
 
 def _package_page(package: str, modules: list[Path]) -> str:
-    rows = "\n".join(f"| [{_dotted(path).partition('.')[2]}]({_dotted(path)}.md) | {_first_line(path)} |" for path in modules)
+    rows = "\n".join(
+        f"| [{_dotted(path).partition('.')[2]}]({_dotted(path)}.md) | {_first_line(path)} |"
+        for path in modules
+    )
     intro = f"# {package}\n\n{PACKAGES[package]} Imported as `hexapod_cosim.{package}`.\n\n"
     return f"{intro}| module | what |\n|---|---|\n{rows}\n"
 
 
 def _index() -> str:
-    rows = "\n".join(f"| [{package}]({package}.md) | {text} |" for package, text in PACKAGES.items())
+    rows = "\n".join(
+        f"| [{package}]({package}.md) | {text} |" for package, text in PACKAGES.items()
+    )
     text = "Everything public, from its docstrings. "
     text += "Where to begin: the [tutorial](../../tutorial.md) and the [notebooks](../../notebooks/index.md)."
     return f"# Python\n\n{text}\n\n| package | what |\n|---|---|\n{rows}\n\n```{{toctree}}\n:hidden:\nmodels\ncontroller\ncosim\n```\n"
@@ -56,4 +63,10 @@ def _index() -> str:
 
 def _first_line(path: Path) -> str:
     text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    return text.split("\n\n")[0].replace("\n", " ").replace("|", "\\|").replace("*", "\\*").replace("[", "\\[")
+    return (
+        text.split("\n\n")[0]
+        .replace("\n", " ")
+        .replace("|", "\\|")
+        .replace("*", "\\*")
+        .replace("[", "\\[")
+    )

@@ -1,7 +1,9 @@
-"""Puts the site's pages together: those of docs/ and of the repository's root, and every file of the repository that they link to.
+"""Puts the site's pages together: those of docs/ and of the repository's root, and every file of
+the repository that they link to.
 
-Links on the pages are relative, as a reader of the repository follows them. On the site a link to another page leads to that page, and one
-to a file or folder to a page that shows it, so the site is whole without the repository.
+Links on the pages are relative, as a reader of the repository follows them. On the site a link to
+another page leads to that page, and one to a file or folder to a page that shows it, so the site is
+whole without the repository.
 """
 
 from __future__ import annotations
@@ -17,7 +19,11 @@ from pathlib import Path, PurePosixPath
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 # pages from elsewhere, and files that a page of the reference tells better than they do
-ELSEWHERE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md", "benchmarks/README.md": "benchmarks.md"}
+ELSEWHERE = {
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "benchmarks/README.md": "benchmarks.md",
+}
 INSTEAD = {
     "README.md": "index.md",
     "docs/README.md": "index.md",
@@ -27,7 +33,16 @@ INSTEAD = {
     "controller_fmu/include/hexapod/controller.h": "reference/c.md",
 }
 PACKAGES = ("models", "controller", "cosim")  # with a page per module in the reference
-LANGUAGES = {".py": "python", ".c": "c", ".h": "c", ".cpp": "cpp", ".toml": "toml", ".json": "json", ".xml": "xml", ".md": "markdown"}
+LANGUAGES = {
+    ".py": "python",
+    ".c": "c",
+    ".h": "c",
+    ".cpp": "cpp",
+    ".toml": "toml",
+    ".json": "json",
+    ".xml": "xml",
+    ".md": "markdown",
+}
 PICTURES = (".png", ".svg", ".jpg")
 LINK = re.compile(r"(?<=\]\()([^)\s]+)(?=\))")
 CODE = re.compile(r"(^```.*?^```[^\n]*$|`[^`\n]+`)", flags=re.DOTALL | re.MULTILINE)
@@ -43,7 +58,9 @@ class Stage:
     """A folder that is filled with pages for Sphinx."""
 
     folder: Path
-    shown: set[str] = field(default_factory=set)  # files and folders of the repository that have a page of their own
+    shown: set[str] = field(
+        default_factory=set
+    )  # files and folders of the repository that have a page of their own
 
     def write(self, name: str, text: str) -> None:
         """Adds a page."""
@@ -64,7 +81,9 @@ class Stage:
             self.write(name, self._linked(text, source, name))
 
     def _linked(self, text: str, source: Path, name: str) -> str:
-        return outside_code(text, lambda part: LINK.sub(lambda match: self._target(match[1], source, name), part))
+        return outside_code(
+            text, lambda part: LINK.sub(lambda match: self._target(match[1], source, name), part)
+        )
 
     def _target(self, link: str, source: Path, name: str) -> str:
         """Where a link of a page leads on the site."""
@@ -73,7 +92,9 @@ class Stage:
             return link
         found = (source.parent / path).resolve()
         if not found.exists() or not found.is_relative_to(ROOT):
-            raise BrokenLinkError(f"{source.relative_to(ROOT)}: link to {link}: no such file; expected a path relative to the page")
+            raise BrokenLinkError(
+                f"{source.relative_to(ROOT)}: link to {link}: no such file; expected a path relative to the page"
+            )
         relative = os.path.relpath(self._place(found), PurePosixPath(name).parent)
         return relative + (f"#{anchor}" if anchor and found.suffix == ".md" else "")
 
@@ -104,8 +125,14 @@ class Stage:
         return name
 
     def _listing(self, folder: Path, name: str) -> str:
-        entries = [entry for entry in sorted(folder.iterdir()) if not entry.name.startswith(".") and entry.name not in HIDDEN]
-        rows = "\n".join(f"- {_named(entry, name)}" for entry in entries if entry.is_dir() or is_text(entry))
+        entries = [
+            entry
+            for entry in sorted(folder.iterdir())
+            if not entry.name.startswith(".") and entry.name not in HIDDEN
+        ]
+        rows = "\n".join(
+            f"- {_named(entry, name)}" for entry in entries if entry.is_dir() or is_text(entry)
+        )
         return f"---\norphan: true\n---\n\n# {folder.relative_to(ROOT).as_posix()}/\n\n{rows}\n"
 
 
@@ -119,14 +146,18 @@ def _named(entry: Path, page: str) -> str:
 
 def pages() -> Iterator[Path]:
     """The repository's pages that are the site's too."""
-    yield from sorted(path for path in DOCS.rglob("*.md") if path.name != "README.md" or path.parent != DOCS)
+    yield from sorted(
+        path for path in DOCS.rglob("*.md") if path.name != "README.md" or path.parent != DOCS
+    )
     yield from sorted(DOCS.rglob("*.ipynb"))
     yield from (ROOT / name for name in ELSEWHERE)
 
 
 def is_page(path: Path) -> bool:
     """Whether a file is one of them."""
-    return path.relative_to(ROOT).as_posix() in ELSEWHERE or (path.suffix in {".md", ".ipynb"} and path.is_relative_to(DOCS))
+    return path.relative_to(ROOT).as_posix() in ELSEWHERE or (
+        path.suffix in {".md", ".ipynb"} and path.is_relative_to(DOCS)
+    )
 
 
 def page_name(path: Path) -> str:
@@ -145,7 +176,10 @@ def outside_code(text: str, change: Callable[[str], str]) -> str:
 
 def is_text(path: Path) -> bool:
     """Whether a file is one to be read."""
-    return path.suffix in {*LANGUAGES, ".txt", ".csv", ".jinja", ".cff", ""} and b"\0" not in path.read_bytes()[:1024]
+    return (
+        path.suffix in {*LANGUAGES, ".txt", ".csv", ".jinja", ".cff", ""}
+        and b"\0" not in path.read_bytes()[:1024]
+    )
 
 
 def listing_of(path: Path) -> str:

@@ -1,4 +1,6 @@
-"""The reference of an FMU's variables, from its interface.toml by way of the rows that stand in the FMU's own documentation."""
+"""The reference of an FMU's variables, from its interface.toml by way of the rows that stand in
+the FMU's own documentation.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +14,22 @@ from hexapod_cosim.models import load_robot
 
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
 PERIOD = 0.005  # s, the default macro-step
-DESIGNED, DESIGNED_NAMES = "designed", ("gains.slip.", "gains.suspension.")  # by `hexapod design`, for each robot
+DESIGNED, DESIGNED_NAMES = (
+    "designed",
+    ("gains.slip.", "gains.suspension."),
+)  # by `hexapod design`, for each robot
 COLUMNS = ("variable", "unit", "number", "range", "start", "meaning")
 
 
 def interfaces() -> dict[str, Interface]:
     """The default robot's two FMUs."""
     robot = load_robot("athena")
-    return {"plant": load_interface(robot), "controller": load_controller_interface(make_setup(robot, control="kinematic", period=PERIOD))}
+    return {
+        "plant": load_interface(robot),
+        "controller": load_controller_interface(
+            make_setup(robot, control="kinematic", period=PERIOD)
+        ),
+    }
 
 
 def page(interface: Interface) -> str:
@@ -55,7 +65,11 @@ def _row(row: Row) -> str:
     unit = f"[{unit}](#{unit.lower()})" if row["choices"] else unit
     start = DESIGNED if row["name"].startswith(DESIGNED_NAMES) else row["start"]
     cells = (f"`{row['name']}`", unit, row["count"], row["range"], start, row["meaning"])
-    return "| " + " | ".join(text if text.startswith(("`", "[")) else escaped(text) for text in cells) + " |"
+    return (
+        "| "
+        + " | ".join(text if text.startswith(("`", "[")) else escaped(text) for text in cells)
+        + " |"
+    )
 
 
 def _choices(interface: Interface) -> Iterator[str]:
@@ -65,7 +79,10 @@ def _choices(interface: Interface) -> Iterator[str]:
     for name, enumeration in interface.enumerations.items():
         if name in used:
             yield f"### {name}\n\n| number | name | meaning |\n|---|---|---|"
-            yield from (f"| {number} | `{item}` | {escaped(text)} |" for number, (item, text) in enumerate(enumeration.items, start=1))
+            yield from (
+                f"| {number} | `{item}` | {escaped(text)} |"
+                for number, (item, text) in enumerate(enumeration.items, start=1)
+            )
             yield ""
 
 

@@ -1,7 +1,9 @@
-"""`python -m tools.importers.compare`: the same recorded walk through importers that no one here wrote, and how far each is from fmpy.
+"""`python -m tools.importers.compare`: the same recorded walk through importers that no one here
+wrote, and how far each is from fmpy.
 
-Everything lies in build/importers: an environment of the importers' own, the walk, each importer's answers. An importer that cannot be
-installed on this machine is named with the reason; one that was installed has to run and agree, or the exit code says so.
+Everything lies in build/importers: an environment of the importers' own, the walk, each importer's
+answers. An importer that cannot be installed on this machine is named with the reason; one that was
+installed has to run and agree, or the exit code says so.
 """
 
 from __future__ import annotations
@@ -21,7 +23,14 @@ from rich.table import Table
 
 from hexapod_cosim.cosim.common.plant_files import package_version
 from hexapod_cosim.cosim.master.recorder import Recording
-from tools.importers.outcome import Outcome, answers, last_lines, not_installed, shortcomings, version
+from tools.importers.outcome import (
+    Outcome,
+    answers,
+    last_lines,
+    not_installed,
+    shortcomings,
+    version,
+)
 from tools.importers.packages import TOOLS, PackageRow, compare_packages
 from tools.importers.walk import STEP, Walk, record
 
@@ -29,8 +38,11 @@ HERE = Path(__file__).resolve().parent
 ADAPTERS = HERE / "adapters"
 BUILD = HERE.parents[1] / "build" / "importers"
 DURATION = 3.0  # s    three gait cycles and a half
-ROUND_OFF = 2e-9  # a last bit in when a step ends, carried through touch-downs; steepest rises of forces hold second differences of depths
-SMALL = 1e-3  # SI     an output that never gets larger is judged by this: residuals are themselves round-off
+# a last bit in when a step ends, carried through touch-downs; steepest rises of forces hold second
+# differences of depths
+ROUND_OFF = 2e-9
+# SI     an output that never gets larger is judged by this: residuals are themselves round-off
+SMALL = 1e-3
 FMI_SIM = "0.7.0"
 
 
@@ -45,17 +57,23 @@ class Importer:
 
 
 IMPORTERS = (
-    Importer("libcosim", ("libcosimpy",), "libcosim_walk.py", "override manipulator, held over the step"),
+    Importer(
+        "libcosim", ("libcosimpy",), "libcosim_walk.py", "override manipulator, held over the step"
+    ),
     Importer("Ecos", ("ecospy", "tbb"), "ecos_walk.py", "set before the step, held over it"),
-    Importer("fmi-sim", (), "fmi_sim_walk.py", "CSV read by itself, rows at the communication points"),
+    Importer(
+        "fmi-sim", (), "fmi_sim_walk.py", "CSV read by itself, rows at the communication points"
+    ),
 )
 
 
 @dataclass(frozen=True)
 class Row:
-    """What came of an importer. Differences are the largest of all outputs and times, each of its output's largest value.
+    """What came of an importer. Differences are the largest of all outputs and times, each of its
+    output's largest value.
 
-    difference: from fmpy;  own: from fmpy told the importer's own times, to the last bit;  missing: it could not be installed.
+    difference: from fmpy;  own: from fmpy told the importer's own times, to the last bit;  missing:
+    it could not be installed.
     """
 
     name: str
@@ -81,17 +99,26 @@ def main() -> int:
     python = environment()
     ours = row("hexapod's master", package_version(), "as recorded", walk.recorded, walk)
     missing = install_fmi_sim(python)
-    rows = [through(importer, walk, python, missing="" if importer.packages else missing) for importer in IMPORTERS]
+    rows = [
+        through(importer, walk, python, missing="" if importer.packages else missing)
+        for importer in IMPORTERS
+    ]
     show([ours, *rows], walk)
     masters, tools = compare_packages(BUILD / "package", python, duration=duration)
     show_packages([*masters, *tools])
     return verdict(rows, tools, ours=[ours, *masters])
 
 
-def verdict(importers: Sequence[Row], tools: Sequence[PackageRow], *, ours: Sequence[Outcome]) -> int:
-    """Says what is not good enough, and returns the exit code. Masters of our own (`ours`) have to agree, whatever can be installed."""
+def verdict(
+    importers: Sequence[Row], tools: Sequence[PackageRow], *, ours: Sequence[Outcome]
+) -> int:
+    """Says what is not good enough, and returns the exit code. Masters of our own (`ours`) have
+    to agree, whatever can be installed.
+    """
     wrong = [f"{one.name} does not agree" for one in ours if not one.agrees]
-    wrong += shortcomings("importers", importers, wanted=len(IMPORTERS)) + shortcomings("tools for packages", tools, wanted=len(TOOLS))
+    wrong += shortcomings("importers", importers, wanted=len(IMPORTERS)) + shortcomings(
+        "tools for packages", tools, wanted=len(TOOLS)
+    )
     for text in wrong:
         print(text, file=sys.stderr)
     return 1 if wrong else 0
@@ -104,20 +131,38 @@ def environment() -> Path:
     python = folder / "bin" / "python"
     for line in requirements.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):
-            subprocess.run([str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", line], check=False)
+            subprocess.run(
+                [
+                    str(python),
+                    "-m",
+                    "pip",
+                    "install",
+                    "--quiet",
+                    "--disable-pip-version-check",
+                    line,
+                ],
+                check=False,
+            )
     return python
 
 
 def install_fmi_sim(python: Path) -> str:
-    """fmi-sim from crates.io; returns "", or why it cannot be had. To build it takes libclang, which PyPI has, and gcc's headers."""
+    """fmi-sim from crates.io; returns "", or why it cannot be had. To build it takes libclang,
+    which PyPI has, and gcc's headers.
+    """
     folder = BUILD / "cargo"
     if (folder / "bin" / "fmi-sim").exists():
         return ""
     if shutil.which("cargo") is None:
         return "cargo (Rust) is not installed"
-    headers = subprocess.run(["gcc", "-print-file-name=include"], capture_output=True, text=True, check=False).stdout.strip()
+    headers = subprocess.run(
+        ["gcc", "-print-file-name=include"], capture_output=True, text=True, check=False
+    ).stdout.strip()
     libclang = next(python.parents[1].glob("lib/python3*/site-packages/clang/native"), Path())
-    environment = os.environ | {"LIBCLANG_PATH": str(libclang), "BINDGEN_EXTRA_CLANG_ARGS": f"-I{headers}"}
+    environment = os.environ | {
+        "LIBCLANG_PATH": str(libclang),
+        "BINDGEN_EXTRA_CLANG_ARGS": f"-I{headers}",
+    }
     command = [
         "cargo",
         "install",
@@ -140,7 +185,9 @@ def through(importer: Importer, walk: Walk, python: Path, *, missing: str = "") 
     if missing:
         return Row(importer.name, "", importer.given, None, None, missing, missing=True)
     outputs = walk.folder / f"{importer.name}.csv"
-    found, said = answers([python, ADAPTERS / importer.adapter, walk.fmu, walk.inputs, walk.wanted, outputs], outputs)
+    found, said = answers(
+        [python, ADAPTERS / importer.adapter, walk.fmu, walk.inputs, walk.wanted, outputs], outputs
+    )
     release = version(importer.packages[0], python) if importer.packages else FMI_SIM
     if found is None:
         return Row(importer.name, release, importer.given, None, None, said)
@@ -150,9 +197,16 @@ def through(importer: Importer, walk: Walk, python: Path, *, missing: str = "") 
 def row(name: str, release: str, given: str, found: Recording, walk: Walk) -> Row:
     """An importer's answers, judged."""
     difference, worst = judged(found, walk.reference)
-    lengths = (np.full(len(found.time), STEP), np.diff(found.time, prepend=0.0))  # importers pass h, or the difference of their times
+    lengths = (
+        np.full(len(found.time), STEP),
+        np.diff(found.time, prepend=0.0),
+    )  # importers pass h, or the difference of their times
     whole = len(found.time) == len(walk.reference.time)
-    own = min(judged(found, walk.replay(found.time, steps))[0] for steps in lengths) if whole and np.isfinite(found.time).all() else None
+    own = (
+        min(judged(found, walk.replay(found.time, steps))[0] for steps in lengths)
+        if whole and np.isfinite(found.time).all()
+        else None
+    )
     return Row(name, release, given, difference, own, worst)
 
 
@@ -175,24 +229,47 @@ def show(rows: list[Row], walk: Walk) -> None:
     """Prints the table."""
     count = walk.reference.data.shape[0] * (walk.reference.data.shape[1] - 1)
     title = f"{len(walk.reference.time)} steps of {STEP:g} s, {count} values, against fmpy"
-    table = Table("importer", "version", "inputs", "largest difference", "told its own times", "remark", title=title)
+    table = Table(
+        "importer",
+        "version",
+        "inputs",
+        "largest difference",
+        "told its own times",
+        "remark",
+        title=title,
+    )
     for one in rows:
-        table.add_row(one.name, one.version, one.given, shown(one.difference), shown(one.own), one.remark)
+        table.add_row(
+            one.name, one.version, one.given, shown(one.difference), shown(one.own), one.remark
+        )
     Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
 
 
 def show_packages(rows: list[PackageRow]) -> None:
     """Prints the table of packages."""
-    title = "plant and controller in a package, against the Python master with the Python controller"
+    title = (
+        "plant and controller in a package, against the Python master with the Python controller"
+    )
     table = Table("tool", "version", "on time", "measurements a period late", title=title)
     for one in rows:
-        table.add_row(one.name, one.version, shown(one.prompt), shown(one.late) if not one.trouble else one.trouble)
+        table.add_row(
+            one.name,
+            one.version,
+            shown(one.prompt),
+            shown(one.late) if not one.trouble else one.trouble,
+        )
     Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
 
 
 def shown(difference: float | None) -> str:
     """A difference, or what stands for it."""
-    return "not run" if difference is None else f"{difference:.1e}" if difference else "none, to the last bit"
+    return (
+        "not run"
+        if difference is None
+        else f"{difference:.1e}"
+        if difference
+        else "none, to the last bit"
+    )
 
 
 if __name__ == "__main__":

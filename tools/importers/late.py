@@ -1,4 +1,6 @@
-"""The Python master and controller on a package's walk, on time and with measurements that are one period old."""
+"""The Python master and controller on a package's walk, on time and with measurements that are
+one period old.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +19,11 @@ from hexapod_cosim.cosim.scenario.schedule import make_schedule
 
 
 class Late:
-    """Answers each time with the measurements of the period before, but for the first; what it remembers it takes from the present ones.
+    """Answers each time with the measurements of the period before, but for the first; what it
+    remembers it takes from the present ones.
 
-    So does a controller FMU whose inputs are set after its outputs were read: its laws go on with every measurement, its answers come late.
+    So does a controller FMU whose inputs are set after its outputs were read: its laws go on with
+    every measurement, its answers come late.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -42,7 +46,9 @@ def copy(measurement: Measurement) -> Measurement:
     return Measurement(**{name: np.array(value) for name, value in vars(measurement).items()})
 
 
-def walk(setup: ControllerSetup, fmu: Path, *, duration: float, overrides: list[str], late: bool) -> Recording:
+def walk(
+    setup: ControllerSetup, fmu: Path, *, duration: float, overrides: list[str], late: bool
+) -> Recording:
     """Rows after each step, under the Python controller of this set-up."""
     settings = [f"duration={duration}", f"macro_step={setup.period}", *overrides]
     schedule = make_schedule(load_scenario("walk_flat", overrides=settings))

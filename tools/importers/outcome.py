@@ -1,4 +1,6 @@
-"""What came of tools that no one here wrote: their answers, why there are none, and whether that is good enough."""
+"""What came of tools that no one here wrote: their answers, why there are none, and whether that
+is good enough.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ class Outcome(Protocol):
 def version(distribution: str, python: Path) -> str:
     """Of a package in the tools' environment; "" if it is not there."""
     code = f"from importlib.metadata import version; print(version({distribution!r}))"
-    return subprocess.run([str(python), "-c", code], capture_output=True, text=True, check=False).stdout.strip()
+    return subprocess.run(
+        [str(python), "-c", code], capture_output=True, text=True, check=False
+    ).stdout.strip()
 
 
 def not_installed(distributions: Iterable[str], python: Path) -> str:
@@ -40,7 +44,9 @@ def not_installed(distributions: Iterable[str], python: Path) -> str:
 def answers(command: Sequence[str | Path], outputs: Path) -> tuple[Recording | None, str]:
     """What an adapter wrote, or None and what it said; what an earlier one wrote does not count."""
     outputs.unlink(missing_ok=True)
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, check=False
+    )
     if done.returncode:
         return None, f"failed ({done.returncode}): {last_lines(done.stderr or done.stdout)}"
     try:
@@ -55,7 +61,9 @@ def last_lines(text: str) -> str:
 
 
 def shortcomings(kind: str, outcomes: Collection[Outcome], *, wanted: int) -> list[str]:
-    """Why the outcomes of foreign tools are not good enough, a sentence each: all that could be installed agree, and none is left out."""
+    """Why the outcomes of foreign tools are not good enough, a sentence each: all that could be
+    installed agree, and none is left out.
+    """
     found = [f"{one.name} does not agree" for one in outcomes if not (one.missing or one.agrees)]
     settled = sum(one.missing or one.agrees for one in outcomes)
     if settled < wanted:

@@ -1,4 +1,6 @@
-"""The same package through tools that no one here wrote, against the Python master: on time, and with measurements a period late."""
+"""The same package through tools that no one here wrote, against the Python master: on time, and
+with measurements a period late.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +23,31 @@ from tools.importers.package import run
 
 ADAPTERS = Path(__file__).resolve().parent / "adapters"
 PERIOD = 0.005  # s
-SAME = 1e-9  # the controllers' last bits, which the servos' stiffness and the ground's turn into forces
+# the controllers' last bits, which the servos' stiffness and the ground's turn into forces
+SAME = 1e-9
 SMALL = 1e-3  # SI    an output that never gets larger is judged by this
-# that inputs do not reach at once: some tools show outputs before they set the next inputs, some after
-JUDGED = ("torso.position", "torso.quaternion", "torso.velocity", ".angle", ".speed", "foot.force", "foot.normal_force")
-TOOLS = (("libcosim", ("libcosimpy",), "libcosim_package.py"), ("Ecos", ("ecospy", "tbb"), "ecos_package.py"))
+# that inputs do not reach at once: some tools show outputs before they set the next inputs, some
+# after
+JUDGED = (
+    "torso.position",
+    "torso.quaternion",
+    "torso.velocity",
+    ".angle",
+    ".speed",
+    "foot.force",
+    "foot.normal_force",
+)
+TOOLS = (
+    ("libcosim", ("libcosimpy",), "libcosim_package.py"),
+    ("Ecos", ("ecospy", "tbb"), "ecos_package.py"),
+)
 
 
 @dataclass(frozen=True)
 class PackageRow:
-    """What came of a tool: the largest difference of all judged outputs and times, each of its largest value, from either order."""
+    """What came of a tool: the largest difference of all judged outputs and times, each of its
+    largest value, from either order.
+    """
 
     name: str
     version: str
@@ -42,38 +59,73 @@ class PackageRow:
     @property
     def agrees(self) -> bool:
         """It ran, and gave the walk of one of the orders."""
-        return any(difference is not None and difference <= SAME for difference in (self.prompt, self.late))
+        return any(
+            difference is not None and difference <= SAME for difference in (self.prompt, self.late)
+        )
 
 
-def compare_packages(folder: Path, python: Path, *, duration: float) -> tuple[list[PackageRow], list[PackageRow]]:
-    """Packs the compliant walk and runs it through plain masters and foreign tools; `python`: of the tools' environment."""
+def compare_packages(
+    folder: Path, python: Path, *, duration: float
+) -> tuple[list[PackageRow], list[PackageRow]]:
+    """Packs the compliant walk and runs it through plain masters and foreign tools; `python`: of
+    the tools' environment.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    setup, steps = make_setup(load_robot("athena"), control="compliant", period=PERIOD), round(duration / PERIOD)
+    setup, steps = (
+        make_setup(load_robot("athena"), control="compliant", period=PERIOD),
+        round(duration / PERIOD),
+    )
     package = export_package(setup, folder / "athena.ssp", stop=duration)
     with zipfile.ZipFile(package) as archive:
         plant = Path(archive.extract("resources/plant.fmu", folder))
-    masters = [walk(setup, plant, duration=duration, overrides=[], late=late) for late in (False, True)]
+    masters = [
+        walk(setup, plant, duration=duration, overrides=[], late=late) for late in (False, True)
+    ]
     with Fmu(plant) as fmu:
         outputs = fmu.names("output")
     names = [name for name in outputs if any(part in name for part in JUDGED)]
     wanted = folder / "names.txt"
     wanted.write_text("\n".join(f"{PLANT}.{name}" for name in names), encoding="utf-8")
     rows = []
-    for name, at_once in (("plain master, plant before controller", True), ("plain master, both at once", False)):
-        found = run(package, wanted.read_text().split("\n"), step=PERIOD, steps=steps, order=(PLANT, CONTROLLER), at_once=at_once)
+    for name, at_once in (
+        ("plain master, plant before controller", True),
+        ("plain master, both at once", False),
+    ):
+        found = run(
+            package,
+            wanted.read_text().split("\n"),
+            step=PERIOD,
+            steps=steps,
+            order=(PLANT, CONTROLLER),
+            at_once=at_once,
+        )
         rows.append(PackageRow(name, package_version(), *judged(found, masters, names)))
     tools = []
     for name, needs, adapter in TOOLS:
         answered = folder / f"{name}.csv"
-        command: list[str | Path] = [python, ADAPTERS / adapter, package, wanted, answered, str(steps)]
+        command: list[str | Path] = [
+            python,
+            ADAPTERS / adapter,
+            package,
+            wanted,
+            answered,
+            str(steps),
+        ]
         tools.append(through(name, needs, command, answered, masters, names))
     return rows, tools
 
 
 def through(
-    name: str, needs: Sequence[str], command: Sequence[str | Path], outputs: Path, masters: Sequence[Recording], names: Sequence[str]
+    name: str,
+    needs: Sequence[str],
+    command: Sequence[str | Path],
+    outputs: Path,
+    masters: Sequence[Recording],
+    names: Sequence[str],
 ) -> PackageRow:
-    """A package through one tool, judged. needs: packages of PyPI, itself first; command: its adapter's, after the environment's Python."""
+    """A package through one tool, judged. needs: packages of PyPI, itself first; command: its
+    adapter's, after the environment's Python.
+    """
     python = Path(command[0])
     missing = not_installed(needs, python)
     if missing:
@@ -85,11 +137,18 @@ def through(
     return PackageRow(name, release, *judged(found, masters, names))
 
 
-def judged(found: Recording, masters: Sequence[Recording], names: Sequence[str]) -> tuple[float, float]:
-    """The largest difference from each master, of the output's largest value; none there is: infinite."""
+def judged(
+    found: Recording, masters: Sequence[Recording], names: Sequence[str]
+) -> tuple[float, float]:
+    """The largest difference from each master, of the output's largest value; none there is:
+    infinite.
+    """
     wanted = [f"{PLANT}.{name}" for name in names]
     if not set(wanted) <= set(found.names) or len(found.time) != len(masters[0].time):
         return np.inf, np.inf
     theirs, ours = found.columns(wanted), [master.columns(names) for master in masters]
-    on_time, late = (float((np.abs(theirs - one).max(axis=0) / np.maximum(np.abs(one).max(axis=0), SMALL)).max()) for one in ours)
+    on_time, late = (
+        float((np.abs(theirs - one).max(axis=0) / np.maximum(np.abs(one).max(axis=0), SMALL)).max())
+        for one in ours
+    )
     return on_time, late  # NaN, of values that are none, agrees with nothing

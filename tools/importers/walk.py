@@ -1,4 +1,6 @@
-"""The walk that every importer repeats: joint commands recorded from a compliant walk, and what fmpy's own simulator makes of them."""
+"""The walk that every importer repeats: joint commands recorded from a compliant walk, and what
+fmpy's own simulator makes of them.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,8 @@ STEP = 0.005  # s
 class Walk:
     """Files in one folder, and the answers expected of an importer.
 
-    `reference`: a row per communication point after the first, columns of `outputs`; `recorded`: the same as our own master saw them.
+    `reference`: a row per communication point after the first, columns of `outputs`; `recorded`:
+    the same as our own master saw them.
     """
 
     folder: Path
@@ -46,44 +49,82 @@ class Walk:
         return place
 
     def replay(self, ends: NDArray[np.float64], steps: NDArray[np.float64]) -> Recording:
-        """The walk on an importer's own communication points: `ends` and lengths of its `steps`, (steps,) each [s]."""
+        """The walk on an importer's own communication points: `ends` and lengths of its `steps`,
+        (steps,) each [s].
+        """
         commands, outputs = read_csv(self.inputs), self.reference.names[1:]
         rows = []
         with Fmu(self.fmu) as plant:
             plant.initialise(0.0, float(commands.time[-1]))
             driven = plant.block(commands.names[1:])
             seen = [plant.block(plant.names("output", kind)) for kind in ("Real", "Boolean")]
-            for begin, step, values in zip([0.0, *ends[:-1]], steps, commands.data[:, 1:], strict=False):
+            for begin, step, values in zip(
+                [0.0, *ends[:-1]], steps, commands.data[:, 1:], strict=False
+            ):
                 driven.values[:] = values
                 driven.set()
                 plant.step(float(begin), float(step))
                 for block in seen:
                     block.get()
                 rows.append(np.concatenate([block.values for block in seen]))
-        found = Recording(("time", *(name for block in seen for name in block.names)), np.column_stack([ends, np.array(rows)]))
+        found = Recording(
+            ("time", *(name for block in seen for name in block.names)),
+            np.column_stack([ends, np.array(rows)]),
+        )
         return Recording(("time", *outputs), found.columns(["time", *outputs]))
 
 
 def record(folder: Path, *, duration: float, robot: str = "athena") -> Walk:
-    """Walks under compliant control for `duration` [s] and writes FMU, commands and names of outputs into a folder."""
+    """Walks under compliant control for `duration` [s] and writes FMU, commands and names of
+    outputs into a folder.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     fmu = export_fmu(load_robot(robot), folder / f"{robot}.fmu")
     description = read_description(fmu)
-    names = {kind: [one.name for one in description.modelVariables if one.causality == kind] for kind in ("input", "output")}
-    scenario = load_scenario("walk_flat", overrides=[f"robot={robot}", f"duration={duration}", f"macro_step={STEP}", "control=compliant"])
+    names = {
+        kind: [one.name for one in description.modelVariables if one.causality == kind]
+        for kind in ("input", "output")
+    }
+    scenario = load_scenario(
+        "walk_flat",
+        overrides=[
+            f"robot={robot}",
+            f"duration={duration}",
+            f"macro_step={STEP}",
+            "control=compliant",
+        ],
+    )
     recording = simulate(scenario, fmu=fmu).outcome.recording
     inputs, wanted = folder / "inputs.csv", folder / "outputs.txt"
     commands = Recording(("time", *names["input"]), recording.columns(["time", *names["input"]]))
     write_csv(commands, inputs)
     wanted.write_text("\n".join(names["output"]), encoding="utf-8")
-    recorded = Recording(("time", *names["output"]), recording.columns(["time", *names["output"]])[1:])
+    recorded = Recording(
+        ("time", *names["output"]), recording.columns(["time", *names["output"]])[1:]
+    )
     reference = through_fmpy(fmu, commands, names["output"])
-    return Walk(folder=folder, fmu=fmu, inputs=inputs, wanted=wanted, reference=reference, recorded=recorded)
+    return Walk(
+        folder=folder, fmu=fmu, inputs=inputs, wanted=wanted, reference=reference, recorded=recorded
+    )
 
 
 def through_fmpy(fmu: Path, commands: Recording, outputs: list[str]) -> Recording:
-    """fmpy's simulate_fmu: commands and communication points on the same grid, so that each command holds over its step."""
-    signals = np.array([tuple(row) for row in commands.data], dtype=[(name, np.float64) for name in commands.names])
+    """fmpy's simulate_fmu: commands and communication points on the same grid, so that each
+    command holds over its step.
+    """
+    signals = np.array(
+        [tuple(row) for row in commands.data], dtype=[(name, np.float64) for name in commands.names]
+    )
     end = float(commands.time[-1])
-    found = fmpy.simulate_fmu(str(fmu), stop_time=end, output_interval=STEP, input=signals, output=outputs, fmi_type="CoSimulation")
-    return Recording(("time", *outputs), np.column_stack([found[name].astype(np.float64) for name in ("time", *outputs)])[1:])
+    found = fmpy.simulate_fmu(
+        str(fmu),
+        stop_time=end,
+        output_interval=STEP,
+        input=signals,
+        output=outputs,
+        fmi_type="CoSimulation",
+    )
+    return Recording(
+        ("time", *outputs),
+        np.column_stack([found[name].astype(np.float64) for name in ("time", *outputs)])[1:],
+    )

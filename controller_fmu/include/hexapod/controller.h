@@ -1,8 +1,10 @@
-/* controller.h - the controller: joint commands from a body velocity and from foot forces, once a period.
+/* controller.h - the controller: joint commands from a body velocity and from foot forces, once a
+ * period.
  *
- * The C form of controller/ (Python), to round-off: the same files, names and laws, one step at a time. SI units, frames and orders as in
- * hexapod.h (docs/architecture.md). A controller has no pointers, no globals and no hidden state: its bytes are its state. After create nothing allocates, prints
- * or exits.
+ * The C form of controller/ (Python), to round-off: the same files, names and laws, one step at a
+ * time. SI units, frames and orders as in hexapod.h (docs/architecture.md). A controller has no
+ * pointers, no globals and no hidden state: its bytes are its state. After create nothing
+ * allocates, prints or exits.
  */
 #ifndef HEXAPOD_CONTROLLER_H
 #define HEXAPOD_CONTROLLER_H
@@ -20,7 +22,13 @@ typedef enum hxControl {
 } hxControl;
 
 /* Which leg is in the air when: offsets by name, or the ones given. */
-typedef enum hxPattern { HX_PATTERN_TRIPOD = 1, HX_PATTERN_RIPPLE, HX_PATTERN_WAVE, HX_PATTERN_AMBLE, HX_PATTERN_CUSTOM } hxPattern;
+typedef enum hxPattern {
+  HX_PATTERN_TRIPOD = 1,
+  HX_PATTERN_RIPPLE,
+  HX_PATTERN_WAVE,
+  HX_PATTERN_AMBLE,
+  HX_PATTERN_CUSTOM
+} hxPattern;
 
 /* What the controller knows of a link; joint axes are z, -y, y (docs/architecture.md). */
 typedef struct hxKnownLink {
@@ -92,7 +100,8 @@ typedef struct hxParts {
   int support, slip_pid, suspension, touchdown, posture, path, limits, fallback;
 } hxParts;
 
-/* The robot as its controller knows it, the gait and the laws. hx_controller_definition_default fills in the ATHENA-like robot. */
+/* The robot as its controller knows it, the gait and the laws. hx_controller_definition_default
+ * fills in the ATHENA-like robot. */
 typedef struct hxControllerDefinition {
   double period;  /* s    between two steps of the controller */
   int control;    /* hxControl */
@@ -136,43 +145,54 @@ typedef struct hxControllerOutput {
   int swinging[HX_LEGS];                  /* planned to be in the air */
   int unreachable[HX_LEGS];               /* the joints cannot follow */
   int fallback[HX_LEGS];                  /* walks without feedback */
-  double shift[HX_LEGS][2];               /* m  horizontal correction of the foot, walking frame */
-  double lift[HX_LEGS];                   /* m  and the vertical one */
-  double planned[HX_LEGS][3];             /* m  the foot's centre as the command plans it, torso frame, without any correction */
+  double shift[HX_LEGS][2]; /* m  horizontal correction of the foot, walking frame */
+  double lift[HX_LEGS]; /* m  and the vertical one */
+  double planned[HX_LEGS][3]; /* m  the foot's centre as the command plans it, torso frame, without
+                                 any correction */
   double acceleration_ref[HX_LEGS][HX_JOINTS]; /* rad/s2  planned, for kinematic drives */
 } hxControllerOutput;
 
 typedef struct hxController hxController;
 
 HX_API void hx_controller_definition_default(hxControllerDefinition *definition);
-HX_API void hx_controller_input_default(hxControllerInput *input); /* nothing commanded, nothing felt, joints in the stance */
+HX_API void hx_controller_input_default(
+    hxControllerInput *input); /* nothing commanded, nothing felt, joints in the stance */
 
 /* The ranges of every number in either structure; returns how many there are. */
 HX_API size_t hx_controller_definition_ranges(const hxRange **range);
 HX_API size_t hx_controller_input_ranges(const hxRange **range);
 
-/* Checks a definition. On failure message (HX_MESSAGE_SIZE bytes, may be NULL) says what, got, expected. */
-HX_API hxStatus hx_controller_definition_check(const hxControllerDefinition *definition, char *message);
+/* Checks a definition. On failure message (HX_MESSAGE_SIZE bytes, may be NULL) says what, got,
+ * expected. */
+HX_API hxStatus hx_controller_definition_check(const hxControllerDefinition *definition,
+                                               char *message);
 
 /* Allocates a controller of the default robot at time 0; NULL when out of memory. */
 HX_API hxController *hx_controller_create(void);
 HX_API void hx_controller_destroy(hxController *controller);
 
-/* Standing in the stance, all memory cleared, the first tick at time t. On failure nothing changes but the message. */
-HX_API hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinition *definition, double t);
+/* Standing in the stance, all memory cleared, the first tick at time t. On failure nothing changes
+ * but the message. */
+HX_API hxStatus hx_controller_reset(hxController *controller,
+                                    const hxControllerDefinition *definition, double t);
 
-/* The joint commands at the present time: of this input when a tick is due, else those of the last tick. Changes nothing that
- * counts: what was calculated is only kept for the step that follows under the same input. */
-HX_API void hx_controller_output(hxController *controller, const hxControllerInput *input, hxControllerOutput *output);
+/* The joint commands at the present time: of this input when a tick is due, else those of the last
+ * tick. Changes nothing that counts: what was calculated is only kept for the step that follows
+ * under the same input. */
+HX_API void hx_controller_output(hxController *controller, const hxControllerInput *input,
+                                 hxControllerOutput *output);
 
-/* Goes on to t_end >= time under this input, which changes at a rate (1/s; NULL: is held): all ticks before t_end are done. On failure
- * nothing changes but the message. */
-HX_API hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input, const hxControllerInput *rate, double t_end);
+/* Goes on to t_end >= time under this input, which changes at a rate (1/s; NULL: is held): all
+ * ticks before t_end are done. On failure nothing changes but the message. */
+HX_API hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input,
+                                   const hxControllerInput *rate, double t_end);
 
 HX_API double hx_controller_time(const hxController *controller);
-HX_API const char *hx_controller_message(const hxController *controller); /* of the last failure, "" before any */
+HX_API const char *
+hx_controller_message(const hxController *controller); /* of the last failure, "" before any */
 
-/* The controller's bytes: size, copy out, copy in (checked: HX_BAD_STATE leaves the controller as it was). */
+/* The controller's bytes: size, copy out, copy in (checked: HX_BAD_STATE leaves the controller as
+ * it was). */
 HX_API size_t hx_controller_state_size(void);
 HX_API void hx_controller_get_state(const hxController *controller, void *bytes);
 HX_API hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size);

@@ -1,7 +1,9 @@
-"""Workers of a Dask cluster, which may come, go and die while a study runs. Each gets the job once; the scheduler sees chunks.
+"""Workers of a Dask cluster, which may come, go and die while a study runs. Each gets the job once;
+the scheduler sees chunks.
 
-Chunks are handed to workers by name rather than to whichever the scheduler likes. So it is known what a worker that died was at, the
-scheduler does not try it again by itself, and a run that ends its worker costs as many of them as on one machine.
+Chunks are handed to workers by name rather than to whichever the scheduler likes. So it is known
+what a worker that died was at, the scheduler does not try it again by itself, and a run that ends
+its worker costs as many of them as on one machine.
 """
 
 from __future__ import annotations
@@ -26,8 +28,11 @@ from hexapod_cosim.models import HexapodError
 
 CONNECT = "10s"  # until a scheduler that does not answer is given up
 PATIENCE = 60.0  # s    without any worker, until the study stops
-LOOK = 1.0  # s    between looks at who is there; the scheduler also tells, but a message may be lost
-FETCH = 5.0  # s    for a chunk's results to travel, until it is looked at whether their worker is still there
+LOOK = (
+    1.0  # s    between looks at who is there; the scheduler also tells, but a message may be lost
+)
+# s    for a chunk's results to travel, until it is looked at whether their worker is still there
+FETCH = 5.0
 COME_AND_GO = ("add-worker", "remove-worker")
 OURS = "hexapod-"  # begins the names of jobs, which their client's ends
 DIED = "its worker of the cluster died"
@@ -47,11 +52,17 @@ class Cluster:
 
     def __init__(self, client: Any, job: Job, say: EventSink) -> None:
         self._client, self._job, self._say = client, job.name, say
-        self._lanes: dict[str, deque[Any]] = {}  # by worker, the futures of chunks it was given, in their order
-        self._chunks: dict[Any, tuple[str, Chunk]] = {}  # by future, its worker and what it was asked for
+        self._lanes: dict[
+            str, deque[Any]
+        ] = {}  # by worker, the futures of chunks it was given, in their order
+        self._chunks: dict[
+            Any, tuple[str, Chunk]
+        ] = {}  # by future, its worker and what it was asked for
         self._waiting: deque[Chunk] = deque()
         self._numbers = count()
-        self._news: SimpleQueue[Any] = SimpleQueue()  # futures that are done and workers that are gone, from Dask's threads
+        self._news: SimpleQueue[Any] = (
+            SimpleQueue()
+        )  # futures that are done and workers that are gone, from Dask's threads
         self._looked, self._seen, self._missed = -LOOK, monotonic(), False
         client.subscribe_topic("all", self._hear)
         self._look()
@@ -67,7 +78,9 @@ class Cluster:
         self._hand_out()
 
     def take(self) -> list[Returned]:
-        """Waits until a chunk is back. Raises StudyError when the scheduler is gone, or all workers are for too long."""
+        """Waits until a chunk is back. Raises StudyError when the scheduler is gone, or all
+        workers are for too long.
+        """
         while True:
             found = [returned for news in self._heard() for returned in self._told(news)]
             self._look()
@@ -127,7 +140,9 @@ class Cluster:
             raise no_workers(self._client.scheduler.address)
 
     def _hand_out(self) -> None:
-        """Those that may have ended a worker first, each alone on one; while such a one waits nothing else is handed out."""
+        """Those that may have ended a worker first, each alone on one; while such a one waits
+        nothing else is handed out.
+        """
         suspects = sorted(self._waiting, key=lambda chunk: not chunk.suspect)
         self._waiting = deque(suspects)
         while self._waiting and self._lanes:
@@ -141,7 +156,9 @@ class Cluster:
 
     def _submit(self, chunk: Chunk, address: str) -> None:
         key = f"hexapod-{self._job}-{next(self._numbers)}"
-        future = self._client.submit(work_here, self._job, chunk, key=key, pure=False, workers=[address], retries=0)
+        future = self._client.submit(
+            work_here, self._job, chunk, key=key, pure=False, workers=[address], retries=0
+        )
         self._chunks[future] = address, chunk
         self._lanes[address].append(future)
         future.add_done_callback(self._news.put)
@@ -151,12 +168,16 @@ class Cluster:
         lane = self._lanes.pop(gone.address, deque())
         left = [(future.status, self._chunks.pop(future)[1]) for future in lane]
         _quietly(self._client.cancel, list(lane))
-        guilty = next((chunk for status, chunk in left if status == "pending" and not gone.expected), None)
+        guilty = next(
+            (chunk for status, chunk in left if status == "pending" and not gone.expected), None
+        )
         self._waiting.extendleft(chunk for _, chunk in reversed(left) if chunk is not guilty)
         return [] if guilty is None else [Returned(guilty, [], died=DIED)]
 
     def _back(self, future: Any) -> list[Returned]:
-        """What a future came to; nothing of one that was called back, or whose results are lost or late."""
+        """What a future came to; nothing of one that was called back, or whose results are lost
+        or late.
+        """
         from distributed import KilledWorker  # noqa: PLC0415
 
         if future not in self._chunks or future.status == "lost":
@@ -174,7 +195,11 @@ class Cluster:
         except HexapodError:
             raise
         except Exception as error:  # of the chunk, or of fetching what it came to
-            raise (unfit(error) if future.status == "error" else lost(f"{type(error).__name__}: {error}")) from error
+            raise (
+                unfit(error)
+                if future.status == "error"
+                else lost(f"{type(error).__name__}: {error}")
+            ) from error
         address, chunk = self._chunks.pop(future)
         self._lanes[address].remove(future)
         future.release()
@@ -183,19 +208,30 @@ class Cluster:
 
 def lost(why: str) -> StudyError:
     """The error for a cluster that is gone."""
-    return StudyError("the cluster is gone", got=why, expected="a scheduler with workers", fix=AGAIN)
+    return StudyError(
+        "the cluster is gone", got=why, expected="a scheduler with workers", fix=AGAIN
+    )
 
 
 def unfit(error: Exception) -> StudyError:
     """The error for a worker on which nothing runs."""
     fix = "install the same versions on all machines of the cluster, with what --engine names"
-    return StudyError("a worker of the cluster cannot run the study", got=f"{type(error).__name__}: {error}", fix=fix)
+    return StudyError(
+        "a worker of the cluster cannot run the study",
+        got=f"{type(error).__name__}: {error}",
+        fix=fix,
+    )
 
 
 def no_workers(address: str) -> StudyError:
     """The error for a cluster without any."""
     fix = f"start some: dask worker {address} --nthreads 1; all runs stored so far are kept"
-    return StudyError("the cluster has no workers", got=f"none for {PATIENCE:g} s", expected="one at least", fix=fix)
+    return StudyError(
+        "the cluster has no workers",
+        got=f"none for {PATIENCE:g} s",
+        expected="one at least",
+        fix=fix,
+    )
 
 
 @contextmanager
@@ -204,7 +240,9 @@ def cluster_crew(job: Job, address: str, say: EventSink) -> Iterator[Cluster]:
     client = _connect(address)
     name = f"{OURS}{client.id}"
     with ExitStack() as opened:
-        opened.enter_context(_silence("distributed"))  # its tracebacks of a scheduler that died: we say what there is to say
+        opened.enter_context(
+            _silence("distributed")
+        )  # its tracebacks of a scheduler that died: we say what there is to say
         opened.callback(_quietly, client.close, timeout=5)
         _quietly(client.run_on_scheduler, _left_behind())
         opened.callback(_while_there, client, client.unregister_worker_plugin, name)
@@ -230,7 +268,9 @@ def _silence(name: str) -> Iterator[None]:
 
 
 def _left_behind() -> Callable[..., Any]:
-    """What takes the jobs of studies that were killed off the cluster; a function within, to travel by value."""
+    """What takes the jobs of studies that were killed off the cluster; a function within, to
+    travel by value.
+    """
     ours = OURS
 
     async def clear(dask_scheduler: Any) -> None:
@@ -256,11 +296,17 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client  # noqa: PLC0415  an extra
     except ImportError as error:
-        raise StudyError("Dask is not installed", fix=install_extra("cluster"), where="--scheduler") from error
+        raise StudyError(
+            "Dask is not installed", fix=install_extra("cluster"), where="--scheduler"
+        ) from error
     try:
         return Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         fix = "start one: dask scheduler; it says its address"
         raise StudyError(
-            "no scheduler answers", got=address, expected="tcp://HOST:8786 of a Dask scheduler", fix=fix, where="--scheduler"
+            "no scheduler answers",
+            got=address,
+            expected="tcp://HOST:8786 of a Dask scheduler",
+            fix=fix,
+            where="--scheduler",
         ) from error

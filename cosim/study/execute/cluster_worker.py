@@ -15,7 +15,9 @@ _jobs: dict[str, Job] = {}  # of this process, by their names
 
 
 def job_plugin(job: Job) -> Any:
-    """What puts the job on every worker, those too that come later or begin anew, and takes it away again."""
+    """What puts the job on every worker, those too that come later or begin anew, and takes it
+    away again.
+    """
     from distributed import WorkerPlugin  # noqa: PLC0415  an extra
 
     class JobPlugin(WorkerPlugin):  # type: ignore[misc]  # untyped
@@ -29,7 +31,9 @@ def job_plugin(job: Job) -> Any:
 
 
 def take_job(job: Job) -> None:
-    """Before a job's first chunk: a function of its own, since the plugin travels by value and would bring its own `_jobs`."""
+    """Before a job's first chunk: a function of its own, since the plugin travels by value and
+    would bring its own `_jobs`.
+    """
     _jobs[job.name] = job
 
 
@@ -42,7 +46,10 @@ def drop_job(job: str) -> None:
 def work_here(job: str, chunk: Chunk) -> list[Done]:
     """Runs a chunk on a worker that has the job. Raises StudyError on one that does not."""
     if job not in _jobs:
-        raise StudyError("a worker of the cluster did not get the study's job", fix="look into its log, and start it again")
+        raise StudyError(
+            "a worker of the cluster did not get the study's job",
+            fix="look into its log, and start it again",
+        )
 
     def progress(_done: float) -> None:
         if job not in _jobs:

@@ -1,8 +1,9 @@
 """The loop around a study's runs: hands out chunks, keeps what comes back, goes on where it was.
 
-Memory does not grow with the number of runs, but for a byte each that says which are done: orders are made when a worker has room for
-them, rows leave for the disk in parts. What a run comes to depends on its order alone, so neither the workers, nor the chunks, nor how
-often a study was killed show in the result.
+Memory does not grow with the number of runs, but for a byte each that says which are done: orders
+are made when a worker has room for them, rows leave for the disk in parts. What a run comes to
+depends on its order alone, so neither the workers, nor the chunks, nor how often a study was killed
+show in the result.
 """
 
 from __future__ import annotations
@@ -22,14 +23,22 @@ from hexapod_cosim.cosim.study.store.columns import row_of
 from hexapod_cosim.cosim.study.store.done import Done
 from hexapod_cosim.cosim.study.store.store import Store
 
-CHUNK_TIME = 0.5  # s    of work in a chunk: what a hand-over costs is small beside it, and little is lost with a worker
-MOST_CHUNKS = 40.0  # 1/s    that come back from all workers together: a cluster's scheduler takes some milliseconds for each
+# s    of work in a chunk: what a hand-over costs is small beside it, and little is lost with a
+# worker
+CHUNK_TIME = 0.5
+# 1/s    that come back from all workers together: a cluster's scheduler takes some milliseconds for
+# each
+MOST_CHUNKS = 40.0
 MAX_CHUNK = 256
-USELESS = 3 * DEATHS  # deaths in a row, for each worker, without a run between them: it is not the runs
+USELESS = (
+    3 * DEATHS
+)  # deaths in a row, for each worker, without a run between them: it is not the runs
 CAUSES = 'look for what ends them (memory?); a script that runs a study needs `if __name__ == "__main__":`'
 DEAD = "died"  # a run's status: whatever worker had it ended
 
-Tell = Callable[[int, int], None]  # how many runs came in now, and how many of them did not walk to the end
+Tell = Callable[
+    [int, int], None
+]  # how many runs came in now, and how many of them did not walk to the end
 
 
 @dataclass(frozen=True)
@@ -63,7 +72,8 @@ def chunk_time(workers: int) -> float:
 
 
 def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[Done], None, None]:
-    """Runs orders and stores them; yields what was stored, for whom it concerns. Stored to the last row when the iterator is closed.
+    """Runs orders and stores them; yields what was stored, for whom it concerns. Stored to the last
+    row when the iterator is closed.
 
     Raises HexapodError when the disk is full or the workers are gone.
     """
@@ -72,7 +82,9 @@ def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[D
     flying, useless = 0, 0
     try:
         while True:
-            while flying < IN_FLIGHT * crew.size and (chunk := _next(again, waiting, sizes.of_chunk(crew.size))):
+            while flying < IN_FLIGHT * crew.size and (
+                chunk := _next(again, waiting, sizes.of_chunk(crew.size))
+            ):
                 crew.hand_in(chunk)
                 flying += 1
             if not flying:
@@ -81,7 +93,12 @@ def conduct(desk: Desk, crew: Crew, orders: Iterable[Order]) -> Generator[list[D
                 flying -= 1
                 useless = 0 if returned.done else useless + bool(returned.died)
                 if useless > USELESS * crew.size:
-                    raise StudyError("no worker lives to finish a run", got=returned.died, fix=CAUSES, where=desk.study.where)
+                    raise StudyError(
+                        "no worker lives to finish a run",
+                        got=returned.died,
+                        fix=CAUSES,
+                        where=desk.study.where,
+                    )
                 done = [*returned.done, *_given_up(returned)]
                 again.extend(_once_more(returned, len(done)))
                 sizes.learn(returned.done)
@@ -104,7 +121,13 @@ def _given_up(returned: Returned) -> list[Done]:
     chunk = returned.chunk
     if not returned.died or len(chunk.orders) > 1 or chunk.deaths + 1 < DEATHS:
         return []
-    return [Done(chunk.orders[0], failed(chunk.orders[0], f"{returned.died}, {DEATHS} times", status=DEAD), 0.0)]
+    return [
+        Done(
+            chunk.orders[0],
+            failed(chunk.orders[0], f"{returned.died}, {DEATHS} times", status=DEAD),
+            0.0,
+        )
+    ]
 
 
 def _once_more(returned: Returned, done: int) -> list[Chunk]:

@@ -1,4 +1,6 @@
-"""Who does the work: something that takes chunks of orders and gives back what they came to, in whatever order."""
+"""Who does the work: something that takes chunks of orders and gives back what they came to, in
+whatever order.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ class Chunk:
 
     orders: tuple[Order, ...]
     deaths: int = 0  # of workers that had it, it being a run by itself
-    suspect: bool = False  # a worker died that had it: no other chunk may wait behind it, so that it is known what the next one dies of
+    # a worker died that had it: no other chunk may wait behind it, so that it is known what the
+    # next one dies of
+    suspect: bool = False
 
     def tried_again(self) -> list[Chunk]:
         """Each order by itself, after a worker died of one of them."""

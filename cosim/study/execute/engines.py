@@ -1,4 +1,6 @@
-"""How one run's figures are made, behind one small protocol: whatever turns a scenario into a Summary can take part."""
+"""How one run's figures are made, behind one small protocol: whatever turns a scenario into a
+Summary can take part.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ class Engine(Protocol):
     """Runs scenarios of one robot's FMU."""
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """What a run came to; never raises HexapodError. A KeyboardInterrupt that `progress` raises ends it as INTERRUPTED."""
+        """What a run came to; never raises HexapodError. A KeyboardInterrupt that `progress`
+        raises ends it as INTERRUPTED.
+        """
         ...
 
     def close(self) -> None:
@@ -59,7 +63,9 @@ DEFAULT_ENGINE = "compiled"
 
 
 def engine_named(name: str) -> Maker:
-    """One of ENGINES, or MODULE:NAME of one's own, which all workers must be able to import. Raises StudyError."""
+    """One of ENGINES, or MODULE:NAME of one's own, which all workers must be able to import.
+    Raises StudyError.
+    """
     module, colon, maker = name.partition(":")
     if not colon:
         if name not in ENGINES:
@@ -69,5 +75,9 @@ def engine_named(name: str) -> Maker:
         return cast(Maker, getattr(import_module(module), maker))
     except (ImportError, AttributeError) as error:
         raise StudyError(
-            "no such engine", got=name, expected="MODULE:NAME that Python can import", fix=str(error), where="--engine"
+            "no such engine",
+            got=name,
+            expected="MODULE:NAME that Python can import",
+            fix=str(error),
+            where="--engine",
         ) from error

@@ -1,4 +1,6 @@
-"""Workers on this machine: processes begun anew, each fed by itself, so that when one dies it is known on which chunk."""
+"""Workers on this machine: processes begun anew, each fed by itself, so that when one dies it is
+known on which chunk.
+"""
 
 from __future__ import annotations
 
@@ -33,8 +35,11 @@ class _Lane:
 
     def _begin(self) -> None:
         context = multiprocessing.get_context(METHOD)
-        # the job is read by the process: it would fill the pipe to one that dies before it reads, and be waited for without end
-        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_begin, initargs=(self._stop, self._folder))
+        # the job is read by the process: it would fill the pipe to one that dies before it reads,
+        # and be waited for without end
+        self._pool = ProcessPoolExecutor(
+            1, mp_context=context, initializer=_begin, initargs=(self._stop, self._folder)
+        )
 
     def hand_in(self, chunk: Chunk) -> None:
         try:
@@ -56,7 +61,9 @@ class _Lane:
                 return
 
     def _dead(self, chunk: Chunk) -> Iterator[Returned]:
-        """The chunk it was at, and those it had not begun: as if never handed in, for another process."""
+        """The chunk it was at, and those it had not begun: as if never handed in, for another
+        process.
+        """
         waiting = [other for _, other in self.chunks]
         self.chunks.clear()
         self._pool.shutdown(wait=False)
@@ -82,7 +89,9 @@ class Pool:
 
     def take(self) -> list[Returned]:
         """Waits until a chunk is back."""
-        wait([lane.chunks[0][0] for lane in self._lanes if lane.chunks], return_when=FIRST_COMPLETED)
+        wait(
+            [lane.chunks[0][0] for lane in self._lanes if lane.chunks], return_when=FIRST_COMPLETED
+        )
         return [returned for lane in self._lanes for returned in lane.taken()]
 
     def close(self) -> None:
@@ -92,7 +101,9 @@ class Pool:
 
 
 class Here:
-    """This process: nothing to start, easy to follow with a debugger, and gone with the first walk that ends it."""
+    """This process: nothing to start, easy to follow with a debugger, and gone with the first
+    walk that ends it.
+    """
 
     size = 1
 

@@ -1,7 +1,8 @@
-"""Where a study's processes on this machine keep what they unpack: one folder, which goes when the study ends.
+"""Where a study's processes on this machine keep what they unpack: one folder, which goes when the
+study ends.
 
-Killed processes leave theirs: workers that outlive their program take its folder with them, and what is left all the same goes when the
-next study begins.
+Killed processes leave theirs: workers that outlive their program take its folder with them, and
+what is left all the same goes when the next study begins.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ PREFIX, LOCK, JOB = "hexapod-crew-", "lock", "job"
 
 @contextmanager
 def scratch(job: Job) -> Iterator[Path]:
-    """A folder that holds the job, locked while it is in use. Raises HexapodError when there is no room for it."""
+    """A folder that holds the job, locked while it is in use. Raises HexapodError when there is
+    no room for it.
+    """
     sweep()
     with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -43,7 +46,9 @@ def job_in(folder: Path) -> Job:
 
 
 def sweep() -> None:
-    """Takes away folders whose program is gone; one without a lock is left alone, for it may just be made."""
+    """Takes away folders whose program is gone; one without a lock is left alone, for it may
+    just be made.
+    """
     for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
         with suppress(OSError):
             with (folder / LOCK).open("r+", encoding="utf-8") as file:

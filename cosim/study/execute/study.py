@@ -38,7 +38,9 @@ from hexapod_cosim.cosim.study.store.manifest import (
 from hexapod_cosim.cosim.study.store.results import POINTS, SUMMARY
 from hexapod_cosim.cosim.study.store.store import Store, Writer, write_durably, write_whole
 
-Begun = Callable[[int, int], Callable[[int, int], None]]  # runs in all, of them done already -> who is told of progress
+Begun = Callable[
+    [int, int], Callable[[int, int], None]
+]  # runs in all, of them done already -> who is told of progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +50,11 @@ class Options:
     engine: str = DEFAULT_ENGINE
     fmu: Path | None = None
     gains: Gains | None = None
-    workers: int | None = None  # processes; None: one for each processor; 0: this one does it, and ends with a walk that ends it
+    workers: int | None = (
+        # processes; None: one for each processor; 0: this one does it, and ends with a walk that
+        # ends it
+        None
+    )
     scheduler: str | None = None  # a Dask scheduler's address instead
     command: str = ""
     write: Writer = write_durably
@@ -56,13 +62,17 @@ class Options:
 
 
 def run_study(study: Study, folder: Path, *, options: Options, begun: Begun) -> Path:
-    """Runs what of a study is not in the folder yet, and puts it all together. Returns the file of results.
+    """Runs what of a study is not in the folder yet, and puts it all together. Returns the file of
+    results.
 
-    Raises HexapodError: a folder of something else, a full disk, a cluster that is gone. All that was stored is kept.
+    Raises HexapodError: a folder of something else, a full disk, a cluster that is gone. All that
+    was stored is kept.
     """
     with locked(folder):
         job = make_job(study, engine=options.engine, fmu=options.fmu, gains=options.gains)
-        begin_folder(folder, manifest_of(study, job, runs=count_runs(study)), command=options.command)
+        begin_folder(
+            folder, manifest_of(study, job, runs=count_runs(study)), command=options.command
+        )
         clear_leftovers(folder, shared=(POINTS, SUMMARY))
         store = Store(folder / RUNS, schema_of(study), write=options.write)
         store.prepare(count_runs(study), say=options.say)
@@ -89,7 +99,10 @@ def _sweep(study: Study, store: Store, job: Job, options: Options, begun: Begun)
     if done.all():
         return
     orders = sweep.orders(missing(done))
-    with crew_of(job, options, study) as crew, closing(conduct(Desk(study, store, tell), crew, orders)) as results:
+    with (
+        crew_of(job, options, study) as crew,
+        closing(conduct(Desk(study, store, tell), crew, orders)) as results,
+    ):
         for _ in results:
             pass
 
@@ -97,7 +110,8 @@ def _sweep(study: Study, store: Store, job: Job, options: Options, begun: Begun)
 def crew_of(job: Job, options: Options, study: Study) -> AbstractContextManager[Crew]:
     """The workers that the options name."""
     if options.scheduler is not None:
-        from hexapod_cosim.cosim.study.execute.cluster import cluster_crew  # noqa: PLC0415  an extra
+        # an extra
+        from hexapod_cosim.cosim.study.execute.cluster import cluster_crew  # noqa: PLC0415
 
         return cluster_crew(job, options.scheduler, options.say)
     if options.workers == 0:
@@ -106,8 +120,12 @@ def crew_of(job: Job, options: Options, study: Study) -> AbstractContextManager[
 
 
 def put_together(study: Study, store: Store, folder: Path) -> None:
-    """results.parquet, all runs in the order of their numbers, the same bytes however they were run; times.parquet, what they took."""
+    """results.parquet, all runs in the order of their numbers, the same bytes however they were
+    run; times.parquet, what they took.
+    """
     schema = schema_of(study)
     facts = provenance(read_json(folder / MANIFEST))
     write_whole(folder / RESULTS, store.sorted_rows(), result_schema(schema).with_metadata(facts))
-    write_whole(folder / TIMES, store.sorted_rows(), pa.schema([schema.field("run"), schema.field(WALL)]))
+    write_whole(
+        folder / TIMES, store.sorted_rows(), pa.schema([schema.field("run"), schema.field(WALL)])
+    )

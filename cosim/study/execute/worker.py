@@ -24,7 +24,14 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_valu
 from hexapod_cosim.cosim.study.execute.engines import Engine, engine_named
 from hexapod_cosim.cosim.study.execute.job import Job, environment
 from hexapod_cosim.cosim.study.plan.identity import canonical, settings_of
-from hexapod_cosim.cosim.study.plan.records import GAINS, SCENARIO_FACTOR, Factor, Order, StudyError, Value
+from hexapod_cosim.cosim.study.plan.records import (
+    GAINS,
+    SCENARIO_FACTOR,
+    Factor,
+    Order,
+    StudyError,
+    Value,
+)
 from hexapod_cosim.cosim.study.store.done import Done
 from hexapod_cosim.models import HexapodError
 
@@ -39,14 +46,26 @@ class Workshop:
 
     def __init__(self, job: Job) -> None:
         differences = [
-            f"{name} {job.environment[name]}, here {have}" for name, have in environment().items() if job.environment[name] != have
+            f"{name} {job.environment[name]}, here {have}"
+            for name, have in environment().items()
+            if job.environment[name] != have
         ]
         if differences:
             fix = "install the same versions on all machines of the cluster"
-            raise StudyError("this worker is not like the machine that sends the study", got="; ".join(differences), fix=fix)
+            raise StudyError(
+                "this worker is not like the machine that sends the study",
+                got="; ".join(differences),
+                fix=fix,
+            )
         self._job, self._folder = job, _folder()
-        self._files = {name: self._unpack(f"robot{k}", Path(name).suffix, data) for k, (name, data) in enumerate(job.robots.items())}
-        self._fmus = {name: self._unpack(f"fmu{k}", ".fmu", data) for k, (name, data) in enumerate(job.fmus.items())}
+        self._files = {
+            name: self._unpack(f"robot{k}", Path(name).suffix, data)
+            for k, (name, data) in enumerate(job.robots.items())
+        }
+        self._fmus = {
+            name: self._unpack(f"fmu{k}", ".fmu", data)
+            for k, (name, data) in enumerate(job.fmus.items())
+        }
         self._controller = self._unpack("controller", ".fmu", job.controller)
         self._engines: dict[str, Engine] = {}
         self._designs: OrderedDict[tuple[str, float], Gains] = OrderedDict()
@@ -81,7 +100,9 @@ class Workshop:
             return self._portable(failed(order, str(error)))
         except KeyboardInterrupt:
             raise
-        except BaseException as error:  # a mistake in an engine, or no memory: this run's result, not the study's end
+        except (
+            BaseException
+        ) as error:  # a mistake in an engine, or no memory: this run's result, not the study's end
             self._drop_engines()
             return self._portable(failed(order, told(error), status=FAILED))
         if summary.status != INTERRUPTED:
@@ -94,12 +115,18 @@ class Workshop:
         scenario = self._scenario(order)
         robot = scenario.robot
         scenario = replace(scenario, robot=str(self._files.get(robot, robot)))
-        return self._engine(robot).summary(scenario, gains=self._gains(scenario, order), progress=progress)
+        return self._engine(robot).summary(
+            scenario, gains=self._gains(scenario, order), progress=progress
+        )
 
     def _portable(self, summary: Summary) -> Summary:
         """Without the place where this process unpacked the job."""
         place = str(Path(self._folder.name) / " ").rstrip()
-        return replace(summary, reason=summary.reason.replace(place, "")) if place in summary.reason else summary
+        return (
+            replace(summary, reason=summary.reason.replace(place, ""))
+            if place in summary.reason
+            else summary
+        )
 
     def _scenario(self, order: Order) -> Scenario:
         case = self._job.cases[order.case]
@@ -109,7 +136,11 @@ class Workshop:
             if factor.name != SCENARIO_FACTOR and not factor.name.startswith(GAINS)
         }
         table = with_values(case.table, settings)
-        return scenario_from_table({**table, "seed": order.seed, "control": order.control}, where=case.where, given=list(settings))
+        return scenario_from_table(
+            {**table, "seed": order.seed, "control": order.control},
+            where=case.where,
+            given=list(settings),
+        )
 
     def _gains(self, scenario: Scenario, order: Order) -> Gains | None:
         if order.control == "kinematic":
@@ -129,7 +160,9 @@ class Workshop:
 
     def _engine(self, robot: str) -> Engine:
         if robot not in self._engines:
-            self._engines[robot] = engine_named(self._job.engine)(self._fmus[robot], self._controller)
+            self._engines[robot] = engine_named(self._job.engine)(
+                self._fmus[robot], self._controller
+            )
         return self._engines[robot]
 
     def _drop_engines(self) -> None:
@@ -154,7 +187,13 @@ def _folder() -> TemporaryDirectory[str]:
 
 def _no_room(error: OSError, where: str) -> StudyError:
     fix = "make room there, or name another folder with TMPDIR"
-    return StudyError("a worker cannot unpack its job", got=error.strerror, expected="room for temporary files", fix=fix, where=where)
+    return StudyError(
+        "a worker cannot unpack its job",
+        got=error.strerror,
+        expected="room for temporary files",
+        fix=fix,
+        where=where,
+    )
 
 
 def effective(order: Order, factors: Sequence[Factor]) -> bytes:
@@ -173,9 +212,14 @@ def checked(summary: Summary) -> Summary:
         raise TypeError(f"the engine gave {type(summary).__name__}, expected a Summary")
     fallback = None if summary.fallback is None else float(summary.fallback)
     return replace(
-        summary, status=str(summary.status), reason=str(summary.reason), upright=bool(summary.upright), fallback=fallback,
-        warnings=tuple(map(str, summary.warnings)), metrics={name: float(summary.metrics[name]) for name in METRICS},
-    )  # fmt: skip
+        summary,
+        status=str(summary.status),
+        reason=str(summary.reason),
+        upright=bool(summary.upright),
+        fallback=fallback,
+        warnings=tuple(map(str, summary.warnings)),
+        metrics={name: float(summary.metrics[name]) for name in METRICS},
+    )
 
 
 def told(error: BaseException) -> str:
@@ -194,18 +238,26 @@ def changed_gains(gains: Gains, settings: Sequence[tuple[Factor, Value]]) -> Gai
         if factor.name.startswith(GAINS):
             part, _, name = factor.name.removeprefix(GAINS).partition(".")
             table = getattr(gains, part)
-            changed: Mapping[str, Any] = {name: float(value) * (getattr(table, name) if factor.relative else 1.0)}
+            changed: Mapping[str, Any] = {
+                name: float(value) * (getattr(table, name) if factor.relative else 1.0)
+            }
             gains = replace(gains, **{part: replace(table, **changed)})
     return gains
 
 
 def failed(order: Order, reason: str, *, status: str = REFUSED) -> Summary:
     """A run without figures."""
-    return Summary(control=order.control, seed=order.seed, status=status, reason=reason, metrics=NO_FIGURES)
+    return Summary(
+        control=order.control, seed=order.seed, status=status, reason=reason, metrics=NO_FIGURES
+    )
 
 
-_shops: dict[str, Workshop] = {}  # of this process, by the name of their job; a cluster's worker may serve several studies
-_one_at_a_time = Lock()  # a cluster's worker may have threads; the FMU's loader changes the process' folder
+_shops: dict[
+    str, Workshop
+] = {}  # of this process, by the name of their job; a cluster's worker may serve several studies
+_one_at_a_time = (
+    Lock()
+)  # a cluster's worker may have threads; the FMU's loader changes the process' folder
 
 
 def close_workshop(job: str) -> None:

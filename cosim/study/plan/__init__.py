@@ -1,1 +1,3 @@
-"""What a study runs: its file, factors, design points and identities of runs. Imports no other room of `study`."""
+"""What a study runs: its file, factors, design points and identities of runs. Imports no other
+room of `study`.
+"""

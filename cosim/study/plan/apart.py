@@ -1,8 +1,10 @@
-"""Held-out scenarios kept apart from those that an optimiser is trained on: no scenario and no seed stands on both sides.
+"""Held-out scenarios kept apart from those that an optimiser is trained on: no scenario and no seed
+stands on both sides.
 
-What counts is the walk, not what a file calls it: robot, ground, gait, commands, events, sensors and parameters, with what [set] and the
-optimiser's variables put in their place. Two scenarios that differ in title, file, seed, variation, length or numerics alone are the same
-one: with no variation their walks would be those trained on, or a part of them.
+What counts is the walk, not what a file calls it: robot, ground, gait, commands, events, sensors
+and parameters, with what [set] and the optimiser's variables put in their place. Two scenarios that
+differ in title, file, seed, variation, length or numerics alone are the same one: with no variation
+their walks would be those trained on, or a part of them.
 """
 
 from __future__ import annotations
@@ -13,7 +15,13 @@ from typing import Any
 
 from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.records import Outputs
-from hexapod_cosim.cosim.scenario.scenario import list_scenarios, read_tables, scenario_from_table, scenario_robot, with_values
+from hexapod_cosim.cosim.scenario.scenario import (
+    list_scenarios,
+    read_tables,
+    scenario_from_table,
+    scenario_robot,
+    with_values,
+)
 from hexapod_cosim.cosim.study.plan.factors import samples
 from hexapod_cosim.cosim.study.plan.keys import flat
 from hexapod_cosim.cosim.study.plan.records import GAINS, Case, Judging, Optimise, Study, StudyError
@@ -23,12 +31,22 @@ SUGGESTED = 3  # scenarios in a fix
 
 
 def check_seeds_apart(training: Judging, held_out: Judging, where: str) -> None:
-    """A seed draws the same changes in any scenario, so it is either trained on or held out. Raises StudyError."""
+    """A seed draws the same changes in any scenario, so it is either trained on or held out.
+    Raises StudyError.
+    """
     shared = sorted(set(training.seeds) & set(held_out.seeds))
     if shared:
         expected = "seeds that the optimiser never sees"
-        fix = f"write seeds = {{ first = {max(training.seeds) + 1}, count = {len(held_out.seeds)} }}"
-        raise StudyError("held-out seeds that are trained on", got=shared, expected=expected, fix=fix, where=f"{where}.held_out.seeds")
+        fix = (
+            f"write seeds = {{ first = {max(training.seeds) + 1}, count = {len(held_out.seeds)} }}"
+        )
+        raise StudyError(
+            "held-out seeds that are trained on",
+            got=shared,
+            expected=expected,
+            fix=fix,
+            where=f"{where}.held_out.seeds",
+        )
 
 
 def check_scenarios_apart(study: Study, asked: Optimise) -> None:
@@ -39,25 +57,48 @@ def check_scenarios_apart(study: Study, asked: Optimise) -> None:
         same = next((other for other, item in trained.items() if item == content), None)
         if same is not None:
             raise StudyError(
-                "a held-out scenario that is trained on", got=name if same == name else f"{name}, the same walk as {same}",
-                expected="walks that the optimiser never sees, whatever their seeds", fix=_fix(study, asked, list(trained.values())),
+                "a held-out scenario that is trained on",
+                got=name if same == name else f"{name}, the same walk as {same}",
+                expected="walks that the optimiser never sees, whatever their seeds",
+                fix=_fix(study, asked, list(trained.values())),
                 where=f"{study.where}: optimise.held_out.scenarios",
-            )  # fmt: skip
+            )
 
 
 def content_of(case: Case, study: Study) -> Any:
     """What makes a scenario's walk, to be compared."""
-    settings = {factor.name: factor.setting(samples(factor)[0]) for factor in study.factors if not factor.name.startswith(GAINS)}
+    settings = {
+        factor.name: factor.setting(samples(factor)[0])
+        for factor in study.factors
+        if not factor.name.startswith(GAINS)
+    }
     scenario = scenario_from_table(with_values(case.table, settings), where=case.where)
     own = load_robot(scenario.robot)
     gait = replace(own.gait, **dict(scenario.settings.get("gait", {})))
     robot = replace(scenario_robot(scenario), name="", gait=gait, solver=own.solver)
-    start = {entry.name: entry.start for entry in load_interface(own).of_causality("parameter")} if scenario.parameters else {}
-    parameters = {name: value for name, value in scenario.parameters.items() if start.get(name) != value}
+    start = (
+        {entry.name: entry.start for entry in load_interface(own).of_causality("parameter")}
+        if scenario.parameters
+        else {}
+    )
+    parameters = {
+        name: value for name, value in scenario.parameters.items() if start.get(name) != value
+    }
     plain = replace(
-        scenario, title="", robot="", where="", control="kinematic", start=0.0, duration=1.0, macro_step=1.0, seed=0, settings={},
-        variation=None, outputs=Outputs(), parameters=parameters,
-    )  # fmt: skip
+        scenario,
+        title="",
+        robot="",
+        where="",
+        control="kinematic",
+        start=0.0,
+        duration=1.0,
+        macro_step=1.0,
+        seed=0,
+        settings={},
+        variation=None,
+        outputs=Outputs(),
+        parameters=parameters,
+    )
     return robot, plain
 
 
@@ -74,7 +115,11 @@ def _fix(study: Study, asked: Optimise, trained: Sequence[Any]) -> str:
             continue
         if other and case.table.get("robot") == robot and _goes(case):
             names.append(f'"{name}"')
-    return f"write scenarios = [{', '.join(names[:SUGGESTED])}], or files of your own" if names else "name other scenarios"
+    return (
+        f"write scenarios = [{', '.join(names[:SUGGESTED])}], or files of your own"
+        if names
+        else "name other scenarios"
+    )
 
 
 def _goes(case: Case) -> bool:

@@ -1,4 +1,6 @@
-"""Whether a study's factors are what its scenarios know: each value is tried by itself before anything is run."""
+"""Whether a study's factors are what its scenarios know: each value is tried by itself before
+anything is run.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,31 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_valu
 from hexapod_cosim.cosim.study.plan.apart import check_scenarios_apart
 from hexapod_cosim.cosim.study.plan.factors import PARAMETERS, samples
 from hexapod_cosim.cosim.study.plan.points import check_design
-from hexapod_cosim.cosim.study.plan.records import DRAWN, GAINS, GRID, LIST, SCENARIO_FACTOR, VALUES, Case, Factor, Study, StudyError, Value
+from hexapod_cosim.cosim.study.plan.records import (
+    DRAWN,
+    GAINS,
+    GRID,
+    LIST,
+    SCENARIO_FACTOR,
+    VALUES,
+    Case,
+    Factor,
+    Study,
+    StudyError,
+    Value,
+)
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
 ELSEWHERE = {
-    "control": 'controls = ["kinematic", "compliant"]', "seed": "seeds = 10", "title": "title at the top", "events": "a scenario",
+    "control": 'controls = ["kinematic", "compliant"]',
+    "seed": "seeds = 10",
+    "title": "title at the top",
+    "events": "a scenario",
     "outputs": "nothing: a study keeps no recordings",
-}  # fmt: skip
-MAX_TRIED = 200  # values of a factor that are tried, evenly spread, the least and the largest among them
+}
+MAX_TRIED = (
+    200  # values of a factor that are tried, evenly spread, the least and the largest among them
+)
 MAX_RUNS = 10**8
 UNBOUNDED = 1e30  # what an FMU without a bound says
 
@@ -36,16 +55,32 @@ def check_study(study: Study) -> None:
     for factor in study.factors:
         where = f"{study.where}: {'factors' if study.optimise is None else 'optimise.variables'}.{factor.name}"
         check_settable(factor.name, where)
-        if (study.design != LIST or study.optimise is not None) and len(set(factor.values)) < len(factor.values):
-            raise StudyError("value not allowed", got=list(factor.values), expected="different values", fix="correct it", where=where)
+        if (study.design != LIST or study.optimise is not None) and len(set(factor.values)) < len(
+            factor.values
+        ):
+            raise StudyError(
+                "value not allowed",
+                got=list(factor.values),
+                expected="different values",
+                fix="correct it",
+                where=where,
+            )
         if factor.name.startswith(GAINS):
             _check_gain(factor, study, where)
         elif factor.relative:
-            raise StudyError("relative to what?", got=factor.name, expected=f"a gain, {GAINS}...", fix="leave out relative", where=where)
+            raise StudyError(
+                "relative to what?",
+                got=factor.name,
+                expected=f"a gain, {GAINS}...",
+                fix="leave out relative",
+                where=where,
+            )
         elif factor.name != SCENARIO_FACTOR:
             _check_setting(factor, study, where)
         elif factor.kind != VALUES:
-            raise StudyError("not scenarios", got=factor.kind, expected="a list of names", where=where)
+            raise StudyError(
+                "not scenarios", got=factor.kind, expected="a list of names", where=where
+            )
     if study.optimise is not None:
         check_scenarios_apart(study, study.optimise)
 
@@ -54,7 +89,9 @@ def check_settable(name: str, where: str, *, kind: str = "factor") -> None:
     """Raises StudyError for a setting that a study gives its runs itself."""
     first = name.partition(".")[0]
     if first in ELSEWHERE:
-        raise StudyError(f"not a {kind}", got=name, fix=f"write {ELSEWHERE[first]} instead", where=where)
+        raise StudyError(
+            f"not a {kind}", got=name, fix=f"write {ELSEWHERE[first]} instead", where=where
+        )
 
 
 def _check_size(study: Study) -> None:
@@ -63,36 +100,69 @@ def _check_size(study: Study) -> None:
         count = study.optimise.most
     else:
         lengths = [len(factor.values) for factor in study.factors]
-        points = study.points if study.design in DRAWN else math.prod(lengths) if study.design == GRID else lengths[0]
+        points = (
+            study.points
+            if study.design in DRAWN
+            else math.prod(lengths)
+            if study.design == GRID
+            else lengths[0]
+        )
         count = points * len(study.seeds) * len(study.controls)
     if count > MAX_RUNS:
         fix = "take fewer points, seeds or trials, or split the study by seeds"
-        got, expected = f"{count:,} runs" if count < MAX_RUNS**2 else f"{float(count):.3g} runs", f"at most {MAX_RUNS:,} runs"
+        got, expected = (
+            f"{count:,} runs" if count < MAX_RUNS**2 else f"{float(count):.3g} runs",
+            f"at most {MAX_RUNS:,} runs",
+        )
         raise StudyError("too many runs", got=got, expected=expected, fix=fix, where=study.where)
 
 
 def gain_names() -> list[str]:
     """All gains by the names that factors have: gains.slip.kp and so on."""
     hints = get_type_hints(Gains)
-    parts = {name: kind for name, kind in hints.items() if is_dataclass(kind) and name not in ("requirements", "margins")}
+    parts = {
+        name: kind
+        for name, kind in hints.items()
+        if is_dataclass(kind) and name not in ("requirements", "margins")
+    }
     return [f"{GAINS}{name}.{item.name}" for name, kind in parts.items() for item in fields(kind)]
 
 
 def _check_gain(factor: Factor, study: Study, where: str) -> None:
     if factor.name not in gain_names():
         raise unknown_name("gain", factor.name, gain_names(), where=where, error=StudyError)
-    if factor.unit or not all(isinstance(value, int | float) and not isinstance(value, bool) for value in samples(factor)):
+    if factor.unit or not all(
+        isinstance(value, int | float) and not isinstance(value, bool) for value in samples(factor)
+    ):
         raise StudyError(
-            "not a gain's value", got=samples(factor)[0], expected="numbers without a unit", fix="leave the unit out", where=where
+            "not a gain's value",
+            got=samples(factor)[0],
+            expected="numbers without a unit",
+            fix="leave the unit out",
+            where=where,
         )
     part, _, name = factor.name.removeprefix(GAINS).partition(".")
     above = name in POSITIVE[part]
-    bad = next((value for value in samples(factor) if not (value > 0.0 if above else value >= 0.0)), None)  # type: ignore[operator]
+    bad = next(
+        (value for value in samples(factor) if not (value > 0.0 if above else value >= 0.0)), None
+    )  # type: ignore[operator]
     if bad is not None:
-        raise StudyError("not a gain's value", got=bad, expected="numbers > 0" if above else "numbers >= 0", fix="correct it", where=where)
+        raise StudyError(
+            "not a gain's value",
+            got=bad,
+            expected="numbers > 0" if above else "numbers >= 0",
+            fix="correct it",
+            where=where,
+        )
     if "compliant" not in study.run_controls:
         fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
-        raise StudyError("a gain that no run has", got=factor.name, expected="compliant among the controls", fix=fix, where=where)
+        raise StudyError(
+            "a gain that no run has",
+            got=factor.name,
+            expected="compliant among the controls",
+            fix=fix,
+            where=where,
+        )
 
 
 def _check_setting(factor: Factor, study: Study, where: str) -> None:
@@ -101,7 +171,13 @@ def _check_setting(factor: Factor, study: Study, where: str) -> None:
     for value in values:
         if isinstance(value, str) and factor.name != "robot" and QUANTITY.fullmatch(value):
             fix = 'write { values = [5, 10], unit = "deg" }'
-            raise StudyError("a number in a text", got=value, expected="numbers, and their unit beside them", fix=fix, where=where)
+            raise StudyError(
+                "a number in a text",
+                got=value,
+                expected="numbers, and their unit beside them",
+                fix=fix,
+                where=where,
+            )
     for k, case in enumerate(study.cases.values()):
         for value in values if k == 0 else (values[0], values[-1]):
             _try(case, factor, value, where)
@@ -117,13 +193,18 @@ def _spread(values: Sequence[Value]) -> list[Value]:
 def _try(case: Case, factor: Factor, value: Value, where: str) -> None:
     try:
         table = with_values(case.table, {factor.name: factor.setting(value)})
-        check_scenario(scenario_from_table(table, where=case.where, given=[factor.name]), names=(factor.name,))
+        check_scenario(
+            scenario_from_table(table, where=case.where, given=[factor.name]), names=(factor.name,)
+        )
     except HexapodError as error:
-        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
+        raise StudyError(
+            error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
+        ) from error
 
 
 def check_scenario(scenario: Scenario, *, names: Sequence[str]) -> None:
-    """What a scenario's file alone does not tell: that there is its robot, and that these parameters of its FMU can have their values.
+    """What a scenario's file alone does not tell: that there is its robot, and that these
+    parameters of its FMU can have their values.
 
     Raises HexapodError.
     """
@@ -131,16 +212,27 @@ def check_scenario(scenario: Scenario, *, names: Sequence[str]) -> None:
         robot = load_robot(scenario.robot)
     except HexapodError as error:
         where = error.where or f"{scenario.where}: robot"
-        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
+        raise StudyError(
+            error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
+        ) from error
     for name in names:
         if name in scenario.parameters:
-            _check_parameter(load_interface(robot), name, scenario.parameters[name], f"{scenario.where}: {PARAMETERS}{name}")
+            _check_parameter(
+                load_interface(robot),
+                name,
+                scenario.parameters[name],
+                f"{scenario.where}: {PARAMETERS}{name}",
+            )
 
 
 def _check_parameter(interface: Interface, name: str, value: Any, where: str) -> None:
     """As the FMU takes it: a number of its range in its own unit, or the name of a choice."""
     variable = interface.by_name[name]
-    choices = [item for item, _ in interface.enumerations[variable.enumeration].items] if variable.enumeration else []
+    choices = (
+        [item for item, _ in interface.enumerations[variable.enumeration].items]
+        if variable.enumeration
+        else []
+    )
     if isinstance(value, str) and choices:
         if value not in choices:
             raise unknown_name(f"choice for {name}", value, choices, where=where, error=StudyError)
@@ -148,7 +240,13 @@ def _check_parameter(interface: Interface, name: str, value: Any, where: str) ->
     low, high = (math.nan if end is None else end for end in (variable.minimum, variable.maximum))
     if isinstance(value, bool) or not isinstance(value, int | float) or value < low or value > high:
         unit = f" in {variable.unit}" if variable.unit else ""
-        ends = [f"{sign} {end:g}" for sign, end in ((">=", low), ("<=", high)) if abs(end) < UNBOUNDED]
-        expected = f"one of {', '.join(choices)}" if choices else " ".join([f"a number{unit}", " and ".join(ends)]).strip()
+        ends = [
+            f"{sign} {end:g}" for sign, end in ((">=", low), ("<=", high)) if abs(end) < UNBOUNDED
+        ]
+        expected = (
+            f"one of {', '.join(choices)}"
+            if choices
+            else " ".join([f"a number{unit}", " and ".join(ends)]).strip()
+        )
         fix = "parameters of the FMU take plain numbers of their own unit"
         raise StudyError("value not allowed", got=value, expected=expected, fix=fix, where=where)

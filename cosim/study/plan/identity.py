@@ -18,9 +18,15 @@ def canonical(content: Any) -> bytes:
 def identity(order: Order, factors: Sequence[Factor]) -> str:
     """A hash of a run's settings, whatever its number."""
     settings = {factor.name: value for factor, value in zip(factors, order.values, strict=True)}
-    return hashlib.sha256(canonical([order.case, settings, order.seed, order.control])).hexdigest()[:16]
+    return hashlib.sha256(canonical([order.case, settings, order.seed, order.control])).hexdigest()[
+        :16
+    ]
 
 
 def settings_of(order: Order, factors: Sequence[Factor]) -> list[tuple[Factor, Value]]:
     """Each factor that is set, with its value."""
-    return [(factor, value) for factor, value in zip(factors, order.values, strict=True) if value is not None]
+    return [
+        (factor, value)
+        for factor, value in zip(factors, order.values, strict=True)
+        if value is not None
+    ]

@@ -8,7 +8,9 @@ from hexapod_cosim.cosim.study.plan.records import Judging, Order, Study, Value
 
 
 class Optimisation:
-    """The numbers of all its runs: trials, the beginning (no setting at all), then the held-out runs."""
+    """The numbers of all its runs: trials, the beginning (no setting at all), then the held-out
+    runs.
+    """
 
     def __init__(self, study: Study) -> None:
         assert study.optimise is not None
@@ -21,12 +23,24 @@ class Optimisation:
 
     def held_out(self, place: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
         """The held-out runs of the `place`-th of what is tried in the end."""
-        return self._orders(self.asked.held_out, self.trained + place * self.asked.held_out.runs, point, values)
+        return self._orders(
+            self.asked.held_out, self.trained + place * self.asked.held_out.runs, point, values
+        )
 
-    def _orders(self, judging: Judging, first: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
+    def _orders(
+        self, judging: Judging, first: int, point: int, values: tuple[Value | None, ...]
+    ) -> list[Order]:
         pairs = enumerate(product(judging.cases, judging.seeds))
         return [
-            Order(run=first + k, point=point, case=case, values=values, seed=seed, control=self.asked.control) for k, (case, seed) in pairs
+            Order(
+                run=first + k,
+                point=point,
+                case=case,
+                values=values,
+                seed=seed,
+                control=self.asked.control,
+            )
+            for k, (case, seed) in pairs
         ]
 
     @property

@@ -47,7 +47,10 @@ class Design:
             return tuple(factor.values[index] for factor in factors)
         if self._study.design == GRID:
             return _of_grid(factors, index)
-        return tuple(at_quantile(factor, float(share)) for factor, share in zip(factors, self._shares(index), strict=True))
+        return tuple(
+            at_quantile(factor, float(share))
+            for factor, share in zip(factors, self._shares(index), strict=True)
+        )
 
 
 def _of_grid(factors: tuple[Factor, ...], index: int) -> tuple[Value, ...]:
@@ -70,7 +73,9 @@ def _shares(study: Study) -> Shares:
     """Points in the unit cube of the factors' quantiles, by number."""
     size = len(study.factors)
     if study.design == LATIN_HYPERCUBE and size:
-        cube = qmc.LatinHypercube(size, seed=np.random.default_rng([study.seed, STREAM])).random(study.points)
+        cube = qmc.LatinHypercube(size, seed=np.random.default_rng([study.seed, STREAM])).random(
+            study.points
+        )
         return lambda index: cube[index]
     if study.design == SOBOL and size:
         return _Sobol(size, study.seed)
@@ -85,7 +90,9 @@ class _Sobol:
         self._restart()
 
     def _restart(self) -> None:
-        self._engine = qmc.Sobol(self._size, scramble=True, seed=np.random.default_rng([self._seed, STREAM]))
+        self._engine = qmc.Sobol(
+            self._size, scramble=True, seed=np.random.default_rng([self._seed, STREAM])
+        )
         self._next = 0
 
     def __call__(self, index: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -103,7 +110,9 @@ class Sweep:
 
     def __init__(self, study: Study) -> None:
         self._study, self._design = study, Design(study)
-        self._place = next((k for k, factor in enumerate(study.factors) if factor.name == SCENARIO_FACTOR), None)
+        self._place = next(
+            (k for k, factor in enumerate(study.factors) if factor.name == SCENARIO_FACTOR), None
+        )
         self._case = next(iter(study.cases))
         self.points = self._design.count
         self.count = self.points * len(study.seeds) * len(study.controls)
@@ -119,7 +128,14 @@ class Sweep:
             if point != known:
                 known, values = point, self._design.point(point)
             case = self._case if self._place is None else str(values[self._place])
-            yield Order(run=run, point=point, case=case, values=values, seed=seeds[seed], control=controls[control])
+            yield Order(
+                run=run,
+                point=point,
+                case=case,
+                values=values,
+                seed=seeds[seed],
+                control=controls[control],
+            )
 
 
 def check_design(study: Study) -> None:
@@ -128,15 +144,42 @@ def check_design(study: Study) -> None:
     drawn = [factor.name for factor in study.factors if factor.kind != VALUES]
     if study.design not in DRAWN and drawn:
         fix = f'write design = "{RANDOM}" (or another of {", ".join(DRAWN)}) and points = 100, or give values'
-        raise StudyError(f"a distribution in a design {study.design!r}", got=drawn[0], expected="values", fix=fix, where=where)
+        raise StudyError(
+            f"a distribution in a design {study.design!r}",
+            got=drawn[0],
+            expected="values",
+            fix=fix,
+            where=where,
+        )
     lengths = {factor.name: len(factor.values) for factor in study.factors}
     if study.design == LIST and len(set(lengths.values())) > 1:
         fix = f'make them as long as each other, or write design = "{GRID}" for all combinations'
-        raise StudyError("lists of different lengths", got=lengths, expected="one value of each factor per point", fix=fix, where=where)
+        raise StudyError(
+            "lists of different lengths",
+            got=lengths,
+            expected="one value of each factor per point",
+            fix=fix,
+            where=where,
+        )
     if study.design == LATIN_HYPERCUBE and study.points * len(study.factors) > MAX_STRATA:
         fix = f'write design = "{SOBOL}", which holds none'
-        got, expected = f"{study.points} points, {len(study.factors)} factors", f"points times factors of at most {MAX_STRATA:,}"
-        raise StudyError("too large a Latin hypercube", got=got, expected=expected, fix=fix, where=f"{study.where}: points")
+        got, expected = (
+            f"{study.points} points, {len(study.factors)} factors",
+            f"points times factors of at most {MAX_STRATA:,}",
+        )
+        raise StudyError(
+            "too large a Latin hypercube",
+            got=got,
+            expected=expected,
+            fix=fix,
+            where=f"{study.where}: points",
+        )
     if study.design != GRID and not study.factors:
         fix = "leave design out to run the seeds alone"
-        raise StudyError("nothing to vary", got=f"design {study.design!r} without factors", expected="factors", fix=fix, where=where)
+        raise StudyError(
+            "nothing to vary",
+            got=f"design {study.design!r} without factors",
+            expected="factors",
+            fix=fix,
+            where=where,
+        )

@@ -1,4 +1,6 @@
-"""Studies from TOML files: every key judged, every factor tried on the scenario before the first run."""
+"""Studies from TOML files: every key judged, every factor tried on the scenario before the first
+run.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +16,55 @@ from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
 from hexapod_cosim.cosim.study.plan.checks import check_scenario, check_settable, check_study
 from hexapod_cosim.cosim.study.plan.factors import plain_name, read_factors
-from hexapod_cosim.cosim.study.plan.keys import check_plain, flat, names_of, read_seeds, text_of, truth_of, whole
+from hexapod_cosim.cosim.study.plan.keys import (
+    check_plain,
+    flat,
+    names_of,
+    read_seeds,
+    text_of,
+    truth_of,
+    whole,
+)
 from hexapod_cosim.cosim.study.plan.objective import read_optimise
-from hexapod_cosim.cosim.study.plan.records import DESIGNS, DRAWN, GRID, SCENARIO_FACTOR, VALUES, Case, Factor, Optimise, Study, StudyError
+from hexapod_cosim.cosim.study.plan.records import (
+    DESIGNS,
+    DRAWN,
+    GRID,
+    SCENARIO_FACTOR,
+    VALUES,
+    Case,
+    Factor,
+    Optimise,
+    Study,
+    StudyError,
+)
 from hexapod_cosim.models import HexapodError, unknown_name
 
-KEYS = ("title", "scenario", "set", "design", "points", "seeds", "controls", "seed", "variation", "factors", "optimise")
+KEYS = (
+    "title",
+    "scenario",
+    "set",
+    "design",
+    "points",
+    "seeds",
+    "controls",
+    "seed",
+    "variation",
+    "factors",
+    "optimise",
+)
 MAX_POINTS, MAX_SEEDS = 10**8, 10**7
 MAX_SEED = 2**32 - 1  # that all generators of random numbers take
 MOST_OF_NAME = 255  # bytes of a file's
-STANDARD_TABLE = {name: getattr(STANDARD, name) for name in ("attitude", "height", "joint_angle", "command_delay")}
+STANDARD_TABLE = {
+    name: getattr(STANDARD, name) for name in ("attitude", "height", "joint_angle", "command_delay")
+}
 
 
 def load_study(path_or_name: str | Path) -> Study:
-    """Reads a study file, or a bundled one by name. Raises StudyError, and ScenarioError for its scenarios."""
+    """Reads a study file, or a bundled one by name. Raises StudyError, and ScenarioError for its
+    scenarios.
+    """
     path, bundled = Path(path_or_name), list_studies()
     if not path.suffix and len(path.parts) == 1 and not path.is_file():
         if str(path_or_name) not in bundled:
@@ -37,18 +74,31 @@ def load_study(path_or_name: str | Path) -> Study:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         fix = "give the path of a study file, or one of: " + ", ".join(bundled)
-        raise StudyError("cannot read the study", got=error.strerror, fix=fix, where=str(path)) from error
+        raise StudyError(
+            "cannot read the study", got=error.strerror, fix=fix, where=str(path)
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise StudyError(
-            "not a TOML file", got=str(error), expected="TOML 1.0 in UTF-8", fix="correct that line", where=str(path)
+            "not a TOML file",
+            got=str(error),
+            expected="TOML 1.0 in UTF-8",
+            fix="correct that line",
+            where=str(path),
         ) from error
-    return study_from_table(table, where=path.name if path in bundled.values() else str(path), folder=path.parent)
+    return study_from_table(
+        table, where=path.name if path in bundled.values() else str(path), folder=path.parent
+    )
 
 
 def study_from_table(
-    table: Mapping[str, Any], *, where: str, folder: Path = Path(), scenarios: Mapping[str, Mapping[str, Any]] | None = None
+    table: Mapping[str, Any],
+    *,
+    where: str,
+    folder: Path = Path(),
+    scenarios: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Study:
-    """A checked study from the tables of a file in `folder`, against which scenario files are looked for. Raises StudyError.
+    """A checked study from the tables of a file in `folder`, against which scenario files are
+    looked for. Raises StudyError.
 
     `scenarios`: in full, by name, when they are known already and no file is read.
     """
@@ -57,19 +107,32 @@ def study_from_table(
         if key not in KEYS:
             raise unknown_name("key", key, KEYS, where=where, error=StudyError)
     factors = read_factors(table.get("factors", {}), f"{where}: factors")
-    optimise = read_optimise(table["optimise"], f"{where}: optimise") if "optimise" in table else None
+    optimise = (
+        read_optimise(table["optimise"], f"{where}: optimise") if "optimise" in table else None
+    )
     if optimise is not None:
         _refuse(table, ("factors", "design", "points", "seeds", "controls"), where)
     study = Study(
-        title=text_of(table, "title", Path(where).stem, where), cases={}, factors=factors if optimise is None else optimise[1],
-        design=_design(table, where), points=_points(table, where),
+        title=text_of(table, "title", Path(where).stem, where),
+        cases={},
+        factors=factors if optimise is None else optimise[1],
+        design=_design(table, where),
+        points=_points(table, where),
         seeds=read_seeds(table.get("seeds", 1), f"{where}: seeds", most=MAX_SEEDS),
         controls=names_of(table.get("controls", list(CONTROLS)), CONTROLS, f"{where}: controls"),
-        seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED), optimise=None if optimise is None else optimise[0],
-        source=dict(table), where=where,
-    )  # fmt: skip
+        seed=whole(table.get("seed", 0), f"{where}: seed", least=0, most=MAX_SEED),
+        optimise=None if optimise is None else optimise[0],
+        source=dict(table),
+        where=where,
+    )
     if scenarios is not None:
-        return replace(study, cases={name: Case(name=name, table=tables, where=where) for name, tables in scenarios.items()})
+        return replace(
+            study,
+            cases={
+                name: Case(name=name, table=tables, where=where)
+                for name, tables in scenarios.items()
+            },
+        )
     study = replace(study, cases=_cases(study, folder))
     check_study(study)
     return study
@@ -79,7 +142,13 @@ def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
     for key in keys:
         if key in table:
             fix = "leave it out: the variables, training and held_out of [optimise] say what is run"
-            raise StudyError("not a key of an optimisation", got=key, expected="[optimise] alone", fix=fix, where=where)
+            raise StudyError(
+                "not a key of an optimisation",
+                got=key,
+                expected="[optimise] alone",
+                fix=fix,
+                where=where,
+            )
 
 
 def _design(table: Mapping[str, Any], where: str) -> str:
@@ -89,35 +158,70 @@ def _design(table: Mapping[str, Any], where: str) -> str:
 def _points(table: Mapping[str, Any], where: str) -> int:
     drawn = table.get("design") in DRAWN
     if drawn and "points" not in table:
-        raise StudyError("missing key", expected="a number of points", fix="write points = 100", where=f"{where}: points")
+        raise StudyError(
+            "missing key",
+            expected="a number of points",
+            fix="write points = 100",
+            where=f"{where}: points",
+        )
     if not drawn and "points" in table:
         fix = f'leave it out, or write design = "{DRAWN[-1]}" (or {", ".join(DRAWN[:-1])})'
-        raise StudyError("a number of points for a design that has its own", got=table["points"], fix=fix, where=f"{where}: points")
+        raise StudyError(
+            "a number of points for a design that has its own",
+            got=table["points"],
+            fix=fix,
+            where=f"{where}: points",
+        )
     return whole(table.get("points", 1), f"{where}: points", least=1, most=MAX_POINTS)
 
 
 def _cases(study: Study, folder: Path) -> dict[str, Case]:
-    """The scenarios that runs are of: the file's own, those of the factor `scenario`, those an optimiser is judged on."""
+    """The scenarios that runs are of: the file's own, those of the factor `scenario`, those an
+    optimiser is judged on.
+    """
     source, where = study.source, study.where
     own = source.get("scenario", "walk_flat")
     changes = source.get("set", {})
     if not isinstance(changes, Mapping):
-        raise StudyError("wrong type", got=changes, expected="a table of settings", fix="write [set]", where=f"{where}: set")
+        raise StudyError(
+            "wrong type",
+            got=changes,
+            expected="a table of settings",
+            fix="write [set]",
+            where=f"{where}: set",
+        )
     changed = flat(changes, f"{where}: set")
     for name in changed:
         check_settable(plain_name(name), f"{where}: set.{name}", kind="setting")
         _refuse_twice(name, study)
     vary = truth_of(source, "variation", len(study.seeds) > 1 or study.optimise is not None, where)
-    names = [own if isinstance(own, str) else study.title, *_named_scenarios(study.factors, study.optimise)]
+    names = [
+        own if isinstance(own, str) else study.title,
+        *_named_scenarios(study.factors, study.optimise),
+    ]
     tables: dict[str, Mapping[str, Any] | None] = dict.fromkeys(names)
     if isinstance(own, Mapping):
         if names[0] in names[1:]:
             fix = "give the study another title"
-            raise StudyError("two scenarios of one name", got=names[0], expected="different names", fix=fix, where=f"{where}: scenario")
+            raise StudyError(
+                "two scenarios of one name",
+                got=names[0],
+                expected="different names",
+                fix=fix,
+                where=f"{where}: scenario",
+            )
         tables[names[0]] = own
     elif not isinstance(own, str):
-        raise StudyError("wrong type", got=own, expected="a scenario's name, file or table", where=f"{where}: scenario")
-    return {name: _case(name, inline, changed, folder, where, vary=vary, key=_key_of(name, study)) for name, inline in tables.items()}
+        raise StudyError(
+            "wrong type",
+            got=own,
+            expected="a scenario's name, file or table",
+            where=f"{where}: scenario",
+        )
+    return {
+        name: _case(name, inline, changed, folder, where, vary=vary, key=_key_of(name, study))
+        for name, inline in tables.items()
+    }
 
 
 def _key_of(name: str, study: Study) -> str:
@@ -125,7 +229,10 @@ def _key_of(name: str, study: Study) -> str:
     if any(factor.name == SCENARIO_FACTOR and name in factor.values for factor in study.factors):
         return "factors.scenario"
     if study.optimise is not None:
-        for part, judging in (("training", study.optimise.training), ("held_out", study.optimise.held_out)):
+        for part, judging in (
+            ("training", study.optimise.training),
+            ("held_out", study.optimise.held_out),
+        ):
             if name in judging.cases:
                 return f"optimise.{part}.scenarios"
     return "scenario"
@@ -136,31 +243,70 @@ def _refuse_twice(name: str, study: Study) -> None:
     if study.optimise is None and plain_name(name) in {factor.name for factor in study.factors}:
         fix = "take one of them away: the factor's values would replace it in every run"
         raise StudyError(
-            "set and varied", got=name, expected="each name in [set] or [factors]", fix=fix, where=f"{study.where}: set.{name}"
+            "set and varied",
+            got=name,
+            expected="each name in [set] or [factors]",
+            fix=fix,
+            where=f"{study.where}: set.{name}",
         )
 
 
 def _named_scenarios(factors: Sequence[Factor], optimise: Optimise | None) -> list[str]:
-    values = [str(value) for factor in factors if factor.name == SCENARIO_FACTOR and factor.kind == VALUES for value in factor.values]
-    return values if optimise is None else [*values, *optimise.training.cases, *optimise.held_out.cases]
+    values = [
+        str(value)
+        for factor in factors
+        if factor.name == SCENARIO_FACTOR and factor.kind == VALUES
+        for value in factor.values
+    ]
+    return (
+        values
+        if optimise is None
+        else [*values, *optimise.training.cases, *optimise.held_out.cases]
+    )
 
 
 def _case(
-    name: str, inline: Mapping[str, Any] | None, changes: Mapping[str, Any], folder: Path, where: str, *, vary: bool, key: str
+    name: str,
+    inline: Mapping[str, Any] | None,
+    changes: Mapping[str, Any],
+    folder: Path,
+    where: str,
+    *,
+    vary: bool,
+    key: str,
 ) -> Case:
     """Raises ScenarioError for a scenario that cannot be run as it is."""
     beside = folder / name
     if inline is None and len(beside.name.encode()) > MOST_OF_NAME:
         expected = f"a name of at most {MOST_OF_NAME} letters"
-        raise StudyError("no file has such a name", got=name, expected=expected, fix="name a scenario", where=f"{where}: scenario")
-    table, told = (dict(inline), f"{where}: scenario") if inline is not None else _read(beside, name, f"{where}: {key}")
+        raise StudyError(
+            "no file has such a name",
+            got=name,
+            expected=expected,
+            fix="name a scenario",
+            where=f"{where}: scenario",
+        )
+    table, told = (
+        (dict(inline), f"{where}: scenario")
+        if inline is not None
+        else _read(beside, name, f"{where}: {key}")
+    )
     scenario = scenario_from_table(table, where=told)
     check_scenario(scenario, names=list(scenario.parameters))
     try:
         table = with_values(table, changes)
-        check_scenario(scenario_from_table(table, where=told, given=list(changes)), names=[plain_name(name) for name in changes])
+        check_scenario(
+            scenario_from_table(table, where=told, given=list(changes)),
+            names=[plain_name(name) for name in changes],
+        )
     except HexapodError as error:
-        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=_place(error, where)) from error
+        raise StudyError(
+            error.what,
+            got=error.got,
+            expected=error.expected,
+            fix=error.fix,
+            where=_place(error, where),
+        ) from error
     if vary and "variation" not in table:
         table["variation"] = dict(STANDARD_TABLE)
     table["outputs"] = {"plots": False}  # a study keeps no recordings
@@ -168,13 +314,17 @@ def _case(
 
 
 def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
-    """A scenario's tables, from a file beside the study if there is one. Raises HexapodError; of an unknown name with the study's place."""
+    """A scenario's tables, from a file beside the study if there is one. Raises HexapodError; of
+    an unknown name with the study's place.
+    """
     try:
         return read_tables(beside if beside.is_file() else name)
     except HexapodError as error:
         if error.where:
             raise
-        raise StudyError(error.what, got=error.got, expected=error.expected, fix=error.fix, where=where) from error
+        raise StudyError(
+            error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
+        ) from error
 
 
 def _place(error: HexapodError, where: str) -> str:

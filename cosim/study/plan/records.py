@@ -11,8 +11,20 @@ from hexapod_cosim.models import HexapodError
 
 Value = float | int | bool | str
 
-VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = "values", "uniform", "loguniform", "normal", "integers"
-GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = ("grid", "list", "random", "latin_hypercube", "sobol")
+VALUES, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS = (
+    "values",
+    "uniform",
+    "loguniform",
+    "normal",
+    "integers",
+)
+GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = (
+    "grid",
+    "list",
+    "random",
+    "latin_hypercube",
+    "sobol",
+)
 DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs of a number of points that the file gives
 SCENARIO_FACTOR = "scenario"
 GAINS = "gains."  # what begins so is a gain of the compliant control
@@ -26,7 +38,9 @@ class StudyError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class Factor:
-    """What a study varies: a setting by its name as --set knows it, a gain (gains.slip.kp), or the scenario itself."""
+    """What a study varies: a setting by its name as --set knows it, a gain (gains.slip.kp), or
+    the scenario itself.
+    """
 
     name: str
     kind: str  # VALUES, or a distribution
@@ -134,6 +148,8 @@ class Order:
     run: int
     point: int
     case: str
-    values: tuple[Value | None, ...]  # of the factors, in their order; None leaves a setting as it is
+    values: tuple[
+        Value | None, ...
+    ]  # of the factors, in their order; None leaves a setting as it is
     seed: int
     control: str

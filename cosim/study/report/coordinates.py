@@ -1,4 +1,6 @@
-"""Parallel coordinates of a study: an axis per factor that varies, then slip and cost; a line per point and control."""
+"""Parallel coordinates of a study: an axis per factor that varies, then slip and cost; a line
+per point and control.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +14,37 @@ from matplotlib.figure import Figure
 
 from hexapod_cosim.cosim.results.metrics import FLOORS
 from hexapod_cosim.cosim.study.plan.records import Factor, Study
-from hexapod_cosim.cosim.study.report.marks import COLOURMAP, COST, SLIP, Array, label_of, logarithmic, mean_of, named, place_of, some_of
+from hexapod_cosim.cosim.study.report.marks import (
+    COLOURMAP,
+    COST,
+    SLIP,
+    Array,
+    label_of,
+    logarithmic,
+    mean_of,
+    named,
+    place_of,
+    some_of,
+)
 from hexapod_cosim.cosim.study.store.table import Point
 
 FIGURES = 2  # the last axes: slip and cost
 
 
 def parallel(points: Sequence[Point], study: Study) -> Figure:
-    """An axis per factor, then slip and cost; points without these end, grey and dashed, at the last factor."""
-    factors = [factor for factor in study.factors if len(set(factor.values)) != 1] or list(study.factors)
+    """An axis per factor, then slip and cost; points without these end, grey and dashed, at the
+    last factor.
+    """
+    factors = [factor for factor in study.factors if len(set(factor.values)) != 1] or list(
+        study.factors
+    )
     controls = study.run_controls
-    chosen = some_of([point for point in points if not point.held_out and None not in point.values.values()])
-    places = [tuple(place_of(factor, point.values[factor.name]) for factor in factors) for point in chosen]
+    chosen = some_of(
+        [point for point in points if not point.held_out and None not in point.values.values()]
+    )
+    places = [
+        tuple(place_of(factor, point.values[factor.name]) for factor in factors) for point in chosen
+    ]
     rows = [
         [
             (*place, _decades(mean_of(point, control, SLIP)), mean_of(point, control, COST))
@@ -31,9 +52,15 @@ def parallel(points: Sequence[Point], study: Study) -> Figure:
         ]
         for control in controls
     ]
-    table = np.array(rows, dtype=np.float64).reshape(len(controls), len(chosen), len(factors) + FIGURES)
+    table = np.array(rows, dtype=np.float64).reshape(
+        len(controls), len(chosen), len(factors) + FIGURES
+    )
     low, high = (limit(table, np.isfinite(table)) for limit in (_least, _largest))
-    scaled = np.where(high > low, (table - low) / np.where(high > low, high - low, 1.0), np.where(np.isfinite(table), 0.5, math.nan))
+    scaled = np.where(
+        high > low,
+        (table - low) / np.where(high > low, high - low, 1.0),
+        np.where(np.isfinite(table), 0.5, math.nan),
+    )
     figure = Figure(figsize=(max(1.5 * (len(factors) + 3), 7.0), 2.9 * len(controls) + 0.5))
     panels = np.atleast_1d(figure.subplots(len(controls), 1))
     for axes, control, lines in zip(panels, controls, scaled, strict=True):
@@ -59,15 +86,22 @@ def _lines(axes: Axes, lines: Array, decades: tuple[float, float]) -> LineCollec
     has = np.isfinite(lines).all(axis=1)
     whole, ended = lines[has], lines[~has, :-FIGURES]
     whole = whole[np.argsort(-whole[:, -FIGURES])]  # little slip on top
-    slips = 10.0 ** (whole[:, -FIGURES] * (high - low) + low if high > low else np.full(len(whole), low))
+    slips = 10.0 ** (
+        whole[:, -FIGURES] * (high - low) + low if high > low else np.full(len(whole), low)
+    )
     axes.add_collection(
         LineCollection(
-            [np.column_stack([np.arange(count - FIGURES), line]) for line in ended], colors="0.55", linewidth=0.8, linestyle="--"
+            [np.column_stack([np.arange(count - FIGURES), line]) for line in ended],
+            colors="0.55",
+            linewidth=0.8,
+            linestyle="--",
         )
     )
     paths = [np.column_stack([np.arange(count), line]) for line in whole]
     norm = logarithmic(10.0 ** np.array(decades))
-    collection = LineCollection(paths, array=slips, cmap=COLOURMAP, norm=norm, linewidth=0.9, alpha=0.75)
+    collection = LineCollection(
+        paths, array=slips, cmap=COLOURMAP, norm=norm, linewidth=0.9, alpha=0.75
+    )
     axes.add_collection(collection)
     return collection
 
@@ -85,20 +119,45 @@ def _axes(axes: Axes, control: str, factors: Sequence[Factor], limits: tuple[Arr
         axes.spines[side].set_visible(False)
     for place in range(count):
         axes.plot([place, place], [0.0, 1.0], color="0.6", linewidth=0.8, zorder=0)
-        ends = (10.0 ** low[place], 10.0 ** high[place]) if place == count - FIGURES else (low[place], high[place])
-        _ends(axes, place, factors[place] if place < len(factors) else None, float(ends[0]), float(ends[1]))
+        ends = (
+            (10.0 ** low[place], 10.0 ** high[place])
+            if place == count - FIGURES
+            else (low[place], high[place])
+        )
+        _ends(
+            axes,
+            place,
+            factors[place] if place < len(factors) else None,
+            float(ends[0]),
+            float(ends[1]),
+        )
 
 
 def _ends(axes: Axes, place: int, factor: Factor | None, low: float, high: float) -> None:
-    """What the ends of an axis mean: numbers, or the first and last of names; in the middle where both are the same."""
+    """What the ends of an axis mean: numbers, or the first and last of names; in the middle
+    where both are the same.
+    """
     if not math.isfinite(low):
-        axes.text(place, 0.5, "none", ha="center", va="center", fontsize=7, color="0.35", backgroundcolor="white")
+        axes.text(
+            place,
+            0.5,
+            "none",
+            ha="center",
+            va="center",
+            fontsize=7,
+            color="0.35",
+            backgroundcolor="white",
+        )
         return
     texts = (f"{low:.3g}", f"{high:.3g}")
     if factor is not None and named(factor):
         names = list(dict.fromkeys(map(str, factor.values)))
         texts = (names[int(low)], names[int(high)])
-    ends = ((-0.03, texts[0], "top"), (1.03, texts[1], "bottom")) if high > low else ((1.03, texts[0], "bottom"),)
+    ends = (
+        ((-0.03, texts[0], "top"), (1.03, texts[1], "bottom"))
+        if high > low
+        else ((1.03, texts[0], "bottom"),)
+    )
     for y, text, side in ends:
         axes.text(place, y, text, ha="center", va=side, fontsize=7, color="0.35")
 

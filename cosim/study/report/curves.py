@@ -1,4 +1,6 @@
-"""Figures of a study with an axis for a factor, a metric or the trials: what a factor does, slip against cost, how an optimiser got on."""
+"""Figures of a study with an axis for a factor, a metric or the trials: what a factor does, slip
+against cost, how an optimiser got on.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,16 @@ def response(points: Sequence[Point], factor: Factor, study: Study) -> Figure:
     return figure
 
 
-def _curve(axes: Axes, points: Sequence[Point], factor: Factor, what: tuple[str, str], *, joined: bool) -> None:
+def _curve(
+    axes: Axes, points: Sequence[Point], factor: Factor, what: tuple[str, str], *, joined: bool
+) -> None:
     control, metric = what
-    shown = sorted((place_of(factor, item.values[factor.name]), item.means[control][metric]) for item in points)
-    x, mean, half = np.array([(place, item.value, item.half_width) for place, item in shown]).reshape(-1, 3).T
+    shown = sorted(
+        (place_of(factor, item.values[factor.name]), item.means[control][metric]) for item in points
+    )
+    x, mean, half = (
+        np.array([(place, item.value, item.half_width) for place, item in shown]).reshape(-1, 3).T
+    )
     half = np.where(np.isfinite(half), half, 0.0)
     line = "-" if joined else ""
     axes.errorbar(
@@ -103,13 +111,29 @@ def shown_effects(study: Study) -> list[Factor]:
 def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str) -> None:
     place = np.array([place_of(factor, item.values[factor.name]) for item in points])
     slip = np.array([mean_of(item, control, SLIP) for item in points])
-    lost = np.array([item.runs[control] > 0 and item.walked[control] == 0 for item in points], dtype=np.bool_)
-    axes.plot(place, slip, linestyle="", marker=MARKS[control], markersize=4, alpha=0.6, color=COLOURS[control], label=control)
+    lost = np.array(
+        [item.runs[control] > 0 and item.walked[control] == 0 for item in points], dtype=np.bool_
+    )
+    axes.plot(
+        place,
+        slip,
+        linestyle="",
+        marker=MARKS[control],
+        markersize=4,
+        alpha=0.6,
+        color=COLOURS[control],
+        label=control,
+    )
     height = 0.02 if control == "kinematic" else 0.07
     axes.plot(
-        place[lost], np.full(np.sum(lost), height), linestyle="", marker="x", markersize=4, color=COLOURS[control],
+        place[lost],
+        np.full(np.sum(lost), height),
+        linestyle="",
+        marker="x",
+        markersize=4,
+        color=COLOURS[control],
         transform=axes.get_xaxis_transform(),
-    )  # fmt: skip
+    )
 
 
 def pareto(points: Sequence[Point], study: Study) -> Figure:
@@ -121,13 +145,29 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
         if not len(pairs):
             continue
         shown = some_of(pairs.tolist())
-        axes.plot(*np.array(shown).T, linestyle="", marker=MARKS[control], markersize=4, alpha=0.5, color=COLOURS[control], label=control)
+        axes.plot(
+            *np.array(shown).T,
+            linestyle="",
+            marker=MARKS[control],
+            markersize=4,
+            alpha=0.5,
+            color=COLOURS[control],
+            label=control,
+        )
         edge = front(pairs)
         axes.plot(*edge.T, drawstyle="steps-post", color=COLOURS[control], linewidth=1.4)
-        axes.plot(*edge.T, linestyle="", marker=MARKS[control], markersize=5.5, color=COLOURS[control])
+        axes.plot(
+            *edge.T, linestyle="", marker=MARKS[control], markersize=5.5, color=COLOURS[control]
+        )
     costs, slips = (np.concatenate([line.get_data()[k] for line in axes.lines]) for k in (0, 1))
     for name, values in (("xscale", np.asarray(costs)), ("yscale", np.asarray(slips))):
-        axes.set(**{name: "log" if values.min() > 0.0 and values.max() > WIDE * values.min() else "linear"})
+        axes.set(
+            **{
+                name: "log"
+                if values.min() > 0.0 and values.max() > WIDE * values.min()
+                else "linear"
+            }
+        )
     axes.set(xlabel=NAMES[COST], ylabel=NAMES[SLIP])
     axes.margins(0.05)
     axes.legend(title="line: the front")
@@ -136,7 +176,9 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
 
 def slip_and_cost(points: Sequence[Point], control: str) -> Array:
     """(k, 2) cost of transport and slip of the points that have both."""
-    pairs = np.array([(mean_of(point, control, COST), mean_of(point, control, SLIP)) for point in points]).reshape(-1, 2)
+    pairs = np.array(
+        [(mean_of(point, control, COST), mean_of(point, control, SLIP)) for point in points]
+    ).reshape(-1, 2)
     return np.asarray(pairs[np.isfinite(pairs).all(axis=1)])
 
 
@@ -158,20 +200,50 @@ def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:
     figure = Figure(figsize=(8.0, 3.4))
     axes = figure.subplots()
     for feasible, mark, label in ((True, "o", "trial"), (False, "x", "breaks a constraint")):
-        some = [(trial.number, trial.means[name]) for trial in trials if trial.feasible is feasible and math.isfinite(trial.means[name])]
+        some = [
+            (trial.number, trial.means[name])
+            for trial in trials
+            if trial.feasible is feasible and math.isfinite(trial.means[name])
+        ]
         if some:
             colour = "#0072B2" if feasible else GREY
-            axes.plot(*zip(*some, strict=True), linestyle="", marker=mark, markersize=4.5, color=colour, label=label)
+            axes.plot(
+                *zip(*some, strict=True),
+                linestyle="",
+                marker=mark,
+                markersize=4.5,
+                color=colour,
+                label=label,
+            )
     lost = [trial.number for trial in trials if not math.isfinite(trial.means[name])]
     if lost:
-        axes.plot(lost, [0.03] * len(lost), "|", color="#D55E00", label="no figure: a run fell", transform=axes.get_xaxis_transform())
+        axes.plot(
+            lost,
+            [0.03] * len(lost),
+            "|",
+            color="#D55E00",
+            label="no figure: a run fell",
+            transform=axes.get_xaxis_transform(),
+        )
     able = [trial for trial in trials if trial.feasible and math.isfinite(trial.means[name])]
     if able:
-        best = (np.minimum if less else np.maximum).accumulate([trial.means[name] for trial in able])
-        axes.step([trial.number for trial in able], best, where="post", color="#009E73", label="best so far")
+        best = (np.minimum if less else np.maximum).accumulate(
+            [trial.means[name] for trial in able]
+        )
+        axes.step(
+            [trial.number for trial in able],
+            best,
+            where="post",
+            color="#009E73",
+            label="best so far",
+        )
     if math.isfinite(before):
         axes.axhline(before, color="#D55E00", linestyle="--", linewidth=1.2, label="before")
-    axes.set(xlabel="trial", ylabel=f"{name} [{unit}]", xlim=(-0.5, max(study.optimise.trials - 0.5, 0.5)))
+    axes.set(
+        xlabel="trial",
+        ylabel=f"{name} [{unit}]",
+        xlim=(-0.5, max(study.optimise.trials - 0.5, 0.5)),
+    )
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside upper center", ncols=5)
     return figure

@@ -1,4 +1,5 @@
-"""Figures of a study: what two factors do, all factors at once, slip against cost, and how an optimiser got where it got.
+"""Figures of a study: what two factors do, all factors at once, slip against cost, and how an
+optimiser got where it got.
 
 Colours are told apart by colour-blind readers, and marks by their shape too.
 """
@@ -18,7 +19,14 @@ from hexapod_cosim.controller.figure_style import DPI, SETTINGS, UNDATED
 from hexapod_cosim.cosim.common.files import atomic_path
 from hexapod_cosim.cosim.study.plan.records import GRID, VALUES, Study
 from hexapod_cosim.cosim.study.report.coordinates import parallel
-from hexapod_cosim.cosim.study.report.curves import effects, history, pareto, response, shown_effects, slip_and_cost
+from hexapod_cosim.cosim.study.report.curves import (
+    effects,
+    history,
+    pareto,
+    response,
+    shown_effects,
+    slip_and_cost,
+)
 from hexapod_cosim.cosim.study.report.heat import heat_map
 from hexapod_cosim.cosim.study.report.marks import MOST_CELLS, SLIP, mean_of
 from hexapod_cosim.cosim.study.store.table import Point
@@ -37,10 +45,18 @@ class Drawing:
     draw: Callable[[], Figure]
 
 
-def drawings(study: Study, points: Sequence[Point], trials: Sequence[Trial], *, before: float = math.nan) -> dict[str, Drawing]:
-    """The figures that a study's points allow, by the name of their files; none of what has no figure."""
+def drawings(
+    study: Study, points: Sequence[Point], trials: Sequence[Trial], *, before: float = math.nan
+) -> dict[str, Drawing]:
+    """The figures that a study's points allow, by the name of their files; none of what has no
+    figure.
+    """
     found: dict[str, Drawing] = {}
-    walks = any(math.isfinite(mean_of(point, control, SLIP)) for point in points for control in study.run_controls)
+    walks = any(
+        math.isfinite(mean_of(point, control, SLIP))
+        for point in points
+        for control in study.run_controls
+    )
     if study.optimise is not None and trials:
         caption = f"Mean {study.optimise.metrics[0]} of each trial over its training runs, and the best so far; dashed: what it began from."
         found["history"] = Drawing("Optimisation", caption, partial(history, study, trials, before))
@@ -50,29 +66,44 @@ def drawings(study: Study, points: Sequence[Point], trials: Sequence[Trial], *, 
         why = "Grey, dashed: without a figure, as no run walked, or not long enough."
         caption = f"A line per point and control; colour: mean slip per metre. {why}"
         found["parallel"] = Drawing("All factors", caption, partial(parallel, points, study))
-    if any(len(slip_and_cost([item for item in points if not item.held_out], control)) for control in study.run_controls):
+    if any(
+        len(slip_and_cost([item for item in points if not item.held_out], control))
+        for control in study.run_controls
+    ):
         caption = "A mark per point and control, means over its walks; line: what no other point betters in both."
-        found["pareto"] = Drawing("Slip against cost of transport", caption, partial(pareto, points, study))
+        found["pareto"] = Drawing(
+            "Slip against cost of transport", caption, partial(pareto, points, study)
+        )
     return found
 
 
 def _of_factors(study: Study, points: Sequence[Point], *, walks: bool) -> dict[str, Drawing]:
     """What factors do: over two of a grid, over the only one, or over each by itself."""
-    axes = [factor for factor in study.factors if factor.kind == VALUES and 1 < len(factor.values) <= MOST_CELLS]
+    axes = [
+        factor
+        for factor in study.factors
+        if factor.kind == VALUES and 1 < len(factor.values) <= MOST_CELLS
+    ]
     if study.design == GRID and len(axes) >= 2 and walks:
         title = f"{axes[0].name} and {axes[1].name}"
         caption = f"Mean slip per metre{', averaged over the others' if len(study.factors) > 2 else ''}. {WHY_NOT}"
-        return {"heat_map": Drawing(title, caption, partial(heat_map, points, axes[0], axes[1], study))}
+        return {
+            "heat_map": Drawing(title, caption, partial(heat_map, points, axes[0], axes[1], study))
+        }
     if len(study.factors) == 1 and walks:
         bars = "; bars: Student's 95 % intervals over seeds" if len(study.seeds) > 1 else ""
         return {
             "response": Drawing(
-                study.factors[0].name, f"Means of the walks at each point{bars}.", partial(response, points, study.factors[0], study)
+                study.factors[0].name,
+                f"Means of the walks at each point{bars}.",
+                partial(response, points, study.factors[0], study),
             )
         }
     if study.factors and shown_effects(study) and walks:
         caption = "Mean slip per metre of each point over each factor by itself; crosses at the lower edge: no run walked."
-        return {"effects": Drawing("Slip over each factor", caption, partial(effects, points, study))}
+        return {
+            "effects": Drawing("Slip over each factor", caption, partial(effects, points, study))
+        }
     return {}
 
 
@@ -89,6 +120,8 @@ def save(found: dict[str, Drawing], folder: Path) -> list[Path]:
             for kind, metadata in UNDATED.items():
                 with atomic_path(folder / f"{name}.{kind}") as path:
                     figure.savefig(path, format=kind, dpi=DPI, metadata=metadata)
-                figure.set_layout_engine("none")  # laid out once is enough: it takes as long as the drawing
+                figure.set_layout_engine(
+                    "none"
+                )  # laid out once is enough: it takes as long as the drawing
                 files.append(folder / f"{name}.{kind}")
     return files

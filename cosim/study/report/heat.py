@@ -1,4 +1,6 @@
-"""The heat map of a grid's first two factors: a panel per control, and the paired change between them."""
+"""The heat map of a grid's first two factors: a panel per control, and the paired change between
+them.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,16 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from hexapod_cosim.cosim.study.plan.records import Factor, Study
-from hexapod_cosim.cosim.study.report.marks import CHANGES, COLOURMAP, SLIP, Array, label_of, logarithmic, mean_of, ticks_of
+from hexapod_cosim.cosim.study.report.marks import (
+    CHANGES,
+    COLOURMAP,
+    SLIP,
+    Array,
+    label_of,
+    logarithmic,
+    mean_of,
+    ticks_of,
+)
 from hexapod_cosim.cosim.study.store.table import Point
 
 MOST_NUMBERED = 60  # cells with their numbers in them
@@ -22,7 +33,9 @@ GREY = "0.5"
 
 @dataclass(frozen=True)
 class _Panel:
-    """Values by cell (second, first), NaN where there is none, and how many runs and walks a cell has."""
+    """Values by cell (second, first), NaN where there is none, and how many runs and walks a
+    cell has.
+    """
 
     title: str
     values: Array
@@ -39,17 +52,35 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
     slips = [cells.mean(_slip(control)) for control in controls]
     norm = logarithmic(np.concatenate(slips, axis=None))
     panels = [
-        _Panel(f"{control}, slip [m/m]", values, cells.total(_runs(control)), cells.total(_walked(control)), norm, COLOURMAP)
+        _Panel(
+            f"{control}, slip [m/m]",
+            values,
+            cells.total(_runs(control)),
+            cells.total(_walked(control)),
+            norm,
+            COLOURMAP,
+        )
         for control, values in zip(controls, slips, strict=True)
     ]
     if len(controls) == 2:
         change = 100.0 * (cells.mean(_change) - 1.0)
         title = f"{controls[0]} → {controls[1]}, pairs [%]"
         panels.append(
-            _Panel(title, change, cells.total(_judged), cells.total(lambda point: point.pairs), Normalize(-100.0, 100.0), CHANGES)
+            _Panel(
+                title,
+                change,
+                cells.total(_judged),
+                cells.total(lambda point: point.pairs),
+                Normalize(-100.0, 100.0),
+                CHANGES,
+            )
         )
-    figure = Figure(figsize=(3.6 * len(panels) + 0.8, 0.42 * min(max(len(second.values), 3), 12) + 2.2))
-    for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels), sharey=True)), panels, strict=True):
+    figure = Figure(
+        figsize=(3.6 * len(panels) + 0.8, 0.42 * min(max(len(second.values), 3), 12) + 2.2)
+    )
+    for axes, panel in zip(
+        np.atleast_1d(figure.subplots(1, len(panels), sharey=True)), panels, strict=True
+    ):
         _draw(figure, axes, panel, first, second)
     figure.axes[0].set_ylabel(label_of(second))
     return figure
@@ -68,8 +99,12 @@ def _walked(control: str) -> Callable[[Point], int]:
 
 
 def _judged(point: Point) -> int:
-    """Whether it is known if there is a pair of walks: there is one, or one of the controls has run and never walked."""
-    return point.pairs or int(any(point.runs[name] and not point.walked[name] for name in point.runs))
+    """Whether it is known if there is a pair of walks: there is one, or one of the controls has
+    run and never walked.
+    """
+    return point.pairs or int(
+        any(point.runs[name] and not point.walked[name] for name in point.runs)
+    )
 
 
 def _change(point: Point) -> tuple[float, float]:
@@ -84,7 +119,10 @@ class _Cells:
         self._shape = len(second.values), len(first.values)
         across = {value: place for place, value in enumerate(first.values)}
         up = {value: place for place, value in enumerate(second.values)}
-        self._points = [((up[point.values[second.name]], across[point.values[first.name]]), point) for point in points]
+        self._points = [
+            ((up[point.values[second.name]], across[point.values[first.name]]), point)
+            for point in points
+        ]
 
     def mean(self, figures: Callable[[Point], tuple[float, float]]) -> Array:
         """Sum over sum of what each point has of both; NaN where there is none."""
@@ -94,7 +132,9 @@ class _Cells:
             if all(map(math.isfinite, pair)):
                 above[place] += pair[0]
                 below[place] += pair[1]
-        return np.asarray(np.divide(above, below, out=np.full(self._shape, math.nan), where=below > 0.0))
+        return np.asarray(
+            np.divide(above, below, out=np.full(self._shape, math.nan), where=below > 0.0)
+        )
 
     def total(self, figure: Callable[[Point], int]) -> Array:
         """Sum over the points of a cell."""
@@ -105,16 +145,27 @@ class _Cells:
 
 
 def _draw(figure: Figure, axes: Axes, panel: _Panel, first: Factor, second: Factor) -> None:
-    """Cells without a figure say why: a dot where nothing was run yet, a cross where no run walked, a dash where the walk has none."""
+    """Cells without a figure say why: a dot where nothing was run yet, a cross where no run
+    walked, a dash where the walk has none.
+    """
     axes.set_title(panel.title)
     axes.grid(visible=False)
-    image = axes.imshow(panel.values, origin="lower", aspect="auto", cmap=panel.colours, norm=panel.norm, interpolation="nearest")
+    image = axes.imshow(
+        panel.values,
+        origin="lower",
+        aspect="auto",
+        cmap=panel.colours,
+        norm=panel.norm,
+        interpolation="nearest",
+    )
     for row, column in np.argwhere(~np.isfinite(panel.values)):
         mark = "." if not panel.runs[row, column] else "x" if not panel.walked[row, column] else "_"
         axes.plot(column, row, marker=mark, color=GREY)
     if panel.values.size <= MOST_NUMBERED:
         _numbers(axes, panel.values, image)
-    axes.set_xticks(range(len(first.values)), ticks_of(first), rotation=45 if len(first.values) > 6 else 0)
+    axes.set_xticks(
+        range(len(first.values)), ticks_of(first), rotation=45 if len(first.values) > 6 else 0
+    )
     axes.set_yticks(range(len(second.values)), ticks_of(second))
     axes.set_xlabel(label_of(first))
     figure.colorbar(image, ax=axes, shrink=0.9)
@@ -125,5 +176,12 @@ def _numbers(axes: Axes, values: Array, image: Any) -> None:
         if math.isfinite(value):
             red, green, blue, _ = image.cmap(image.norm(value))
             light = 0.299 * red + 0.587 * green + 0.114 * blue > 0.55
-            axes.text(column, row, f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}", ha="center", va="center", fontsize=7.5,
-                      color="black" if light else "white")  # fmt: skip
+            axes.text(
+                column,
+                row,
+                f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}",
+                ha="center",
+                va="center",
+                fontsize=7.5,
+                color="black" if light else "white",
+            )

@@ -38,7 +38,9 @@ def label_of(factor: Factor) -> str:
 
 def named(factor: Factor) -> bool:
     """Whether its values are names or truths rather than numbers."""
-    return factor.kind == VALUES and not all(isinstance(value, int | float) and not isinstance(value, bool) for value in factor.values)
+    return factor.kind == VALUES and not all(
+        isinstance(value, int | float) and not isinstance(value, bool) for value in factor.values
+    )
 
 
 def place_of(factor: Factor, value: Any) -> float:
@@ -48,13 +50,20 @@ def place_of(factor: Factor, value: Any) -> float:
 
 def ticks_of(factor: Factor) -> list[str]:
     """Different values, for people."""
-    return [f"{value:.4g}" if isinstance(value, float) else str(value) for value in dict.fromkeys(factor.values)]
+    return [
+        f"{value:.4g}" if isinstance(value, float) else str(value)
+        for value in dict.fromkeys(factor.values)
+    ]
 
 
 def logarithmic(slips: Array) -> LogNorm:
     """Colours of slips that lie decades apart."""
     seen = np.clip(slips[np.isfinite(slips)], FLOORS[SLIP], None)
-    return LogNorm(float(seen.min()), float(seen.max()) * (1.0 + 1e-9)) if len(seen) else LogNorm(FLOORS[SLIP], 1.0)
+    return (
+        LogNorm(float(seen.min()), float(seen.max()) * (1.0 + 1e-9))
+        if len(seen)
+        else LogNorm(FLOORS[SLIP], 1.0)
+    )
 
 
 def some_of(items: Sequence[_Item]) -> list[_Item]:

@@ -1,4 +1,6 @@
-"""What to know before reading a study's figures: for the top of its report, and for the terminal."""
+"""What to know before reading a study's figures: for the top of its report, and for the
+terminal.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,9 @@ from hexapod_cosim.cosim.study.plan.records import SOBOL, Study
 from hexapod_cosim.cosim.study.store.results import Results
 
 NO_WALK = "No run walked to its end, so there are no figures of walks. What ended the runs stands under Failures."
-TOO_SHORT = "too short for figures, which are of whole gait cycles after the second: set a longer duration."
+TOO_SHORT = (
+    "too short for figures, which are of whole gait cycles after the second: set a longer duration."
+)
 
 
 def notes(results: Results) -> list[str]:
@@ -33,7 +37,9 @@ def _of_what_is_there(results: Results) -> Iterator[str]:
 
 
 def _of_walks(results: Results) -> Iterator[str]:
-    """Where no run walked, or walks gave no figures: under a scenario or a control too, where others gave them."""
+    """Where no run walked, or walks gave no figures: under a scenario or a control too, where
+    others gave them.
+    """
     walks = results.overall.walks
     if results.overall.runs and not walks:
         yield NO_WALK

@@ -1,4 +1,6 @@
-"""report.html of a study: one file with everything in it, made from the folder alone, also of a study that is not done."""
+"""report.html of a study: one file with everything in it, made from the folder alone, also of a
+study that is not done.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,12 @@ from hexapod_cosim.cosim.study.store.table import Mean, Point
 
 REPORT, FIGURES_FOLDER = "report.html", "plots"
 SHOWN_POINTS = 100  # rows of the table; points.parquet has all
-OF_POINTS = ("slip_per_metre", "cost_of_transport", "peak_force", "torque_rms")  # metrics in that table
+OF_POINTS = (
+    "slip_per_metre",
+    "cost_of_transport",
+    "peak_force",
+    "torque_rms",
+)  # metrics in that table
 
 
 def write_study_report(results: Results, folder: Path) -> list[Path]:
@@ -32,16 +39,36 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
     before = math.nan
     if results.optimum is not None and results.study.optimise is not None:
         before = _number(results.optimum["before"]["training"][results.study.optimise.metrics[0]])
-    found = drawings(results.study, results.points, results.trials, before=before) if results.points else {}
+    found = (
+        drawings(results.study, results.points, results.trials, before=before)
+        if results.points
+        else {}
+    )
     files = save(found, folder / FIGURES_FOLDER) if found else []
-    pictures = [(item.title, item.caption, _embedded(folder / FIGURES_FOLDER / f"{name}.svg")) for name, item in found.items()]
-    environment = Environment(loader=PackageLoader("hexapod_cosim.cosim.study", "report"), autoescape=True, undefined=StrictUndefined)
+    pictures = [
+        (item.title, item.caption, _embedded(folder / FIGURES_FOLDER / f"{name}.svg"))
+        for name, item in found.items()
+    ]
+    environment = Environment(
+        loader=PackageLoader("hexapod_cosim.cosim.study", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+    )
     page = environment.get_template("study.html.jinja").render(
-        results=results, overall=overall_rows(results), points=point_rows(results), figures=pictures, optimum=optimum_rows(results),
+        results=results,
+        overall=overall_rows(results),
+        points=point_rows(results),
+        figures=pictures,
+        optimum=optimum_rows(results),
         gained=optimum_changes(results),
-        failures=[(*key, count) for key, count in results.overall.failures.items()], toml=_toml(results), notes=notes(results),
-        of_what=of_what(results), method=METHOD, wall=shown_time(results.wall), metrics=OF_POINTS,
-    )  # fmt: skip
+        failures=[(*key, count) for key, count in results.overall.failures.items()],
+        toml=_toml(results),
+        notes=notes(results),
+        of_what=of_what(results),
+        method=METHOD,
+        wall=shown_time(results.wall),
+        metrics=OF_POINTS,
+    )
     write_text(folder / REPORT, page)
     return [folder / POINTS, folder / SUMMARY, *files, folder / REPORT]
 
@@ -54,12 +81,17 @@ def _toml(results: Results) -> dict[str, str]:
     """What it takes to run it again, as files."""
     gains = results.manifest["gains"]
     texts = {"The study": to_toml(_known(results.manifest["study"]))}
-    texts |= {f"Scenario {name}": to_toml(_known(table)) for name, table in results.manifest["scenarios"].items()}
+    texts |= {
+        f"Scenario {name}": to_toml(_known(table))
+        for name, table in results.manifest["scenarios"].items()
+    }
     return texts | ({} if gains is None else {"Gains": to_toml(_known(gains))})
 
 
 def _known(content: Any) -> Any:
-    """Without what JSON could not hold: an endless duration, which a file says by saying nothing."""
+    """Without what JSON could not hold: an endless duration, which a file says by saying
+    nothing.
+    """
     if isinstance(content, Mapping):
         return {key: _known(value) for key, value in content.items() if value is not None}
     return [_known(value) for value in content] if isinstance(content, list) else content
@@ -72,7 +104,11 @@ def of_what(results: Results) -> str:
         return "over all trials, training and held-out runs together: how far trials lie apart, not how sure the optimum is"
     if results.of_points == 1:
         return "over seeds"
-    seeds = "; runs of one point share it, so with several seeds the interval is on the narrow side" if len(study.seeds) > 1 else ""
+    seeds = (
+        "; runs of one point share it, so with several seeds the interval is on the narrow side"
+        if len(study.seeds) > 1
+        else ""
+    )
     if study.design in DRAWN:
         return f"over points drawn from the factors' distributions{seeds}"
     return "as if the points had been drawn at random: mostly how far they lie apart. The table of points has intervals over seeds alone"
@@ -81,10 +117,15 @@ def of_what(results: Results) -> str:
 def overall_rows(results: Results) -> list[dict[str, Any]]:
     """A row per metric: mean of all runs that walked by control, change over all pairs."""
     overall, rows = results.overall, []
-    means = {control: {name: overall.means[control][name].value for name in FIGURES} for control in results.study.run_controls}
+    means = {
+        control: {name: overall.means[control][name].value for name in FIGURES}
+        for control in results.study.run_controls
+    }
     for name in (each for each in shown_metrics(means, net_slip=False) if each in FIGURES):
         unit, _, meaning = METRICS[name]
-        values = [shown_mean(name, overall.means[control][name]) for control in results.study.run_controls]
+        values = [
+            shown_mean(name, overall.means[control][name]) for control in results.study.run_controls
+        ]
         change = overall.changes.get(name)
         pairs = 0 if change is None else change.pairs
         rows.append(
@@ -102,15 +143,23 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
 
 
 def spread(results: Results, name: str) -> str:
-    """The least and the largest change of a metric over the points, relative; "" where fewer than two have one."""
+    """The least and the largest change of a metric over the points, relative; "" where fewer
+    than two have one.
+    """
     found = [point.changes[name].relative for point in results.points if name in point.changes]
     known = [value for value in found if math.isfinite(value)]
     return f"{min(known):+.0%} .. {max(known):+.0%}" if len(known) > 1 else ""
 
 
 def point_rows(results: Results) -> list[dict[str, Any]]:
-    """A row per point, of some evenly chosen ones when there are many: settings, walked, a few metrics."""
-    points = [point for point in results.points if not point.held_out] if results.study.optimise is None else results.points
+    """A row per point, of some evenly chosen ones when there are many: settings, walked, a few
+    metrics.
+    """
+    points = (
+        [point for point in results.points if not point.held_out]
+        if results.study.optimise is None
+        else results.points
+    )
     step = max(math.ceil(len(points) / SHOWN_POINTS), 1)
     return [_point_row(point, results) for point in points[::step]]
 
@@ -118,13 +167,19 @@ def point_rows(results: Results) -> list[dict[str, Any]]:
 def _point_row(point: Point, results: Results) -> dict[str, Any]:
     controls = results.study.run_controls
     cells = [
-        {"values": [shown_mean(name, point.means[control][name]) for control in controls], **shown_change(point.changes.get(name))}
+        {
+            "values": [shown_mean(name, point.means[control][name]) for control in controls],
+            **shown_change(point.changes.get(name)),
+        }
         for name in OF_POINTS
     ]
     return {
-        "number": point.number, "settings": [shown_value(value) for value in point.values.values()], "held_out": point.held_out,
-        "walked": [f"{point.walked[control]} of {point.runs[control]}" for control in controls], "cells": cells,
-    }  # fmt: skip
+        "number": point.number,
+        "settings": [shown_value(value) for value in point.values.values()],
+        "held_out": point.held_out,
+        "walked": [f"{point.walked[control]} of {point.runs[control]}" for control in controls],
+        "cells": cells,
+    }
 
 
 def shown_time(seconds: float) -> str:
@@ -145,7 +200,11 @@ def shown_mean(name: str, item: Mean) -> str:
     if not math.isfinite(item.value):
         return "-"
     value = 0.0 if abs(item.value) < DUST * FLOORS[name] else item.value
-    half = f" ± {short(item.half_width, 2)}" if math.isfinite(item.half_width) and item.half_width >= DUST * FLOORS[name] else ""
+    half = (
+        f" ± {short(item.half_width, 2)}"
+        if math.isfinite(item.half_width) and item.half_width >= DUST * FLOORS[name]
+        else ""
+    )
     return f"{short(value, 3)}{half}"
 
 
@@ -159,7 +218,11 @@ def shown_change(change: Change | None) -> dict[str, str]:
     """A change relative to the first control's mean, where that has a meaning, and its interval."""
     if change is None or not change.pairs or not math.isfinite(change.relative):
         return {"change": "", "interval": "", "verdict": "" if change is None else change.verdict}
-    return {"change": f"{change.relative:+.0%}", "interval": _shown_interval(*change.interval), "verdict": change.verdict}
+    return {
+        "change": f"{change.relative:+.0%}",
+        "interval": _shown_interval(*change.interval),
+        "verdict": change.verdict,
+    }
 
 
 def _shown_interval(low: float, high: float) -> str:
@@ -171,33 +234,58 @@ def optimum_rows(results: Results) -> list[dict[str, Any]]:
     optimum = results.optimum
     if optimum is None:
         return []
-    before = {"label": "before", "settings": ["-"] * len(optimum["variables"]), **_judged(optimum["before"])}
+    before = {
+        "label": "before",
+        "settings": ["-"] * len(optimum["variables"]),
+        **_judged(optimum["before"]),
+    }
     return [before, *(_best_row(item, optimum) for item in optimum["best"])]
 
 
 def optimum_changes(results: Results) -> list[dict[str, Any]]:
-    """A row per best trial, metric and part (held out first): how it differs from what the optimiser began from, over pairs of runs."""
+    """A row per best trial, metric and part (held out first): how it differs from what the
+    optimiser began from, over pairs of runs.
+    """
     return [
-        {"label": f"trial {item['trial']}", "part": part.replace("_", " "), "metric": name, **_found_change(table)}
+        {
+            "label": f"trial {item['trial']}",
+            "part": part.replace("_", " "),
+            "metric": name,
+            **_found_change(table),
+        }
         for item in (results.optimum or {"best": []})["best"]
         for part in ("held_out", "training")
-        for name, table in item.get("change", {}).get(part, {}).items()  # folders of before have none
+        for name, table in item.get("change", {})
+        .get(part, {})
+        .items()  # folders of before have none
     ]
 
 
 def _found_change(table: Mapping[str, Any]) -> dict[str, Any]:
     relative, low, high = (_number(table[key]) for key in ("relative", "low", "high"))
     change = f"{relative:+.1%}" if math.isfinite(relative) else "-"
-    return {"change": change, "interval": _shown_interval(low, high), "verdict": table["verdict"], "pairs": table["pairs"]}
+    return {
+        "change": change,
+        "interval": _shown_interval(low, high),
+        "verdict": table["verdict"],
+        "pairs": table["pairs"],
+    }
 
 
 def _best_row(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, Any]:
     label = f"trial {item['trial']}" + ("" if item["feasible"] else " (breaks a constraint)")
-    return {"label": label, "settings": [shown_value(item["values"][name]) for name in optimum["variables"]], **_judged(item)}
+    return {
+        "label": label,
+        "settings": [shown_value(item["values"][name]) for name in optimum["variables"]],
+        **_judged(item),
+    }
 
 
 def _judged(item: Mapping[str, Any]) -> dict[str, list[str]]:
-    return {part: [_shown_figure(name, value) for name, value in item[part].items()] for part in ("training", "held_out")}
+    return {
+        part: [_shown_figure(name, value) for name, value in item[part].items()]
+        for part in ("training", "held_out")
+    }
 
 
 def _shown_figure(name: str, value: float | None) -> str:

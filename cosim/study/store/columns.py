@@ -1,4 +1,6 @@
-"""A run as a row of the store: its number and settings, how it ended, its metrics, and what it took."""
+"""A run as a row of the store: its number and settings, how it ended, its metrics, and what it
+took.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,14 @@ import pyarrow as pa
 
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.study.plan.identity import identity
-from hexapod_cosim.cosim.study.plan.records import GAINS, SCENARIO_FACTOR, VALUES, Factor, Study, Value
+from hexapod_cosim.cosim.study.plan.records import (
+    GAINS,
+    SCENARIO_FACTOR,
+    VALUES,
+    Factor,
+    Study,
+    Value,
+)
 from hexapod_cosim.cosim.study.store.done import Done
 
 OF_TIME = "realtime_factor"  # the metric that is the machine's
@@ -20,16 +29,30 @@ BETWEEN = " | "  # warnings of a run
 
 def schema_of(study: Study) -> pa.Schema:
     """The columns, with their units; a scenario that is a factor stands under `case`."""
-    fields = [pa.field("run", pa.int64()), pa.field("point", pa.int64()), pa.field("case", pa.string())]
-    fields += [_unit(pa.field(factor.name, _type(factor)), _unit_of(factor)) for factor in _own_columns(study)]
+    fields = [
+        pa.field("run", pa.int64()),
+        pa.field("point", pa.int64()),
+        pa.field("case", pa.string()),
+    ]
+    fields += [
+        _unit(pa.field(factor.name, _type(factor)), _unit_of(factor))
+        for factor in _own_columns(study)
+    ]
     fields += [
         pa.field("seed", pa.int64()),
         pa.field("control", pa.string()),
         pa.field("status", pa.string()),
         pa.field("reason", pa.string()),
     ]
-    fields += [pa.field("upright", pa.bool_()), pa.field("walked", pa.bool_()), pa.field("fallback", pa.float64())]
-    fields += [pa.field("warnings", pa.string()), *(_unit(pa.field(name, pa.float64()), UNITS[name]) for name in FIGURES)]
+    fields += [
+        pa.field("upright", pa.bool_()),
+        pa.field("walked", pa.bool_()),
+        pa.field("fallback", pa.float64()),
+    ]
+    fields += [
+        pa.field("warnings", pa.string()),
+        *(_unit(pa.field(name, pa.float64()), UNITS[name]) for name in FIGURES),
+    ]
     fields += [pa.field("identity", pa.string()), _unit(pa.field(WALL, pa.float64()), "s")]
     return pa.schema(fields)
 
@@ -67,12 +90,25 @@ def row_of(done: Done, study: Study) -> dict[str, object]:
         if factor.name != SCENARIO_FACTOR
     }
     return {
-        "run": order.run, "point": order.point, "case": order.case, **values, "seed": order.seed, "control": order.control,
-        "status": summary.status, "reason": summary.reason, "upright": summary.upright, "walked": summary.walked,
-        "fallback": summary.fallback, "warnings": BETWEEN.join(summary.warnings),
-        **{name: None if math.isnan(summary.metrics[name]) else summary.metrics[name] for name in FIGURES},
-        "identity": identity(order, study.factors), WALL: done.wall,
-    }  # fmt: skip
+        "run": order.run,
+        "point": order.point,
+        "case": order.case,
+        **values,
+        "seed": order.seed,
+        "control": order.control,
+        "status": summary.status,
+        "reason": summary.reason,
+        "upright": summary.upright,
+        "walked": summary.walked,
+        "fallback": summary.fallback,
+        "warnings": BETWEEN.join(summary.warnings),
+        **{
+            name: None if math.isnan(summary.metrics[name]) else summary.metrics[name]
+            for name in FIGURES
+        },
+        "identity": identity(order, study.factors),
+        WALL: done.wall,
+    }
 
 
 def _cell(factor: Factor, value: Value | None) -> Value | None:
@@ -80,5 +116,11 @@ def _cell(factor: Factor, value: Value | None) -> Value | None:
         return None
     kind = _type(factor)
     if kind == pa.string():
-        return value if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+        return (
+            value
+            if isinstance(value, str)
+            else str(value).lower()
+            if isinstance(value, bool)
+            else str(value)
+        )
     return value if kind == pa.bool_() else float(value)

@@ -1,8 +1,11 @@
-"""Counts, means and squared deviations of many samples at once, kept instead of their values: memory does not grow with these.
+"""Counts, means and squared deviations of many samples at once, kept instead of their values:
+memory does not grow with these.
 
-Within a block of values both are summed in two passes; blocks are put together as Chan, Golub and LeVeque do (1983):
+Within a block of values both are summed in two passes; blocks are put together as Chan, Golub and
+LeVeque do (1983):
 
-    mean = mean_a + d n_b/n        square = square_a + square_b + d^2 n_a n_b/n        d = mean_b - mean_a, n = n_a + n_b
+    mean = mean_a + d n_b/n        square = square_a + square_b + d^2 n_a n_b/n        d = mean_b -
+    mean_a, n = n_a + n_b
 """
 
 from __future__ import annotations
@@ -47,12 +50,20 @@ class Moments:
         count = self.count + other.count
         share = other.count / np.maximum(count, 1.0)
         apart = other.mean - self.mean
-        return Moments(count, self.mean + apart * share, self.square + other.square + apart**2 * self.count * share)
+        return Moments(
+            count,
+            self.mean + apart * share,
+            self.square + other.square + apart**2 * self.count * share,
+        )
 
 
 def ratio_half_widths(before: Moments, after: Moments, difference: Moments) -> Array:
-    """Of pairs, half of the 95 % intervals of ln(mean after / mean before); NaN where there is none."""
-    return log_half_widths(difference.count, before.mean, after.mean, (before.square, after.square, difference.square))
+    """Of pairs, half of the 95 % intervals of ln(mean after / mean before); NaN where there is
+    none.
+    """
+    return log_half_widths(
+        difference.count, before.mean, after.mean, (before.square, after.square, difference.square)
+    )
 
 
 def no_moments(*shape: int) -> Moments:
@@ -61,7 +72,9 @@ def no_moments(*shape: int) -> Moments:
 
 
 def moments_of(values: Array, valid: Truths, starts: Numbers) -> Moments:
-    """Of the valid ones among values (n, ...), in groups of neighbours that begin at `starts` (g,), the first at 0; (g, ...)."""
+    """Of the valid ones among values (n, ...), in groups of neighbours that begin at `starts`
+    (g,), the first at 0; (g, ...).
+    """
     count = np.add.reduceat(valid, starts, axis=0, dtype=np.float64)
     sizes = np.diff(np.append(starts, len(values)))
     kept = np.where(valid, values, 0.0)

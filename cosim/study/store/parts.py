@@ -1,4 +1,6 @@
-"""Parts of a study's store: Parquet files that are never changed, whose names hold their number and the checksum of their bytes."""
+"""Parts of a study's store: Parquet files that are never changed, whose names hold their number
+and the checksum of their bytes.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,11 @@ def part_of(table: pa.Table, *, kind: str, number: int) -> tuple[str, bytes]:
 
 def parts_in(folder: Path, *, kind: str = "") -> list[Path]:
     """The parts in a folder, of one kind or of all, in the order of their numbers."""
-    found = [path for path in folder.glob("*.parquet") if (match := NAME.fullmatch(path.name)) and kind in ("", match[1])]
+    found = [
+        path
+        for path in folder.glob("*.parquet")
+        if (match := NAME.fullmatch(path.name)) and kind in ("", match[1])
+    ]
     return sorted(found, key=number_of)
 
 
@@ -47,14 +53,18 @@ def number_of(path: Path) -> int:
 
 
 def read_part(path: Path, schema: pa.Schema, columns: Sequence[str] | None = None) -> pa.Table:
-    """A part, or columns of it. Raises FileNotFoundError when it is gone, DamagedPartError, StudyError when it cannot be read."""
+    """A part, or columns of it. Raises FileNotFoundError when it is gone, DamagedPartError,
+    StudyError when it cannot be read.
+    """
     try:
         content = path.read_bytes()
     except FileNotFoundError:
         raise
     except OSError as error:
         fix = "see that it can be read"
-        raise StudyError("cannot read a part of the results", got=error.strerror, fix=fix, where=str(path)) from error
+        raise StudyError(
+            "cannot read a part of the results", got=error.strerror, fix=fix, where=str(path)
+        ) from error
     if _checksum(content) != path.stem[-8:]:
         raise damaged(path, f"{len(content)} bytes that are not those that were written")
     try:
@@ -68,14 +78,22 @@ def read_part(path: Path, schema: pa.Schema, columns: Sequence[str] | None = Non
 
 def runs_of(path: Path, schema: pa.Schema) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
     """The numbers of a part's runs, in order. Raises as `read_part` does."""
-    runs: np.ndarray[tuple[int], np.dtype[np.int64]] = read_part(path, schema, [RUN])[RUN].to_numpy()
+    runs: np.ndarray[tuple[int], np.dtype[np.int64]] = read_part(path, schema, [RUN])[
+        RUN
+    ].to_numpy()
     return runs
 
 
 def damaged(path: Path, why: str) -> DamagedPartError:
     """The error for a part that is not what was written."""
     fix = "start the study again: it sets the part aside and runs its runs again"
-    return DamagedPartError("a damaged part of the results", got=why, expected="the Parquet file that was stored", fix=fix, where=str(path))
+    return DamagedPartError(
+        "a damaged part of the results",
+        got=why,
+        expected="the Parquet file that was stored",
+        fix=fix,
+        where=str(path),
+    )
 
 
 def _checksum(content: bytes) -> str:

@@ -23,7 +23,15 @@ from hexapod_cosim.cosim.study.store.columns import FIGURES, WALL, result_schema
 from hexapod_cosim.cosim.study.store.manifest import MANIFEST, RESULTS, RUNS, TIMES, provenance
 from hexapod_cosim.cosim.study.store.moments import Array, ratio_half_widths
 from hexapod_cosim.cosim.study.store.store import ROWS_AT_ONCE, Store, write_durably, write_whole
-from hexapod_cosim.cosim.study.store.sums import AFTER, BEFORE, DIFFERENCE, Block, Rows, blocks_of, whole_pairs
+from hexapod_cosim.cosim.study.store.sums import (
+    AFTER,
+    BEFORE,
+    DIFFERENCE,
+    Block,
+    Rows,
+    blocks_of,
+    whole_pairs,
+)
 from hexapod_cosim.cosim.study.store.table import Mean, Overall, Point, Tally, point_at
 from hexapod_cosim.cosim.study.store.trials import OPTIMUM, Trial, trials_of
 from hexapod_cosim.models import HexapodError
@@ -55,10 +63,14 @@ def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
         manifest: dict[str, Any] = read_json(folder / MANIFEST)
     except HexapodError as error:
         fix = "give a folder written by `hexapod study`"
-        raise HexapodError("not a study's folder", got=str(folder), expected=f"a folder with {MANIFEST}", fix=fix) from error
+        raise HexapodError(
+            "not a study's folder", got=str(folder), expected=f"a folder with {MANIFEST}", fix=fix
+        ) from error
     where = str(folder / MANIFEST)
     study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
-    return replace(study, title=manifest["title"]), manifest  # which is the file's name where the file has none
+    return replace(
+        study, title=manifest["title"]
+    ), manifest  # which is the file's name where the file has none
 
 
 def read_results(folder: Path) -> Results:
@@ -85,20 +97,38 @@ def read_results(folder: Path) -> Results:
             count += len(block.held_out)
             yield points_table(block, study)
 
-    step = max(math.ceil(manifest["runs"] / (len(study.seeds) * len(study.run_controls)) / MOST_POINTS), 1) if study.optimise is None else 1
+    step = (
+        max(
+            math.ceil(
+                manifest["runs"] / (len(study.seeds) * len(study.run_controls)) / MOST_POINTS
+            ),
+            1,
+        )
+        if study.optimise is None
+        else 1
+    )
     write_whole(folder / POINTS, chosen(), points_schema(study).with_metadata(provenance(manifest)))
     trials = [] if study.optimise is None else trials_of(Optimisation(study), kept)
     optimum = read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None
     results = Results(
-        study=study, manifest=manifest, facts=facts, overall=tally.overall(), points=kept, of_points=count,
-        trials=trials, optimum=optimum, damaged=damaged, wall=wall,
-    )  # fmt: skip
+        study=study,
+        manifest=manifest,
+        facts=facts,
+        overall=tally.overall(),
+        points=kept,
+        of_points=count,
+        trials=trials,
+        optimum=optimum,
+        damaged=damaged,
+        wall=wall,
+    )
     write_durably(folder / SUMMARY, (to_json(summary_of(results)) + "\n").encode())
     return results
 
 
 def _tables(folder: Path, study: Study, *, finished: bool) -> tuple[Iterator[pa.Table], list[str]]:
-    """All runs in order from their parts, which have checksums; where one is damaged, from a finished study's results or from the others.
+    """All runs in order from their parts, which have checksums; where one is damaged, from a
+    finished study's results or from the others.
 
     And in words, which parts are missing.
     """
@@ -109,7 +139,9 @@ def _tables(folder: Path, study: Study, *, finished: bool) -> tuple[Iterator[pa.
 
 
 def _readable(folder: Path, study: Study) -> tuple[pq.ParquetFile, pq.ParquetFile] | None:
-    """The results and times of a finished study, if they are there and whole as far as their ends tell."""
+    """The results and times of a finished study, if they are there and whole as far as their
+    ends tell.
+    """
     try:
         files = pq.ParquetFile(folder / RESULTS), pq.ParquetFile(folder / TIMES)
     except (OSError, pa.ArrowException):
@@ -121,27 +153,45 @@ def _readable(folder: Path, study: Study) -> tuple[pq.ParquetFile, pq.ParquetFil
 def _blocks(results: pq.ParquetFile, times: pq.ParquetFile) -> Iterator[pa.Table]:
     """Runs with what they took, some ten thousand at a time."""
     try:
-        for runs, took in zip(results.iter_batches(ROWS_AT_ONCE), times.iter_batches(ROWS_AT_ONCE), strict=True):
+        for runs, took in zip(
+            results.iter_batches(ROWS_AT_ONCE), times.iter_batches(ROWS_AT_ONCE), strict=True
+        ):
             yield pa.Table.from_batches([runs]).append_column(WALL, took[WALL])
     except (OSError, pa.ArrowException) as error:
         fix = "start the study again: it runs what is missing and writes them anew"
-        raise HexapodError("damaged results", got=str(error), expected=f"{RESULTS} and {TIMES} as they were written", fix=fix) from error
+        raise HexapodError(
+            "damaged results",
+            got=str(error),
+            expected=f"{RESULTS} and {TIMES} as they were written",
+            fix=fix,
+        ) from error
 
 
 def summary_of(results: Results) -> dict[str, Any]:
-    """For JSON: totals, means with half their interval, changes, failures by reason, the optimum."""
+    """For JSON: totals, means with half their interval, changes, failures by reason, the
+    optimum.
+    """
     overall = results.overall
     failures = [
         {"control": control, "status": status, "reason": reason, "runs": count}
         for (control, status, reason), count in overall.failures.items()
     ]
     return {
-        "title": results.study.title, "runs": overall.runs, "of": results.manifest["runs"], "points": results.of_points,
-        "walked": dict(overall.walked), "run_by_control": dict(overall.total), "pairs": overall.pairs,
-        "means": {control: {name: _mean(item) for name, item in means.items()} for control, means in overall.means.items()},
+        "title": results.study.title,
+        "runs": overall.runs,
+        "of": results.manifest["runs"],
+        "points": results.of_points,
+        "walked": dict(overall.walked),
+        "run_by_control": dict(overall.total),
+        "pairs": overall.pairs,
+        "means": {
+            control: {name: _mean(item) for name, item in means.items()}
+            for control, means in overall.means.items()
+        },
         "change": {name: change.as_table() for name, change in overall.changes.items()},
-        "failures": failures, "optimum": results.optimum,
-    }  # fmt: skip
+        "failures": failures,
+        "optimum": results.optimum,
+    }
 
 
 def _mean(item: Mean) -> dict[str, float]:
@@ -149,18 +199,31 @@ def _mean(item: Mean) -> dict[str, float]:
 
 
 def points_schema(study: Study) -> pa.Schema:
-    """A point's settings, then by control runs, walked and each metric's mean with half its interval, then pairs and their changes."""
+    """A point's settings, then by control runs, walked and each metric's mean with half its
+    interval, then pairs and their changes.
+    """
     runs = schema_of(study)
     fields = [runs.field(name) for name in ("point", "case")] + [
         runs.field(factor.name) for factor in study.factors if factor.name != SCENARIO_FACTOR
     ]
     fields.append(pa.field("held_out", pa.bool_()))
     for control in study.run_controls:
-        fields += [pa.field(f"{control}.runs", pa.int64()), pa.field(f"{control}.walked", pa.int64())]
-        fields += [runs.field(name).with_name(f"{control}.{name}{part}") for name in FIGURES for part in ("", HALF)]
+        fields += [
+            pa.field(f"{control}.runs", pa.int64()),
+            pa.field(f"{control}.walked", pa.int64()),
+        ]
+        fields += [
+            runs.field(name).with_name(f"{control}.{name}{part}")
+            for name in FIGURES
+            for part in ("", HALF)
+        ]
     if len(study.run_controls) == 2:
         fields.append(pa.field("pairs", pa.int64()))
-        fields += [runs.field(name).with_name(f"change.{name}{part}") for name in FIGURES for part in ("", HALF)]
+        fields += [
+            runs.field(name).with_name(f"change.{name}{part}")
+            for name in FIGURES
+            for part in ("", HALF)
+        ]
         fields += [pa.field(f"change.{name}.verdict", pa.string()) for name in FIGURES]
     return pa.schema(fields)
 
@@ -168,7 +231,9 @@ def points_schema(study: Study) -> pa.Schema:
 def points_table(block: Block, study: Study) -> pa.Table:
     """A block's points as rows of points.parquet."""
     sums, schema = block.sums, points_schema(study)
-    columns: dict[str, Any] = {name: block.first[name] for name in schema.names if name in block.first.schema.names}
+    columns: dict[str, Any] = {
+        name: block.first[name] for name in schema.names if name in block.first.schema.names
+    }
     columns["held_out"] = block.held_out
     for k, control in enumerate(study.run_controls):
         columns |= {f"{control}.runs": sums.runs[:, k], f"{control}.walked": sums.walked[:, k]}
@@ -177,12 +242,23 @@ def points_table(block: Block, study: Study) -> pa.Table:
     if len(study.run_controls) == 2:
         before, after, half_width = (sums.moments[:, part] for part in (BEFORE, AFTER, DIFFERENCE))
         ratio = ratio_half_widths(before, after, half_width)
-        columns |= {"pairs": sums.pairs, **_by_metric("change", after.value - before.value, half_width.half_width)}
+        columns |= {
+            "pairs": sums.pairs,
+            **_by_metric("change", after.value - before.value, half_width.half_width),
+        }
         for k, name in enumerate(FIGURES):
-            verdict = verdicts(name, before.value[:, k], after.value[:, k], half_width.half_width[:, k], ratio[:, k])
+            verdict = verdicts(
+                name,
+                before.value[:, k],
+                after.value[:, k],
+                half_width.half_width[:, k],
+                ratio[:, k],
+            )
             columns[f"change.{name}.verdict"] = verdict.tolist()
     arrays = [
-        pa.array(item, schema.field(name).type, from_pandas=True) if isinstance(item, np.ndarray) else item
+        pa.array(item, schema.field(name).type, from_pandas=True)
+        if isinstance(item, np.ndarray)
+        else item
         for name, item in ((name, columns[name]) for name in schema.names)
     ]
     return pa.table(arrays, schema=schema)

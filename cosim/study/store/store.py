@@ -1,8 +1,10 @@
-"""Where runs are kept as they come: Parquet parts in a folder, each written whole, flushed to the disk and renamed into place.
+"""Where runs are kept as they come: Parquet parts in a folder, each written whole, flushed to the
+disk and renamed into place.
 
-A part is never changed. Many small ones are put together into one, written before they are taken away; a run that stands in two parts
-is the same in both. So a folder is valid whenever the power goes, and may be read while a study runs. A part that is damaged all the same
-is set aside, and its runs are run again.
+A part is never changed. Many small ones are put together into one, written before they are taken
+away; a run that stands in two parts is the same in both. So a folder is valid whenever the power
+goes, and may be read while a study runs. A part that is damaged all the same is set aside, and its
+runs are run again.
 """
 
 from __future__ import annotations
@@ -42,14 +44,19 @@ from hexapod_cosim.cosim.study.store.parts import (
 MANY = 64  # small parts are put together
 ROWS_AT_ONCE = 16_384  # in memory, of the whole
 FLUSH_ROWS, FLUSH_SECONDS = 1024, 2.0  # no more than this is lost to a kill
-MOST_LOOKS = 100  # for parts that vanish while they are read, because a running study puts them together
-LEFTOVERS = ".*.new"  # half-written files of processes that were killed, or files that others write just now
+MOST_LOOKS = (
+    100  # for parts that vanish while they are read, because a running study puts them together
+)
+# half-written files of processes that were killed, or files that others write just now
+LEFTOVERS = ".*.new"
 
 Writer = Callable[[Path, bytes], None]
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Writes a file whole or not at all, on the disk when this returns. Raises StudyError when the disk is full, HexapodError else."""
+    """Writes a file whole or not at all, on the disk when this returns. Raises StudyError when
+    the disk is full, HexapodError else.
+    """
     part = _unfinished(path)
     try:
         with part.open("wb") as file:
@@ -82,7 +89,13 @@ def _sync_folder(folder: Path) -> None:
 def _not_written(path: Path, error: OSError) -> Exception:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         fix = "make room and start the study again: it goes on, all runs stored so far are kept"
-        return StudyError("the disk is full", got=error.strerror, expected="room for the results", fix=fix, where=str(path.parent))
+        return StudyError(
+            "the disk is full",
+            got=error.strerror,
+            expected="room for the results",
+            fix=fix,
+            where=str(path.parent),
+        )
     return not_writable(path, error)
 
 
@@ -98,7 +111,9 @@ class Store:
         self._flushed = monotonic()
 
     def prepare(self, count: int, *, say: EventSink = ignore_event) -> None:
-        """Makes the folder for `count` runs, takes away what a killed study left half written, and sets damaged parts aside."""
+        """Makes the folder for `count` runs, takes away what a killed study left half written,
+        and sets damaged parts aside.
+        """
         try:
             self._folder.mkdir(exist_ok=True)
             for left in self._folder.glob(LEFTOVERS):
@@ -116,20 +131,26 @@ class Store:
         except DamagedPartError as error:
             aside = path.with_name(path.name + DAMAGED)
             os.replace(path, aside)
-            say(f"{path}: {error.what} ({error.got}): set aside as {aside.name}, its runs are run again")
+            say(
+                f"{path}: {error.what} ({error.got}): set aside as {aside.name}, its runs are run again"
+            )
 
     def parts(self) -> list[Path]:
         """All parts, in the order of their numbers."""
         return parts_in(self._folder)
 
     def add(self, rows: Iterable[dict[str, object]]) -> None:
-        """Keeps rows; they are on the disk within FLUSH_SECONDS, if more come. Raises StudyError when the disk is full."""
+        """Keeps rows; they are on the disk within FLUSH_SECONDS, if more come. Raises StudyError
+        when the disk is full.
+        """
         self._rows.extend(rows)
         if len(self._rows) >= FLUSH_ROWS or monotonic() - self._flushed >= FLUSH_SECONDS:
             self.flush()
 
     def flush(self) -> None:
-        """Puts what was added on the disk. Raises StudyError when it is full: the rows are then lost, and run again another time."""
+        """Puts what was added on the disk. Raises StudyError when it is full: the rows are then
+        lost, and run again another time.
+        """
         rows, self._rows, self._flushed = self._rows, [], monotonic()
         if rows:
             self._write_part(SMALL, pa.Table.from_pylist(rows, schema=self._schema))
@@ -143,13 +164,19 @@ class Store:
     def _put_together(self) -> None:
         small = parts_in(self._folder, kind=SMALL)
         if len(small) >= MANY:
-            self._write_part(MERGED, pa.concat_tables(read_part(path, self._schema) for path in small))
+            self._write_part(
+                MERGED, pa.concat_tables(read_part(path, self._schema) for path in small)
+            )
             for path in small:
-                with suppress(PermissionError):  # somebody reads it on Windows: it stays, with runs that stand twice
+                with suppress(
+                    PermissionError
+                ):  # somebody reads it on Windows: it stays, with runs that stand twice
                     path.unlink()
 
     def done(self, count: int) -> NDArray[np.bool_]:
-        """(count,) which runs are stored: a byte each. Raises StudyError for a part that cannot be read."""
+        """(count,) which runs are stored: a byte each. Raises StudyError for a part that cannot
+        be read.
+        """
         found = np.zeros(count, dtype=np.bool_)
         for path in self.parts():
             found[runs_of(path, self._schema)] = True
@@ -162,11 +189,16 @@ class Store:
             low, high = self._range(path)
             if low <= max(runs) and high >= min(runs):
                 table = read_part(path, self._schema)
-                found |= {row[RUN]: row for row in table.filter(pa.compute.field(RUN).isin(list(runs))).to_pylist()}
+                found |= {
+                    row[RUN]: row
+                    for row in table.filter(pa.compute.field(RUN).isin(list(runs))).to_pylist()
+                }
         return found
 
     def skip_damaged(self) -> list[str]:
-        """Leaves damaged parts out of `sorted_rows` from now on, and says in words which they are. They stay where they are."""
+        """Leaves damaged parts out of `sorted_rows` from now on, and says in words which they
+        are. They stay where they are.
+        """
         for path in self.parts():
             try:
                 self._range(path)
@@ -181,20 +213,30 @@ class Store:
         begin, looks = 0, 0
         while True:
             try:
-                ranges = {path: self._range(path) for path in self._settled_parts() if path not in self._skipped}
+                ranges = {
+                    path: self._range(path)
+                    for path in self._settled_parts()
+                    if path not in self._skipped
+                }
                 if begin > max((high for _, high in ranges.values()), default=-1):
                     return
                 table = self._block(begin, begin + ROWS_AT_ONCE, ranges)
-            except FileNotFoundError as error:  # a running study put parts together: what was in them is elsewhere now
+            except (
+                FileNotFoundError
+            ) as error:  # a running study put parts together: what was in them is elsewhere now
                 looks += 1
                 if looks > MOST_LOOKS:
-                    raise StudyError("parts of the results vanish", got=str(error.filename), fix="try again") from error
+                    raise StudyError(
+                        "parts of the results vanish", got=str(error.filename), fix="try again"
+                    ) from error
                 continue
             yield table
             begin, looks = begin + ROWS_AT_ONCE, 0
 
     def _settled_parts(self) -> list[Path]:
-        """All parts, listed twice alike: a listing during which one came and others went may have neither."""
+        """All parts, listed twice alike: a listing during which one came and others went may
+        have neither.
+        """
         before, now = None, self.parts()
         while now != before:
             before, now = now, self.parts()
@@ -204,7 +246,10 @@ class Store:
         """The runs from `begin` to before `stop`. Raises FileNotFoundError."""
         place = pa.compute.field(RUN)
         paths = [path for path, (low, high) in ranges.items() if low < stop and high >= begin]
-        tables = [read_part(path, self._schema).filter((place >= begin) & (place < stop)) for path in paths]
+        tables = [
+            read_part(path, self._schema).filter((place >= begin) & (place < stop))
+            for path in paths
+        ]
         table = pa.concat_tables(tables).sort_by(RUN) if tables else self._schema.empty_table()
         runs = table[RUN].to_numpy()
         return table.filter(pa.array(np.append(True, runs[1:] != runs[:-1])[: len(runs)]))
@@ -217,7 +262,9 @@ class Store:
 
 
 def write_whole(path: Path, tables: Iterable[pa.Table], schema: pa.Schema) -> None:
-    """One Parquet file of tables, whole or not at all: the same bytes for the same rows. Raises StudyError when the disk is full."""
+    """One Parquet file of tables, whole or not at all: the same bytes for the same rows. Raises
+    StudyError when the disk is full.
+    """
     part = _unfinished(path)
     try:
         with part.open("wb") as file:

@@ -1,7 +1,9 @@
-"""Sorted runs turned into sums: of each point, and of all. No more than a block of rows is ever held, however many runs a point has.
+"""Sorted runs turned into sums: of each point, and of all. No more than a block of rows is ever
+held, however many runs a point has.
 
-A pair is two runs of the same point, scenario and seed, one under each control: in sorted runs they stand next to each other, and where
-one of them is missing the other has no pair. It counts by itself, not in a change.
+A pair is two runs of the same point, scenario and seed, one under each control: in sorted runs they
+stand next to each other, and where one of them is missing the other has no pair. It counts by
+itself, not in a change.
 """
 
 from __future__ import annotations
@@ -30,25 +32,36 @@ class Sums:
     moments: Moments  # (g, c + 3, figures) of walks: by control, then of pairs
 
     def __getitem__(self, place: slice) -> Sums:
-        return Sums(runs=self.runs[place], walked=self.walked[place], pairs=self.pairs[place], moments=self.moments[place])
+        return Sums(
+            runs=self.runs[place],
+            walked=self.walked[place],
+            pairs=self.pairs[place],
+            moments=self.moments[place],
+        )
 
     def merged(self, other: Sums) -> Sums:
         """Each group with the other's at its place."""
         return Sums(
-            runs=self.runs + other.runs, walked=self.walked + other.walked, pairs=self.pairs + other.pairs,
+            runs=self.runs + other.runs,
+            walked=self.walked + other.walked,
+            pairs=self.pairs + other.pairs,
             moments=self.moments.merged(other.moments),
-        )  # fmt: skip
+        )
 
     def appended(self, other: Sums) -> Sums:
         """The groups of both."""
         counts = ((self.runs, other.runs), (self.walked, other.walked), (self.pairs, other.pairs))
         runs, walked, pairs = (np.concatenate(pair) for pair in counts)
-        return Sums(runs=runs, walked=walked, pairs=pairs, moments=appended(self.moments, other.moments))
+        return Sums(
+            runs=runs, walked=walked, pairs=pairs, moments=appended(self.moments, other.moments)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Whole points next to each other: a row of each for its settings, and the sums of their runs."""
+    """Whole points next to each other: a row of each for its settings, and the sums of their
+    runs.
+    """
 
     first: pa.Table
     held_out: Truths
@@ -60,7 +73,9 @@ class Rows:
 
     def __init__(self, table: pa.Table, study: Study) -> None:
         self.table, self._size = table, len(study.run_controls)
-        self._control = pc.index_in(table["control"], value_set=pa.array(study.run_controls)).to_numpy()
+        self._control = pc.index_in(
+            table["control"], value_set=pa.array(study.run_controls)
+        ).to_numpy()
         self._walked = table["walked"].to_numpy()
         self._point = table["point"].to_numpy()
         self.held_out = np.zeros(len(self._point), dtype=np.bool_)
@@ -77,17 +92,24 @@ class Rows:
         own = self._control[:, None] == np.arange(self._size)
         first = self._first_of_pairs()
         both = first & self._walked & np.append(self._walked[1:], False)
-        figures = np.column_stack([self.table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in FIGURES])
+        figures = np.column_stack(
+            [self.table[name].to_numpy(zero_copy_only=False).astype(np.float64) for name in FIGURES]
+        )
         following = np.concatenate([figures[1:], figures[-1:]])
-        values = np.stack([*[figures] * self._size, figures, following, following - figures], axis=1)
+        values = np.stack(
+            [*[figures] * self._size, figures, following, following - figures], axis=1
+        )
         counted = np.column_stack([own & self._walked[:, None], both, both, both])
         paired = np.isfinite(figures) & np.isfinite(following)
-        valid = counted[:, :, None] & np.stack([*[np.isfinite(figures)] * self._size, paired, paired, paired], axis=1)
+        valid = counted[:, :, None] & np.stack(
+            [*[np.isfinite(figures)] * self._size, paired, paired, paired], axis=1
+        )
         return Sums(
             runs=np.add.reduceat(own, starts, axis=0, dtype=np.int64),
             walked=np.add.reduceat(own & self._walked[:, None], starts, axis=0, dtype=np.int64),
-            pairs=np.add.reduceat(both, starts, dtype=np.int64), moments=moments_of(values, valid, starts),
-        )  # fmt: skip
+            pairs=np.add.reduceat(both, starts, dtype=np.int64),
+            moments=moments_of(values, valid, starts),
+        )
 
     def _first_of_pairs(self) -> Truths:
         """(n,) whether the next run is the same under the other control."""
@@ -103,7 +125,11 @@ def whole_pairs(tables: Iterable[pa.Table], controls: Sequence[str]) -> Iterator
     left: pa.Table | None = None
     for part in tables:
         table = part if left is None else pa.concat_tables([left, part])
-        waits = len(controls) == 2 and table.num_rows > 0 and table["control"][-1].as_py() == controls[0]
+        waits = (
+            len(controls) == 2
+            and table.num_rows > 0
+            and table["control"][-1].as_py() == controls[0]
+        )
         kept = table.num_rows - waits
         left = table.slice(kept) if waits else None
         if kept:
@@ -117,7 +143,14 @@ def blocks_of(parts: Iterable[Rows]) -> Iterator[Block]:
     open_end: Block | None = None
     for rows in parts:
         starts = rows.starts()
-        block = _joined(open_end, Block(first=rows.table.take(starts), held_out=rows.held_out[starts], sums=rows.sums(starts)))
+        block = _joined(
+            open_end,
+            Block(
+                first=rows.table.take(starts),
+                held_out=rows.held_out[starts],
+                sums=rows.sums(starts),
+            ),
+        )
         count = len(block.held_out)
         if count > 1:
             yield _cut(block, slice(0, count - 1))
@@ -137,8 +170,12 @@ def _joined(left: Block | None, right: Block) -> Block:
         return right
     if left.first["point"][0] == right.first["point"][0] and left.held_out[0] == right.held_out[0]:
         same, rest = _cut(right, slice(0, 1)), _cut(right, slice(1, len(right.held_out)))
-        left, right = Block(first=left.first, held_out=left.held_out, sums=left.sums.merged(same.sums)), rest
+        left, right = (
+            Block(first=left.first, held_out=left.held_out, sums=left.sums.merged(same.sums)),
+            rest,
+        )
     return Block(
-        first=pa.concat_tables([left.first, right.first]), held_out=np.concatenate([left.held_out, right.held_out]),
+        first=pa.concat_tables([left.first, right.first]),
+        held_out=np.concatenate([left.held_out, right.held_out]),
         sums=left.sums.appended(right.sums),
-    )  # fmt: skip
+    )

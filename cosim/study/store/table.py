@@ -1,6 +1,8 @@
-"""What runs of a point come to: means with 95 % intervals over seeds, and paired changes from the first control to the second.
+"""What runs of a point come to: means with 95 % intervals over seeds, and paired changes from the
+first control to the second.
 
-All are of walks that came to their end: what a fall leaves behind is no figure of a walk, and stands in results.parquet alone.
+All are of walks that came to their end: what a fall leaves behind is no figure of a walk, and
+stands in results.parquet alone.
 """
 
 from __future__ import annotations
@@ -56,27 +58,45 @@ class Overall:
     walked: Mapping[str, int]  # by control
     total: Mapping[str, int]
     pairs: int  # in which both walked
-    failures: Mapping[tuple[str, str, str], int]  # by control, status and reason, the most frequent first
+    failures: Mapping[
+        tuple[str, str, str], int
+    ]  # by control, status and reason, the most frequent first
     changes: Mapping[str, Change]  # over all pairs
     means: Mapping[str, Mapping[str, Mean]]
-    walks: Mapping[tuple[str, str], tuple[int, int]]  # by scenario and control: how many walked, how many of these have any figure
+    walks: Mapping[
+        tuple[str, str], tuple[int, int]
+    ]  # by scenario and control: how many walked, how many of these have any figure
 
 
 MOST_REASONS = 30
-MOST_KINDS = 1000  # of reasons that are told apart, so that their number does not grow with the runs
+MOST_KINDS = (
+    1000  # of reasons that are told apart, so that their number does not grow with the runs
+)
 OTHER = "other reasons"
 DIGITS = str.maketrans("0123456789", "#" * 10)
 
 
 def point_at(block: Block, place: int, study: Study) -> Point:
     """One of a block's points."""
-    row, sums, controls = block.first.slice(place, 1).to_pylist()[0], block.sums[place : place + 1], study.run_controls
+    row, sums, controls = (
+        block.first.slice(place, 1).to_pylist()[0],
+        block.sums[place : place + 1],
+        study.run_controls,
+    )
     return Point(
-        number=row["point"], case=row["case"], held_out=bool(block.held_out[place]),
-        values={factor.name: row["case" if factor.name == SCENARIO_FACTOR else factor.name] for factor in study.factors},
-        runs=dict(zip(controls, sums.runs[0].tolist(), strict=True)), walked=dict(zip(controls, sums.walked[0].tolist(), strict=True)),
-        pairs=int(sums.pairs[0]), means=_means(sums, study), changes=_changes(sums, study),
-    )  # fmt: skip
+        number=row["point"],
+        case=row["case"],
+        held_out=bool(block.held_out[place]),
+        values={
+            factor.name: row["case" if factor.name == SCENARIO_FACTOR else factor.name]
+            for factor in study.factors
+        },
+        runs=dict(zip(controls, sums.runs[0].tolist(), strict=True)),
+        walked=dict(zip(controls, sums.walked[0].tolist(), strict=True)),
+        pairs=int(sums.pairs[0]),
+        means=_means(sums, study),
+        changes=_changes(sums, study),
+    )
 
 
 def _means(sums: Sums, study: Study) -> dict[str, dict[str, Mean]]:
@@ -84,21 +104,35 @@ def _means(sums: Sums, study: Study) -> dict[str, dict[str, Mean]]:
     found = {}
     for k, control in enumerate(study.run_controls):
         part = sums.moments[0, k]
-        parts = zip(FIGURES, part.value.tolist(), part.half_width.tolist(), part.count.astype(int).tolist(), strict=True)
-        found[control] = {name: Mean(value, half_width, runs) for name, value, half_width, runs in parts}
+        parts = zip(
+            FIGURES,
+            part.value.tolist(),
+            part.half_width.tolist(),
+            part.count.astype(int).tolist(),
+            strict=True,
+        )
+        found[control] = {
+            name: Mean(value, half_width, runs) for name, value, half_width, runs in parts
+        }
     return found
 
 
 def _changes(sums: Sums, study: Study) -> dict[str, Change]:
-    """By metric, of the first group; as `hexapod compare` has them, of the pairs in which both walked."""
+    """By metric, of the first group; as `hexapod compare` has them, of the pairs in which both
+    walked.
+    """
     if len(study.run_controls) != 2:
         return {}
     before, after, difference = (sums.moments[0, part] for part in (BEFORE, AFTER, DIFFERENCE))
     ratio = ratio_half_widths(before, after, difference)
     parts = (before.value, after.value, difference.half_width, ratio, difference.count.astype(int))
     return {
-        name: made_change(name, before=first, after=second, half_width=half, log_half_width=log_half, pairs=pairs)
-        for name, first, second, half, log_half, pairs in zip(FIGURES, *(part.tolist() for part in parts), strict=True)
+        name: made_change(
+            name, before=first, after=second, half_width=half, log_half_width=log_half, pairs=pairs
+        )
+        for name, first, second, half, log_half, pairs in zip(
+            FIGURES, *(part.tolist() for part in parts), strict=True
+        )
     }
 
 
@@ -118,7 +152,9 @@ class Tally:
         for case, control, walked, figured in _walks(rows.table):
             before = self._walks.get((case, control), (0, 0))
             self._walks[case, control] = before[0] + walked, before[1] + figured
-        lost = rows.table.filter(pc.invert(rows.table["walked"])).select(["control", "status", "reason", "warnings"])
+        lost = rows.table.filter(pc.invert(rows.table["walked"])).select(
+            ["control", "status", "reason", "warnings"]
+        )
         for row in lost.to_pylist():
             kind = (row["control"], row["status"], _reason(row))
             if kind not in self._failures and len(self._failures) >= MOST_KINDS:
@@ -130,17 +166,24 @@ class Tally:
         controls, sums = self._study.run_controls, self._sums or _no_sums(self._study)
         runs, walked = sums.runs[0].tolist(), sums.walked[0].tolist()
         return Overall(
-            runs=sum(runs), walked=dict(zip(controls, walked, strict=True)), total=dict(zip(controls, runs, strict=True)),
-            pairs=int(sums.pairs[0]), failures=dict(self._failures.most_common(MOST_REASONS)), changes=_changes(sums, self._study),
-            means=_means(sums, self._study), walks=dict(self._walks),
-        )  # fmt: skip
+            runs=sum(runs),
+            walked=dict(zip(controls, walked, strict=True)),
+            total=dict(zip(controls, runs, strict=True)),
+            pairs=int(sums.pairs[0]),
+            failures=dict(self._failures.most_common(MOST_REASONS)),
+            changes=_changes(sums, self._study),
+            means=_means(sums, self._study),
+            walks=dict(self._walks),
+        )
 
 
 def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
     """By scenario and control: how many walked, and how many of these have any figure."""
     kept = table.filter(table["walked"])
     figured = pc.is_valid(pc.coalesce(*(kept[name] for name in FIGURES if name not in OF_THE_RUN)))
-    groups = pa.table({"case": kept["case"], "control": kept["control"], "figured": figured}).group_by(["case", "control"])
+    groups = pa.table(
+        {"case": kept["case"], "control": kept["control"], "figured": figured}
+    ).group_by(["case", "control"])
     return [
         (row["case"], row["control"], row["figured_count"], row["figured_sum"])
         for row in groups.aggregate([("figured", "count"), ("figured", "sum")]).to_pylist()
@@ -150,11 +193,15 @@ def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
 def _no_sums(study: Study) -> Sums:
     size = len(study.run_controls)
     none = np.zeros((1, size), dtype=np.int64)
-    return Sums(runs=none, walked=none, pairs=none[:, 0], moments=no_moments(1, size + 3, len(FIGURES)))
+    return Sums(
+        runs=none, walked=none, pairs=none[:, 0], moments=no_moments(1, size + 3, len(FIGURES))
+    )
 
 
 def _reason(row: Row) -> str:
-    """Why a run did not walk to its end, without the figures in it, so that like is counted with like."""
+    """Why a run did not walk to its end, without the figures in it, so that like is counted with
+    like.
+    """
     text = str(row["reason"] or row["warnings"].partition(" | ")[0] or "the robot fell")
     return _without_numbers(text)
 

@@ -32,11 +32,25 @@ def trials_of(plan: Optimisation, points: Sequence[Point]) -> list[Trial]:
     """Trials from the points of their runs, for people to look at; those that are whole."""
     found = []
     for point in points:
-        if point.held_out or point.number >= plan.asked.trials or point.runs[plan.asked.control] < plan.asked.training.runs:
+        if (
+            point.held_out
+            or point.number >= plan.asked.trials
+            or point.runs[plan.asked.control] < plan.asked.training.runs
+        ):
             continue
         share = point.walked[plan.asked.control] / point.runs[plan.asked.control]
-        means = {name: item.value if share == 1.0 else math.nan for name, item in point.means[plan.asked.control].items()}
+        means = {
+            name: item.value if share == 1.0 else math.nan
+            for name, item in point.means[plan.asked.control].items()
+        }
         means[WALKED] = share
         values = tuple(point.values[factor.name] for factor in plan.study.factors)
-        found.append(Trial(number=point.number, values=values, means=means, feasible=feasible(means, plan.asked)))
+        found.append(
+            Trial(
+                number=point.number,
+                values=values,
+                means=means,
+                feasible=feasible(means, plan.asked),
+            )
+        )
     return found

@@ -37,12 +37,25 @@ export class Actor {
     this.lamp.shadow.radius = 4;
     this.lamp.shadow.intensity = 0.6;
     this.lamp.shadow.normalBias = 0.004;
-    Object.assign(this.lamp.shadow.camera, { left: -REACH, right: REACH, top: REACH, bottom: -REACH, near: 0.5, far: 6 });
+    Object.assign(this.lamp.shadow.camera, {
+      left: -REACH,
+      right: REACH,
+      top: REACH,
+      bottom: -REACH,
+      near: 0.5,
+      far: 6,
+    });
     this.scene.add(this.model, this.floor, this.arrows, this.lamp, this.lamp.target, this.sky);
   }
 
   addTrails(stances: readonly Stance[], enlarged: number): void {
-    this.trails = new Trails(stances, this.recording, this.run.ground, enlarged, this.run.robot.foot);
+    this.trails = new Trails(
+      stances,
+      this.recording,
+      this.run.ground,
+      enlarged,
+      this.run.robot.foot,
+    );
     if (this.print) this.trails.paint(this.print);
     this.scene.add(this.trails);
   }
@@ -61,7 +74,11 @@ export class Actor {
   /** Brings everything to a time; beyond its recording the run stays as it ended. */
   show(time: number): void {
     const pose = this.poseAt(time);
-    this.place.set(pose.position.x, pose.position.y, groundHeight(this.run.ground, pose.position.x, pose.position.y));
+    this.place.set(
+      pose.position.x,
+      pose.position.y,
+      groundHeight(this.run.ground, pose.position.x, pose.position.y),
+    );
     this.model.place(pose, this.touching(time));
     this.showForces(pose, time);
     this.floor.follow(pose.position.x, pose.position.y);
@@ -76,22 +93,32 @@ export class Actor {
 
   /** What is to be seen now: trails, lit feet, forces [body weights] that arrows show. */
   shown(): { trails: Shown; lit: boolean[]; arrows: number[][] } {
-    return { trails: this.trails?.shown() ?? { prints: 0, pieces: 0, latest: null }, lit: this.model.lit(), arrows: this.arrows.shown() };
+    return {
+      trails: this.trails?.shown() ?? { prints: 0, pieces: 0, latest: null },
+      lit: this.model.lit(),
+      arrows: this.arrows.shown(),
+    };
   }
 
   private touching(time: number): boolean[] {
     const { row } = this.recording.place(time);
     return this.run.robot.legs.map(
-      ({ name }) => this.recording.has(`${name}.contact`) && this.recording.column(`${name}.contact`)[row] > 0.5,
+      ({ name }) =>
+        this.recording.has(`${name}.contact`) &&
+        this.recording.column(`${name}.contact`)[row] > 0.5,
     );
   }
 
   private showForces(pose: Pose, time: number): void {
     const normal = groundNormal(this.run.ground);
-    const soles = footCentres(this.run.robot, pose).map((foot) => foot.addScaledVector(normal, -this.run.robot.foot));
+    const soles = footCentres(this.run.robot, pose).map((foot) =>
+      foot.addScaledVector(normal, -this.run.robot.foot),
+    );
     const forces = this.run.robot.legs.map(({ name }) => {
       const axes = ["x", "y", "z"].map((axis) => `${name}.force.${axis}`);
-      return this.recording.has(...axes) ? new Vector3(...axes.map((axis) => this.recording.value(axis, time))) : new Vector3();
+      return this.recording.has(...axes)
+        ? new Vector3(...axes.map((axis) => this.recording.value(axis, time)))
+        : new Vector3();
     });
     this.arrows.show(soles, forces);
   }

@@ -1,4 +1,12 @@
-import { type Color, ConeGeometry, CylinderGeometry, Group, Mesh, MeshBasicMaterial, Vector3 } from "three";
+import {
+  type Color,
+  ConeGeometry,
+  CylinderGeometry,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  Vector3,
+} from "three";
 
 const UP = new Vector3(0, 1, 0);
 const LENGTH = 0.42; // m    of an arrow of one body weight
@@ -9,7 +17,11 @@ const HEAD = 0.0125; // m
 /** The ground's force on each foot, an arrow from where it acts. */
 export class ForceArrows extends Group {
   private readonly arrows: { shaft: Mesh; head: Mesh }[];
-  private readonly material = new MeshBasicMaterial({ depthTest: false, transparent: true, opacity: 0.92 }); // seen through the legs;
+  private readonly material = new MeshBasicMaterial({
+    depthTest: false,
+    transparent: true,
+    opacity: 0.92,
+  }); // seen through the legs;
 
   constructor(count: number) {
     super();

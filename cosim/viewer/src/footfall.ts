@@ -10,7 +10,12 @@ const BAR = 0.5; // of a row: where the foot is on the ground
 const HEIGHT = 170; // px
 
 /** Which foot is on the ground when (bars), over where the gait plans it to swing (bands). */
-export function footfallPanel({ run, recording }: Run, host: HTMLElement | null, clock: Clock, span: Span): (() => Panel)[] {
+export function footfallPanel(
+  { run, recording }: Run,
+  host: HTMLElement | null,
+  clock: Clock,
+  span: Span,
+): (() => Panel)[] {
   const legs = run.robot.legs.map(({ name }) => name);
   if (!host || !recording.has(...legs.map((leg) => `${leg}.contact`))) return [];
   const feet = `--${run.label}`;
@@ -21,27 +26,66 @@ export function footfallPanel({ run, recording }: Run, host: HTMLElement | null,
     brush.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
     brush.clip();
     legs.forEach((leg, row) => {
-      if (recording.has(`${leg}.swing`)) bars(plot, recording.time, recording.column(`${leg}.swing`), row, BAND, property("--swing"));
+      if (recording.has(`${leg}.swing`))
+        bars(
+          plot,
+          recording.time,
+          recording.column(`${leg}.swing`),
+          row,
+          BAND,
+          property("--swing"),
+        );
       bars(plot, recording.time, recording.column(`${leg}.contact`), row, BAR, property(feet));
     });
     brush.restore();
   };
-  const down = (time: number): number => legs.filter((leg) => recording.column(`${leg}.contact`)[recording.place(time).row] > 0.5).length;
+  const down = (time: number): number =>
+    legs.filter((leg) => recording.column(`${leg}.contact`)[recording.place(time).row] > 0.5)
+      .length;
   const still = new Float32Array(recording.time.length).fill(Number.NaN);
   const curve = { label: "feet down", colour: feet, time: recording.time, values: still, at: down };
-  const axes = { stroke: () => property("--muted"), grid: { show: false }, ticks: { show: false }, font: "11px system-ui" };
+  const axes = {
+    stroke: () => property("--muted"),
+    grid: { show: false },
+    ticks: { show: false },
+    font: "11px system-ui",
+  };
   const more: Partial<uPlot.Options> = {
-    scales: { x: { time: false, min: span.limits[0], max: span.limits[1] }, y: { range: [-0.5, legs.length - 0.5], dir: -1 } },
+    scales: {
+      x: { time: false, min: span.limits[0], max: span.limits[1] },
+      y: { range: [-0.5, legs.length - 0.5], dir: -1 },
+    },
     axes: [
       { ...axes, size: 22, gap: 3, space: 60 },
-      { ...axes, size: 46, gap: 4, splits: () => legs.map((_, k) => k), values: () => legs, space: 1 },
+      {
+        ...axes,
+        size: 46,
+        gap: 4,
+        splits: () => legs.map((_, k) => k),
+        values: () => legs,
+        space: 1,
+      },
     ],
     hooks: { draw: [draw] },
   };
-  return [() => new Panel({ title: run.label, unit: "", height: HEIGHT, curves: [curve], host, more }, clock, span)];
+  return [
+    () =>
+      new Panel(
+        { title: run.label, unit: "", height: HEIGHT, curves: [curve], host, more },
+        clock,
+        span,
+      ),
+  ];
 }
 
-function bars(plot: uPlot, time: Float64Array, flag: Float32Array, row: number, share: number, colour: string): void {
+function bars(
+  plot: uPlot,
+  time: Float64Array,
+  flag: Float32Array,
+  row: number,
+  share: number,
+  colour: string,
+): void {
   const top = plot.valToPos(row - share / 2, "y", true);
   const height = plot.valToPos(row + share / 2, "y", true) - top;
   plot.ctx.fillStyle = colour;
@@ -52,7 +96,8 @@ function bars(plot: uPlot, time: Float64Array, flag: Float32Array, row: number, 
     if (up || begin < 0) continue;
     const left = plot.valToPos(time[begin], "x", true);
     const right = plot.valToPos(time[Math.min(k, flag.length - 1)], "x", true);
-    if (right >= plot.bbox.left && left <= plot.bbox.left + plot.bbox.width) plot.ctx.fillRect(left, top, right - left, height);
+    if (right >= plot.bbox.left && left <= plot.bbox.left + plot.bbox.width)
+      plot.ctx.fillRect(left, top, right - left, height);
     begin = -1;
   }
 }

@@ -19,12 +19,18 @@ const PIXELS = 512;
 
 /** Unit normal of the ground. */
 export function groundNormal(ground: Ground): Vector3 {
-  return new Vector3(-ground.rise * Math.cos(ground.heading), -ground.rise * Math.sin(ground.heading), 1).normalize();
+  return new Vector3(
+    -ground.rise * Math.cos(ground.heading),
+    -ground.rise * Math.sin(ground.heading),
+    1,
+  ).normalize();
 }
 
 /** Height of the ground at a place. */
 export function groundHeight(ground: Ground, x: number, y: number): number {
-  return ground.height + ground.rise * (x * Math.cos(ground.heading) + y * Math.sin(ground.heading));
+  return (
+    ground.height + ground.rise * (x * Math.cos(ground.heading) + y * Math.sin(ground.heading))
+  );
 }
 
 /** The plane the robot walks on, with a grid of 10 cm; it moves along by whole tiles. */
@@ -36,7 +42,9 @@ export class Floor extends Group {
     this.plane = new Mesh(new PlaneGeometry(SIZE, SIZE), new MeshLambertMaterial());
     this.plane.receiveShadow = true;
     this.add(this.plane);
-    this.quaternion.copy(new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), groundNormal(ground)));
+    this.quaternion.copy(
+      new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), groundNormal(ground)),
+    );
     this.follow(0, 0);
   }
 
@@ -45,7 +53,11 @@ export class Floor extends Group {
     const place = new Vector3(x, y, groundHeight(this.ground, x, y));
     const origin = new Vector3(0, 0, this.ground.height);
     const along = place.sub(origin).applyQuaternion(this.quaternion.clone().invert());
-    const snapped = new Vector3(Math.round(along.x / TILE) * TILE, Math.round(along.y / TILE) * TILE, 0);
+    const snapped = new Vector3(
+      Math.round(along.x / TILE) * TILE,
+      Math.round(along.y / TILE) * TILE,
+      0,
+    );
     this.position.copy(snapped.applyQuaternion(this.quaternion).add(origin));
   }
 

@@ -14,9 +14,18 @@ export interface Pose {
 export function poseAt(recording: Recording, robot: Robot, time: number): Pose {
   const at = (name: string) => recording.value(name, time);
   const { row, share } = recording.place(time);
-  const attitude = attitudeOf(recording, row).slerp(attitudeOf(recording, Math.min(row + 1, recording.time.length - 1)), share);
-  const names = robot.legs.flatMap((leg) => robot.joints.map((joint) => `${leg.name}.${joint}.angle`));
-  return { position: new Vector3(at("torso.x"), at("torso.y"), at("torso.z")), attitude, angles: Float64Array.from(names, at) };
+  const attitude = attitudeOf(recording, row).slerp(
+    attitudeOf(recording, Math.min(row + 1, recording.time.length - 1)),
+    share,
+  );
+  const names = robot.legs.flatMap((leg) =>
+    robot.joints.map((joint) => `${leg.name}.${joint}.angle`),
+  );
+  return {
+    position: new Vector3(at("torso.x"), at("torso.y"), at("torso.z")),
+    attitude,
+    angles: Float64Array.from(names, at),
+  };
 }
 
 function attitudeOf(recording: Recording, row: number): Quaternion {

@@ -29,7 +29,9 @@ async function start(): Promise<void> {
   const payload = JSON.parse(byId("recording")!.textContent!) as Payload;
   document.head.append(element("style", "", plotStyle));
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
-  const runs: Run[] = await Promise.all(payload.runs.map(async (run) => ({ run, recording: await unpack(run) })));
+  const runs: Run[] = await Promise.all(
+    payload.runs.map(async (run) => ({ run, recording: await unpack(run) })),
+  );
   const clock = new Clock(
     Math.min(...runs.map(({ recording }) => recording.start)),
     Math.max(...runs.map(({ recording }) => recording.end)),
@@ -50,7 +52,12 @@ async function start(): Promise<void> {
 }
 
 /** The stage, and then the walk. */
-async function raiseCurtain(runs: readonly Run[], clock: Clock, theme: Theme, transport: Transport): Promise<void> {
+async function raiseCurtain(
+  runs: readonly Run[],
+  clock: Clock,
+  theme: Theme,
+  transport: Transport,
+): Promise<void> {
   const stage = makeStage(runs);
   if (stage) {
     const repaint = () => {
@@ -72,18 +79,28 @@ async function raiseCurtain(runs: readonly Run[], clock: Clock, theme: Theme, tr
 /** The 3D view; undefined, and a word in its place, where the browser or the recording cannot give it. */
 function makeStage(runs: readonly Run[]): Stage | undefined {
   const host = byId("stage");
-  const able = runs.filter(({ run, recording }) => recording.has("torso.x", "torso.qw", `${run.robot.legs[0].name}.coxa.angle`));
+  const able = runs.filter(({ run, recording }) =>
+    recording.has("torso.x", "torso.qw", `${run.robot.legs[0].name}.coxa.angle`),
+  );
   if (!host || able.length === 0) {
-    refuse(host, "The replay needs torso.position, torso.quaternion and the joints' angles, which were not recorded (outputs.csv).");
+    refuse(
+      host,
+      "The replay needs torso.position, torso.quaternion and the joints' angles, which were not recorded (outputs.csv).",
+    );
     return undefined;
   }
   try {
     return new Stage(
       host,
-      able.map(({ run, recording }) => new Actor(run, recording, new Color(property(`--${run.label}`)))),
+      able.map(
+        ({ run, recording }) => new Actor(run, recording, new Color(property(`--${run.label}`))),
+      ),
     );
   } catch {
-    refuse(host, "The replay needs WebGL, which this browser does not offer. Plots and tables do without.");
+    refuse(
+      host,
+      "The replay needs WebGL, which this browser does not offer. Plots and tables do without.",
+    );
     return undefined;
   }
 }
@@ -101,7 +118,8 @@ function askedTime(): number | undefined {
 
 /** Plays at once, unless the reader asks for less motion or for a time. */
 function begin(clock: Clock): void {
-  if (askedTime() === undefined && !matchMedia("(prefers-reduced-motion: reduce)").matches) clock.play();
+  if (askedTime() === undefined && !matchMedia("(prefers-reduced-motion: reduce)").matches)
+    clock.play();
 }
 
 function runForever(clock: Clock, stage: Stage | undefined): void {
@@ -117,7 +135,9 @@ function runForever(clock: Clock, stage: Stage | undefined): void {
 
 async function addTrails(stage: Stage): Promise<void> {
   await rest();
-  const found = stage.actors.map(({ recording, run }) => findStances(recording, run.robot, run.ground));
+  const found = stage.actors.map(({ recording, run }) =>
+    findStances(recording, run.robot, run.ground),
+  );
   const enlarged = enlargement(found.flat());
   stage.actors.forEach((actor, k) => {
     actor.addTrails(found[k], enlarged);
@@ -129,7 +149,11 @@ async function addTrails(stage: Stage): Promise<void> {
 /** One plot after the other, with rests in which the replay goes on. */
 async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> {
   const whole = clock.end - clock.start;
-  const cycles = new Span(clock.start, clock.end, Math.min(SHOWN_CYCLES * runs[0].run.period, whole));
+  const cycles = new Span(
+    clock.start,
+    clock.end,
+    Math.min(SHOWN_CYCLES * runs[0].run.period, whole),
+  );
   const walk = new Span(clock.start, clock.end, whole);
   cycles.follow(clock.time);
   makeWindowButtons(cycles, clock, runs[0].run.period);
@@ -161,6 +185,9 @@ function feetOf(runs: readonly Run[], label: string, clock: Clock): number[][] {
 }
 
 start().catch((error: unknown) => {
-  refuse(byId("stage"), `The replay did not start: ${error instanceof Error ? error.message : String(error)}`);
+  refuse(
+    byId("stage"),
+    `The replay did not start: ${error instanceof Error ? error.message : String(error)}`,
+  );
   throw error;
 });

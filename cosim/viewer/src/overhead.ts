@@ -28,13 +28,22 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
   const first = runs[0].recording;
   const planned = first.has("command.x", "command.y") ? [wayOf("commanded", first, "command")] : [];
   const frame = frameOf([...ways, ...planned], planned[0]);
-  const drawing = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": "Path of the torso from above" });
-  for (const way of [...planned, ...ways]) drawing.append(svg("polyline", { class: `way ${way.label}`, points: pointsOf(way, frame) }));
+  const drawing = svg("svg", {
+    viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
+    role: "img",
+    "aria-label": "Path of the torso from above",
+  });
+  for (const way of [...planned, ...ways])
+    drawing.append(svg("polyline", { class: `way ${way.label}`, points: pointsOf(way, frame) }));
   const dots = ways.map((way) => svg("circle", { class: `dot ${way.label}`, r: "7" }));
   drawing.append(...dots);
   const map = element("div", "map");
   map.append(drawing, ...axes(drawing, frame));
-  host.append(map, element("p", "across", "x [m]"), element("p", "note", `y [mm] upwards. ${frame.note}`));
+  host.append(
+    map,
+    element("p", "across", "x [m]"),
+    element("p", "note", `y [mm] upwards. ${frame.note}`),
+  );
   const show = () => {
     ways.forEach((way, k) => {
       const row = nearestRow(way.time, clock.time);
@@ -44,7 +53,9 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
   };
   clock.listen(show);
   show();
-  drawing.addEventListener("pointerdown", (event) => clock.seek(timeNear(ways, frame, inside(drawing, event))));
+  drawing.addEventListener("pointerdown", (event) =>
+    clock.seek(timeNear(ways, frame, inside(drawing, event))),
+  );
 }
 
 /** Lines and values of both axes; the values beside the drawing, so that they stay as large as text is. */
@@ -55,16 +66,29 @@ function axes(drawing: SVGElement, frame: Frame): HTMLElement[] {
     return made;
   };
   const line = (x1: number, y1: number, x2: number, y2: number) =>
-    drawing.prepend(svg("line", { class: "mesh", x1: String(x1), y1: String(y1), x2: String(x2), y2: String(y2) }));
-  const [stepX, stepY] = [stepOf(frame.ends[0], 6), stepOf(frame.ends[1].map((y) => 1e3 * y) as [number, number], 4)];
+    drawing.prepend(
+      svg("line", {
+        class: "mesh",
+        x1: String(x1),
+        y1: String(y1),
+        x2: String(x2),
+        y2: String(y2),
+      }),
+    );
+  const [stepX, stepY] = [
+    stepOf(frame.ends[0], 6),
+    stepOf(frame.ends[1].map((y) => 1e3 * y) as [number, number], 4),
+  ];
   const across = multiples(frame.ends[0], stepX).map((x) => {
     line(frame.across(x), 0, frame.across(x), HEIGHT);
     return label(tick(x, stepX), "along", "left", frame.across(x) / WIDTH);
   });
-  const upwards = multiples(frame.ends[1].map((y) => 1e3 * y) as [number, number], stepY).map((y) => {
-    line(0, frame.up(1e-3 * y), WIDTH, frame.up(1e-3 * y));
-    return label(tick(y, stepY), "beside", "top", frame.up(1e-3 * y) / HEIGHT);
-  });
+  const upwards = multiples(frame.ends[1].map((y) => 1e3 * y) as [number, number], stepY).map(
+    (y) => {
+      line(0, frame.up(1e-3 * y), WIDTH, frame.up(1e-3 * y));
+      return label(tick(y, stepY), "beside", "top", frame.up(1e-3 * y) / HEIGHT);
+    },
+  );
   return [...across, ...upwards];
 }
 
@@ -76,7 +100,10 @@ function stepOf([low, high]: readonly [number, number], wished: number): number 
 
 function multiples([low, high]: readonly [number, number], step: number): number[] {
   const first = Math.ceil(low / step);
-  return Array.from({ length: Math.max(Math.floor(high / step) - first + 1, 0) }, (_, k) => (first + k) * step);
+  return Array.from(
+    { length: Math.max(Math.floor(high / step) - first + 1, 0) },
+    (_, k) => (first + k) * step,
+  );
 }
 
 interface Frame {
@@ -88,7 +115,12 @@ interface Frame {
 }
 
 function wayOf(label: string, recording: Run["recording"], stem: string): Way {
-  return { label, x: recording.column(`${stem}.x`), y: recording.column(`${stem}.y`), time: recording.time };
+  return {
+    label,
+    x: recording.column(`${stem}.x`),
+    y: recording.column(`${stem}.y`),
+    time: recording.time,
+  };
 }
 
 /** To scale for a path that bends; for a straight one the sideways axis is enlarged, and the note says by how much. */
@@ -106,13 +138,22 @@ function frameOf(ways: readonly Way[], planned: Way | undefined): Frame {
     ? `To scale, ${size}.`
     : `${size}, ${(1e3 * Math.max(high - low, LEAST)).toPrecision(2)} mm from top to bottom: sideways drawn ${Math.round(scales[1] / scales[0])} times larger.`;
   const half = [(0.5 * WIDTH) / scales[0], (0.5 * HEIGHT) / scales[1]];
-  const ends = [[middle - half[0], middle + half[0]] as const, [level - half[1], level + half[1]] as const] as const;
-  return { ends, across: (x) => 0.5 * WIDTH + scales[0] * (x - middle), up: (y) => 0.5 * HEIGHT - scales[1] * (y - level), note };
+  const ends = [
+    [middle - half[0], middle + half[0]] as const,
+    [level - half[1], level + half[1]] as const,
+  ] as const;
+  return {
+    ends,
+    across: (x) => 0.5 * WIDTH + scales[0] * (x - middle),
+    up: (y) => 0.5 * HEIGHT - scales[1] * (y - level),
+    note,
+  };
 }
 
 function limits(columns: readonly Float32Array[]): [number, number] {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
-  for (const column of columns) for (const value of column) [low, high] = [Math.min(low, value), Math.max(high, value)];
+  for (const column of columns)
+    for (const value of column) [low, high] = [Math.min(low, value), Math.max(high, value)];
   return [low, high];
 }
 
@@ -124,7 +165,9 @@ function spread(column: Float32Array): number {
 function pointsOf(way: Way, frame: Frame): string {
   const step = Math.max(1, Math.ceil(way.x.length / MOST_POINTS));
   const rows = Array.from({ length: Math.ceil(way.x.length / step) }, (_, k) => k * step);
-  return rows.map((row) => `${frame.across(way.x[row]).toFixed(1)},${frame.up(way.y[row]).toFixed(1)}`).join(" ");
+  return rows
+    .map((row) => `${frame.across(way.x[row]).toFixed(1)},${frame.up(way.y[row]).toFixed(1)}`)
+    .join(" ");
 }
 
 function nearestRow(time: Float64Array, wanted: number): number {
@@ -150,7 +193,10 @@ function timeNear(ways: readonly Way[], frame: Frame, [x, y]: readonly [number, 
 
 function inside(drawing: SVGElement, event: PointerEvent): [number, number] {
   const box = drawing.getBoundingClientRect();
-  return [((event.clientX - box.left) / box.width) * WIDTH, ((event.clientY - box.top) / box.height) * HEIGHT];
+  return [
+    ((event.clientX - box.left) / box.width) * WIDTH,
+    ((event.clientY - box.top) / box.height) * HEIGHT,
+  ];
 }
 
 function svg(tag: string, attributes: Record<string, string>): SVGElement {

@@ -77,11 +77,20 @@ export class Panel {
       padding: [6, 8, 0, 0],
       scales: {
         x: { time: false, min, max },
-        y: { range: (_, low, high) => roomy(...(this.options.limits ?? ([low ?? 0, high ?? 1] as const))) },
+        y: {
+          range: (_, low, high) =>
+            roomy(...(this.options.limits ?? ([low ?? 0, high ?? 1] as const))),
+        },
       },
       axes: [
         { ...quiet, size: 22, gap: 3, space: 60 },
-        { ...quiet, size: 46, gap: 4, space: 26, values: (_, splits, __, ___, step) => splits.map((value) => tick(value, step)) },
+        {
+          ...quiet,
+          size: 46,
+          gap: 4,
+          space: 26,
+          values: (_, splits, __, ___, step) => splits.map((value) => tick(value, step)),
+        },
       ],
       series: [{}, ...this.options.curves.map(seriesOf)],
       ...this.options.more,
@@ -112,7 +121,8 @@ export class Panel {
 
   private listenToPointer(): void {
     const over = this.plot.over;
-    const timeOf = (event: MouseEvent) => this.plot.posToVal(event.clientX - over.getBoundingClientRect().left, "x");
+    const timeOf = (event: MouseEvent) =>
+      this.plot.posToVal(event.clientX - over.getBoundingClientRect().left, "x");
     over.addEventListener("pointerdown", (event) => {
       if (event.button !== 0) return;
       over.setPointerCapture(event.pointerId);
@@ -163,8 +173,11 @@ function seriesOf(curve: Curve): uPlot.Series {
 /** Curves that share their times as they are, others joined. */
 function dataOf(curves: readonly Curve[]): uPlot.AlignedData {
   const time = curves[0].time;
-  if (curves.every((curve) => sameTimes(curve.time, time))) return [time, ...curves.map((curve) => curve.values)] as uPlot.AlignedData;
-  return uPlot.join(curves.map((curve) => [Array.from(curve.time), Array.from(curve.values)] as uPlot.AlignedData));
+  if (curves.every((curve) => sameTimes(curve.time, time)))
+    return [time, ...curves.map((curve) => curve.values)] as uPlot.AlignedData;
+  return uPlot.join(
+    curves.map((curve) => [Array.from(curve.time), Array.from(curve.values)] as uPlot.AlignedData),
+  );
 }
 
 function sameTimes(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
@@ -176,13 +189,19 @@ function sameTimes(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
 /** Limits with air above and below; a constant gets a range to lie in. */
 function roomy(from: number, to: number): uPlot.Range.MinMax {
   const size = Math.max(Math.abs(from), Math.abs(to));
-  const air = to - from > LEAST * size ? Math.max(0.07 * (to - from), 0.5 * LEAST) : Math.max(0.1 * size, 0.5);
+  const air =
+    to - from > LEAST * size
+      ? Math.max(0.07 * (to - from), 0.5 * LEAST)
+      : Math.max(0.1 * size, 0.5);
   return [from >= 0 && from < 0.3 * (to - from) ? 0 : from - air, to + air];
 }
 
 /** A value of an axis whose values are a step apart: as many digits as the step needs. */
 export function tick(value: number, step: number): string {
-  const digits = [0, 1, 2, 3, 4, 5, 6].find((count) => Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) < 1e-6) ?? 6;
+  const digits =
+    [0, 1, 2, 3, 4, 5, 6].find(
+      (count) => Math.abs(step * 10 ** count - Math.round(step * 10 ** count)) < 1e-6,
+    ) ?? 6;
   const text = value.toFixed(digits);
   return (Number(text) === 0 ? (0).toFixed(digits) : text).replace("-", "−");
 }

@@ -47,37 +47,77 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
     ),
   );
   const compared: Record<string, Wanted[]> = {
-    foot_forces: legs.map((leg) => ({ title: nameOf(leg), unit: "BW", column: `${leg}.load`, limits: loads })),
+    foot_forces: legs.map((leg) => ({
+      title: nameOf(leg),
+      unit: "BW",
+      column: `${leg}.load`,
+      limits: loads,
+    })),
     slip: [
       { title: "slipped way, all feet", unit: "mm", column: "slip.way", whole: true, height: 150 },
-      ...legs.map((leg) => ({ title: nameOf(leg), unit: "mm/s", column: `${leg}.slip`, limits: slips })),
+      ...legs.map((leg) => ({
+        title: nameOf(leg),
+        unit: "mm/s",
+        column: `${leg}.slip`,
+        limits: slips,
+      })),
     ],
-    feet: legs.map((leg) => ({ title: nameOf(leg), unit: "mm", column: `${leg}.off`, limits: errors })),
+    feet: legs.map((leg) => ({
+      title: nameOf(leg),
+      unit: "mm",
+      column: `${leg}.off`,
+      limits: errors,
+    })),
     posture: [
       { title: "height", unit: "mm", column: "height" },
       ...["roll", "pitch", "yaw"].map((name) => ({ title: name, unit: "deg", column: name })),
     ],
-    torques: robot.joints.map((joint) => ({ title: joint, unit: "N m", column: `${joint}.torque` })),
+    torques: robot.joints.map((joint) => ({
+      title: joint,
+      unit: "N m",
+      column: `${joint}.torque`,
+    })),
   };
   const makers = Object.entries(compared).flatMap(([section, wanted]) =>
-    wanted.flatMap((item) => comparedPanel(section, item, runs, clock, item.whole ? spans.walk : spans.cycles)),
+    wanted.flatMap((item) =>
+      comparedPanel(section, item, runs, clock, item.whole ? spans.walk : spans.cycles),
+    ),
   );
   makers.push(...runs.flatMap((run) => energyPanels(run, clock, spans.walk)));
-  makers.push(...runs.flatMap((run) => footfallPanel(run, hostOf("footfall"), clock, spans.cycles)));
+  makers.push(
+    ...runs.flatMap((run) => footfallPanel(run, hostOf("footfall"), clock, spans.cycles)),
+  );
   return makers;
 }
 
-function comparedPanel(section: string, item: Wanted, runs: readonly Run[], clock: Clock, span: Span): (() => Panel)[] {
+function comparedPanel(
+  section: string,
+  item: Wanted,
+  runs: readonly Run[],
+  clock: Clock,
+  span: Span,
+): (() => Panel)[] {
   const host = hostOf(section);
-  const curves = runs.filter(({ recording }) => recording.has(item.column)).map((run) => curveOf(run, item.column));
+  const curves = runs
+    .filter(({ recording }) => recording.has(item.column))
+    .map((run) => curveOf(run, item.column));
   if (!host || curves.length === 0) return [];
-  const options: PanelOptions = { title: item.title, unit: item.unit, height: item.height ?? 130, curves, host, limits: item.limits };
+  const options: PanelOptions = {
+    title: item.title,
+    unit: item.unit,
+    height: item.height ?? 130,
+    curves,
+    host,
+    limits: item.limits,
+  };
   return [() => new Panel(options, clock, span)];
 }
 
 function energyPanels({ run, recording }: Run, clock: Clock, span: Span): (() => Panel)[] {
   const host = hostOf("energy");
-  const books = BOOKS.filter(([name]) => recording.has(`energy.${name}`) && moves(recording.column(`energy.${name}`)));
+  const books = BOOKS.filter(
+    ([name]) => recording.has(`energy.${name}`) && moves(recording.column(`energy.${name}`)),
+  );
   if (!host || books.length === 0) return [];
   const curves = books.map(([name, label, colour, dash]) => ({
     ...columnCurve(recording, `energy.${name}`, label, colour),
@@ -86,7 +126,12 @@ function energyPanels({ run, recording }: Run, clock: Clock, span: Span): (() =>
   const residual = [columnCurve(recording, "energy.residual", "residual", "--ink")];
   return [
     () => new Panel({ title: run.label, unit: "J", height: 190, curves, host }, clock, span),
-    () => new Panel({ title: `${run.label}: unexplained`, unit: "mJ", height: 190, curves: residual, host }, clock, span),
+    () =>
+      new Panel(
+        { title: `${run.label}: unexplained`, unit: "mJ", height: 190, curves: residual, host },
+        clock,
+        span,
+      ),
   ];
 }
 
@@ -96,7 +141,13 @@ function curveOf({ run, recording }: Run, column: string): Curve {
 }
 
 function columnCurve(recording: Recording, column: string, label: string, colour: string): Curve {
-  return { label, colour, time: recording.time, values: recording.column(column), at: (time) => recording.value(column, time) };
+  return {
+    label,
+    colour,
+    time: recording.time,
+    values: recording.column(column),
+    at: (time) => recording.value(column, time),
+  };
 }
 
 /** Least and largest value of the columns that there are. */
@@ -104,7 +155,8 @@ function limitsOf(runs: readonly Run[], names: readonly string[]): [number, numb
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (const { recording } of runs) {
     for (const name of names.filter((one) => recording.has(one))) {
-      for (const value of recording.column(name)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      for (const value of recording.column(name))
+        [low, high] = [Math.min(low, value), Math.max(high, value)];
     }
   }
   return low <= high ? [low, high] : undefined;

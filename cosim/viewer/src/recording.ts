@@ -62,7 +62,8 @@ export async function unpack(run: PackedRun): Promise<Recording> {
     }
   }
   const time = new Float64Array(run.rows);
-  for (let k = 0; k < run.rows; k++) time[k] = run.start + run.tick * (steps[k] + 65536 * steps[run.rows + k]);
+  for (let k = 0; k < run.rows; k++)
+    time[k] = run.start + run.tick * (steps[k] + 65536 * steps[run.rows + k]);
   const columns = new Map<string, Float32Array>();
   run.columns.forEach(([name, scale, offset], index) => {
     const first = (index + 2) * run.rows;

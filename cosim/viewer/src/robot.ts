@@ -1,4 +1,13 @@
-import { type BufferGeometry, CapsuleGeometry, Color, Group, Mesh, MeshLambertMaterial, SphereGeometry, Vector3 } from "three";
+import {
+  type BufferGeometry,
+  CapsuleGeometry,
+  Color,
+  Group,
+  Mesh,
+  MeshLambertMaterial,
+  SphereGeometry,
+  Vector3,
+} from "three";
 import { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
 import { legPoints, type Pose, torsoOrigin, toVector3 } from "./kinematics";
 import type { Robot } from "./types";
@@ -51,11 +60,19 @@ export class RobotModel extends Group {
   private makeTorso(mark: Color): void {
     const [length, width, height] = this.robot.torso.size;
     const corner = 0.22 * Math.min(length, width, height);
-    this.torso.add(solid(new RoundedBoxGeometry(length, width, height, 4, corner), this.robot.colours.torso));
-    const lid = solid(new RoundedBoxGeometry(0.72 * length, STRIPE * width, 0.14 * height, 3, 0.05 * height), "#ffffff");
+    this.torso.add(
+      solid(new RoundedBoxGeometry(length, width, height, 4, corner), this.robot.colours.torso),
+    );
+    const lid = solid(
+      new RoundedBoxGeometry(0.72 * length, STRIPE * width, 0.14 * height, 3, 0.05 * height),
+      "#ffffff",
+    );
     lid.material.color.copy(mark);
     lid.position.set(0, 0, 0.5 * height);
-    const nose = solid(new RoundedBoxGeometry(0.05 * length, 0.5 * width, 0.3 * height, 3, 0.05 * height), "#e8edf3");
+    const nose = solid(
+      new RoundedBoxGeometry(0.05 * length, 0.5 * width, 0.3 * height, 3, 0.05 * height),
+      "#e8edf3",
+    );
     nose.position.set(0.5 * length, 0, 0.12 * height);
     this.torso.add(lid, nose);
   }
@@ -65,7 +82,10 @@ export class RobotModel extends Group {
     const scale = toVector3(data[0].tip).length();
     return data.map((link, joint) => {
       const radius = this.robot.thickness[joint] * scale;
-      const mesh = solid(new CapsuleGeometry(radius, toVector3(link.tip).length(), 8, 20), this.robot.colours[this.robot.joints[joint]]);
+      const mesh = solid(
+        new CapsuleGeometry(radius, toVector3(link.tip).length(), 8, 20),
+        this.robot.colours[this.robot.joints[joint]],
+      );
       this.add(mesh);
       return mesh;
     });

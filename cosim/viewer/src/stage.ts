@@ -67,7 +67,10 @@ export class Stage {
   /** Has the graphics driver compile what draws the scenes, while the page goes on, where it can; nothing is drawn before. */
   async prepare(): Promise<void> {
     const aside = this.renderer.extensions.has("KHR_parallel_shader_compile");
-    if (aside) await Promise.all(this.actors.map((actor) => this.renderer.compileAsync(actor.scene, this.view)));
+    if (aside)
+      await Promise.all(
+        this.actors.map((actor) => this.renderer.compileAsync(actor.scene, this.view)),
+      );
     this.warm = true;
     this.stale = true;
   }
@@ -116,10 +119,19 @@ export class Stage {
   /** A plain wheel scrolls the page, and so does a finger up and down; what turns the view is dragging. */
   private makeControls(): OrbitControls {
     const canvas = this.renderer.domElement;
-    canvas.addEventListener("wheel", (event) => !(event.ctrlKey || event.metaKey) && event.stopImmediatePropagation(), { capture: true });
+    canvas.addEventListener(
+      "wheel",
+      (event) => !(event.ctrlKey || event.metaKey) && event.stopImmediatePropagation(),
+      { capture: true },
+    );
     const controls = new OrbitControls(this.camera, canvas);
     canvas.style.touchAction = "pan-y";
-    Object.assign(controls, { enablePan: false, minDistance: 0.25, maxDistance: 4, maxPolarAngle: 0.49 * Math.PI });
+    Object.assign(controls, {
+      enablePan: false,
+      minDistance: 0.25,
+      maxDistance: 4,
+      maxPolarAngle: 0.49 * Math.PI,
+    });
     controls.addEventListener("change", () => {
       this.stale = true;
     });

@@ -16,14 +16,22 @@ export interface Stance {
 /** All stances of all feet; empty when the recording does not tell. */
 export function findStances(recording: Recording, robot: Robot, ground: Ground): Stance[] {
   return robot.legs.flatMap((leg, index) => {
-    const names = [`${leg.name}.contact`, `${leg.name}.slipped.x`, `${leg.name}.slipped.y`] as const;
+    const names = [
+      `${leg.name}.contact`,
+      `${leg.name}.slipped.x`,
+      `${leg.name}.slipped.y`,
+    ] as const;
     if (!recording.has(...names, "torso.x", "torso.qw", `${leg.name}.coxa.angle`)) return [];
     const [contact, x, y] = names.map((name) => recording.column(name));
     return spans(contact).map(([begin, end]) => {
       const foot = footCentres(robot, poseAt(recording, robot, recording.time[begin]))[index];
       const place = new Vector3(foot.x, foot.y, groundHeight(ground, foot.x, foot.y));
       const rows = sampled(begin, end);
-      return { place, rows, slipped: rows.map((row) => ({ x: x[row] - x[begin], y: y[row] - y[begin] })) };
+      return {
+        place,
+        rows,
+        slipped: rows.map((row) => ({ x: x[row] - x[begin], y: y[row] - y[begin] })),
+      };
     });
   });
 }
@@ -45,7 +53,9 @@ function spans(flag: Float32Array): [number, number][] {
 
 function sampled(begin: number, end: number): number[] {
   const count = Math.min(end - begin + 1, MOST_POINTS);
-  return Array.from({ length: count }, (_, k) => Math.round(begin + ((end - begin) * k) / Math.max(count - 1, 1)));
+  return Array.from({ length: count }, (_, k) =>
+    Math.round(begin + ((end - begin) * k) / Math.max(count - 1, 1)),
+  );
 }
 
 /** How far a stance's foot slipped in all [m]. */

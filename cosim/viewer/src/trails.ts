@@ -74,15 +74,25 @@ export class Trails extends Group {
     const [prints, pieces] = [this.prints.count, this.ribbon.geometry.drawRange.count / 6];
     const rows = [...this.printRows.slice(0, prints), ...this.pieceRows.slice(0, pieces)];
     const latest = rows.length > 0 ? this.recording.time[Math.max(...rows)] : null;
-    return { prints: Math.min(prints, this.printRows.length), pieces: Math.min(pieces, this.pieceRows.length), latest };
+    return {
+      prints: Math.min(prints, this.printRows.length),
+      pieces: Math.min(pieces, this.pieceRows.length),
+      latest,
+    };
   }
 
   paint(print: Color): void {
     (this.prints.material as MeshBasicMaterial).color.copy(print);
   }
 
-  private makeRibbon(stances: readonly Stance[], ground: Ground, enlarged: number): Mesh<BufferGeometry, MeshBasicMaterial> {
-    const pieces = stances.filter((stance) => slippedBy(stance) > LEAST).flatMap((stance) => piecesOf(stance, enlarged));
+  private makeRibbon(
+    stances: readonly Stance[],
+    ground: Ground,
+    enlarged: number,
+  ): Mesh<BufferGeometry, MeshBasicMaterial> {
+    const pieces = stances
+      .filter((stance) => slippedBy(stance) > LEAST)
+      .flatMap((stance) => piecesOf(stance, enlarged));
     pieces.sort((a, b) => a.row - b.row);
     const positions: number[] = [];
     const colours: number[] = [];
@@ -95,7 +105,10 @@ export class Trails extends Group {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(new Float32Array(positions), 3));
     geometry.setAttribute("color", new BufferAttribute(new Float32Array(colours), 3));
-    const mesh = new Mesh(geometry, new MeshBasicMaterial({ vertexColors: true, side: DoubleSide }));
+    const mesh = new Mesh(
+      geometry,
+      new MeshBasicMaterial({ vertexColors: true, side: DoubleSide }),
+    );
     mesh.frustumCulled = false;
     return mesh;
   }
@@ -109,7 +122,10 @@ interface Piece {
 }
 
 function piecesOf(stance: Stance, enlarged: number): Piece[] {
-  const points = stance.slipped.map(({ x, y }): [number, number] => [stance.place.x + enlarged * x, stance.place.y + enlarged * y]);
+  const points = stance.slipped.map(({ x, y }): [number, number] => [
+    stance.place.x + enlarged * x,
+    stance.place.y + enlarged * y,
+  ]);
   return stance.rows.slice(1).map((row, k) => {
     const { x, y } = stance.slipped[k + 1];
     return { row, from: points[k], to: points[k + 1], way: Math.hypot(x, y) };
@@ -130,11 +146,22 @@ function corners({ from, to }: Piece): [number, number][] {
 
 function footprints(stances: readonly Stance[], ground: Ground, radius: number): InstancedMesh {
   const material = new MeshBasicMaterial({ transparent: true, opacity: 0.5, depthWrite: false });
-  const mesh = new InstancedMesh(new CircleGeometry(0.8 * radius, 24), material, Math.max(stances.length, 1));
+  const mesh = new InstancedMesh(
+    new CircleGeometry(0.8 * radius, 24),
+    material,
+    Math.max(stances.length, 1),
+  );
   const normal = groundNormal(ground);
   const flat = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), normal);
   stances.forEach((stance, k) => {
-    mesh.setMatrixAt(k, new Matrix4().compose(stance.place.clone().addScaledVector(normal, 0.5 * LIFT), flat, new Vector3(1, 1, 1)));
+    mesh.setMatrixAt(
+      k,
+      new Matrix4().compose(
+        stance.place.clone().addScaledVector(normal, 0.5 * LIFT),
+        flat,
+        new Vector3(1, 1, 1),
+      ),
+    );
   });
   mesh.frustumCulled = false;
   return mesh;

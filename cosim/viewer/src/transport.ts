@@ -33,7 +33,8 @@ export class Transport {
   /** Gives it the stage whose camera its buttons move. */
   attach(stage: Stage): void {
     this.stage = stage;
-    for (const button of [this.follow, byId<HTMLButtonElement>("home")]) if (button) button.disabled = false;
+    for (const button of [this.follow, byId<HTMLButtonElement>("home")])
+      if (button) button.disabled = false;
   }
 
   toggleFollow(): void {
@@ -49,8 +50,11 @@ export class Transport {
       this.slider.max = String(this.clock.end);
       this.slider.step = "any";
     }
-    this.speed?.append(...SPEEDS.map((speed) => new Option(`${speed}×`, String(speed), speed === 1, speed === 1)));
-    for (const button of [this.follow, byId<HTMLButtonElement>("home")]) if (button) button.disabled = true;
+    this.speed?.append(
+      ...SPEEDS.map((speed) => new Option(`${speed}×`, String(speed), speed === 1, speed === 1)),
+    );
+    for (const button of [this.follow, byId<HTMLButtonElement>("home")])
+      if (button) button.disabled = true;
   }
 
   private show(): void {
@@ -58,7 +62,10 @@ export class Transport {
     if (this.slider) {
       this.slider.value = String(time);
       this.slider.setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
-      this.slider.style.setProperty("--done", `${(100 * (time - this.clock.start)) / Math.max(end - this.clock.start, 1e-9)}%`);
+      this.slider.style.setProperty(
+        "--done",
+        `${(100 * (time - this.clock.start)) / Math.max(end - this.clock.start, 1e-9)}%`,
+      );
     }
     if (this.told) this.told.textContent = `${time.toFixed(2)} / ${end.toFixed(1)} s`;
     if (this.speed) this.speed.value = String(speed);
@@ -75,7 +82,10 @@ export function makeWindowButtons(span: Span, clock: Clock, period: number): voi
   const whole = clock.end - clock.start;
   const cycles = WINDOWS.filter((count) => count * period < whole);
   const choices = [
-    ...cycles.map((count) => ({ text: count === 1 ? "1 cycle" : `${count} cycles`, width: count * period })),
+    ...cycles.map((count) => ({
+      text: count === 1 ? "1 cycle" : `${count} cycles`,
+      width: count * period,
+    })),
     { text: "whole run", width: whole },
   ];
   const buttons = choices.map(({ text, width }) => {
@@ -86,7 +96,8 @@ export function makeWindowButtons(span: Span, clock: Clock, period: number): voi
   });
   const mark = () => {
     const [low, high] = span.limits;
-    for (const { button, width } of buttons) button.setAttribute("aria-pressed", String(Math.abs(high - low - width) < 1e-6 * whole));
+    for (const { button, width } of buttons)
+      button.setAttribute("aria-pressed", String(Math.abs(high - low - width) < 1e-6 * whole));
   };
   span.listen(mark);
   mark();

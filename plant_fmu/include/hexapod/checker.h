@@ -1,4 +1,5 @@
-/* checker.h - how definitions and inputs of plant and controller are judged. Not for users of their headers. */
+/* checker.h - how definitions and inputs of plant and controller are judged. Not for users of their
+ * headers. */
 #ifndef HEXAPOD_CHECKER_H
 #define HEXAPOD_CHECKER_H
 

@@ -1,4 +1,5 @@
-/* inside.h - how the plant's own files are compiled, whatever an importer's compiler call says. Not for users of hexapod.h. */
+/* inside.h - how the plant's own files are compiled, whatever an importer's compiler call says. Not
+ * for users of hexapod.h. */
 #ifndef HEXAPOD_INSIDE_H
 #define HEXAPOD_INSIDE_H
 
@@ -11,7 +12,8 @@
 #pragma fp_contract(off)
 #endif
 
-/* What is declared between these two stays inside the library; where they are empty nothing is exported unasked. */
+/* What is declared between these two stays inside the library; where they are empty nothing is
+ * exported unasked. */
 #if defined(__GNUC__) && !defined(_WIN32)
 #define HX_HIDDEN_BEGIN _Pragma("GCC visibility push(hidden)")
 #define HX_HIDDEN_END _Pragma("GCC visibility pop")

@@ -1,4 +1,5 @@
-/* legs.h - what plant and controller agree on: legs in the order LF LM LR RF RM RR, joints coxa, femur, tibia; and how ranges are told. */
+/* legs.h - what plant and controller agree on: legs in the order LF LM LR RF RM RR, joints coxa,
+ * femur, tibia; and how ranges are told. */
 #ifndef HEXAPOD_LEGS_H
 #define HEXAPOD_LEGS_H
 

@@ -1,4 +1,5 @@
-/* status.h - what a call of the plant or of the controller came to, and how bytes are told from damaged ones. */
+/* status.h - what a call of the plant or of the controller came to, and how bytes are told from
+ * damaged ones. */
 #ifndef HEXAPOD_STATUS_H
 #define HEXAPOD_STATUS_H
 
@@ -15,7 +16,9 @@ extern "C" {
 #elif defined(HX_SHARED)
 #define HX_API __declspec(dllexport)
 #elif defined(__GNUC__) && !defined(_WIN32)
-#define HX_API __attribute__((visibility("hidden"))) /* compiled into something else: not among that one's symbols */
+#define HX_API                                                                                     \
+  __attribute__((                                                                                  \
+      visibility("hidden"))) /* compiled into something else: not among that one's symbols */
 #else
 #define HX_API
 #endif
@@ -36,7 +39,8 @@ typedef enum hxStatus {
 HX_API const char *hx_version(void);
 HX_API const char *hx_status_name(hxStatus status);
 
-/* A number that tells damaged bytes from intact ones, on every machine the same; seed: of what came before, or 0. */
+/* A number that tells damaged bytes from intact ones, on every machine the same; seed: of what came
+ * before, or 0. */
 HX_API uint64_t hx_checksum(uint64_t seed, const void *bytes, size_t n);
 
 #ifdef __cplusplus

@@ -16,16 +16,17 @@ static const double hx_gear_speed = 0.05; /* rad/s, where the gear's dry frictio
 
 /* The motor: clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line (eq. 13). */
 typedef struct {
-  hxReal torque;    /* N m        motor on child */
-  hxReal wanted;    /* N m        before the limits */
+  hxReal torque; /* N m        motor on child */
+  hxReal wanted; /* N m        before the limits */
   hxReal low, high; /* N m        the limits at this speed */
-  hxReal load;      /* 1          speed over the no-load speed */
+  hxReal load; /* 1          speed over the no-load speed */
 } hxMotor;
 
-static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref,
-                                      hxReal torque_ref) {
+static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal speed,
+                                      hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
-  const hxReal wanted = model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
+  const hxReal wanted =
+      model->kp * (angle_ref - angle) + model->kd * (speed_ref - speed) + torque_ref;
   const hxReal load = speed * (1.0 / model->speed_max);
   const hxReal high = model->torque_max * hx_clip(1.0 - load, zero, one);
   const hxReal low = -model->torque_max * hx_clip(1.0 + load, zero, one);
@@ -33,19 +34,22 @@ static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal
 }
 
 /* The motor with its slopes, and the gear: -tau_c tanh(qd / 0.05) (eq. 13). */
-static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed, hxReal angle_ref, hxReal speed_ref,
-                                      hxReal torque_ref) {
+static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
+                                      hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxMotor motor = hx_motor_torque(model, angle, speed, angle_ref, speed_ref, torque_ref);
   const hxMask free = hx_less(motor.low, motor.wanted) & hx_less(motor.wanted, motor.high);
   /* on the torque-speed line's slopes */
-  const hxMask falling = ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
+  const hxMask falling =
+      ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
   const hxReal t = hx_tanh(speed * (1.0 / hx_gear_speed));
   return (hxServo){
       .torque = motor.torque,
       .friction = -model->coulomb_friction * t,
       .stiffness = hx_select(free, hx_splat(model->kp), zero),
-      .damping = hx_select(free, hx_splat(model->kd), hx_select(falling, hx_splat(model->torque_max / model->speed_max), zero)),
+      .damping =
+          hx_select(free, hx_splat(model->kd),
+                    hx_select(falling, hx_splat(model->torque_max / model->speed_max), zero)),
       .drag = (model->coulomb_friction / hx_gear_speed) * (1.0 - t * t),
   };
 }

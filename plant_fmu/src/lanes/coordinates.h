@@ -1,44 +1,54 @@
-/* coordinates.h - a motion that is on its joints exactly, from the torso's state and the joints' angles and speeds, and their rates */
+/* coordinates.h - a motion that is on its joints exactly, from the torso's state and the joints'
+ * angles and speeds, and their rates */
 #ifndef HX_COORDINATES_H
 #define HX_COORDINATES_H
 
 #include "work.h"
 
 /* [leg][joint] of the outside, one joint, slot by slot */
-static inline void gather_joint(const hxNumber (*table)[HX_JOINTS], int joint, hxNumber slots[HX_SLOTS]) {
+static inline void gather_joint(const hxNumber (*table)[HX_JOINTS], int joint,
+                                hxNumber slots[HX_SLOTS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) slots[leg] = table[leg][joint];
   hx_fill_slots(slots);
 }
 
 static inline void scatter_joint(hxReal x, int joint, int slot, hxNumber (*table)[HX_JOINTS]) {
-  for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane) table[slot + lane][joint] = hx_lane(x, lane);
+  for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane)
+    table[slot + lane][joint] = hx_lane(x, lane);
 }
 
-/* p_j = p_i zero turn(q), about the child's z; w_j = w_i + qd s; r and v as the joint's point has them on both sides */
-static inline void place_link(const hxModel *model, int joint, int slot, hxReal angle, hxReal speed, hxMotion *motion) {
+/* p_j = p_i zero turn(q), about the child's z; w_j = w_i + qd s; r and v as the joint's point has
+ * them on both sides */
+static inline void place_link(const hxModel *model, int joint, int slot, hxReal angle, hxReal speed,
+                              hxMotion *motion) {
   const hxJointModel *m = &model->joint[joint];
   const hxReal zero = hx_splat(0.0);
   hxReal sine, cosine;
   hx_lanes_sin_cos(0.5 * angle, &sine, &cosine);
   const hxQuat from = hx_quat_mul(hx_parent_quat(motion, joint, slot), hx_load_quat(m->zero, slot));
-  hx_store_quat(&motion->link[joint][HX_P], slot, hx_quat_mul(from, (hxQuat){cosine, zero, zero, sine}));
+  hx_store_quat(&motion->link[joint][HX_P], slot,
+                hx_quat_mul(from, (hxQuat){cosine, zero, zero, sine}));
   const hxBody i = hx_parent_body(motion, joint, slot);
   const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot)), w_j = hx_add_scaled(i.w, speed, s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);
   const hxBody j = hx_link_body(motion, joint, slot);
   const hxJointKinematics k = hx_joint_kinematics(m, slot, &i, &j);
-  const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot), v_i = hx_parent_vec3(motion, joint, HX_V, slot);
+  const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
+               v_i = hx_parent_vec3(motion, joint, HX_V, slot);
   hx_store_vec3(&motion->link[joint][HX_R], slot, hx_sub(hx_add(r_i, k.sP_i), k.sP_j));
-  hx_store_vec3(&motion->link[joint][HX_V], slot, hx_sub(hx_add(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
+  hx_store_vec3(&motion->link[joint][HX_V], slot,
+                hx_sub(hx_add(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
 }
 
-static inline void hx_motion_from_coordinates(const hxModel *model, const hxCoordinates *x, hxMotion *motion) {
+static inline void hx_motion_from_coordinates(const hxModel *model, const hxCoordinates *x,
+                                              hxMotion *motion) {
   memset(motion, 0, sizeof *motion);
   memcpy(&motion->torso[HX_R], x->position, sizeof x->position);
   memcpy(&motion->torso[HX_P], x->quaternion, sizeof x->quaternion);
   memcpy(&motion->torso[HX_V], x->velocity, sizeof x->velocity);
   memcpy(&motion->torso[HX_W], x->angular_velocity, sizeof x->angular_velocity);
-  motion->actuator_work = x->actuator_work, motion->push_work = x->push_work, motion->dissipated = x->dissipated;
+  motion->actuator_work = x->actuator_work, motion->push_work = x->push_work,
+  motion->dissipated = x->dissipated;
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxNumber angle[HX_SLOTS], speed[HX_SLOTS];
     gather_joint(x->angle, joint, angle);
@@ -59,7 +69,8 @@ static inline void copy_common(const hxMotion *motion, hxCoordinates *x) {
   memcpy(x->quaternion, &motion->torso[HX_P], sizeof x->quaternion);
   memcpy(x->velocity, &motion->torso[HX_V], sizeof x->velocity);
   memcpy(x->angular_velocity, &motion->torso[HX_W], sizeof x->angular_velocity);
-  x->actuator_work = motion->actuator_work, x->push_work = motion->push_work, x->dissipated = motion->dissipated;
+  x->actuator_work = motion->actuator_work, x->push_work = motion->push_work,
+  x->dissipated = motion->dissipated;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int i = 0; i < 3; ++i) x->bristle[leg][i] = motion->bristle[i][leg];
 }
@@ -75,7 +86,8 @@ static inline void hx_coordinates_of(const hxMotion *motion, const hxWork *work,
     }
 }
 
-static inline void hx_coordinates_rate(const hxMotion *rate, const hxWork *work, hxCoordinates *dx) {
+static inline void hx_coordinates_rate(const hxMotion *rate, const hxWork *work,
+                                       hxCoordinates *dx) {
   copy_common(rate, dx);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {

@@ -1,4 +1,5 @@
-/* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels there (eq. 4, 5, 18, 19) */
+/* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels
+ * there (eq. 4, 5, 18, 19) */
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
@@ -7,42 +8,42 @@
 /* The ground: how far a point is above it, and which way is up there. */
 typedef struct {
   hxReal distance; /* m  signed, > 0 above the ground */
-  hxVec3 normal;   /* 1  out of the ground, world axes */
+  hxVec3 normal; /* 1  out of the ground, world axes */
 } hxGround;
 
 /* A sphere against the ground. */
 typedef struct {
-  hxVec3 arm;           /* m  tibia's centre of mass to the contact point */
-  hxVec3 normal;        /* 1  out of the ground there */
+  hxVec3 arm; /* m  tibia's centre of mass to the contact point */
+  hxVec3 normal; /* 1  out of the ground there */
   hxReal delta, ddelta; /* m, m/s  penetration, approach speed */
-  hxVec3 velocity;      /* m/s  of the foot's material point there */
+  hxVec3 velocity; /* m/s  of the foot's material point there */
 } hxFootKinematics;
 
 /* Force along the normal and its slopes. */
 typedef struct {
-  hxReal force;     /* N    f_n */
-  hxReal elastic;   /* N    its part that is stored: K delta^(3/2) */
+  hxReal force; /* N    f_n */
+  hxReal elastic; /* N    its part that is stored: K delta^(3/2) */
   hxReal stiffness; /* N/m  df_n/ddelta */
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
 } hxNormalForce;
 
 /* What a foot with bristles feels across the normal. */
 typedef struct {
-  hxVec3 grip;      /* 1    -f_t over f_n */
-  hxVec3 rate;      /* m/s  db/dt */
+  hxVec3 grip; /* 1    -f_t over f_n */
+  hxVec3 rate; /* m/s  db/dt */
   hxReal stiffness; /* 1/m  secant of grip by b */
-  hxReal damping;   /* s/m  of grip by db/dt */
-  hxReal yield;     /* 1/s  of db/dt by -b: how fast the bristles let go while they slide */
+  hxReal damping; /* s/m  of grip by db/dt */
+  hxReal yield; /* 1/s  of db/dt by -b: how fast the bristles let go while they slide */
 } hxBristle;
 
 typedef struct {
   hxFootKinematics kin;
   hxNormalForce normal;
-  hxVec3 slip, force;   /* m/s, N  tangential velocity, ground on foot */
+  hxVec3 slip, force; /* m/s, N  tangential velocity, ground on foot */
   hxReal slip_speed;
-  hxReal drag;          /* N s/m  size of the tangential force over the slip speed */
+  hxReal drag; /* N s/m  size of the tangential force over the slip speed */
   hxReal drag_per_load; /* s/m    the same over f_n */
-  hxBristle bristle;    /* of the bristle law alone */
+  hxBristle bristle; /* of the bristle law alone */
 } hxFootWork;
 
 static const double break_away = 0.7; /* of the presliding: below it a bristle is a spring */
@@ -50,36 +51,42 @@ static const double break_away = 0.7; /* of the presliding: below it a bristle i
 /* The only place a terrain is chosen. */
 static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
   if (model->terrain_kind == HX_TERRAIN_FLAT)
-    return (hxGround){point.z - model->ground_point[2], {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
+    return (hxGround){point.z - model->ground_point[2],
+                      {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
   return (hxGround){hx_dot(n, hx_sub(point, hx_splat_vec3(model->ground_point))), n};
 }
 
-/* g of f_t = -mu f_n g(|v_t|) v_t (eq. 5): tanh(k_t v) / v, whose limit at rest is k_t; the series k_t (1 - (k_t v)^2 / 3) is exact below
- * k_t v = 1e-5. */
+/* g of f_t = -mu f_n g(|v_t|) v_t (eq. 5): tanh(k_t v) / v, whose limit at rest is k_t; the series
+ * k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
 static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
   if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
   const hxReal x = model->slope * speed;
   const hxMask slow = hx_less(x, hx_splat(1e-5));
-  return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0), hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
+  return model->slope * hx_select(slow, 1.0 - x * x * (1.0 / 3.0),
+                                  hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
 }
 
-/* Elasto-plastic bristles (eq. 18, 19), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+ u/|u|, of which friction is the share
- * w = u (3 - u.u)/2 + d room/|(room, d)|, d = 3/2 tau db/dt / b_max. The room that the spring leaves, 1 - |u| (3 - u.u)/2, is all that the
- * damping can have: w never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages scatter. Friction is
- * static where nothing slides and falls with the speed p of what does: mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2). */
+/* Elasto-plastic bristles (eq. 18, 19), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+
+ * u/|u|, of which friction is the share w = u (3 - u.u)/2 + d room/|(room, d)|, d = 3/2 tau db/dt /
+ * b_max. The room that the spring leaves, 1 - |u| (3 - u.u)/2, is all that the damping can have: w
+ * never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages
+ * scatter. Friction is static where nothing slides and falls with the speed p of what does: mu(p) =
+ * mu + (mu_s - mu)/(1 + (p/v_s)^2). */
 static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
   const hxVec3 u = hx_scale(hx_splat(per_length), b);
   const hxReal size = hx_sqrt(hx_dot(u, u)), within = hx_min(size, one);
   const hxReal s = hx_clip((size - break_away) * (1.0 / (1.0 - break_away)), zero, one);
-  const hxReal let_go = s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) / hx_max(size, hx_splat(break_away));
+  const hxReal let_go =
+      s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) / hx_max(size, hx_splat(break_away));
   const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -let_go, u));
   const hxVec3 d = hx_scale(hx_splat(1.5 * model->bristle_damping * per_length), rate);
   const hxReal spring = (1.5 - 0.5 * within * within) / hx_max(size, one);
   const hxReal room = 1.0 - spring * size;
-  const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) + 1e-30); /* tiny: no room and no motion is 0, not 0/0 */
+  const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) +
+                                      1e-30); /* tiny: no room and no motion is 0, not 0/0 */
   const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
   const hxReal sliding = hx_splat(model->per_stribeck) * let_go * size;
   const hxReal mu = model->mu + model->static_rise / (1.0 + sliding * sliding);
@@ -93,7 +100,8 @@ static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b
 }
 
 /* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 4) while the contact is closed */
-static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping, hxReal delta, hxReal ddelta) {
+static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping,
+                                            hxReal delta, hxReal ddelta) {
   const hxReal zero = hx_splat(0.0);
   const hxReal depth = closed * hx_max(delta, zero);
   const hxReal root = hx_sqrt(depth);
@@ -108,19 +116,25 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
   };
 }
 
-static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxMotion *motion, int slot, const hxBody *tibia) {
-  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot);
+static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxMotion *motion,
+                                                  int slot, const hxBody *tibia) {
+  const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
+               v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot);
   const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->foot_centre, slot));
   const hxGround ground = hx_ground(model, hx_add(r, to_centre));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-model->foot_radius), ground.normal);
   const hxVec3 velocity = hx_add(v, hx_cross(tibia->w, arm));
-  return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance, -hx_dot(velocity, ground.normal), velocity};
+  return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance,
+                            -hx_dot(velocity, ground.normal), velocity};
 }
 
-/* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t or the bristles' across it. The only place a friction law is chosen. */
-static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, int slot, hxVec3 bristle, hxFootWork *foot) {
+/* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t or the bristles' across it. The only place a
+ * friction law is chosen. */
+static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, int slot,
+                                 hxVec3 bristle, hxFootWork *foot) {
   const hxFootKinematics *kin = &foot->kin;
-  foot->normal = hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]), kin->delta, kin->ddelta);
+  foot->normal = hx_normal_force(model, hx_load(&contact->closed[slot]),
+                                 hx_load(&contact->damping[slot]), kin->delta, kin->ddelta);
   foot->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
   if (model->friction_law == HX_FRICTION_BRISTLE) {
@@ -135,7 +149,8 @@ static inline void hx_foot_force(const hxModel *model, const hxContactState *con
 
 /* W  that friction takes */
 static inline hxReal hx_friction_power(const hxModel *model, const hxFootWork *foot) {
-  if (model->friction_law == HX_FRICTION_BRISTLE) return foot->normal.force * hx_dot(foot->bristle.grip, foot->slip);
+  if (model->friction_law == HX_FRICTION_BRISTLE)
+    return foot->normal.force * hx_dot(foot->bristle.grip, foot->slip);
   return foot->drag * foot->slip_speed * foot->slip_speed;
 }
 

@@ -8,22 +8,26 @@
 #include "../method.h"
 #include "measure.h"
 
-static const double step_floor = 1e-11;              /* s  below this the error control gives up */
-static const double most_steps[3] = {1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
-static const double touch_depth[2] = {1e-10, 1e-6};  /* m, m over the tolerance  a touch-down is found when the foot is in by less */
+static const double step_floor = 1e-11; /* s  below this the error control gives up */
+static const double most_steps[3] = {
+    1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
+static const double touch_depth[2] = {
+    1e-10, 1e-6}; /* m, m over the tolerance  a touch-down is found when the foot is in by less */
 
 /* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
-static const double bristle_scale = 10.0; /* preslidings: at the default tolerance a thousandth of the friction force */
+static const double bristle_scale =
+    10.0; /* preslidings: at the default tolerance a thousandth of the friction force */
 
 /* Where a step starts. */
 typedef struct {
   const hxModel *model;
-  const hxCommand *command, *ramp; /* what is asked for at command->time, and its change per second; ramp NULL: none */
+  const hxCommand *command,
+      *ramp; /* what is asked for at command->time, and its change per second; ramp NULL: none */
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
-  double touch;     /* m  how deep a foot may be that has just touched down */
+  double touch; /* m  how deep a foot may be that has just touched down */
   double last_step; /* count of steps, kept and rejected, at which the error control gives up */
   const hxMotion *y;
 } hxStart;
@@ -50,11 +54,14 @@ static inline hxFeet feet_of(const hxModel *model, const hxMotion *motion) {
   return feet;
 }
 
-/* ---- one step --------------------------------------------------------------------------------------------------------------- */
+/* ---- one step
+ * ---------------------------------------------------------------------------------------------------------------
+ */
 
-/* base + h sum of weights k, n of them (base NULL: 0), k from entry `first` on; one pass over memory, n and sizes known to the compiler */
-static inline void combine_n(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int first,
-                             int size) {
+/* base + h sum of weights k, n of them (base NULL: 0), k from entry `first` on; one pass over
+ * memory, n and sizes known to the compiler */
+static inline void combine_n(double *out, const double *base, double h, const double *weights,
+                             const hxRate *k, int n, int first, int size) {
   hxReal w[HX_STAGES];
   for (int j = 0; j < n; ++j) w[j] = hx_splat(h * weights[j]);
   for (int i = 0; i < size; i += HX_LANES) {
@@ -64,8 +71,8 @@ static inline void combine_n(double *out, const double *base, double h, const do
   }
 }
 
-static inline void combine_part(double *out, const double *base, double h, const double *weights, const hxRate *k, int n, int first,
-                                int size) {
+static inline void combine_part(double *out, const double *base, double h, const double *weights,
+                                const hxRate *k, int n, int first, int size) {
   switch (n) {
   case 1:
     combine_n(out, base, h, weights, k, 1, first, size);
@@ -85,11 +92,13 @@ static inline void combine_part(double *out, const double *base, double h, const
 }
 
 /* the same from an entry of k to its end; bristles only where they move */
-static inline void combine(const hxModel *model, double *out, const double *base, double h, const double *weights, const hxRate *k, int n,
-                           int first) {
+static inline void combine(const hxModel *model, double *out, const double *base, double h,
+                           const double *weights, const hxRate *k, int n, int first) {
   enum { END = HX_TURN_SIZE + HX_BODIES_SIZE };
   combine_part(out, base, h, weights, k, n, first, END - first);
-  if (has_bristles(model)) combine_n(out + END - first, base ? base + END - first : NULL, h, weights, k, n, END, HX_BRISTLE_SIZE);
+  if (has_bristles(model))
+    combine_n(out + END - first, base ? base + END - first : NULL, h, weights, k, n, END,
+              HX_BRISTLE_SIZE);
 }
 
 static inline double larger(double a, double b) { return b > a ? b : a; }
@@ -108,7 +117,8 @@ static double error_norm(const hxModel *model, const hxMotion *error) {
   }
   for (int i = 0; i < 3 && has_bristles(model); ++i)
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
-      links = hx_max(links, 1.0 / (bristle_scale * model->presliding) * hx_abs(hx_load(&error->bristle[i][slot])));
+      links = hx_max(links, 1.0 / (bristle_scale * model->presliding) *
+                                hx_abs(hx_load(&error->bristle[i][slot])));
   hx_store(largest, links);
   for (int lane = 0; lane < HX_LANES; ++lane) worst = larger(worst, largest[lane]);
   return worst / model->tolerance;
@@ -128,7 +138,8 @@ static void normalise_quaternions(hxMotion *m) {
 
 /* A kinematic drive's command a while after it was given. A rate given for an input takes the place
  * of the input one derivative above it. */
-static void move_drive(const hxCommand *from, const hxCommand *rate, double elapsed, int joint, int slot, hxCommand *now) {
+static void move_drive(const hxCommand *from, const hxCommand *rate, double elapsed, int joint,
+                       int slot, hxCommand *now) {
   const int given = rate->speed[joint][slot] != 0.0;
   const double a = given ? rate->speed[joint][slot] : from->acceleration[joint][slot];
   const double jerk = given ? 0.0 : rate->acceleration[joint][slot];
@@ -136,7 +147,8 @@ static void move_drive(const hxCommand *from, const hxCommand *rate, double elap
   now->speed[joint][slot] = from->speed[joint][slot] + elapsed * (a + 0.5 * elapsed * jerk);
   if (rate->angle[joint][slot] != 0.0) return;
   now->angle[joint][slot] =
-      from->angle[joint][slot] + elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
+      from->angle[joint][slot] +
+      elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
 }
 
 /* The command at a time; in kinematic mode drives go on between rates as without (eq. 14). */
@@ -172,7 +184,8 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     }
     const hxCommand *command = command_at(start, t, &now);
     hxImplicit *stage = m->gamma > 0.0 ? &implicit : NULL;
-    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? &y : start->y, stage, 0, &work, &k[i]);
+    hx_dynamics_evaluate(model, start->contact, command, t, i > 0 ? &y : start->y, stage, 0, &work,
+                         &k[i]);
     hx_add_impulses(model, command, stage, &work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
@@ -183,13 +196,16 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     combine(model, y.y, NULL, h, m->e, k, m->stages, HX_TURN_SIZE);
     trial->error = error_norm(model, &y);
   }
-  trial->y.actuator_work = start->y->actuator_work; /* the accepted step's are added by measure_step */
+  trial->y.actuator_work =
+      start->y->actuator_work; /* the accepted step's are added by measure_step */
   trial->y.push_work = start->y->push_work, trial->y.dissipated = start->y->dissipated;
   normalise_quaternions(&trial->y);
   if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial->y);
 }
 
-/* ---- touch-down ------------------------------------------------------------------------------------------------------------- */
+/* ---- touch-down
+ * -------------------------------------------------------------------------------------------------------------
+ */
 
 /* how deep the deepest open foot is in the ground */
 static double open_depth(const hxContactState *contact, const hxFeet *feet) {
@@ -199,9 +215,12 @@ static double open_depth(const hxContactState *contact, const hxFeet *feet) {
   return depth;
 }
 
-/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends: bisection. */
-static double cubic_crossing(double from, double slope_from, double to, double slope_to, double level) {
-  const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;
+/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends:
+ * bisection. */
+static double cubic_crossing(double from, double slope_from, double to, double slope_to,
+                             double level) {
+  const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise,
+               curve = rise - slope_from - bend;
   double low = 0.0, high = 1.0;
   while (high - low > 1e-14) {
     const double x = 0.5 * (low + high);
@@ -213,24 +232,29 @@ static double cubic_crossing(double from, double slope_from, double to, double s
   return high;
 }
 
-/* When the first open foot will be half a touch depth in, by the cubics through depths and speeds at two times. */
-static double expected_touch(const hxStart *start, double t_low, const hxFeet *low, double t_high, const hxFeet *high) {
+/* When the first open foot will be half a touch depth in, by the cubics through depths and speeds
+ * at two times. */
+static double expected_touch(const hxStart *start, double t_low, const hxFeet *low, double t_high,
+                             const hxFeet *high) {
   const double h = t_high - t_low, level = 0.5 * start->touch;
   double first = 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if (start->contact->closed[leg] == 0.0 && high->delta[leg] > level) {
-      const double x = cubic_crossing(low->delta[leg], h * low->ddelta[leg], high->delta[leg], h * high->ddelta[leg], level);
+      const double x = cubic_crossing(low->delta[leg], h * low->ddelta[leg], high->delta[leg],
+                                      h * high->ddelta[leg], level);
       first = x < first ? x : first;
     }
   return t_low + first * h;
 }
 
-/* Shortens a step that ends below the ground to one that ends on it: each guess is a step of its own; every third halves what is left,
- * should the cubics crawl. */
-static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial, hxFeet *feet) {
+/* Shortens a step that ends below the ground to one that ends on it: each guess is a step of its
+ * own; every third halves what is left, should the cubics crawl. */
+static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial,
+                             hxFeet *feet) {
   double low = 0.0, high = h;
   hxFeet feet_low = feet_of(start->model, start->y);
-  for (int guess = 1; open_depth(start->contact, feet) > start->touch && high - low > step_floor; ++guess) {
+  for (int guess = 1; open_depth(start->contact, feet) > start->touch && high - low > step_floor;
+       ++guess) {
     double middle = guess % 3 ? expected_touch(start, low, &feet_low, high, feet) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
     hxTrial nearer;
@@ -244,9 +268,12 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
   return high;
 }
 
-/* ---- error control ---------------------------------------------------------------------------------------------------------- */
+/* ---- error control
+ * ----------------------------------------------------------------------------------------------------------
+ */
 
-/* x^(-1/n) for x in about [1e-4, 1e4], in plain arithmetic: the same on every machine. Newton on r^-n = x rises to its root. */
+/* x^(-1/n) for x in about [1e-4, 1e4], in plain arithmetic: the same on every machine. Newton on
+ * r^-n = x rises to its root. */
 static double inverse_root(double x, int n) {
   double r = 0.1, before = 0.0;
   for (int i = 0; i < 100 && r > before; ++i) {
@@ -269,16 +296,21 @@ static double step_factor(const hxMethodRow *method, double error) {
 }
 
 /* Steps that a call over a time may take: no call runs on for ever. */
-static double steps_allowed(double time) { return fmin(most_steps[0] + most_steps[1] * time, most_steps[2]); }
+static double steps_allowed(double time) {
+  return fmin(most_steps[0] + most_steps[1] * time, most_steps[2]);
+}
 
 /* Why a step of h from t cannot be had. */
 static hxStatus give_up(const hxTrial *trial, double t, double h, char *message) {
   const int lost = isnan(trial->error);
   snprintf(message, HX_MESSAGE_SIZE,
-           lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, stiffness and inputs, or let the error "
+           lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
+                  "stiffness and inputs, or let the error "
                   "control choose the step (solver.step = 0)"
-                : "the error control gives up at t = %.9g s (step %.3g s), where it finds no step that takes the motion on in reasonable "
-                  "time; check the inputs for extreme values, raise solver.tolerance or use a linearly implicit solver.method",
+                : "the error control gives up at t = %.9g s (step %.3g s), where it finds no step "
+                  "that takes the motion on in reasonable "
+                  "time; check the inputs for extreme values, raise solver.tolerance or use a "
+                  "linearly implicit solver.method",
            t, h);
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
 }
@@ -292,47 +324,66 @@ static int all_finite(const hxMotion *y) {
   return total == 0.0;
 }
 
-/* ---- what a step did -------------------------------------------------------------------------------------------------------- */
+/* ---- what a step did
+ * --------------------------------------------------------------------------------------------------------
+ */
 
 /* Work of the push: its impulses times the mean of the torso's velocities at both ends. */
 static double push_work(const hxImpulses *impulses, const hxMotion *from, const hxMotion *to) {
   double work = 0.0;
-  for (int i = 0; i < 6; ++i) work += impulses->push[i] * (0.5 * (from->torso[HX_V + i] + to->torso[HX_V + i]));
+  for (int i = 0; i < 6; ++i)
+    work += impulses->push[i] * (0.5 * (from->torso[HX_V + i] + to->torso[HX_V + i]));
   return work;
 }
 
-/* Adds the works of an accepted step of h to the motion at its end, and what it did to what the state has measured. */
-static void measure_step(const hxStart *start, double h, const hxMoment *end, hxState *state, hxTrial *trial) {
+/* Adds the works of an accepted step of h to the motion at its end, and what it did to what the
+ * state has measured. */
+static void measure_step(const hxStart *start, double h, const hxMoment *end, hxState *state,
+                         hxTrial *trial) {
   hxStepWorks works;
   hxCommand command[INTERVALS + 1];
   hxReal work[HX_PACKS];
-  hxPath path = {.model = start->model, .contact = start->contact, .t = start->t, .h = h, .from = &state->moment, .to = end};
+  hxPath path = {.model = start->model,
+                 .contact = start->contact,
+                 .t = start->t,
+                 .h = h,
+                 .from = &state->moment,
+                 .to = end};
   for (int node = 0; node <= INTERVALS; ++node)
-    path.command[node] = command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
+    path.command[node] =
+        command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
   hx_measure_path(&path, &works, measured);
-  for (int pack = 0; pack < HX_PACKS; ++pack) work[pack] = (works.motor[0][pack] + works.motor[1][pack]) + works.motor[2][pack];
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    work[pack] = (works.motor[0][pack] + works.motor[1][pack]) + works.motor[2][pack];
   trial->y.actuator_work += hx_lane(hx_sum_legs(work), 0);
   trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);
   trial->y.dissipated = (measured->contact_loss + measured->friction_loss) + measured->gear_loss;
   state->moment = *end;
 }
 
-/* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is its length. */
-static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state, double *taken, char *message) {
+/* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is
+ * its length. */
+static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state,
+                        double *taken, char *message) {
   const hxModel *model = start->model;
   hxTrial trial;
-  double h = model->step > 0.0 ? h_max : h_max / ceil(fmax(1.0, h_max / *next_step - 1e-9)); /* equal steps; no more for a last bit */
+  double h = model->step > 0.0
+                 ? h_max
+                 : h_max / ceil(fmax(1.0, h_max / *next_step -
+                                              1e-9)); /* equal steps; no more for a last bit */
   trial.error = 0.0;
   for (;;) {
-    if (model->step == 0.0 && state->steps + state->rejected >= start->last_step) return give_up(&trial, start->t, h, message);
+    if (model->step == 0.0 && state->steps + state->rejected >= start->last_step)
+      return give_up(&trial, start->t, h, message);
     try_step(start, h, state, &trial);
     if (!all_finite(&trial.y)) trial.error = NAN;
     if (trial.error <= 1.0) break;
     state->rejected += 1.0;
     h *= fmin(step_factor(start->method, trial.error), 0.9);
-    if (h < step_floor || (model->step > 0.0 && isnan(trial.error))) return give_up(&trial, start->t, h, message);
+    if (h < step_floor || (model->step > 0.0 && isnan(trial.error)))
+      return give_up(&trial, start->t, h, message);
   }
   if (model->step == 0.0) {
     const double next = fmin(model->step_max, h * step_factor(start->method, trial.error));
@@ -358,9 +409,10 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   return HX_OK;
 }
 
-/* From state->time to t_end; the last step lands on it exactly. A call that an event broke off goes on as if it had not been. */
-static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
-                       hxState *state, char *message) {
+/* From state->time to t_end; the last step lands on it exactly. A call that an event broke off goes
+ * on as if it had not been. */
+static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
+                       double t_end, hxEvents *events, hxState *state, char *message) {
   hxStart start = {.model = model,
                    .command = command,
                    .ramp = ramp,
@@ -369,7 +421,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .y = &state->motion};
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
-  double first = fmin(state->first_step, state->next_step); /* new inputs: a larger error than the last step's */
+  double first = fmin(state->first_step,
+                      state->next_step); /* new inputs: a larger error than the last step's */
   double *next_step = command->time < state->time ? &state->next_step : &first;
   while (state->time < t_end && !(events->stop && events->found)) {
     const double left = t_end - state->time;
@@ -386,13 +439,14 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
   return HX_OK;
 }
 
-static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
-                          hxState *state, char *message) {
+static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
+                          double t_end, hxEvents *events, hxState *state, char *message) {
   const double t_start = command->time;
   const double count = fmax(1.0, ceil((t_end - t_start) / model->step - 1e-9));
   if (count > steps_allowed(t_end - t_start)) {
     snprintf(message, HX_MESSAGE_SIZE,
-             "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; raise solver.step "
+             "solver.step: got %.3g s, which makes %.0f steps of this call, expected at most %.0f; "
+             "raise solver.step "
              "or make shorter calls",
              model->step, count, steps_allowed(t_end - t_start));
     return HX_STEP_TOO_SMALL;
@@ -405,12 +459,14 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
   return HX_OK;
 }
 
-/* Advances the state to t_end exactly, or to an event. On failure the state is somewhere on the way and the message says why. */
-static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp, double t_end, hxEvents *events,
-                             hxState *state, char *message) {
+/* Advances the state to t_end exactly, or to an event. On failure the state is somewhere on the way
+ * and the message says why. */
+static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
+                             double t_end, hxEvents *events, hxState *state, char *message) {
   if (state->moment.stale != 0.0) hx_moment_here(model, state);
   if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);
-  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end, events, state, message);
+  const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end,
+                                                                    events, state, message);
   fill_motion_slots(&state->motion);
   hx_fill_measured_slots(state);
   return status;

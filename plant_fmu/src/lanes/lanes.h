@@ -1,8 +1,9 @@
 /* lanes.h - several legs at once: hxReal is HX_LANES doubles, one leg each.
  *
- * All arithmetic on legs goes through this type, with the operators of C. The width follows the instruction set; each lane's
- * result does not depend on it, because every operation here is exact IEEE arithmetic lane by lane (no contraction, no libm).
- * The headers in this folder are the physics on lanes: each kernel_*.c includes them once, at its own width.
+ * All arithmetic on legs goes through this type, with the operators of C. The width follows the
+ * instruction set; each lane's result does not depend on it, because every operation here is exact
+ * IEEE arithmetic lane by lane (no contraction, no libm). The headers in this folder are the
+ * physics on lanes: each kernel_*.c includes them once, at its own width.
  */
 #ifndef HX_LANES_H
 #define HX_LANES_H
@@ -87,23 +88,33 @@ static inline hxReal hx_from_bits(hxMask m) {
   return x;
 }
 
-/* mask ? a : b, lane by lane; b < a ? b : a and a < b ? b : a, which is what these instructions do, NaN and signed zeros included */
+/* mask ? a : b, lane by lane; b < a ? b : a and a < b ? b : a, which is what these instructions do,
+ * NaN and signed zeros included */
 #if HX_LANES == 4 && defined(__AVX__)
-static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return _mm256_blendv_pd(b, a, hx_from_bits(mask)); }
+static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) {
+  return _mm256_blendv_pd(b, a, hx_from_bits(mask));
+}
 static inline hxReal hx_min(hxReal a, hxReal b) { return _mm256_min_pd(b, a); }
 static inline hxReal hx_max(hxReal a, hxReal b) { return _mm256_max_pd(b, a); }
 #else
-static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return hx_from_bits((mask & hx_bits(a)) | (~mask & hx_bits(b))); }
+static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) {
+  return hx_from_bits((mask & hx_bits(a)) | (~mask & hx_bits(b)));
+}
 static inline hxReal hx_min(hxReal a, hxReal b) { return hx_select(hx_less(b, a), b, a); }
 static inline hxReal hx_max(hxReal a, hxReal b) { return hx_select(hx_less(a, b), b, a); }
 #endif
-static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) { return hx_min(hx_max(x, low), high); }
+static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) {
+  return hx_min(hx_max(x, low), high);
+}
 static inline hxReal hx_abs(hxReal x) { return hx_from_bits(hx_bits(x) & INT64_MAX); }
 
-/* e^x - 1 for |x| <= 40: x = k ln 2 + r, Taylor to r^13 (remainder 4e-18), then 2^k (e^r - 1) + (2^k - 1) */
+/* e^x - 1 for |x| <= 40: x = k ln 2 + r, Taylor to r^13 (remainder 4e-18), then 2^k (e^r - 1) +
+ * (2^k - 1) */
 static inline hxReal hx_expm1(hxReal x) {
-  const double round = 6755399441055744.0; /* 1.5 * 2^52: adding and taking it away rounds to an integer */
-  const double ln2_high = 6.93147180369123816490e-01, ln2_low = 1.90821492927058770002e-10; /* ln 2 in two pieces */
+  const double round =
+      6755399441055744.0; /* 1.5 * 2^52: adding and taking it away rounds to an integer */
+  const double ln2_high = 6.93147180369123816490e-01,
+               ln2_low = 1.90821492927058770002e-10; /* ln 2 in two pieces */
   const hxReal shifted = x * 1.4426950408889634 + round;
   const hxReal k = shifted - round;
   const hxReal r = (x - k * ln2_high) - k * ln2_low;
@@ -111,9 +122,11 @@ static inline hxReal hx_expm1(hxReal x) {
   const hxReal r4 = r2 * r2;
   const hxReal low = (1.0 + r * (1.0 / 2)) + r2 * ((1.0 / 6) + r * (1.0 / 24));
   const hxReal mid = ((1.0 / 120) + r * (1.0 / 720)) + r2 * ((1.0 / 5040) + r * (1.0 / 40320));
-  const hxReal high = ((1.0 / 362880) + r * (1.0 / 3628800)) + r2 * ((1.0 / 39916800) + r * (1.0 / 479001600)) + r4 * (1.0 / 6227020800.0);
+  const hxReal high = ((1.0 / 362880) + r * (1.0 / 3628800)) +
+                      r2 * ((1.0 / 39916800) + r * (1.0 / 479001600)) + r4 * (1.0 / 6227020800.0);
   const hxReal expm1_r = r * (low + r4 * (mid + r4 * high));
-  const hxMask exponent = (hx_bits(shifted) & 0x7ff) + 1023; /* k's low bits, two's complement, biased */
+  const hxMask exponent =
+      (hx_bits(shifted) & 0x7ff) + 1023; /* k's low bits, two's complement, biased */
   const hxReal power = hx_from_bits((exponent & 0x7ff) << 52);
   return power * expm1_r + (power - 1.0);
 }
@@ -130,8 +143,9 @@ static inline hxReal hx_tanh_ratio(hxReal x) {
   return e / ((e + 2.0) * x);
 }
 
-/* The angle 2 atan(y / x) of a half-angle's sine y and cosine x, up to a common factor; in (-pi, pi].
- * Each tan(half) = y / (x + |(x, y)|); two halvings leave |t| <= tan(pi/8), where the minimax polynomial is exact to 1.3e-18. */
+/* The angle 2 atan(y / x) of a half-angle's sine y and cosine x, up to a common factor; in (-pi,
+ * pi]. Each tan(half) = y / (x + |(x, y)|); two halvings leave |t| <= tan(pi/8), where the minimax
+ * polynomial is exact to 1.3e-18. */
 static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   const hxMask back = hx_less(x, hx_splat(0.0));
   const hxReal y2 = y * y;
@@ -139,13 +153,16 @@ static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   for (int halving = 0; halving < 2; ++halving) cosine = cosine + hx_sqrt(cosine * cosine + y2);
   const hxReal t = hx_select(back, -y, y) / cosine;
   const hxReal z = t * t, z2 = z * z, z4 = z2 * z2;
-  const hxReal low = (-0.3333333333333313 + z * 0.19999999999942733) + z2 * (-0.14285714279416978 + z * 0.11111110752667197);
-  const hxReal mid = (-0.09090897019166005 + z * 0.07692048884053129) + z2 * (-0.06662990413300302 + z * 0.05847147723724963);
+  const hxReal low = (-0.3333333333333313 + z * 0.19999999999942733) +
+                     z2 * (-0.14285714279416978 + z * 0.11111110752667197);
+  const hxReal mid = (-0.09090897019166005 + z * 0.07692048884053129) +
+                     z2 * (-0.06662990413300302 + z * 0.05847147723724963);
   const hxReal high = (-0.05036270404445784 + z * 0.037993873512197886) - z2 * 0.017835677876676313;
   return 8.0 * (t + t * z * (low + z4 * (mid + z4 * high)));
 }
 
-/* atan2(y, x), 0 at the origin: half the angle has the sine y and the cosine x + r, or r - x and |y| where x + r cancels */
+/* atan2(y, x), 0 at the origin: half the angle has the sine y and the cosine x + r, or r - x and
+ * |y| where x + r cancels */
 static inline double hx_atan2(double y, double x) {
   const double r = sqrt(x * x + y * y);
   if (r == 0.0) return 0.0;
@@ -154,7 +171,9 @@ static inline double hx_atan2(double y, double x) {
 }
 
 /* the angle in [-pi/2, pi/2] whose sine is x */
-static inline double hx_asin(double x) { return hx_atan2(x, sqrt(fmax(0.0, (1.0 - x) * (1.0 + x)))); }
+static inline double hx_asin(double x) {
+  return hx_atan2(x, sqrt(fmax(0.0, (1.0 - x) * (1.0 + x))));
+}
 
 static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
   double s[HX_LANES], c[HX_LANES];
@@ -169,7 +188,8 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
 
 enum { HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES }; /* a pack is HX_LANES legs */
 
-/* The sum over the legs, in every lane, in one order whatever the width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */
+/* The sum over the legs, in every lane, in one order whatever the width: ((x0 + x4) + x2) + ((x1 +
+ * x5) + x3). */
 #if HX_LANES == 2
 static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
   const hxReal x = (pack[0] + pack[2]) + pack[1];
@@ -178,7 +198,8 @@ static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
 #elif HX_LANES == 4
 static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
   const hxMask legs = {-1, -1, 0, 0};
-  const hxReal x = pack[0] + hx_select(legs, pack[1], hx_splat(-0.0)); /* adding -0 changes nothing, not even -0 */
+  const hxReal x = pack[0] + hx_select(legs, pack[1],
+                                       hx_splat(-0.0)); /* adding -0 changes nothing, not even -0 */
   const hxReal halves = x + HX_SHUFFLE(x, 2, 3, 0, 1);
   return halves + HX_SHUFFLE(halves, 1, 0, 3, 2);
 }

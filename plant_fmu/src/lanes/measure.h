@@ -1,9 +1,10 @@
 /* measure.h - what a step did: works, losses, slip, impulses and peaks of joints and feet
  *
- * Works and losses are the impulses of the step's own forces times the mean of the speeds at its ends (eq. 22), so that they explain
- * the change of kinetic energy. What is no work is integrated along the step's path between its ends (hxMoment, eq. 23): angles and
- * depths follow cubics through values and rates, sliding velocities parabolas through values and mean. Nothing depends on how often
- * anyone looks at the plant.
+ * Works and losses are the impulses of the step's own forces times the mean of the speeds at its
+ * ends (eq. 22), so that they explain the change of kinetic energy. What is no work is integrated
+ * along the step's path between its ends (hxMoment, eq. 23): angles and depths follow cubics
+ * through values and rates, sliding velocities parabolas through values and mean. Nothing depends
+ * on how often anyone looks at the plant.
  */
 #ifndef HX_MEASURE_H
 #define HX_MEASURE_H
@@ -11,11 +12,14 @@
 #include "../contact_law.h"
 #include "dynamics.h"
 
-static const double landing_time = 0.02; /* s  after touch-down, in which a rise of the normal force counts as the landing's */
-static const double shortest_bend = 1e-7; /* s  in shorter steps second differences of depths are rounding */
+static const double landing_time =
+    0.02; /* s  after touch-down, in which a rise of the normal force counts as the landing's */
+static const double shortest_bend =
+    1e-7; /* s  in shorter steps second differences of depths are rounding */
 static const double half_turn = 3.14159265358979323846;
 
-/* Nodes of a step, at which laws are evaluated: all of them for feet, every second one for motors; and Simpson's weights there. */
+/* Nodes of a step, at which laws are evaluated: all of them for feet, every second one for motors;
+ * and Simpson's weights there. */
 enum { INTERVALS = 4, MOTOR_STRIDE = 2 };
 static const double foot_weight[INTERVALS + 1] = {1.0 / 12, 4.0 / 12, 2.0 / 12, 4.0 / 12, 1.0 / 12};
 static const double motor_weight[INTERVALS + 1] = {1.0 / 6, 0.0, 4.0 / 6, 0.0, 1.0 / 6};
@@ -36,7 +40,9 @@ typedef struct {
   const hxMoment *from, *to;
 } hxPath;
 
-/* ---- moments ---------------------------------------------------------------------------------------------------------------- */
+/* ---- moments
+ * ----------------------------------------------------------------------------------------------------------------
+ */
 
 /* Angles, speeds and feet of a motion. */
 static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hxMoment *moment) {
@@ -48,14 +54,16 @@ static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hx
       hxReal sine, cosine;
       i = j;
       j = hx_link_body(motion, joint, slot);
-      hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot), hx_link_quat(motion, joint, slot), &sine, &cosine);
+      hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot),
+                          hx_link_quat(motion, joint, slot), &sine, &cosine);
       hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
       const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub(j.w, i.w)));
     }
     const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);
     const hxVec3 to_point = hx_scale(hx_splat(-model->foot_radius), foot.normal);
-    const hxVec3 centre = hx_add(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub(foot.arm, to_point));
+    const hxVec3 centre =
+        hx_add(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub(foot.arm, to_point));
     hx_store_vec3(moment->centre, slot, centre);
     hx_store_vec3(moment->normal, slot, foot.normal);
     hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
@@ -78,7 +86,8 @@ static inline void hx_reset_peaks(hxMeasured *measured) {
   memset(measured->peak_rate, 0, sizeof measured->peak_rate);
 }
 
-/* Slots that no pack of this width covers go with leg 0, as in every motion; a structure begins with so many rows of slots. */
+/* Slots that no pack of this width covers go with leg 0, as in every motion; a structure begins
+ * with so many rows of slots. */
 static inline void fill_rows(void *structure, size_t rows) {
   double *first = structure;
   for (size_t row = 0; row < rows; ++row) hx_fill_slots(&first[row * HX_SLOTS]);
@@ -90,8 +99,8 @@ static inline void hx_fill_measured_slots(hxState *state) {
 }
 
 /* Touch-downs and lift-offs that are due at a time, and what begins with them. */
-static inline void hx_switch_contacts(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], double t,
-                                      hxState *state) {
+static inline void hx_switch_contacts(const hxModel *model, const double delta[HX_SLOTS],
+                                      const double ddelta[HX_SLOTS], double t, hxState *state) {
   const hxContactState before = state->contact;
   state->touchdowns += hx_contact_switch(model, delta, ddelta, &state->contact);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
@@ -103,11 +112,16 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
   if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
 }
 
-/* ---- works and losses (eq. 22) ----------------------------------------------------------------------------------------------- */
+/* ---- works and losses (eq. 22)
+ * -----------------------------------------------------------------------------------------------
+ */
 
-static inline hxReal mean_of(const double *from, const double *to) { return 0.5 * (hx_load(from) + hx_load(to)); }
+static inline hxReal mean_of(const double *from, const double *to) {
+  return 0.5 * (hx_load(from) + hx_load(to));
+}
 
-static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS], int slot) {
+static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS],
+                               int slot) {
   return hx_scale(hx_splat(0.5), hx_add(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
 }
 
@@ -117,7 +131,8 @@ static inline hxReal stored_in_contact(const hxModel *model, hxReal closed, cons
   return closed * (0.4 * model->stiffness) * (depth * depth) * hx_sqrt(depth);
 }
 
-static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse, hxStepWorks *works) {
+static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
+                                 hxStepWorks *works) {
   const hxMoment *from = path->from, *to = path->to;
   const hxReal per_step = hx_splat(1.0 / path->h);
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -130,25 +145,32 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse, 
       works->gear[pack] -= impulse->gear[joint][pack] * speed;
     }
     const hxReal closed = hx_load(&path->contact->closed[slot]);
-    const hxVec3 normal = mean_vec3(from->normal, to->normal, slot), slip = mean_vec3(from->slip, to->slip, slot);
-    const hxReal taken = hx_dot(impulse->foot[pack], normal) * mean_of(&from->ddelta[slot], &to->ddelta[slot]);
-    const hxReal stored =
-        stored_in_contact(path->model, closed, &to->delta[slot]) - stored_in_contact(path->model, closed, &from->delta[slot]);
+    const hxVec3 normal = mean_vec3(from->normal, to->normal, slot),
+                 slip = mean_vec3(from->slip, to->slip, slot);
+    const hxReal taken =
+        hx_dot(impulse->foot[pack], normal) * mean_of(&from->ddelta[slot], &to->ddelta[slot]);
+    const hxReal stored = stored_in_contact(path->model, closed, &to->delta[slot]) -
+                          stored_in_contact(path->model, closed, &from->delta[slot]);
     works->contact[pack] = taken - stored;
     works->friction[pack] = -hx_dot(impulse->foot[pack], slip);
   }
 }
 
-/* ---- joints ----------------------------------------------------------------------------------------------------------------- */
+/* ---- joints
+ * -----------------------------------------------------------------------------------------------------------------
+ */
 
-/* The cubic through values and rates (per step) at both ends, x in [0, 1]: value, rate and rate of the rate. */
+/* The cubic through values and rates (per step) at both ends, x in [0, 1]: value, rate and rate of
+ * the rate. */
 typedef struct {
   hxReal value, rate, second;
 } hxCubic;
 
-static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal slope_to, double x) {
+static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal slope_to,
+                            double x) {
   const hxReal bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;
-  return (hxCubic){from + x * (slope_from + x * (curve + x * bend)), slope_from + x * (2.0 * curve + (3.0 * x) * bend),
+  return (hxCubic){from + x * (slope_from + x * (curve + x * bend)),
+                   slope_from + x * (2.0 * curve + (3.0 * x) * bend),
                    2.0 * curve + (6.0 * x) * bend};
 }
 
@@ -158,12 +180,16 @@ static inline hxReal within_turn(hxReal angle) {
   return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
 }
 
-/* One joint of a pack: positive and negative work, whose difference is the step's work, and the squared torque's integral. */
-static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal work, hxReal mean_torque, hxMeasured *measured) {
+/* One joint of a pack: positive and negative work, whose difference is the step's work, and the
+ * squared torque's integral. */
+static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal work,
+                                 hxReal mean_torque, hxMeasured *measured) {
   const hxModel *model = path->model;
   const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
-  const hxReal angle = hx_load(&path->from->angle[joint][slot]), rise = within_turn(hx_load(&path->to->angle[joint][slot]) - angle);
-  const hxReal slope_from = h * hx_load(&path->from->speed[joint][slot]), slope_to = h * hx_load(&path->to->speed[joint][slot]);
+  const hxReal angle = hx_load(&path->from->angle[joint][slot]),
+               rise = within_turn(hx_load(&path->to->angle[joint][slot]) - angle);
+  const hxReal slope_from = h * hx_load(&path->from->speed[joint][slot]),
+               slope_to = h * hx_load(&path->to->speed[joint][slot]);
   hxReal positive = zero, negative = zero, squared = zero;
   for (int node = 0; node <= INTERVALS; node += MOTOR_STRIDE) {
     const hxCommand *command = path->command[node];
@@ -171,8 +197,9 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
     const hxReal speed = per_step * q.rate, weight = hx_splat(path->h * motor_weight[node]);
     hxReal torque = mean_torque; /* of a kinematic drive, which has no law */
     if (model->servo_mode != HX_SERVO_KINEMATIC)
-      torque = hx_motor_torque(model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
-                               hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]))
+      torque = hx_motor_torque(
+                   model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
+                   hx_load(&command->speed[joint][slot]), hx_load(&command->torque[joint][slot]))
                    .torque;
     positive += weight * hx_max(torque * speed, zero);
     negative += weight * hx_max(-(torque * speed), zero);
@@ -185,22 +212,31 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
   negative -= hx_select(drives, zero, rest);
   const hxReal below = hx_min(positive, negative); /* neither sinks below 0 */
   const hxReal excess = hx_min(below, zero);
-  hx_store(&measured->positive_work[joint][slot], hx_load(&measured->positive_work[joint][slot]) + (positive - excess));
-  hx_store(&measured->negative_work[joint][slot], hx_load(&measured->negative_work[joint][slot]) + (negative - excess));
-  hx_store(&measured->torque_squared[joint][slot], hx_load(&measured->torque_squared[joint][slot]) + squared);
+  hx_store(&measured->positive_work[joint][slot],
+           hx_load(&measured->positive_work[joint][slot]) + (positive - excess));
+  hx_store(&measured->negative_work[joint][slot],
+           hx_load(&measured->negative_work[joint][slot]) + (negative - excess));
+  hx_store(&measured->torque_squared[joint][slot],
+           hx_load(&measured->torque_squared[joint][slot]) + squared);
 }
 
-/* ---- feet ------------------------------------------------------------------------------------------------------------------- */
+/* ---- feet
+ * -------------------------------------------------------------------------------------------------------------------
+ */
 
 /* a velocity with its values at both ends and its mean, at x in [0, 1] */
 static inline hxVec3 sliding(hxVec3 from, hxVec3 to, hxVec3 mean, double x) {
-  const hxVec3 ends = hx_add_scaled(hx_scale(hx_splat(1.0 - x * (4.0 - 3.0 * x)), from), hx_splat(x * (3.0 * x - 2.0)), to);
+  const hxVec3 ends = hx_add_scaled(hx_scale(hx_splat(1.0 - x * (4.0 - 3.0 * x)), from),
+                                    hx_splat(x * (3.0 * x - 2.0)), to);
   return hx_add_scaled(ends, hx_splat(6.0 * x * (1.0 - x)), mean);
 }
 
-static inline hxVec3 along_ground(hxVec3 a, hxVec3 normal) { return hx_add_scaled(a, -hx_dot(normal, a), normal); }
+static inline hxVec3 along_ground(hxVec3 a, hxVec3 normal) {
+  return hx_add_scaled(a, -hx_dot(normal, a), normal);
+}
 
-/* Share of an interval in which a force that changes linearly exceeds a limit, and where in the interval that part's middle is. */
+/* Share of an interval in which a force that changes linearly exceeds a limit, and where in the
+ * interval that part's middle is. */
 static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *middle) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal a = from - limit, b = to - limit;
@@ -217,7 +253,8 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   const hxModel *model = path->model;
   const hxMoment *from = path->from, *to = path->to;
   const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
-  const hxReal closed = hx_load(&path->contact->closed[slot]), damping = hx_load(&path->contact->damping[slot]);
+  const hxReal closed = hx_load(&path->contact->closed[slot]),
+               damping = hx_load(&path->contact->damping[slot]);
   const hxVec3 slip_from = hx_load_vec3(from->slip, slot), slip_to = hx_load_vec3(to->slip, slot);
   const hxVec3 way = hx_sub(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
   const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
@@ -225,7 +262,8 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   const hxReal delta = hx_load(&from->delta[slot]), slope_from = h * hx_load(&from->ddelta[slot]);
   const hxReal rise = hx_load(&to->delta[slot]) - delta, slope_to = h * hx_load(&to->ddelta[slot]);
   const hxReal landing_end = hx_load(&measured->landed_at[slot]) + landing_time;
-  hxReal peak = hx_load(&measured->peak_force[slot]), steepest = hx_load(&measured->peak_rate[slot]);
+  hxReal peak = hx_load(&measured->peak_force[slot]),
+         steepest = hx_load(&measured->peak_rate[slot]);
   hxReal landing = hx_load(&measured->landing_rate[slot]), impulse = zero, slipped = zero;
   const hxReal bends = path->h < shortest_bend ? zero : per_step * per_step;
   hxReal last_force = zero, last_speed = zero;
@@ -239,7 +277,8 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
     const hxReal rate = f.stiffness * approach + f.viscosity * (bends * depth.second);
     peak = hx_max(peak, f.force);
     steepest = hx_max(steepest, rate);
-    landing = hx_max(landing, hx_select(hx_less(landing_end, hx_splat(path->t + x * path->h)), zero, rate));
+    landing = hx_max(landing,
+                     hx_select(hx_less(landing_end, hx_splat(path->t + x * path->h)), zero, rate));
     impulse += hx_splat(path->h * foot_weight[node]) * f.force;
     if (node > 0) {
       hxReal middle;
@@ -255,13 +294,17 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
 }
 
-/* ---- the whole step --------------------------------------------------------------------------------------------------------- */
+/* ---- the whole step
+ * ---------------------------------------------------------------------------------------------------------
+ */
 
 /* Adds what a step did to what was measured. */
-static inline void hx_measure_path(const hxPath *path, const hxStepWorks *works, hxMeasured *measured) {
+static inline void hx_measure_path(const hxPath *path, const hxStepWorks *works,
+                                   hxMeasured *measured) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack], works->mean_torque[joint][pack], measured);
+      measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack],
+                    works->mean_torque[joint][pack], measured);
     measure_feet(path, pack * HX_LANES, measured);
   }
   measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0);

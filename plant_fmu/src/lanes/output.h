@@ -16,11 +16,15 @@ static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
   return &work->pack[leg / HX_LANES];
 }
 
-static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) { return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w))); }
+static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) {
+  return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w)));
+}
 
 /* of bodies and rotors */
-static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
-  const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J, hx_torso_vec3(motion, HX_V), work->torso.w);
+static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion,
+                                  const hxWork *work) {
+  const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J,
+                                    hx_torso_vec3(motion, HX_V), work->torso.w);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     legs[pack] = hx_splat(0.0);
@@ -29,14 +33,16 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion, 
       const int slot = pack * HX_LANES;
       const hxReal mass = hx_load(&model->joint[joint].mass[slot]);
       const hxReal rotor = (0.5 * model->rotor_inertia) * k->speed * k->speed;
-      legs[pack] += body_kinetic(mass, k->J, hx_link_vec3(motion, joint, HX_V, slot), k->body.w) + rotor;
+      legs[pack] +=
+          body_kinetic(mass, k->J, hx_link_vec3(motion, joint, HX_V, slot), k->body.w) + rotor;
     }
   }
   return hx_lane(torso + hx_sum_legs(legs), 0);
 }
 
 /* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
-static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion,
+                                    const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -44,15 +50,20 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion
     const int slot = pack * HX_LANES;
     legs[pack] = 0.4 * foot->normal.elastic * hx_max(foot->kin.delta, hx_splat(0.0));
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      legs[pack] -= hx_load(&model->joint[joint].mass[slot]) * hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
+      legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
+                    hx_dot(g, hx_link_vec3(motion, joint, HX_R, slot));
   }
   return hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
 }
 
-/* joint on child: force -lambda, torque about the joint's point -(u1 lambda_4 + u2 lambda_5); the motor's torque is not in it */
-static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int leg, int joint, hxOutput *o) {
-  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.axes.x, s), u2 = hx_cross(k->body.axes.y, s);
-  const hxVec3 couple = hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
+/* joint on child: force -lambda, torque about the joint's point -(u1 lambda_4 + u2 lambda_5); the
+ * motor's torque is not in it */
+static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int leg, int joint,
+                       hxOutput *o) {
+  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.axes.x, s),
+               u2 = hx_cross(k->body.axes.y, s);
+  const hxVec3 couple =
+      hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
   o->angle[leg][joint] = hx_lane(k->angle, lane);
   o->speed[leg][joint] = hx_lane(k->speed, lane);
   o->torque[leg][joint] = hx_lane(k->servo.torque, lane);
@@ -63,14 +74,17 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
 
-static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot, hxVec3 tibia, int lane, int leg, hxOutput *o) {
+static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot,
+                      hxVec3 tibia, int lane, int leg, hxOutput *o) {
   get3(foot->force, lane, o->foot.force[leg]);
   get3(hx_add(tibia, foot->kin.arm), lane, o->foot.position[leg]);
   get3(foot->kin.velocity, lane, o->foot.velocity[leg]);
   o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
-  o->foot.tangential_force[leg] = hx_lane(has_bristles(model) ? foot->normal.force * hx_sqrt(hx_dot(foot->bristle.grip, foot->bristle.grip))
-                                                              : foot->drag * foot->slip_speed,
-                                          lane);
+  o->foot.tangential_force[leg] =
+      hx_lane(has_bristles(model)
+                  ? foot->normal.force * hx_sqrt(hx_dot(foot->bristle.grip, foot->bristle.grip))
+                  : foot->drag * foot->slip_speed,
+              lane);
   o->foot.slip_speed[leg] = hx_lane(foot->slip_speed, lane);
   o->foot.penetration[leg] = hx_lane(foot->kin.delta, lane);
   o->foot.impact_speed[leg] = state->contact.impact_speed[leg];
@@ -110,14 +124,16 @@ static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutp
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxConstraint c = hx_joint_constraint(model, motion, joint, pack * HX_LANES);
       position[pack] += hx_dot(c.phi_lin, c.phi_lin) + c.phi[0] * c.phi[0] + c.phi[1] * c.phi[1];
-      velocity[pack] += hx_dot(c.dphi_lin, c.dphi_lin) + c.dphi[0] * c.dphi[0] + c.dphi[1] * c.dphi[1];
+      velocity[pack] +=
+          hx_dot(c.dphi_lin, c.dphi_lin) + c.dphi[0] * c.dphi[0] + c.dphi[1] * c.dphi[1];
     }
   }
   o->constraint.position_error = hx_lane(hx_sqrt(hx_sum_legs(position)), 0);
   o->constraint.velocity_error = hx_lane(hx_sqrt(hx_sum_legs(velocity)), 0);
 }
 
-static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
+static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work,
+                        hxOutput *o) {
   const hxMotion *m = &state->motion;
   o->energy.kinetic = hx_kinetic_energy(model, m, work);
   o->energy.potential = hx_potential_energy(model, m, work);
@@ -127,15 +143,18 @@ static void fill_energy(const hxModel *model, const hxState *state, const hxWork
   o->energy.contact_loss = state->measured.contact_loss;
   o->energy.friction_loss = state->measured.friction_loss;
   o->energy.gear_loss = state->measured.gear_loss;
-  o->energy.residual = o->energy.kinetic + o->energy.potential - state->stored_at_start - m->actuator_work - m->push_work + m->dissipated;
+  o->energy.residual = o->energy.kinetic + o->energy.potential - state->stored_at_start -
+                       m->actuator_work - m->push_work + m->dissipated;
 }
 
-static void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
+static void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work,
+                           hxOutput *o) {
   o->time = state->time;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
-    for (int joint = 0; joint < HX_JOINTS; ++joint) fill_joint(state, &w->joint[joint], lane, leg, joint, o);
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      fill_joint(state, &w->joint[joint], lane, leg, joint, o);
     const hxVec3 tibia = hx_link_vec3(&state->motion, HX_JOINTS - 1, HX_R, leg - lane);
     fill_foot(model, state, &w->foot, tibia, lane, leg, o);
   }
@@ -149,7 +168,8 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
 }
 
 #ifndef HX_TANGENT /* derivatives of state and input do not see them */
-/* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0 */
+/* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0
+ */
 static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
   hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -158,7 +178,8 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
     contact[pack] = (f->force - f->elastic) * w->foot.kin.ddelta;
     friction[pack] = hx_friction_power(model, &w->foot);
     gear[pack] = hx_splat(0.0);
-    for (int joint = 0; joint < HX_JOINTS; ++joint) gear[pack] -= w->joint[joint].servo.friction * w->joint[joint].speed;
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      gear[pack] -= w->joint[joint].servo.friction * w->joint[joint].speed;
   }
   rate->energy.contact_loss = hx_lane(hx_sum_legs(contact), 0);
   rate->energy.friction_loss = hx_lane(hx_sum_legs(friction), 0);
@@ -167,22 +188,28 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const double torque = hx_lane(w->joint[joint].servo.torque, lane), power = torque * hx_lane(w->joint[joint].speed, lane);
+      const double torque = hx_lane(w->joint[joint].servo.torque, lane),
+                   power = torque * hx_lane(w->joint[joint].speed, lane);
       rate->positive_work[leg][joint] = fmax(power, 0.0);
       rate->negative_work[leg][joint] = fmax(-power, 0.0);
       rate->torque_squared[leg][joint] = torque * torque;
     }
     const double force = hx_lane(w->foot.normal.force, lane);
     rate->foot.impulse[leg] = force;
-    rate->foot.slip_distance[leg] = force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
-    rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] = rate->foot.landings[leg] = 0.0;
+    rate->foot.slip_distance[leg] =
+        force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
+    rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] =
+        rate->foot.landings[leg] = 0.0;
   }
 }
 #endif
 
-/* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's bodies */
-static inline void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, hxNumber acceleration[HX_BODIES][6],
-                                         hxNumber multiplier[HX_BODIES - 1][HX_MULTIPLIERS], hxNumber drive_torque[HX_BODIES - 1]) {
+/* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's
+ * bodies */
+static inline void hx_accelerations_fill(const hxWork *work, const hxMotion *rate,
+                                         hxNumber acceleration[HX_BODIES][6],
+                                         hxNumber multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
+                                         hxNumber drive_torque[HX_BODIES - 1]) {
   for (int i = 0; i < 6; ++i) acceleration[0][i] = rate->torso[HX_V + i];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;

@@ -1,4 +1,5 @@
-/* spatial.h - motions, forces and inertias of a rigid body, angular part first, world axes, at a named point */
+/* spatial.h - motions, forces and inertias of a rigid body, angular part first, world axes, at a
+ * named point */
 #ifndef HX_SPATIAL_H
 #define HX_SPATIAL_H
 
@@ -18,7 +19,8 @@ typedef struct {
   hxSym3 A;
 } hxInertia6;
 
-/* a rigid body's, about a point from which its centre of mass is at c: C = J - m c~ c~, H = m c~ = h~, A = m */
+/* a rigid body's, about a point from which its centre of mass is at c: C = J - m c~ c~, H = m c~ =
+ * h~, A = m */
 typedef struct {
   hxReal mass;
   hxVec3 h;
@@ -28,20 +30,29 @@ typedef struct {
 static inline hxRigid6 hx_rigid_inertia(hxReal mass, hxSym3 J, hxVec3 c) {
   const hxVec3 h = hx_scale(mass, c);
   const hxReal xx = h.x * c.x, yy = h.y * c.y, zz = h.z * c.z;
-  return (hxRigid6){mass, h, {J.xx + (yy + zz), J.yy + (xx + zz), J.zz + (xx + yy), J.xy - h.x * c.y, J.xz - h.x * c.z, J.yz - h.y * c.z}};
+  return (hxRigid6){mass,
+                    h,
+                    {J.xx + (yy + zz), J.yy + (xx + zz), J.zz + (xx + yy), J.xy - h.x * c.y,
+                     J.xz - h.x * c.z, J.yz - h.y * c.z}};
 }
 
 static inline hxForce6 hx_rigid_mul(const hxRigid6 *I, hxMotion6 a) {
-  return (hxForce6){hx_add(hx_sym_mul(I->C, a.ang), hx_cross(I->h, a.lin)), hx_add_scaled(hx_cross(a.ang, I->h), I->mass, a.lin)};
+  return (hxForce6){hx_add(hx_sym_mul(I->C, a.ang), hx_cross(I->h, a.lin)),
+                    hx_add_scaled(hx_cross(a.ang, I->h), I->mass, a.lin)};
 }
 
 static inline hxForce6 hx_inertia_mul(const hxInertia6 *I, hxMotion6 a) {
-  return (hxForce6){hx_add(hx_sym_mul(I->C, a.ang), hx_mul(I->H, a.lin)), hx_add(hx_tmul(I->H, a.ang), hx_sym_mul(I->A, a.lin))};
+  return (hxForce6){hx_add(hx_sym_mul(I->C, a.ang), hx_mul(I->H, a.lin)),
+                    hx_add(hx_tmul(I->H, a.ang), hx_sym_mul(I->A, a.lin))};
 }
 
-static inline hxReal hx_power(hxForce6 f, hxMotion6 v) { return hx_dot(f.ang, v.ang) + hx_dot(f.lin, v.lin); }
+static inline hxReal hx_power(hxForce6 f, hxMotion6 v) {
+  return hx_dot(f.ang, v.ang) + hx_dot(f.lin, v.lin);
+}
 
-static inline hxForce6 hx_force_add(hxForce6 a, hxForce6 b) { return (hxForce6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)}; }
+static inline hxForce6 hx_force_add(hxForce6 a, hxForce6 b) {
+  return (hxForce6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)};
+}
 
 static inline hxForce6 hx_force_add_scaled(hxForce6 a, hxReal s, hxForce6 b) {
   return (hxForce6){hx_add_scaled(a.ang, s, b.ang), hx_add_scaled(a.lin, s, b.lin)};
@@ -51,7 +62,9 @@ static inline hxMotion6 hx_motion_add_scaled(hxMotion6 a, hxReal s, hxMotion6 b)
   return (hxMotion6){hx_add_scaled(a.ang, s, b.ang), hx_add_scaled(a.lin, s, b.lin)};
 }
 
-static inline hxMotion6 hx_motion_add(hxMotion6 a, hxMotion6 b) { return (hxMotion6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)}; }
+static inline hxMotion6 hx_motion_add(hxMotion6 a, hxMotion6 b) {
+  return (hxMotion6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)};
+}
 
 static inline hxSym3 hx_sym_add(hxSym3 A, hxSym3 B) {
   return (hxSym3){A.xx + B.xx, A.yy + B.yy, A.zz + B.zz, A.xy + B.xy, A.xz + B.xz, A.yz + B.yz};
@@ -68,13 +81,13 @@ static inline void hx_inertia_add_rigid(hxInertia6 *I, const hxRigid6 *r) {
 /* r - s U U^T of a rigid body */
 static inline hxInertia6 hx_rigid_downdate(const hxRigid6 *r, hxReal s, hxForce6 U) {
   const hxVec3 a = hx_scale(s, U.ang), l = hx_scale(s, U.lin), h = r->h;
-  return (hxInertia6){
-      {r->C.xx - a.x * U.ang.x, r->C.yy - a.y * U.ang.y, r->C.zz - a.z * U.ang.z, r->C.xy - a.x * U.ang.y, r->C.xz - a.x * U.ang.z,
-       r->C.yz - a.y * U.ang.z},
-      {{-(l.x * U.ang.x), h.z - l.x * U.ang.y, -h.y - l.x * U.ang.z},
-       {-h.z - l.y * U.ang.x, -(l.y * U.ang.y), h.x - l.y * U.ang.z},
-       {h.y - l.z * U.ang.x, -h.x - l.z * U.ang.y, -(l.z * U.ang.z)}},
-      {r->mass - l.x * U.lin.x, r->mass - l.y * U.lin.y, r->mass - l.z * U.lin.z, -(l.x * U.lin.y), -(l.x * U.lin.z), -(l.y * U.lin.z)}};
+  return (hxInertia6){{r->C.xx - a.x * U.ang.x, r->C.yy - a.y * U.ang.y, r->C.zz - a.z * U.ang.z,
+                       r->C.xy - a.x * U.ang.y, r->C.xz - a.x * U.ang.z, r->C.yz - a.y * U.ang.z},
+                      {{-(l.x * U.ang.x), h.z - l.x * U.ang.y, -h.y - l.x * U.ang.z},
+                       {-h.z - l.y * U.ang.x, -(l.y * U.ang.y), h.x - l.y * U.ang.z},
+                       {h.y - l.z * U.ang.x, -h.x - l.z * U.ang.y, -(l.z * U.ang.z)}},
+                      {r->mass - l.x * U.lin.x, r->mass - l.y * U.lin.y, r->mass - l.z * U.lin.z,
+                       -(l.x * U.lin.y), -(l.x * U.lin.z), -(l.y * U.lin.z)}};
 }
 
 /* I - s U U^T */
@@ -89,19 +102,22 @@ static inline void hx_inertia_downdate(hxInertia6 *I, hxReal s, hxForce6 U) {
   I->A.xy -= l.x * U.lin.y, I->A.xz -= l.x * U.lin.z, I->A.yz -= l.y * U.lin.z;
 }
 
-/* a symmetric block A that acts at c: [ -c~ A c~  c~ A ; .  A ], as seen about the point that c is from */
+/* a symmetric block A that acts at c: [ -c~ A c~  c~ A ; .  A ], as seen about the point that c is
+ * from */
 static inline hxInertia6 hx_inertia_at(hxSym3 A, hxVec3 c) {
   const hxVec3 x = {A.xx, A.xy, A.xz}, y = {A.xy, A.yy, A.yz}, z = {A.xz, A.yz, A.zz};
   const hxMat3 H = {hx_cross(c, x), hx_cross(c, y), hx_cross(c, z)};
-  const hxVec3 Cx = hx_cross(c, (hxVec3){H.x.x, H.y.x, H.z.x}), Cy = hx_cross(c, (hxVec3){H.x.y, H.y.y, H.z.y}),
+  const hxVec3 Cx = hx_cross(c, (hxVec3){H.x.x, H.y.x, H.z.x}),
+               Cy = hx_cross(c, (hxVec3){H.x.y, H.y.y, H.z.y}),
                Cz = hx_cross(c, (hxVec3){H.x.z, H.y.z, H.z.z}); /* -c~ A c~ = c~ (c~ A)^T */
   return (hxInertia6){{Cx.x, Cy.y, Cz.z, Cx.y, Cx.z, Cy.z}, H, A};
 }
 
 /* the inverse of a positive definite block, by cofactors */
 static inline hxSym3 hx_sym_inverse(hxSym3 S) {
-  const hxSym3 c = {S.yy * S.zz - S.yz * S.yz, S.xx * S.zz - S.xz * S.xz, S.xx * S.yy - S.xy * S.xy,
-                    S.xz * S.yz - S.xy * S.zz, S.xy * S.yz - S.xz * S.yy, S.xy * S.xz - S.xx * S.yz};
+  const hxSym3 c = {S.yy * S.zz - S.yz * S.yz, S.xx * S.zz - S.xz * S.xz,
+                    S.xx * S.yy - S.xy * S.xy, S.xz * S.yz - S.xy * S.zz,
+                    S.xy * S.yz - S.xz * S.yy, S.xy * S.xz - S.xx * S.yz};
   const hxReal r = 1.0 / (S.xx * c.xx + S.xy * c.xy + S.xz * c.xz);
   return (hxSym3){r * c.xx, r * c.yy, r * c.zz, r * c.xy, r * c.xz, r * c.yz};
 }
@@ -112,9 +128,12 @@ static inline hxMotion6 hx_inertia_solve(const hxInertia6 *I, hxForce6 f) {
   const hxVec3 a = {A.xx, A.xy, A.xz}, b = {A.xy, A.yy, A.yz}, c = {A.xz, A.yz, A.zz};
   const hxMat3 G = {hx_mul(I->H, a), hx_mul(I->H, b), hx_mul(I->H, c)}; /* H A^-1 */
   const hxMat3 H = I->H;
-  const hxSym3 S = {I->C.xx - (G.x.x * H.x.x + G.y.x * H.y.x + G.z.x * H.z.x), I->C.yy - (G.x.y * H.x.y + G.y.y * H.y.y + G.z.y * H.z.y),
-                    I->C.zz - (G.x.z * H.x.z + G.y.z * H.y.z + G.z.z * H.z.z), I->C.xy - (G.x.x * H.x.y + G.y.x * H.y.y + G.z.x * H.z.y),
-                    I->C.xz - (G.x.x * H.x.z + G.y.x * H.y.z + G.z.x * H.z.z), I->C.yz - (G.x.y * H.x.z + G.y.y * H.y.z + G.z.y * H.z.z)};
+  const hxSym3 S = {I->C.xx - (G.x.x * H.x.x + G.y.x * H.y.x + G.z.x * H.z.x),
+                    I->C.yy - (G.x.y * H.x.y + G.y.y * H.y.y + G.z.y * H.z.y),
+                    I->C.zz - (G.x.z * H.x.z + G.y.z * H.y.z + G.z.z * H.z.z),
+                    I->C.xy - (G.x.x * H.x.y + G.y.x * H.y.y + G.z.x * H.z.y),
+                    I->C.xz - (G.x.x * H.x.z + G.y.x * H.y.z + G.z.x * H.z.z),
+                    I->C.yz - (G.x.y * H.x.z + G.y.y * H.y.z + G.z.y * H.z.z)};
   const hxVec3 ang = hx_sym_mul(hx_sym_inverse(S), hx_sub(f.ang, hx_mul(G, f.lin)));
   return (hxMotion6){ang, hx_sub(hx_sym_mul(A, f.lin), hx_tmul(G, ang))};
 }

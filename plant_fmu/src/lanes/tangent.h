@@ -1,8 +1,10 @@
-/* tangent.h - one leg at a time, its derivative along: hxReal is the complex number x + i step x', which takes the place of lanes.h's.
+/* tangent.h - one leg at a time, its derivative along: hxReal is the complex number x + i step x',
+ * which takes the place of lanes.h's.
  *
- * Arithmetic on complex numbers differentiates itself: (a + i h a')(b + i h b') = ab + i h (a b' + a' b) but for h^2 a' b', which is
- * nothing where h is 1e-170. Derivatives come out exact to rounding; there is no difference of values in them. What chooses, by order or by
- * sign, looks at the real part; at a kink that is the side that the values are computed on.
+ * Arithmetic on complex numbers differentiates itself: (a + i h a')(b + i h b') = ab + i h (a b' +
+ * a' b) but for h^2 a' b', which is nothing where h is 1e-170. Derivatives come out exact to
+ * rounding; there is no difference of values in them. What chooses, by order or by sign, looks at
+ * the real part; at a kink that is the side that the values are computed on.
  */
 #ifndef HX_LANES_TANGENT_H
 #define HX_LANES_TANGENT_H
@@ -34,11 +36,15 @@ static inline hxMask hx_less(hxReal a, hxReal b) { return hx_re(a) < hx_re(b) ? 
 static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) { return mask ? a : b; }
 static inline hxReal hx_min(hxReal a, hxReal b) { return hx_select(hx_less(b, a), b, a); }
 static inline hxReal hx_max(hxReal a, hxReal b) { return hx_select(hx_less(a, b), b, a); }
-static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) { return hx_min(hx_max(x, low), high); }
+static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) {
+  return hx_min(hx_max(x, low), high);
+}
 static inline hxReal hx_abs(hxReal x) { return hx_re(x) < 0.0 ? -x : x; }
 
 /* f(x) from its value and its slope there */
-static inline hxReal hx_chain(hxReal x, double value, double slope) { return hx_complex(value, slope * hx_im(x)); }
+static inline hxReal hx_chain(hxReal x, double value, double slope) {
+  return hx_complex(value, slope * hx_im(x));
+}
 
 /* the slope at 0 counts as 0: what is under a root here is a square */
 static inline hxReal hx_sqrt(hxReal x) {

@@ -1,4 +1,6 @@
-"""The chapter on validation: its tables and figures, computed anew by the code of the tests, or read from what the benchmarks left."""
+"""The chapter on validation: its tables and figures, computed anew by the code of the tests, or
+read from what the benchmarks left.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,10 @@ READ: Mapping[str, Callable[[], Shown]] = {
 
 def fill(folder: Path) -> None:
     """Puts every result in its place on the page validation.md of a folder."""
-    page, core = folder / "validation.md", ctypes.CDLL(str(shared_library(built(), "plant_fmu", "libhexapod_c")))
+    page, core = (
+        folder / "validation.md",
+        ctypes.CDLL(str(shared_library(built(), "plant_fmu", "libhexapod_c"))),
+    )
 
     def place(match: re.Match[str]) -> str:
         name = match[1]

@@ -1,4 +1,6 @@
-"""The C plant against the equations in numpy and against Pinocchio, at random states with feet in the ground."""
+"""The C plant against the equations in numpy and against Pinocchio, at random states with feet
+in the ground.
+"""
 
 from __future__ import annotations
 
@@ -19,15 +21,29 @@ SEEDS = range(8)
 
 
 def agreement(core: ct.CDLL) -> Shown:
-    """The largest difference over all robots, servo modes and states, relative to the largest entry."""
-    dense = np.max([difference for robot in ROBOTS.values() for difference in _dense(core, robot)], axis=0)
-    pinocchio = max(difference for robot in ROBOTS.values() for difference in _pinocchio(core, robot))
+    """The largest difference over all robots, servo modes and states, relative to the largest
+    entry.
+    """
+    dense = np.max(
+        [difference for robot in ROBOTS.values() for difference in _dense(core, robot)], axis=0
+    )
+    pinocchio = max(
+        difference for robot in ROBOTS.values() for difference in _pinocchio(core, robot)
+    )
     return Shown(
         columns=("compared", "with", "largest relative difference"),
         rows=[
-            ("accelerations of 19 bodies, O(n) in C", "the dense 204 x 204 system in numpy", short(float(dense[0]))),
+            (
+                "accelerations of 19 bodies, O(n) in C",
+                "the dense 204 x 204 system in numpy",
+                short(float(dense[0])),
+            ),
             ("90 multipliers (joint reactions)", "the same", short(float(dense[1]))),
-            ("accelerations of the torso and of 18 joints", "Pinocchio's articulated-body algorithm", short(pinocchio)),
+            (
+                "accelerations of the torso and of 18 joints",
+                "Pinocchio's articulated-body algorithm",
+                short(pinocchio),
+            ),
         ],
     )
 
@@ -49,5 +65,7 @@ def _pinocchio(core: ct.CDLL, robot: Robot) -> Iterator[float]:
         foot, dv = plant.output(command).foot, plant.accelerations(command).dv
         motor, gear = joint_torques(robot, body, command)
         push = np.concatenate([command.push_force, command.push_torque])
-        theirs = pinocchio_accelerations(robot, body, motor + gear, np.stack([foot.position, foot.force], axis=1), push)
+        theirs = pinocchio_accelerations(
+            robot, body, motor + gear, np.stack([foot.position, foot.force], axis=1), push
+        )
         yield distance(np.concatenate([dv[0], constraints(robot, body).G @ dv.ravel()]), theirs)

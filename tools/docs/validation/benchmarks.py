@@ -1,4 +1,6 @@
-"""What the benchmarks left in benchmarks/results: agreement with other engines, speed, and the worth of the control."""
+"""What the benchmarks left in benchmarks/results: agreement with other engines, speed, and the
+worth of the control.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +17,20 @@ from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown, short
 
 RESULTS = ROOT / "benchmarks" / "results"
-ENGINES = {"hexapod": "this plant", "mujoco": "MuJoCo", "pinocchio": "Pinocchio", "simbody": "Simbody"}
+ENGINES = {
+    "hexapod": "this plant",
+    "mujoco": "MuJoCo",
+    "pinocchio": "Pinocchio",
+    "simbody": "Simbody",
+}
 OURS, OF_OURS = "hexapod", ("rosw3", "ros2", "dp54")
 GAITS, SPEEDS = ("tripod", "ripple", "wave"), ("0.04", "0.08", "0.12", "0.16")
-SHOWN = {"slip_per_metre": "slip", "peak_force": "peak force", "loading_rate": "loading rate", "cost_of_transport": "cost of transport"}
+SHOWN = {
+    "slip_per_metre": "slip",
+    "peak_force": "peak force",
+    "loading_rate": "loading rate",
+    "cost_of_transport": "cost of transport",
+}
 
 
 def machines() -> list[Path]:
@@ -32,7 +44,9 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 
 def peers() -> Shown:
-    """How near each engine's finest setting comes to the converged path of the same law, over the family of walks."""
+    """How near each engine's finest setting comes to the converged path of the same law, over
+    the family of walks.
+    """
     best: dict[tuple[str, str], tuple[float, float, str]] = {}
     for key, group in _settings(machines()[-1]):
         engine, method, setting = key
@@ -43,7 +57,16 @@ def peers() -> Shown:
         for (engine, method), (middle, worst, setting) in sorted(best.items())
         if engine != OURS or method in OF_OURS
     ]
-    return Shown(columns=("engine", "method", "step or tolerance", "median over the walks [m]", "furthest walk [m]"), rows=rows)
+    return Shown(
+        columns=(
+            "engine",
+            "method",
+            "step or tolerance",
+            "median over the walks [m]",
+            "furthest walk [m]",
+        ),
+        rows=rows,
+    )
 
 
 def _settings(folder: Path) -> Iterator[tuple[tuple[str, str, str], list[float]]]:
@@ -59,7 +82,10 @@ def speed() -> Shown:
     rows = [row for row in _rows(machines()[-1] / "table.csv") if row["ours"] != "nan"]
     return Shown(
         columns=("figure", "this plant", "unit", "peer", "theirs"),
-        rows=[(row["figure"], _figure(row["ours"]), row["unit"], row["peer"], _figure(row["theirs"])) for row in rows],
+        rows=[
+            (row["figure"], _figure(row["ours"]), row["unit"], row["peer"], _figure(row["theirs"]))
+            for row in rows
+        ],
     )
 
 
@@ -69,28 +95,52 @@ def _figure(text: str) -> str:
 
 def control() -> Shown:
     """Changes from kinematic to compliant control over gaits and speeds, both robots."""
-    tables = {robot: _changes(RESULTS / "control" / f"grid_{robot}.csv") for robot in ("athena", "phantomx_mk4")}
+    tables = {
+        robot: _changes(RESULTS / "control" / f"grid_{robot}.csv")
+        for robot in ("athena", "phantomx_mk4")
+    }
 
     def draw(figure: Figure) -> None:
         panels = figure.subplots(len(tables), len(SHOWN), sharex=True, sharey=True)
         for line, (robot, changes) in zip(panels, tables.items(), strict=True):
             for axes, (metric, title) in zip(line, SHOWN.items(), strict=True):
-                values = np.array([[changes.get((f"{gait}, {speed} m/s", metric), np.nan) for speed in SPEEDS] for gait in GAITS])
+                values = np.array(
+                    [
+                        [changes.get((f"{gait}, {speed} m/s", metric), np.nan) for speed in SPEEDS]
+                        for gait in GAITS
+                    ]
+                )
                 axes.imshow(100.0 * values, cmap="PuOr", vmin=-100.0, vmax=100.0, aspect="auto")
                 axes.grid(visible=False)
                 axes.set_xticks(range(len(SPEEDS)), SPEEDS)
                 axes.set_yticks(range(len(GAITS)), GAITS)
                 for (i, k), value in np.ndenumerate(values):
                     shade = "white" if abs(value) > 0.6 else "black"
-                    axes.text(k, i, "" if np.isnan(value) else f"{100.0 * value:+.0f}", ha="center", va="center", color=shade, fontsize=8)
+                    axes.text(
+                        k,
+                        i,
+                        "" if np.isnan(value) else f"{100.0 * value:+.0f}",
+                        ha="center",
+                        va="center",
+                        color=shade,
+                        fontsize=8,
+                    )
                 if line is panels[0]:
                     axes.set_title(title, fontsize=9)
                 if line is panels[-1]:
                     axes.set_xlabel("m/s")
             line[0].set_ylabel(robot)
 
-    return Shown(draw=draw, size=(8.6, 4.2), alt="Changes in per cent by gait and speed of four metrics, for two robots")
+    return Shown(
+        draw=draw,
+        size=(8.6, 4.2),
+        alt="Changes in per cent by gait and speed of four metrics, for two robots",
+    )
 
 
 def _changes(path: Path) -> dict[tuple[str, str], float]:
-    return {(row["case"], row["metric"]): float(row["relative"]) for row in _rows(path) if row["relative"]}
+    return {
+        (row["case"], row["metric"]): float(row["relative"])
+        for row in _rows(path)
+        if row["relative"]
+    }

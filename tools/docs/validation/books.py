@@ -1,4 +1,6 @@
-"""The energy books: what they leave unexplained, by the tolerance of the integrator, and of every shipped scenario."""
+"""The energy books: what they leave unexplained, by the tolerance of the integrator, and of
+every shipped scenario.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,12 @@ LEAST = 1e-12  # of the work: below it the residual is rounding
 def _recordings() -> dict[float, Recording]:
     with TemporaryDirectory() as folder:
         fmu = export_fmu(load_robot("athena"), Path(folder) / "athena.fmu")
-        plans = {one: load_scenario("walk_flat", overrides=[f"duration={DURATION}", f"solver.tolerance={one}"]) for one in TOLERANCES}
+        plans = {
+            one: load_scenario(
+                "walk_flat", overrides=[f"duration={DURATION}", f"solver.tolerance={one}"]
+            )
+            for one in TOLERANCES
+        }
         return {one: simulate(plan, fmu=fmu).outcome.recording for one, plan in plans.items()}
 
 
@@ -33,20 +40,35 @@ def books() -> Shown:
     walks = {}
     for tolerance, recording in _recordings().items():
         work = float(recording.column("energy.actuator_work")[-1])
-        walks[tolerance] = recording.time, np.abs(recording.column("energy.residual")) / work, recording.column("solver.evaluations")[-1]
+        walks[tolerance] = (
+            recording.time,
+            np.abs(recording.column("energy.residual")) / work,
+            recording.column("solver.evaluations")[-1],
+        )
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         for k, (tolerance, (time, share, _)) in enumerate(walks.items()):
-            axes.semilogy(time[1:], np.maximum(share[1:], LEAST), color=PALETTE[k], label=f"tolerance {tolerance:g}", linewidth=1.1)
+            axes.semilogy(
+                time[1:],
+                np.maximum(share[1:], LEAST),
+                color=PALETTE[k],
+                label=f"tolerance {tolerance:g}",
+                linewidth=1.1,
+            )
         axes.set(xlabel="time [s]", ylabel="residual / the motors' work")
         axes.legend(ncols=2)
 
-    rows = [(f"{tolerance:g}", f"{evaluations:.0f}", short(float(share[-1]))) for tolerance, (_, share, evaluations) in walks.items()]
+    rows = [
+        (f"{tolerance:g}", f"{evaluations:.0f}", short(float(share[-1])))
+        for tolerance, (_, share, evaluations) in walks.items()
+    ]
     return Shown(
-        columns=("solver.tolerance", "evaluations", f"residual over work after {DURATION:g} s"), rows=rows, draw=draw,
+        columns=("solver.tolerance", "evaluations", f"residual over work after {DURATION:g} s"),
+        rows=rows,
+        draw=draw,
         alt="The energy residual of a walk over time: it falls with the tolerance",
-    )  # fmt: skip
+    )
 
 
 SOLVERS = {"default": [], "ros2 at 0.1": ["solver.method=ros2", "solver.tolerance=0.1"]}
@@ -63,5 +85,8 @@ def scenarios() -> Shown:
                     plan = load_scenario(name, overrides=[f"control={control}", *settings])
                     cells.append(short(walker.simulate(plan).metrics["energy_residual"]))
             rows.append(cells)
-    columns = ["scenario", *(f"{control}, {solver}" for solver in SOLVERS for control in ("kinematic", "compliant"))]
+    columns = [
+        "scenario",
+        *(f"{control}, {solver}" for solver in SOLVERS for control in ("kinematic", "compliant")),
+    ]
     return Shown(columns=columns, rows=rows)

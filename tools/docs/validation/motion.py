@@ -26,7 +26,10 @@ def closed_forms(core: ct.CDLL) -> Shown:
     rows = [*_fall(core), *_pendulum(core), *_spin(core), *_conserved(core)]
     return Shown(
         columns=("motion", "computed", "exact", "relative difference"),
-        rows=[(what, f"{got:.12g} {unit}", f"{exact:.12g} {unit}", short(abs(got / exact - 1.0))) for what, got, exact, unit in rows],
+        rows=[
+            (what, f"{got:.12g} {unit}", f"{exact:.12g} {unit}", short(abs(got / exact - 1.0)))
+            for what, got, exact, unit in rows
+        ],
     )
 
 
@@ -45,17 +48,37 @@ def _pendulum(core: ct.CDLL) -> Iterator[Row]:
     plant = Plant(core, robot, angle=flat)
     plant.step(laws.PERIOD / 4.0, carry)
     bottom = plant.output(carry)
-    yield "pendulum of 1 m let go horizontally, angle after a quarter period", bottom.angle[0, 2], math.pi / 2.0, "rad"
+    yield (
+        "pendulum of 1 m let go horizontally, angle after a quarter period",
+        bottom.angle[0, 2],
+        math.pi / 2.0,
+        "rad",
+    )
     yield "the same, speed at the bottom", bottom.speed[0, 2], math.sqrt(2.0 * GRAVITY), "rad/s"
-    yield "the same, joint reaction at the bottom (3 m g)", bottom.reaction_force[0, 2, 2], 3.0 * GRAVITY, "N"
+    yield (
+        "the same, joint reaction at the bottom (3 m g)",
+        bottom.reaction_force[0, 2, 2],
+        3.0 * GRAVITY,
+        "N",
+    )
 
 
 def _spin(core: ct.CDLL) -> Iterator[Row]:
-    robot = replace(changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=laws.FLIGHT), gravity=laws.WEIGHTLESS)
+    robot = replace(
+        changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=laws.FLIGHT),
+        gravity=laws.WEIGHTLESS,
+    )
     flat, rate = np.zeros((6, 3)), 0.9
-    plant = Plant(core, robot, angle=flat, angular_velocity=(0.0, 0.0, rate), position=(0.0, 0.0, laws.HIGH))
+    plant = Plant(
+        core, robot, angle=flat, angular_velocity=(0.0, 0.0, rate), position=(0.0, 0.0, laws.HIGH)
+    )
     plant.step(3.0, Command(angle_ref=flat))
-    yield "spin about a principal axis, turned after 3 s", plant.output().torso.yaw, rate * 3.0, "rad"
+    yield (
+        "spin about a principal axis, turned after 3 s",
+        plant.output().torso.yaw,
+        rate * 3.0,
+        "rad",
+    )
 
 
 def _conserved(core: ct.CDLL) -> Iterator[Row]:
@@ -71,4 +94,9 @@ def _conserved(core: ct.CDLL) -> Iterator[Row]:
     plant = laws.tumbling(core, robot)
     before = kinetic_energy(robot, plant.bodies) + potential_energy(robot, plant.bodies)
     plant.step(0.3, Command(angle_ref=robot.stance))
-    yield "the same, falling, total energy", kinetic_energy(robot, plant.bodies) + potential_energy(robot, plant.bodies), before, "J"
+    yield (
+        "the same, falling, total energy",
+        kinetic_energy(robot, plant.bodies) + potential_energy(robot, plant.bodies),
+        before,
+        "J",
+    )

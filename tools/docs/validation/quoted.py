@@ -1,4 +1,6 @@
-"""The figures that people quote of the judged walk: whether they depend on how often the plant is read, and on the friction assumed."""
+"""The figures that people quote of the judged walk: whether they depend on how often the plant
+is read, and on the friction assumed.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +32,16 @@ LAWS = {  # friction -> settings
     "bristle": ("friction.law=bristle",),
 }
 OF_FRICTION = (
-    "slip_per_metre", "cone_use_p50", "cone_use_p95", "foot_error_stance", "roll_rms", "peak_force", "cost_of_transport",
-    "electrical_cost", "servo_load_max",
-)  # fmt: skip
+    "slip_per_metre",
+    "cone_use_p50",
+    "cone_use_p95",
+    "foot_error_stance",
+    "roll_rms",
+    "peak_force",
+    "cost_of_transport",
+    "electrical_cost",
+    "servo_load_max",
+)
 
 
 @cache
@@ -40,11 +49,15 @@ def walk(*settings: str) -> Result:
     """The judged walk with some settings."""
     with TemporaryDirectory() as folder:
         fmu = export_fmu(load_robot("athena"), Path(folder) / "athena.fmu")
-        return simulate(load_scenario("walk_flat", overrides=[*settings, "outputs.plots=false"]), fmu=fmu)
+        return simulate(
+            load_scenario("walk_flat", overrides=[*settings, "outputs.plots=false"]), fmu=fmu
+        )
 
 
 def intervals() -> Shown:
-    """Every metric of the judged walk with rows 1 ms and 20 ms apart: as a run tells it, and from the rows that are kept alone."""
+    """Every metric of the judged walk with rows 1 ms and 20 ms apart: as a run tells it, and
+    from the rows that are kept alone.
+    """
     columns = ["metric"]
     cells: dict[str, list[str]] = {}
     for control in CONTROLS:
@@ -53,10 +66,16 @@ def intervals() -> Shown:
         view = View(coarse.outcome.recording, coarse.parameters, PERIOD)
         alone = compute_metrics(view, servo=load_robot("athena").servo, realtime_factor=np.nan)
         columns += [f"{control}, rows 1 ms apart", "20 ms", "20 ms, of these rows alone"]
-        names = [name for name in shown_metrics({"": every.metrics}, net_slip=False) if name != OF_THE_LOOP]
+        names = [
+            name
+            for name in shown_metrics({"": every.metrics}, net_slip=False)
+            if name != OF_THE_LOOP
+        ]
         for name in names:
             value = every.metrics[name]
-            cells.setdefault(name, []).extend([f"{value:.4g}", _gap(coarse.metrics[name], value), _gap(alone[name], value)])
+            cells.setdefault(name, []).extend(
+                [f"{value:.4g}", _gap(coarse.metrics[name], value), _gap(alone[name], value)]
+            )
     return Shown(columns=columns, rows=[(f"`{name}`", *row) for name, row in cells.items()])
 
 
@@ -84,19 +103,33 @@ def sampled_again() -> Shown:
             "slip_per_metre": slipped(judged, part.weight) / part.distance,
             "cost_of_transport": driven(judged) / load,
             "torque_rms": float(np.sqrt(squares.mean() / part.duration)),
-            "servo_load_max": float(np.sqrt(squares.max() / part.duration)) / load_robot("athena").servo.torque_continuous,
+            "servo_load_max": float(np.sqrt(squares.max() / part.duration))
+            / load_robot("athena").servo.torque_continuous,
             "peak_force": float(judged.normal.max()) / part.weight,
-            "loading_rate": float(np.percentile(landing_rates(seen, apart=0.5 * PERIOD, after=2.0), 95)) / part.weight,
+            "loading_rate": float(
+                np.percentile(landing_rates(seen, apart=0.5 * PERIOD, after=2.0), 95)
+            )
+            / part.weight,
         }
         for name, value in own.items():
             told = result.metrics[name]
-            rows.setdefault(name, []).extend([f"{told:.5g}", f"{value:.5g}", f"{100.0 * (told / value - 1.0):+.2f} %"])
-    headings = [f"{control}, {what}" for control in CONTROLS for what in ("the plant's", "of samples", "difference")]
-    return Shown(columns=("metric", *headings), rows=[(f"`{name}`", *row) for name, row in rows.items()])
+            rows.setdefault(name, []).extend(
+                [f"{told:.5g}", f"{value:.5g}", f"{100.0 * (told / value - 1.0):+.2f} %"]
+            )
+    headings = [
+        f"{control}, {what}"
+        for control in CONTROLS
+        for what in ("the plant's", "of samples", "difference")
+    ]
+    return Shown(
+        columns=("metric", *headings), rows=[(f"`{name}`", *row) for name, row in rows.items()]
+    )
 
 
 def work_by_step() -> Shown:
-    """Cost of transport by macro-step: the plant's, and summed over one sample of power per macro-step."""
+    """Cost of transport by macro-step: the plant's, and summed over one sample of power per
+    macro-step.
+    """
     rows = []
     for control in CONTROLS:
         cells = []
@@ -112,13 +145,21 @@ def _sampled_cost(result: Result) -> float:
     recording = result.outcome.recording
     part = View(recording, result.parameters, PERIOD).walk
     assert part is not None
-    power = np.maximum(part.recording.columns(joint_names("torque")) * part.recording.columns(joint_names("speed")), 0.0).sum(axis=1)
+    power = np.maximum(
+        part.recording.columns(joint_names("torque"))
+        * part.recording.columns(joint_names("speed")),
+        0.0,
+    ).sum(axis=1)
     return float(part.weights @ power) * part.duration / (part.weight * part.distance)
 
 
 def friction() -> Shown:
     """The judged walk on three frictions that hold a foot differently well."""
-    runs = {(law, control): walk(f"control={control}", *settings) for law, settings in LAWS.items() for control in CONTROLS}
+    runs = {
+        (law, control): walk(f"control={control}", *settings)
+        for law, settings in LAWS.items()
+        for control in CONTROLS
+    }
     columns = ("metric", *(f"{law}: {control}" for law, control in runs))
     return Shown(columns=columns, rows=[_row(name, runs) for name in OF_FRICTION])
 

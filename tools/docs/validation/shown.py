@@ -1,4 +1,6 @@
-"""What a result looks like on a page: a table and, if it has one, a figure, once for light pages and once for dark ones."""
+"""What a result looks like on a page: a table and, if it has one, a figure, once for light pages
+and once for dark ones.
+"""
 
 from __future__ import annotations
 
@@ -31,22 +33,40 @@ class Shown:
     alt: str = ""  # what the figure shows, for those who cannot see it
 
     def markdown(self, folder: Path, stem: str) -> str:
-        """The result in Markdown; its figures are written to `stem`-light.svg and -dark.svg in the folder."""
+        """The result in Markdown; its figures are written to `stem`-light.svg and -dark.svg in
+        the folder.
+        """
         parts = []
         if self.draw is not None:
             (folder / stem).parent.mkdir(parents=True, exist_ok=True)
             for theme in THEMES:
                 self._save(folder / f"{stem}-{theme}.svg", theme)
-                parts.append(f"```{{image}} {stem}-{theme}.svg\n:class: only-{theme}\n:alt: {self.alt}\n```")
+                parts.append(
+                    f"```{{image}} {stem}-{theme}.svg\n:class: only-{theme}\n:alt: {self.alt}\n```"
+                )
         if self.columns:
-            parts.append("\n".join(_line(row) for row in (self.columns, ["---"] * len(self.columns), *self.rows)))
+            parts.append(
+                "\n".join(
+                    _line(row) for row in (self.columns, ["---"] * len(self.columns), *self.rows)
+                )
+            )
         return "\n\n".join(parts)
 
     def _save(self, path: Path, theme: str) -> None:
         colours = dict(THEMES[theme])
-        same = dict.fromkeys(("axes.labelcolor", "xtick.color", "ytick.color", "axes.titlecolor"), colours["text.color"])
+        same = dict.fromkeys(
+            ("axes.labelcolor", "xtick.color", "ytick.color", "axes.titlecolor"),
+            colours["text.color"],
+        )
         with rc_context(
-            {**figure_style.SETTINGS, **colours, **same, "axes.facecolor": "none", "svg.hashsalt": path.name, "svg.fonttype": "path"}
+            {
+                **figure_style.SETTINGS,
+                **colours,
+                **same,
+                "axes.facecolor": "none",
+                "svg.hashsalt": path.name,
+                "svg.fonttype": "path",
+            }
         ):
             figure = Figure(figsize=self.size)
             assert self.draw is not None

@@ -1,4 +1,6 @@
-"""CSV files of doubles that read back the same, without numpy: an importer's environment holds the importer alone."""
+"""CSV files of doubles that read back the same, without numpy: an importer's environment holds
+the importer alone.
+"""
 
 from __future__ import annotations
 

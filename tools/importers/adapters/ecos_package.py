@@ -1,6 +1,7 @@
 """A package through Ecos: usage: ecos_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS.
 
-NAMES: component.variable, one a line. Ecos reads the package as it is; step and parameter set it has to be told.
+NAMES: component.variable, one a line. Ecos reads the package as it is; step and parameter set it
+has to be told.
 """
 
 from __future__ import annotations
@@ -25,7 +26,12 @@ def main() -> None:
         simulation.init(parameter_set=PARAMETER_SET)
         for _ in range(int(steps)):
             simulation.step()
-            seen.append([simulation.get_time(), *(read(simulation, name.replace(".", "::", 1)) for name in names)])
+            seen.append(
+                [
+                    simulation.get_time(),
+                    *(read(simulation, name.replace(".", "::", 1)) for name in names),
+                ]
+            )
         simulation.terminate()
     write_columns(outputs, ["time", *names], seen)
 

@@ -1,4 +1,5 @@
-"""A recorded walk through Ecos (fmi4c inside): usage: ecos_walk.py FMU INPUTS.csv NAMES.txt OUTPUTS.csv.
+"""A recorded walk through Ecos (fmi4c inside): usage: ecos_walk.py FMU INPUTS.csv NAMES.txt
+OUTPUTS.csv.
 
 Inputs are set before each step and hold over it; outputs are read after the step.
 """
@@ -11,10 +12,12 @@ from pathlib import Path
 
 from columns import read_columns, write_columns
 
-# the library is linked to oneTBB, which PyPI's package `tbb` puts into the environment's lib, where no loader looks
+# the library is linked to oneTBB, which PyPI's package `tbb` puts into the environment's lib, where
+# no loader looks
 ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), mode=ctypes.RTLD_GLOBAL)
 
-from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E402  needs the library above
+# needs the library above
+from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E402
 
 
 def main() -> None:
@@ -32,7 +35,9 @@ def main() -> None:
                 for name, value in zip(driven, values, strict=True):
                     simulation.set_real(f"plant::{name}", value)
                 simulation.step()
-                seen.append([simulation.get_time(), *(read(simulation, f"plant::{name}") for name in names)])
+                seen.append(
+                    [simulation.get_time(), *(read(simulation, f"plant::{name}") for name in names)]
+                )
             simulation.terminate()
     write_columns(outputs, ["time", *names], seen)
 

@@ -1,7 +1,8 @@
-"""A recorded walk through fmi-sim, in Rust: usage: fmi_sim_walk.py FMU INPUTS.csv NAMES.txt OUTPUTS.csv.
+"""A recorded walk through fmi-sim, in Rust: usage: fmi_sim_walk.py FMU INPUTS.csv NAMES.txt
+OUTPUTS.csv.
 
-fmi-sim reads the commands itself, draws straight lines between rows and asks at communication points, which are the rows; all outputs it
-writes are seen before the next inputs are set.
+fmi-sim reads the commands itself, draws straight lines between rows and asks at communication
+points, which are the rows; all outputs it writes are seen before the next inputs are set.
 """
 
 from __future__ import annotations
@@ -23,7 +24,17 @@ def main() -> None:
     times = [row[0] for row in read_columns(inputs)[1]]
     step = repr(times[1] - times[0])
     found = Path(outputs).with_suffix(".raw.csv")
-    plan = ["co-simulation", "-s", repr(times[0]), "-f", repr(times[-1]), "--step", step, "--output-interval", step]
+    plan = [
+        "co-simulation",
+        "-s",
+        repr(times[0]),
+        "-f",
+        repr(times[-1]),
+        "--step",
+        step,
+        "--output-interval",
+        step,
+    ]
     command = [str(PROGRAM), "--model", fmu, "-i", inputs, "-o", str(found), *plan]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

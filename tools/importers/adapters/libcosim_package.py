@@ -1,6 +1,7 @@
 """A package through libcosim: usage: libcosim_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS.
 
-NAMES: component.variable, one a line. libcosim reads a package's folder, takes the step from it, and applies its parameter sets by itself.
+NAMES: component.variable, one a line. libcosim reads a package's folder, takes the step from it,
+and applies its parameter sets by itself.
 """
 
 from __future__ import annotations
@@ -31,7 +32,10 @@ def main() -> None:
         observer = CosimObserver.create_last_value()
         execution.add_observer(observer)
         components = {slave.name.decode(): slave.index for slave in execution.slave_infos()}
-        known = {name: {one.name.decode(): one for one in execution.slave_variables(index)} for name, index in components.items()}
+        known = {
+            name: {one.name.decode(): one for one in execution.slave_variables(index)}
+            for name, index in components.items()
+        }
         seen = []
         for _ in range(int(steps)):
             if not execution.step():

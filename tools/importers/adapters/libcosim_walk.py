@@ -1,6 +1,8 @@
-"""A recorded walk through libcosim (FMI Library inside): usage: libcosim_walk.py FMU INPUTS.csv NAMES.txt OUTPUTS.csv.
+"""A recorded walk through libcosim (FMI Library inside): usage: libcosim_walk.py FMU INPUTS.csv
+NAMES.txt OUTPUTS.csv.
 
-Inputs go in through an override manipulator before each step and hold over it; outputs are what its observer saw after the step.
+Inputs go in through an override manipulator before each step and hold over it; outputs are what its
+observer saw after the step.
 """
 
 from __future__ import annotations
@@ -33,7 +35,10 @@ def main() -> None:
     known = {variable.name.decode(): variable for variable in execution.slave_variables(plant)}
     flags = [name for name in names if known[name].type == CosimVariableType.BOOLEAN.value]
     reals = [name for name in names if name not in set(flags)]
-    references = {kind: [known[name].reference for name in group] for kind, group in (("in", driven), ("real", reals), ("flag", flags))}
+    references = {
+        kind: [known[name].reference for name in group]
+        for kind, group in (("in", driven), ("real", reals), ("flag", flags))
+    }
     seen = []
     for _, *values in rows[:-1]:
         manipulator.slave_real_values(plant, references["in"], values)
@@ -41,7 +46,9 @@ def main() -> None:
             raise SystemExit("libcosim: the step failed")
         time = execution.status().current_time / NANOSECONDS
         found = observer.last_boolean_values(plant, references["flag"])
-        seen.append([time, *observer.last_real_values(plant, references["real"]), *map(float, found)])
+        seen.append(
+            [time, *observer.last_real_values(plant, references["real"]), *map(float, found)]
+        )
     write_columns(outputs, ["time", *reals, *flags], seen)
 
 
