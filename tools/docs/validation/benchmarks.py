@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown, short
+from tools.docs.validation.walked import shown
 
 RESULTS = ROOT / "benchmarks" / "results"
 ENGINES = {"hexapod": "this plant", "mujoco": "MuJoCo", "pinocchio": "Pinocchio", "simbody": "Simbody"}
@@ -94,3 +95,42 @@ def control() -> Shown:
 
 def _changes(path: Path) -> dict[tuple[str, str], float]:
     return {(row["case"], row["metric"]): float(row["relative"]) for row in _rows(path) if row["relative"]}
+
+
+PID, WITHOUT, ALL = "slip_pid alone", "all but slip_pid", "all parts"
+ADDED = {  # what the PID changes beside the other parts
+    "slip_per_metre": "PID added to the rest: slip [%]",
+    "foot_error_stance": "feet in stance [%]",
+    "roll_rms": "roll [%]",
+}
+Cases = Mapping[tuple[str, str], dict[str, str]]  # by case and metric
+
+
+def slip_pid() -> Shown:
+    """The slip PID by itself, and what it adds to the other parts, by how wrong the model is."""
+    tables = {name: _cases(name) for name in ("ablation", "sticking", "model_errors")}
+    errors = sorted({case.rpartition(", ")[0] for case, _ in tables["model_errors"]})
+    rows = [_pid_row("the model's", tables["ablation"])]
+    rows.append(_pid_row("holds a foot still (bristle law)", tables["sticking"]))
+    rows += [_pid_row(error, tables["model_errors"], before=f"{error}, ") for error in errors]
+    headings = ("the plant", "slip [m/m], kinematic", "PID alone", "all but the PID", "all parts")
+    changes = ("PID alone against kinematic: slip [%]", *ADDED.values())
+    return Shown(columns=(*headings, *changes), rows=rows)
+
+
+def _cases(name: str) -> Cases:
+    rows = _rows(RESULTS / "control" / f"{name}.csv")
+    return {(row["case"], row["metric"]): row for row in rows}
+
+
+def _pid_row(title: str, cells: Cases, before: str = "") -> list[str]:
+    def value(part: str, metric: str = "slip_per_metre") -> float:
+        row = cells.get((before + part, metric))
+        return float("nan") if row is None else float(row["compliant"])
+
+    kinematic = float(cells[before + ALL, "slip_per_metre"]["kinematic"])
+    slips = [kinematic, *(value(part) for part in (PID, WITHOUT, ALL))]
+    gains = [(slips[1], kinematic), *((value(ALL, name), value(WITHOUT, name)) for name in ADDED)]
+    changes = [100.0 * (after / plain - 1.0) for after, plain in gains]
+    told = (f"{each:+.1f}" if np.isfinite(each) else "-" for each in changes)
+    return [title, *map(shown, slips), *told]
