@@ -22,7 +22,7 @@ def walker(plant_build: Path) -> Iterator[Walker]:
 
 @pytest.mark.parametrize("name", list_scenarios())
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_the_books_of_every_shipped_scenario_close_on_the_other_robot(walker: Walker, name: str, control: str) -> None:
+def test_the_books_close_on_the_other_robot_too(walker: Walker, name: str, control: str) -> None:
     scenario = load_scenario(name, overrides=[f"control={control}", "robot=phantomx_mk4"])
     missing = walker.simulate(scenario).metrics["energy_residual"]
     assert missing < (3e-3 if (name, control) == STANDING else 1e-4)

@@ -129,8 +129,10 @@ def test_the_validation_has_all_its_results(site: Path) -> None:
         assert re.search(rf"{law}</p></td>.*?{delivered}", text, flags=re.DOTALL)
 
     assert text.count("<p>both</p>") == 8  # robots drawn at random and odd ones that walk
-    for period, slip in (("1", "0.0141"), ("2", "0.0141"), ("5", "0.0150")):  # what all three ask for: 3.10 N m
-        assert re.search(rf"<p>{period} ms</p></td>\s*<td><p>0\.287.→.{slip}</p></td>\s*<td><p>0\.00.→.3\.10<", text)
+    between = r"</p></td>\s*<td><p>"
+    for period, slip in (("1", "0.0141"), ("2", "0.0141"), ("5", "0.0150")):
+        row = (f"<p>{period} ms", f"0.287.→.{slip}", "0.00.→.3.10<")  # slip [m/m], torque [N m]
+        assert re.search(between.join(row), text)
 
 
 def test_every_result_of_the_validation_has_its_place_on_the_page() -> None:
