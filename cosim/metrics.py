@@ -64,7 +64,7 @@ _TABLE: dict[str, Metric] = {
     "pitch_rms": Metric("rad", True, "pitch, about its mean", 1e-4),
     "peak_force": Metric("BW", True, "largest foot normal force, in body weights", 5e-3),
     "force_p95": Metric("BW", True, "95th percentile of the normal force of feet under load", 5e-3),
-    "loading_rate": Metric("BW/s", True, "steepest rise of the force in 20 ms after touch-down, 95th percentile", 5e-2),
+    "loading_rate": Metric("BW/s", True, "largest rise of the force over 1 ms in 20 ms after touch-down, 95th percentile", 5e-2),
     "torque_rms": Metric("N m", True, "motor torque over all joints and time", 5e-3),
     "servo_load_max": Metric("1", True, "largest RMS torque of a servo over its continuous rating", 5e-3),
     "heat": Metric("N2 m2 s/m", True, "integral of the sum of squared motor torques, per metre walked", 0.5),
@@ -268,7 +268,7 @@ def _force(walk: Walk) -> dict[str, float]:
 
 
 def landing_rates(walk: Walk) -> Array:
-    """(landings,) steepest rise of the force [N/s] in the 20 ms after touch-down, of all feet's landings between begin and end.
+    """(landings,) largest rise of the force over 1 ms [N/s] in the 20 ms after touch-down, of all feet's landings from begin to end.
 
     A foot that touches down again within half a gait cycle has bounced: both are one landing, and the steeper rise counts.
     """

@@ -1045,7 +1045,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{9c01c14d-25d9-43ed-ab8e-699247efd882}";
+const char hx_default_guid[] = "{c822e5d5-316f-4631-9e1b-103e3591412e}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -163,7 +163,7 @@ typedef struct hxOutput {
     double impulse[HX_LEGS];              /* N s  integral of the normal force since the start */
     double peak_force[HX_LEGS];           /* N    largest normal force of the last step, a call of hx_plant_step */
     double peak_force_rate[HX_LEGS];      /* N/s  steepest rise of the normal force in the last step */
-    double landing_rate[HX_LEGS];         /* N/s  steepest rise within 20 ms after the last touch-down */
+    double landing_rate[HX_LEGS];         /* N/s  largest rise over 1 ms within 20 ms after the last touch-down */
     double landings[HX_LEGS];             /* 1    touch-downs since the start */
     int contact[HX_LEGS];
   } foot;
