@@ -151,18 +151,10 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
 #ifndef HX_TANGENT /* derivatives of state and input do not see them */
 /* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0 */
 static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
-  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
-  for (int pack = 0; pack < HX_PACKS; ++pack) {
-    const hxLegWork *w = &work->pack[pack];
-    const hxNormalForce *f = &w->foot.normal;
-    contact[pack] = (f->force - f->elastic) * w->foot.kin.ddelta;
-    friction[pack] = hx_friction_power(model, &w->foot);
-    gear[pack] = hx_splat(0.0);
-    for (int joint = 0; joint < HX_JOINTS; ++joint) gear[pack] -= w->joint[joint].servo.friction * w->joint[joint].speed;
-  }
-  rate->energy.contact_loss = hx_lane(hx_sum_legs(contact), 0);
-  rate->energy.friction_loss = hx_lane(hx_sum_legs(friction), 0);
-  rate->energy.gear_loss = hx_lane(hx_sum_legs(gear), 0);
+  const hxLossPowers losses = hx_loss_powers(model, work);
+  rate->energy.contact_loss = losses.contact;
+  rate->energy.friction_loss = losses.friction;
+  rate->energy.gear_loss = losses.gear;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
