@@ -23,6 +23,7 @@ MOTOR_WEIGHTS = np.array([1.0, 4.0, 1.0]) / 6.0
 LOAD_SHARE = 0.01  # of the robot's weight: a foot that bears more slips under load
 LANDING_SAMPLE = 1e-4  # s    between two forces of a landing
 LANDING_SAMPLES = 200  # of a landing, which is over 20 ms after touch-down
+CONE_BINS, NEARLY_SLIDING = 31, 0.9  # of the shares of the friction cone that feet use; where the last one begins
 RISE_SAMPLES = 10  # across the window of 1 ms over which a landing's force rises
 
 
@@ -90,6 +91,23 @@ def step_works(robot: Robot, before: Array, after: Array, h: float, impulses: Im
         slips = [foot.velocity + foot.approach_speed * foot.normal for foot in (first, last)]
         friction -= float(impulses.foot[leg] @ (0.5 * (slips[0] + slips[1])))
     return Works(impulses.motor * speed, contact, friction, -float(np.sum(impulses.gear * speed)))
+
+
+def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
+    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n) of the friction cone (eq. 25).
+
+    The share is that of the step's impulses. Bins begin at 0.9 (i/30)^2.
+    """
+    time = np.zeros(CONE_BINS)
+    least = h * LOAD_SHARE * robot.total_mass * float(np.linalg.norm(robot.gravity))
+    edges = NEARLY_SLIDING * (np.arange(CONE_BINS) / (CONE_BINS - 1)) ** 2
+    for leg, (first, last) in enumerate(zip(foot_contacts(robot, before), foot_contacts(robot, after), strict=True)):
+        normal = 0.5 * (first.normal + last.normal)
+        pressed = float(impulses.foot[leg] @ normal)
+        if pressed > least:
+            share = float(np.linalg.norm(impulses.foot[leg] - pressed * normal)) / (robot.friction.mu * pressed)
+            time[np.flatnonzero(edges <= share)[-1]] += h
+    return time
 
 
 def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array) -> tuple[Array, Array, Array]:

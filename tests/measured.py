@@ -20,7 +20,7 @@ AFTER = 0.020  # s    after touch-down
 WINDOW = 0.001  # s    over which a force rises
 QUANTITIES = {
     "torque": joint_names("torque"), "speed": joint_names("speed"), "normal": foot_names("normal_force"),
-    "velocity": foot_vector_names("velocity"),
+    "tangential": foot_names("tangential_force"), "velocity": foot_vector_names("velocity"),
 }  # fmt: skip
 
 
@@ -32,12 +32,13 @@ class Samples:
     torque: Array  # N m    (2, n, 18)
     speed: Array  # rad/s    (2, n, 18)
     normal: Array  # N    (2, n, 6)
+    tangential: Array  # N    (2, n, 6)
     velocity: Array  # m/s    (2, n, 6, 3)
 
     def after(self, time: float) -> Samples:
         """The intervals from a time [s] on."""
         k = int(np.searchsorted(self.time, time - 0.5 * FINE))
-        parts = (self.torque, self.speed, self.normal, self.velocity)
+        parts = (self.torque, self.speed, self.normal, self.tangential, self.velocity)
         return Samples(self.time[k:], *(part[:, k:] for part in parts))
 
 
@@ -62,8 +63,8 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
             if k >= first:
                 seen.get()
                 rows[1, k - first] = seen.values
-    torque, speed, normal, velocity = np.split(rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2)
-    return Samples(FINE * np.arange(first, count, dtype=np.float64), torque, speed, normal, velocity.reshape(2, -1, 6, 3))
+    torque, speed, normal, across, velocity = np.split(rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2)
+    return Samples(FINE * np.arange(first, count, dtype=np.float64), torque, speed, normal, across, velocity.reshape(2, -1, 6, 3))
 
 
 def integral(values: Array) -> Array:

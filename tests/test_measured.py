@@ -81,3 +81,14 @@ def test_landings_are_counted_and_as_steep_as_sampled(twice: Twice) -> None:
     np.testing.assert_allclose(told[1:], seen[1:], rtol=AGREED)
     assert told[0] == pytest.approx(seen[0], rel=1.5e-2)
     assert twice.told["loading_rate"] == pytest.approx(np.percentile(seen, 95) / twice.walk.weight, rel=AGREED)
+
+
+def test_the_use_of_the_friction_cone_is_that_of_the_samples(twice: Twice) -> None:
+    """Percentiles within a bin of the plant's, which is 0.063 sqrt(share) wide; shares of time above 0.9 within 0.1 % of the time."""
+    loaded = twice.samples.normal[1] > 0.01 * twice.walk.weight
+    across = twice.samples.tangential[1][loaded]
+    use = across / (0.7 * twice.samples.normal[1][loaded])
+    p50, p95 = np.percentile(use, [50.0, 95.0])
+    assert twice.told["cone_use_p50"] == pytest.approx(p50, abs=0.063 * np.sqrt(p50) / 2.0)
+    assert twice.told["cone_use_p95"] == pytest.approx(p95, abs=0.063 * np.sqrt(p95) / 2.0)
+    assert twice.told["cone_use_over_90"] == pytest.approx(float(np.mean(use > 0.9)), abs=1e-3)

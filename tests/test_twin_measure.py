@@ -16,7 +16,7 @@ from hexapod_cosim.models.actuator import gear_friction, servo_torque
 from hexapod_cosim.models.contact import contact_damping, foot_contacts, foot_force, standing_damping
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
-from hexapod_cosim.models.measure import Impulses, landing_rate, measured_step, step_works
+from hexapod_cosim.models.measure import Impulses, cone_time, landing_rate, measured_step, step_works
 from hexapod_cosim.models.records import Array
 
 H = 2e-4  # s
@@ -35,6 +35,7 @@ def stage_forces(robot: Robot, body: Array, command: Command, damping: Array) ->
 @pytest.mark.parametrize("terrain", [{}, {"kind": "slope", "incline": 0.2, "heading": 0.7}])
 def test_a_step_s_measures_are_those_of_the_readable_equations(core: ct.CDLL, seed: int, terrain: dict[str, object]) -> None:
     robot = changed(lopsided(seed), solver={"method": "bs32", "step": H}, terrain=terrain, servo={"torque_max": 3.0, "speed_max": 8.0})
+    robot = changed(robot, friction={"slope": 0.3})  # sliding feet use a part of their cones
     command = random_command(robot, seed)
     plant, there = (Plant(core, robot, **random_pose(robot, seed)) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
@@ -48,6 +49,8 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(core: ct.CDLL, se
     plant.step(H, command)
     output, after = plant.output(command), plant.bodies
     works = step_works(robot, before, after, H, Impulses(*sums), ~np.isnan(damping))
+    np.testing.assert_allclose(output.cone_time, cone_time(robot, before, after, H, Impulses(*sums)), rtol=0.0, atol=1e-15)
+    assert 0.0 < float(np.sum(output.cone_time[:30]))
     measured = measured_step(robot, before, after, H, command, works.motor, damping)
 
     assert int(np.count_nonzero(~np.isnan(damping))) > 1

@@ -93,7 +93,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
     hx_step_works(&path, &impulses, &works);
-    hx_measure_path(&path, &works, &state->measured);
+    hx_measure_path(&path, &impulses, &works, &state->measured);
   }
   state->moment = end;
   hx_fill_measured_slots(state);

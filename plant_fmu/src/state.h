@@ -120,6 +120,7 @@ typedef struct hxMeasured {
   double landed_at[HX_SLOTS];                 /* s       time of the last touch-down */
   double landings[HX_SLOTS];                  /* 1       touch-downs */
   double contact_loss, friction_loss, gear_loss; /* J    their sum is what the motion has dissipated */
+  double cone_time[HX_CONE_BINS]; /* s  of all feet under load, by the share of the friction cone that they use */
 } hxMeasured;
 
 enum { HX_MEASURED_ROWS = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };

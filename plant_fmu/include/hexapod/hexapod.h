@@ -19,7 +19,8 @@ extern "C" {
 enum {
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS,   /* 19 */
   HX_BODY_STATE = 13,                    /* r[3] p[4] v[3] w[3] */
-  HX_MULTIPLIERS = 5                     /* per joint */
+  HX_MULTIPLIERS = 5,                    /* per joint */
+  HX_CONE_BINS = 31                      /* of the shares of the friction cone that feet use */
 };
 
 typedef enum hxContactLaw {
@@ -195,6 +196,8 @@ typedef struct hxOutput {
   struct {
     double evaluations, steps, rejected, touchdowns; /* 1, since start */
   } solver;
+  double cone_time
+      [HX_CONE_BINS]; /* s  of all feet under load since the start, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on, the last from 0.9 on */
 } hxOutput;
 
 /* The least numbers that tell where everything is: the torso as it is, joints by angle and speed. Of doubles alone, in this order the

@@ -13,6 +13,7 @@
 #include "dynamics.h"
 
 static const double landing_sample = 1e-4; /* s  between two forces of a landing */
+static const double nearly_sliding = 0.9; /* of the friction cone */
 static const double shortest_bend = 1e-7; /* s  in shorter steps second differences of depths are rounding */
 static const double half_turn = 3.14159265358979323846;
 
@@ -280,16 +281,40 @@ static inline void measure_landing(const hxPath *path, int leg, hxMeasured *meas
   }
 }
 
+/* ---- the friction cone ------------------------------------------------------------------------------------------------------ */
+
+/* The bin of a share |f_t|/(mu f_n) >= 0: bins begin at 0.9 (i/30)^2, finer where shares are small; the last holds all above 0.9. */
+static inline int hx_cone_bin(double share) {
+  const double place = (HX_CONE_BINS - 1) * sqrt(share / nearly_sliding);
+  return place < HX_CONE_BINS - 1 ? (int)place : HX_CONE_BINS - 1;
+}
+
+static inline int hx_has_cone(const hxModel *model) { return model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE; }
+
+/* Time of the feet under load by the share of the cone that the step's impulses use. */
+static inline void measure_cone(const hxPath *path, const hxImpulses *impulse, hxMeasured *measured) {
+  for (int pack = 0; pack < HX_PACKS && hx_has_cone(path->model); ++pack) {
+    const int slot = pack * HX_LANES;
+    const hxVec3 normal = mean_vec3(path->from->normal, path->to->normal, slot);
+    const hxReal pressed = hx_dot(impulse->foot[pack], normal);
+    const hxVec3 across = hx_add_scaled(impulse->foot[pack], -pressed, normal);
+    const hxReal share = hx_sqrt(hx_dot(across, across)) / hx_max(path->model->mu * pressed, hx_splat(1e-300));
+    for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane)
+      if (hx_lane(pressed, lane) > path->h * path->model->load_threshold) measured->cone_time[hx_cone_bin(hx_lane(share, lane))] += path->h;
+  }
+}
+
 /* ---- the whole step --------------------------------------------------------------------------------------------------------- */
 
 /* Adds what a step did to what was measured. */
-static inline void hx_measure_path(const hxPath *path, const hxStepWorks *works, hxMeasured *measured) {
+static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse, const hxStepWorks *works, hxMeasured *measured) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack], works->mean_torque[joint][pack], measured);
     measure_feet(path, pack * HX_LANES, measured);
   }
   for (int leg = 0; leg < HX_LEGS; ++leg) measure_landing(path, leg, measured);
+  measure_cone(path, impulse, measured);
   measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0);
   measured->friction_loss += hx_lane(hx_sum_legs(works->friction), 0);
   measured->gear_loss += hx_lane(hx_sum_legs(works->gear), 0);
