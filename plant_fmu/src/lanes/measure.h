@@ -283,25 +283,30 @@ static inline void measure_landing(const hxPath *path, int leg, hxMeasured *meas
 
 /* ---- the friction cone ------------------------------------------------------------------------------------------------------ */
 
-/* The bin of a share |f_t|/(mu f_n) >= 0: bins begin at 0.9 (i/30)^2, finer where shares are small; the last holds all above 0.9. */
-static inline int hx_cone_bin(double share) {
-  const double place = (HX_CONE_BINS - 1) * sqrt(share / nearly_sliding);
-  return place < HX_CONE_BINS - 1 ? (int)place : HX_CONE_BINS - 1;
+/* Where a share |f_t|/(mu f_n) is among the bins, whose number is the whole part: bin i begins at 0.9 (i/30)^2, so they are finer where
+ * shares are small; the last holds all above 0.9. */
+static inline hxReal hx_cone_place(hxReal share) {
+  const double last = HX_CONE_BINS - 1;
+  return hx_min(last * hx_sqrt((1.0 / nearly_sliding) * share), hx_splat(last));
 }
 
 static inline int hx_has_cone(const hxModel *model) { return model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE; }
 
 /* Time of the feet under load by the share of the cone that the step's impulses use. */
 static inline void measure_cone(const hxPath *path, const hxImpulses *impulse, hxMeasured *measured) {
-  for (int pack = 0; pack < HX_PACKS && hx_has_cone(path->model); ++pack) {
+  double place[HX_SLOTS], pressed[HX_SLOTS];
+  if (!hx_has_cone(path->model)) return;
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
     const int slot = pack * HX_LANES;
     const hxVec3 normal = mean_vec3(path->from->normal, path->to->normal, slot);
-    const hxReal pressed = hx_dot(impulse->foot[pack], normal);
-    const hxVec3 across = hx_add_scaled(impulse->foot[pack], -pressed, normal);
-    const hxReal share = hx_sqrt(hx_dot(across, across)) / hx_max(path->model->mu * pressed, hx_splat(1e-300));
-    for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane)
-      if (hx_lane(pressed, lane) > path->h * path->model->load_threshold) measured->cone_time[hx_cone_bin(hx_lane(share, lane))] += path->h;
+    const hxReal along = hx_dot(impulse->foot[pack], normal);
+    const hxVec3 across = hx_add_scaled(impulse->foot[pack], -along, normal);
+    const hxReal share = hx_sqrt(hx_dot(across, across)) / hx_max(path->model->mu * along, hx_splat(1e-300));
+    hx_store(&place[slot], hx_cone_place(share));
+    hx_store(&pressed[slot], along);
   }
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (pressed[leg] > path->h * path->model->load_threshold) measured->cone_time[(int)place[leg]] += path->h;
 }
 
 /* ---- the whole step --------------------------------------------------------------------------------------------------------- */
