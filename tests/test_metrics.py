@@ -105,7 +105,10 @@ def use_cone(walk: Walk, share: float, rate: Array | float = 1.0) -> None:
 
 
 def test_cone_use_is_what_the_plant_counted_over_time() -> None:
-    """Three feet half of the time at 11 %, one at 20 % and for a quarter of the time at 95 % of the cone; what rows show at their moments does not count."""
+    """At 11 % for the most, at 20 %, and at 95 % of the cone for a tenth of the time.
+
+    What rows show at their moments does not count.
+    """
     walk = Walk()
     high = np.where(walk.time % PERIOD < 0.25, 1.0, 0.0)
     use_cone(walk, 0.11, 1.5)

@@ -47,7 +47,7 @@ def rises(forces: Array) -> Array:
     """(windows,) rise [N/s] over 1 ms up to every 0.1 ms after the first of forces 1 us apart, which follows on none."""
     late = forces[100::100]
     early = np.concatenate([np.zeros(1000), forces])[100 : 100 + 100 * len(late) : 100]
-    return (late - early) / 1e-3
+    return np.asarray((late - early) / 1e-3)
 
 
 # ---- closed forms -----------------------------------------------------------------------------------------------------------

@@ -173,8 +173,10 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
       rate->torque_squared[leg][joint] = torque * torque;
     }
     const double force = hx_lane(w->foot.normal.force, lane), across = tangential_force(model, &w->foot, lane);
-    if (force > model->load_threshold && hx_has_cone(model))
-      rate->cone_time[(int)hx_lane(hx_cone_place(hx_splat(across / (model->mu * force))), 0)] += 1.0;
+    if (force > model->load_threshold && hx_has_cone(model)) {
+      const double place = hx_lane(hx_cone_place(hx_splat(across / (model->mu * force))), 0);
+      rate->cone_time[(int)place] += 1.0;
+    }
     rate->foot.impulse[leg] = force;
     rate->foot.slip_distance[leg] = force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
     rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] = rate->foot.landings[leg] = 0.0;
