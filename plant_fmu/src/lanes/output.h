@@ -156,6 +156,11 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
 }
 
 #ifndef HX_TANGENT /* derivatives of state and input do not see them */
+static int cone_bin(double share) {
+  const double place = hx_lane(hx_cone_place(hx_splat(share)), 0);
+  return (int)place;
+}
+
 /* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0 */
 static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
   const hxLossPowers losses = hx_loss_powers(model, work);
@@ -173,10 +178,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
       rate->torque_squared[leg][joint] = torque * torque;
     }
     const double force = hx_lane(w->foot.normal.force, lane), across = tangential_force(model, &w->foot, lane);
-    if (force > model->load_threshold && hx_has_cone(model)) {
-      const double place = hx_lane(hx_cone_place(hx_splat(across / (model->mu * force))), 0);
-      rate->cone_time[(int)place] += 1.0;
-    }
+    if (force > model->load_threshold && hx_has_cone(model)) rate->cone_time[cone_bin(across / (model->mu * force))] += 1.0;
     rate->foot.impulse[leg] = force;
     rate->foot.slip_distance[leg] = force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
     rate->foot.peak_force[leg] = rate->foot.peak_force_rate[leg] = rate->foot.landing_rate[leg] = rate->foot.landings[leg] = 0.0;
