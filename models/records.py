@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,6 +151,17 @@ class Gait:
     step_height: Annotated[float, Number("m", above=0.0)]
 
 
+def _plain(content: Any) -> Any:
+    """Nested content in which equal numbers are written alike: 0 and -0.0 as 0.0."""
+    if isinstance(content, dict):
+        return {key: _plain(value) for key, value in content.items()}
+    if isinstance(content, tuple | list):
+        return [_plain(value) for value in content]
+    if isinstance(content, int | float) and not isinstance(content, bool):
+        return float(content) + 0.0
+    return content
+
+
 @dataclass(frozen=True, kw_only=True)
 class Robot:
     """A six-legged robot with its laws and settings; `source` says where its numbers come from."""
@@ -197,6 +208,6 @@ class Robot:
     @cached_property
     def hash(self) -> str:
         """sha256 of everything but the provenance texts, in hex: equal robots, equal hash."""
-        content = asdict(self)
+        content = _plain(asdict(self))
         del content["source"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -23,7 +23,6 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
   for (int pack = 0; pack < HX_PACKS; ++pack) hx_store(&state->measured.peak_force[pack * HX_LANES], work.pack[pack].foot.normal.force);
-  for (int slot = 0; slot < HX_SLOTS; ++slot) state->measured.landed_at[slot] = -HUGE_VAL;
   hx_fill_measured_slots(state);
   state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) + hx_potential_energy(model, &state->motion, &work);
 }
@@ -94,7 +93,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
     hx_step_works(&path, &impulses, &works);
-    hx_measure_path(&path, &works, &state->measured);
+    hx_measure_path(&path, &impulses, &works, &state->measured);
   }
   state->moment = end;
   hx_fill_measured_slots(state);

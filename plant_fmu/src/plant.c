@@ -19,7 +19,7 @@ typedef struct {
 } hxSaved;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 6;
+static const uint64_t saved_version = 7;
 
 static uint64_t checksum(const hxSaved *saved) { return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model)); }
 

@@ -103,6 +103,8 @@ typedef struct hxCompleted {
 
 enum { HX_MOMENT_ROWS = offsetof(hxMoment, time) / (HX_SLOTS * sizeof(double)) };
 
+enum { HX_RISE_SAMPLES = 10 }; /* across the window of 1 ms over which a landing's force rises */
+
 /* What was measured since the start, along the path that the steps went. */
 typedef struct hxMeasured {
   double positive_work[HX_JOINTS][HX_SLOTS];  /* J       of the motors, where they drive */
@@ -112,10 +114,13 @@ typedef struct hxMeasured {
   double impulse[HX_SLOTS];                   /* N s     integral of the normal force */
   double peak_force[HX_SLOTS];                /* N       largest normal force of the last call */
   double peak_rate[HX_SLOTS];                 /* N/s     steepest rise of the normal force in the last call */
-  double landing_rate[HX_SLOTS];              /* N/s     steepest rise within landing_time of the last touch-down */
+  double landing_rate[HX_SLOTS];              /* N/s     largest rise over a window within 20 ms of the last touch-down */
+  double landing_force[HX_RISE_SAMPLES][HX_SLOTS]; /* N  the last samples of a landing's normal force, the oldest is next */
+  double landing_left[HX_SLOTS];              /* 1       samples of the landing that are still to come */
   double landed_at[HX_SLOTS];                 /* s       time of the last touch-down */
   double landings[HX_SLOTS];                  /* 1       touch-downs */
   double contact_loss, friction_loss, gear_loss; /* J    their sum is what the motion has dissipated */
+  double cone_time[HX_CONE_BINS]; /* s  of all feet under load, by the share of the friction cone that they use */
 } hxMeasured;
 
 enum { HX_MEASURED_ROWS = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };

@@ -124,9 +124,22 @@ def test_every_function_of_the_c_headers_is_in_the_reference(site: Path) -> None
 def test_the_validation_has_all_its_results(site: Path) -> None:
     text = (site / "validation.html").read_text(encoding="utf-8")
     assert "<!-- result" not in text
-    assert text.count("<table") >= 7
+    assert text.count("<table") >= 20
     for law, delivered in (("exact restitution", "0.5000"), ("Hunt-Crossley", "0.6630")):
         assert re.search(rf"{law}</p></td>.*?{delivered}", text, flags=re.DOTALL)
+
+    assert text.count("<p>both</p>") == 8  # robots drawn at random and odd ones that walk
+    between = r"</p></td>\s*<td><p>"
+    for period, slip in (("1", "0.0141"), ("2", "0.0141"), ("5", "0.0150")):
+        row = (f"<p>{period} ms", f"0.287.→.{slip}", "0.00.→.3.10<")  # slip [m/m], torque [N m]
+        assert re.search(between.join(row), text)
+
+
+def test_every_result_of_the_validation_has_its_place_on_the_page() -> None:
+    from tools.docs.validation import COMPUTED, PLACE, READ  # noqa: PLC0415  takes seconds
+
+    places = PLACE.findall((DOCS / "validation.md").read_text(encoding="utf-8"))
+    assert sorted(places) == sorted([*COMPUTED, *READ])
 
 
 # the pages

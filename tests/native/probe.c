@@ -140,6 +140,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, solver.steps),
     FIELD(hxOutput, solver.rejected),
     FIELD(hxOutput, solver.touchdowns),
+    FIELD(hxOutput, cone_time),
 };
 
 /* the name of the i-th field, its place and size; NULL past the last */

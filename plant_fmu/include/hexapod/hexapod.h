@@ -19,7 +19,8 @@ extern "C" {
 enum {
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS,   /* 19 */
   HX_BODY_STATE = 13,                    /* r[3] p[4] v[3] w[3] */
-  HX_MULTIPLIERS = 5                     /* per joint */
+  HX_MULTIPLIERS = 5,                    /* per joint */
+  HX_CONE_BINS = 31                      /* of the shares of the friction cone that feet use */
 };
 
 typedef enum hxContactLaw {
@@ -163,7 +164,7 @@ typedef struct hxOutput {
     double impulse[HX_LEGS];              /* N s  integral of the normal force since the start */
     double peak_force[HX_LEGS];           /* N    largest normal force of the last step, a call of hx_plant_step */
     double peak_force_rate[HX_LEGS];      /* N/s  steepest rise of the normal force in the last step */
-    double landing_rate[HX_LEGS];         /* N/s  steepest rise within 20 ms after the last touch-down */
+    double landing_rate[HX_LEGS];         /* N/s  largest rise over 1 ms within 20 ms after the last touch-down */
     double landings[HX_LEGS];             /* 1    touch-downs since the start */
     int contact[HX_LEGS];
   } foot;
@@ -195,6 +196,8 @@ typedef struct hxOutput {
   struct {
     double evaluations, steps, rejected, touchdowns; /* 1, since start */
   } solver;
+  double cone_time
+      [HX_CONE_BINS]; /* s  of all feet under load since the start, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on, the last from 0.9 on */
 } hxOutput;
 
 /* The least numbers that tell where everything is: the torso as it is, joints by angle and speed. Of doubles alone, in this order the

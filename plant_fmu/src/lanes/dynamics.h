@@ -448,24 +448,37 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
+/* W  what contact damping, friction and gears of all legs take */
+typedef struct {
+  hxNumber contact, friction, gear;
+} hxLossPowers;
+
+static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *work) {
+  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const hxLegWork *leg = &work->pack[pack];
+    const hxNormalForce *f = &leg->foot.normal;
+    contact[pack] = (f->force - f->elastic) * leg->foot.kin.ddelta;
+    friction[pack] = hx_friction_power(model, &leg->foot);
+    gear[pack] = hx_splat(0.0);
+    for (int joint = 0; joint < HX_JOINTS; ++joint) gear[pack] -= leg->joint[joint].servo.friction * leg->joint[joint].speed;
+  }
+  return (hxLossPowers){hx_lane(hx_sum_legs(contact), 0), hx_lane(hx_sum_legs(friction), 0), hx_lane(hx_sum_legs(gear), 0)};
+}
+
 /* Powers of motors and pushes, and what contact damping, friction and gears take. They are rates for the
  * solvers of others: a step of ours takes its works from its impulses (eq. 22). */
 static inline void store_powers(const hxModel *model, const hxCommand *command, const hxMotion *motion, const hxWork *work,
                                 hxMotion *rate) {
-  hxReal actuator[HX_PACKS], dissipated[HX_PACKS];
+  const hxLossPowers losses = hx_loss_powers(model, work);
+  hxReal actuator[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
-    const hxLegWork *leg = &work->pack[pack];
-    const hxNormalForce *f = &leg->foot.normal;
+    const hxJointWork *joint = work->pack[pack].joint;
     actuator[pack] = hx_splat(0.0);
-    dissipated[pack] = (f->force - f->elastic) * leg->foot.kin.ddelta + hx_friction_power(model, &leg->foot);
-    for (int joint = 0; joint < HX_JOINTS; ++joint) {
-      const hxJointWork *k = &leg->joint[joint];
-      actuator[pack] += k->servo.torque * k->speed;
-      dissipated[pack] -= k->servo.friction * k->speed;
-    }
+    for (int k = 0; k < HX_JOINTS; ++k) actuator[pack] += joint[k].servo.torque * joint[k].speed;
   }
   rate->actuator_work = hx_lane(hx_sum_legs(actuator), 0);
-  rate->dissipated = hx_lane(hx_sum_legs(dissipated), 0);
+  rate->dissipated = (losses.contact + losses.friction) + losses.gear;
   rate->push_work = 0.0;
   for (int i = 0; i < 3; ++i)
     rate->push_work += command->push_force[i] * motion->torso[HX_V + i] + command->push_torque[i] * motion->torso[HX_W + i];

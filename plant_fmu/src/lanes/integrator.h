@@ -311,7 +311,7 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
     path.command[node] = command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
-  hx_measure_path(&path, &works, measured);
+  hx_measure_path(&path, &trial->impulses, &works, measured);
   for (int pack = 0; pack < HX_PACKS; ++pack) work[pack] = (works.motor[0][pack] + works.motor[1][pack]) + works.motor[2][pack];
   trial->y.actuator_work += hx_lane(hx_sum_legs(work), 0);
   trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);

@@ -16,7 +16,19 @@ sys.path.extend(str(ROOT / "tests" / room) for room in ("support", "models", "pl
 
 from building import built, shared_library
 
-from tools.docs.validation import agreement, benchmarks, books, impacts, motion, orders, quoted
+from tools.docs.validation import (
+    agreement,
+    benchmarks,
+    books,
+    control,
+    drive,
+    effort,
+    impacts,
+    motion,
+    orders,
+    quoted,
+    robots,
+)
 
 PLACE = re.compile(r"<!-- result: ([\w-]+) -->")
 COMPUTED: Mapping[str, Callable[[ctypes.CDLL], Shown]] = {
@@ -31,9 +43,14 @@ READ: Mapping[str, Callable[[], Shown]] = {
     "books": books.books,
     "books-of-scenarios": books.scenarios,
     **quoted.RESULTS,
+    **control.RESULTS,
+    **drive.RESULTS,
+    **effort.RESULTS,
+    **robots.RESULTS,
     "peers": benchmarks.peers,
     "speed": benchmarks.speed,
     "control": benchmarks.control,
+    "slip-pid": benchmarks.slip_pid,
 }
 
 
