@@ -21,7 +21,7 @@ double hx_exact_restitution_chi(double e);
 void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
 
 /* The bristles of open feet are slack (eq. 18). */
-void hx_contact_slacken(const hxContactState *contact, hxMotion *motion);
+void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
 /* Touch-down of open feet in the ground, lift-off of closed ones out of it; returns the number of touch-downs. */
 int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact);

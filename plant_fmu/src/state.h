@@ -22,7 +22,7 @@ enum {
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
 
 /* y of y' = f(t, y). The same doubles as a vector for the integrator and by name for the physics. */
-typedef union hxMotion {
+typedef union hxPlantMotion {
   double y[HX_MOTION_SIZE];
   struct {
     double torso[HX_BODY_STATE];
@@ -30,7 +30,7 @@ typedef union hxMotion {
     double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
     double bristle[3][HX_SLOTS]; /* m  b of eq. 18, world axes; 0 and at rest with other laws. The last: they leave it out */
   };
-} hxMotion;
+} hxPlantMotion;
 
 /* A joint and the link it moves; i = parent, j = child (equations.md: s, s^P, a, b). The child's axes here and in its motion are the
  * joint's: x = a, y = b, z = s, so that its rotation matrix holds what the constraint needs. */
@@ -38,8 +38,8 @@ typedef struct hxJointModel {
   double mass[HX_SLOTS];
   double inertia[6][HX_SLOTS];  /* child's axes */
   double s_i[3][HX_SLOTS];      /* joint axis, parent's axes */
-  double sP_i[3][HX_SLOTS];     /* parent's centre of mass to the joint, parent's axes */
-  double sP_j[3][HX_SLOTS];     /* child's centre of mass to the joint, child's axes */
+  double point_i[3][HX_SLOTS];  /* parent's centre of mass to the joint's point, parent's axes */
+  double point_j[3][HX_SLOTS];  /* child's centre of mass to the joint's point, child's axes */
   double zero[4][HX_SLOTS];     /* the turn from the parent's to the child's axes at angle 0 */
   double frame[4][HX_SLOTS];    /* the turn from the link's axes, those of hexapod.h, to the child's axes here */
 } hxJointModel;
@@ -48,7 +48,7 @@ typedef struct hxModel {
   double torso_mass;
   double torso_inertia[6];
   hxJointModel joint[HX_JOINTS];
-  double foot_centre[3][HX_SLOTS];  /* tibia's centre of mass to the foot's centre, tibia's axes */
+  double point_foot[3][HX_SLOTS];  /* tibia's centre of mass to the foot's centre, tibia's axes */
   double foot_radius;
   double gravity[3];
   double alpha, beta;               /* Baumgarte */
@@ -132,7 +132,7 @@ typedef struct hxState {
   double stored_at_start;  /* J  energy the audit starts from */
   double call_start;       /* s  when the call began that an event broke off */
   double call_input;       /* 1  checksum of its input, a whole number; 0: no call was broken off */
-  hxMotion motion;
+  hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
   hxMoment moment;         /* the last step's end */

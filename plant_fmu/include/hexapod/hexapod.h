@@ -272,7 +272,7 @@ HX_API void hx_plant_indicators(const hxPlant *plant,
 HX_API int hx_plant_update_contacts(hxPlant *plant); /* touch-downs and lift-offs that are due; whether coordinates changed (bristles) */
 
 /* What small changes of input and coordinates make of rates and outputs: derivatives along that direction, exact to rounding (complex
- * arithmetic, lanes/tangent.h), contacts held; contact and the solver's counts have none. Either change may be NULL, for none, and so
+ * arithmetic, lanes/complex_step.h), contacts held; contact and the solver's counts have none. Either change may be NULL, for none, and so
  * may either result. HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx,
                                  hxCoordinates *d_rate, hxOutput *d_output);

@@ -52,7 +52,7 @@ static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
   if (model->terrain_kind == HX_TERRAIN_FLAT)
     return (hxGround){point.z - model->ground_point[2], {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
-  return (hxGround){hx_dot(n, hx_sub(point, hx_splat_vec3(model->ground_point))), n};
+  return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
 }
 
 /* g of f_t = -mu f_n g(|v_t|) v_t (eq. 5): tanh(k_t v) / v, whose limit at rest is k_t; the series k_t (1 - (k_t v)^2 / 3) is exact below
@@ -108,12 +108,12 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
   };
 }
 
-static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxMotion *motion, int slot, const hxBody *tibia) {
+static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxPlantMotion *motion, int slot, const hxBody *tibia) {
   const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot);
-  const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->foot_centre, slot));
-  const hxGround ground = hx_ground(model, hx_add(r, to_centre));
+  const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->point_foot, slot));
+  const hxGround ground = hx_ground(model, hx_add3(r, to_centre));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-model->foot_radius), ground.normal);
-  const hxVec3 velocity = hx_add(v, hx_cross(tibia->w, arm));
+  const hxVec3 velocity = hx_add3(v, hx_cross(tibia->w, arm));
   return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance, -hx_dot(velocity, ground.normal), velocity};
 }
 
@@ -125,7 +125,7 @@ static inline void hx_foot_force(const hxModel *model, const hxContactState *con
   foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
   if (model->friction_law == HX_FRICTION_BRISTLE) {
     foot->bristle = hx_bristle(model, hx_load(&contact->closed[slot]), bristle, foot->slip);
-    foot->force = hx_scale(foot->normal.force, hx_sub(kin->normal, foot->bristle.grip));
+    foot->force = hx_scale(foot->normal.force, hx_sub3(kin->normal, foot->bristle.grip));
     return;
   }
   foot->drag_per_load = model->mu * hx_friction(model, foot->slip_speed);

@@ -42,7 +42,7 @@ typedef struct {
 /* ---- moments ---------------------------------------------------------------------------------------------------------------- */
 
 /* Angles, speeds and feet of a motion. */
-static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hxMoment *moment) {
+static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motion, hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     hxBody i = torso, j = torso;
@@ -54,11 +54,11 @@ static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hx
       hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot), hx_link_quat(motion, joint, slot), &sine, &cosine);
       hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
       const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
-      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub(j.w, i.w)));
+      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);
     const hxVec3 to_point = hx_scale(hx_splat(-model->foot_radius), foot.normal);
-    const hxVec3 centre = hx_add(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub(foot.arm, to_point));
+    const hxVec3 centre = hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub3(foot.arm, to_point));
     hx_store_vec3(moment->centre, slot, centre);
     hx_store_vec3(moment->normal, slot, foot.normal);
     hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
@@ -113,7 +113,7 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
 static inline hxReal mean_of(const double *from, const double *to) { return 0.5 * (hx_load(from) + hx_load(to)); }
 
 static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS], int slot) {
-  return hx_scale(hx_splat(0.5), hx_add(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
+  return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
 }
 
 /* 2/5 K delta^(5/2) of a closed foot */
@@ -224,9 +224,9 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
   const hxReal closed = hx_load(&path->contact->closed[slot]), damping = hx_load(&path->contact->damping[slot]);
   const hxVec3 slip_from = hx_load_vec3(from->slip, slot), slip_to = hx_load_vec3(to->slip, slot);
-  const hxVec3 way = hx_sub(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
+  const hxVec3 way = hx_sub3(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
   const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
-  const hxVec3 mean = hx_add(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
+  const hxVec3 mean = hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
   const hxReal delta = hx_load(&from->delta[slot]), slope_from = h * hx_load(&from->ddelta[slot]);
   const hxReal rise = hx_load(&to->delta[slot]) - delta, slope_to = h * hx_load(&to->ddelta[slot]);
   hxReal peak = hx_load(&measured->peak_force[slot]), steepest = hx_load(&measured->peak_rate[slot]);

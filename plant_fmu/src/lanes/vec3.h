@@ -49,8 +49,8 @@ static inline hxVec3 hx_splat_vec3(const hxNumber a[3]) { return (hxVec3){hx_spl
 static inline hxQuat hx_splat_quat(const hxNumber p[4]) { return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])}; }
 
 static inline hxVec3 hx_zero3(void) { return (hxVec3){hx_splat(0.0), hx_splat(0.0), hx_splat(0.0)}; }
-static inline hxVec3 hx_add(hxVec3 a, hxVec3 b) { return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
-static inline hxVec3 hx_sub(hxVec3 a, hxVec3 b) { return (hxVec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
+static inline hxVec3 hx_add3(hxVec3 a, hxVec3 b) { return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
+static inline hxVec3 hx_sub3(hxVec3 a, hxVec3 b) { return (hxVec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
 static inline hxVec3 hx_neg(hxVec3 a) { return (hxVec3){-a.x, -a.y, -a.z}; }
 static inline hxVec3 hx_scale(hxReal s, hxVec3 a) { return (hxVec3){s * a.x, s * a.y, s * a.z}; }
 static inline hxReal hx_dot(hxVec3 a, hxVec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }

@@ -60,7 +60,7 @@ typedef union {
   struct {
     hxNumber torso_turn[8]; /* the last five are padding */
     hxNumber link_turn[HX_JOINTS][3][HX_SLOTS];
-    hxMotion motion;
+    hxPlantMotion motion;
   };
 } hxRate;
 
