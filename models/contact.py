@@ -1,4 +1,4 @@
-"""Foot on ground: normal force with restitution (eq. 4) and friction (eq. 5; bristles: eq. 18, 19).
+"""Foot on ground: normal force with restitution (eq. 14) and friction (eq. 15; bristles: eq. 16-18).
 
 f_n = K delta^1.5 max(0, 1 + d ddelta), with d [s/m] fixed at touch-down from the approach speed there and held to lift-off.
 Most laws are of the form d = chi(e) / v0; chi(e) is what tells them apart.
@@ -95,7 +95,7 @@ def bristle_yield(share: Array) -> Array:
 
 
 def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
-    """(..., 3) Y (v_t.u)+ u/|u|, u = b/b_max: what of the slip velocity (..., 3) [m/s] the foot does not get back (eq. 18)."""
+    """(..., 3) Y (v_t.u)+ u/|u|, u = b/b_max: what of the slip velocity (..., 3) [m/s] the foot does not get back (eq. 16)."""
     u = bristle / presliding
     share = np.linalg.norm(u, axis=-1, keepdims=True)
     along = np.maximum(np.sum(slip * u, axis=-1, keepdims=True), 0.0)
@@ -103,12 +103,12 @@ def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
 
 
 def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """(3,) db/dt [m/s] of a closed foot's bristles (eq. 18)."""
+    """(3,) db/dt [m/s] of a closed foot's bristles (eq. 16)."""
     return slip - sliding_velocity(friction.presliding, slip, bristle)
 
 
 def sliding_friction(friction: Friction, sliding: float) -> float:
-    """mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) of a foot that slides at p [m/s] (eq. 19).
+    """mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) of a foot that slides at p [m/s] (eq. 18).
 
     Static at rest, kinetic well above v_s.
     """
@@ -117,7 +117,7 @@ def sliding_friction(friction: Friction, sliding: float) -> float:
 
 
 def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
-    """(3,) f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau db/dt / b_max (eq. 19).
+    """(3,) f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau db/dt / b_max (eq. 17).
 
     p is the speed of what the foot slides and does not get back: a foot that sticks has static
     friction however it swings.
@@ -143,7 +143,7 @@ class BristleSlopes:
 
 
 def bristle_slopes(friction: Friction, slip: Array, bristle: Array) -> BristleSlopes:
-    """The secants at a slip velocity (3,) [m/s] and a deflection (3,) [m] (eq. 19, eq. 20)."""
+    """The secants at a slip velocity (3,) [m/s] and a deflection (3,) [m] (eq. 17, 21)."""
     u = bristle / friction.presliding
     size, sliding = float(np.linalg.norm(u)), sliding_velocity(friction.presliding, slip, bristle)
     spring = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
@@ -170,7 +170,7 @@ def friction_force(friction: Friction, normal: float, slip: Array, bristle: Arra
 
 
 def friction_drag(friction: Friction, speed: float) -> float:
-    """mu tanh(k_t |v_t|)/|v_t| [s/m]: the tanh law's force over load and slip speed [m/s], eq. 5."""
+    """mu tanh(k_t |v_t|)/|v_t| [s/m]: the tanh law's force over load and slip speed [m/s], eq. 15."""
     if friction.law == "none":
         return 0.0
     x = friction.slope * speed

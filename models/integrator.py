@@ -109,9 +109,9 @@ def feet_of(robot: Robot, body: Array) -> Feet:
 
 
 def try_step(start: Start, h: float) -> Trial:
-    """One step of h [s] by the solver's method (eq. 15, eq. 16), with its error (eq. 20).
+    """One step of h [s] by the solver's method (eq. 19, 20), with its error (eq. 22).
 
-    The vector that eq. 15 advances is what bodies turned by (57,), bodies (247,) and bristles
+    The vector that eq. 19 advances is what bodies turned by (57,), bodies (247,) and bristles
     (18,): the first part tells later stages the angular velocities behind quaternion rates.
     """
     robot, method, solver = start.robot, start.method, start.robot.solver
@@ -148,7 +148,7 @@ def _shifts(change: Array) -> tuple[Array, Array, Array]:
 
 
 def error_norm(robot: Robot, estimate: Array) -> float:
-    """The largest entry of an error estimate (265,) over its scale and the tolerance (eq. 20).
+    """The largest entry of an error estimate (265,) over its scale and the tolerance (eq. 22).
 
     Quaternions of links are those of their joints' axes a, b, s, as the C plant has them.
     """
@@ -210,7 +210,7 @@ def cubic_crossing(
     slope_end: float,
     level: float,
 ) -> float:
-    """Where on [0, 1] the cubic with these ends and slopes reaches a level (eq. 22)."""
+    """Where on [0, 1] the cubic with these ends and slopes reaches a level (eq. 24)."""
     bend = slope_start + slope_end - 2.0 * (end - start)
     curve = end - start - slope_start - bend
     low, high = 0.0, 1.0
@@ -222,7 +222,7 @@ def cubic_crossing(
 
 
 def expected_touch(start: Start, t_low: float, low: Feet, t_high: float, high: Feet) -> float:
-    """When the first open foot will be half a touch depth in, between two times [s] (eq. 22)."""
+    """When the first open foot will be half a touch depth in, between two times [s] (eq. 24)."""
     h, level, first = t_high - t_low, 0.5 * start.touch, 1.0
     for leg in range(LEGS):
         if np.isnan(start.state.damping[leg]) and high.delta[leg] > level:
@@ -272,14 +272,20 @@ def switch_contacts(robot: Robot, state: State) -> State:
         elif not is_open and feet.delta[leg] <= 0.0:
             damping[leg] = math.nan
     bristle = np.where(np.isnan(damping)[:, None], 0.0, state.bristle)
-    return replace(state, damping=damping, bristle=bristle, impact_speed=impact_speed, touchdowns=touchdowns)
+    return replace(
+        state,
+        damping=damping,
+        bristle=bristle,
+        impact_speed=impact_speed,
+        touchdowns=touchdowns,
+    )
 
 
 # error control
 
 
 def step_factor(method: Method, error: float) -> float:
-    """Factor by which the step may change after an attempt with this error (eq. 21)."""
+    """Factor by which the step may change after an attempt with this error (eq. 23)."""
     if error <= 0.0 or math.isnan(error):
         return 0.2 if math.isnan(error) else 5.0
     return float(np.clip(0.9 * error ** (-1.0 / (method.error_order + 1)), 0.2, 5.0))

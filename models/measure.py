@@ -1,4 +1,4 @@
-"""What a step of the integrator did: works and losses (eq. 22), and what is integrated along the step's path (eq. 23).
+"""What a step of the integrator did: works and losses (eq. 27), and what is integrated along the step's path (eq. 28).
 
 A step of h [s] leads from one set of body states (19, 13) to another. The integrator adds up the impulses of its own stage forces;
 everything else here follows from both ends. The fast form is plant_fmu/src/lanes/measure.h.
@@ -77,7 +77,7 @@ def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
 
 
 def step_works(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array) -> Works:
-    """Works of a step (eq. 22): impulses times the mean of the speeds at its ends. closed (6,): feet in contact during the step.
+    """Works of a step (eq. 27): impulses times the mean of the speeds at its ends. closed (6,): feet in contact during the step.
 
     Contact takes the work of the normal force less the growth of its stored energy 2/5 K delta^(5/2).
     """
@@ -111,7 +111,7 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
 
 
 def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array) -> tuple[Array, Array, Array]:
-    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates per step at both ends (eq. 23)."""
+    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates per step at both ends (eq. 28)."""
     bend = slope_start + slope_end - 2.0 * rise
     curve = rise - slope_start - bend
     x = x.reshape(-1, *(1 for _ in np.shape(start)))
@@ -122,7 +122,7 @@ def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Ar
 def measured_step(robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array, damping: Array) -> Measured:
     """What a step did along its path, in position or torque mode.
 
-    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 4 [s/m], nan for feet that are open during the step.
+    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 14 [s/m], nan for feet that are open during the step.
     """
     joints = _joints(robot, before, after, h, command, work)
     return Measured(*joints, *_feet(robot, before, after, h, damping))

@@ -18,7 +18,7 @@ Stage = Callable[[float, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Method:
-    """Coefficients of a method with s stages, as eq. 15 and its error estimate use them."""
+    """Coefficients of a method with s stages, as eq. 19 and its error estimate use them."""
 
     order: int
     error_order: int  # of the embedded method; 0: there is none, so steps are fixed
@@ -36,7 +36,7 @@ class Method:
 
 
 def method_step(method: Method, stage: Stage, y_0: Array, h: float) -> tuple[Array, Array]:
-    """One step of eq. 15 from y_0 (n,) over h [s].
+    """One step of eq. 19 from y_0 (n,) over h [s].
 
     Args:
         method: the coefficients.

@@ -1,4 +1,4 @@
-"""A stage of the integrator (eq. 16), dense: the fast form is plant_fmu/src/lanes/stage.h.
+"""A stage of the integrator (eq. 20), dense: the fast form is plant_fmu/src/lanes/stage.h.
 
 A linearly implicit stage solves eq. 1 with the stiff part of the forces taken where the step leads.
 Without it (z = 0) it is eq. 1 itself, as explicit methods need it.
@@ -114,7 +114,7 @@ def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
 
 
 def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of eq. 16 where the bodies (19, 13) are.
+    """(114, 114) twice: G_x and G_v of eq. 20 where the bodies (19, 13) are.
 
     They are servos and gears on the joints' axes, and each contact along its normal n and, by
     its drag alone, across it.
@@ -149,7 +149,7 @@ def solve_stage(
     z: float,
     change: tuple[Array, Array, Array],
 ) -> StageRate:
-    """Eq. 16 at bodies (19, 13) and bristles (6, 3), dense.
+    """Eq. 20 at bodies (19, 13) and bristles (6, 3), dense.
 
     Args:
         robot, command: as in `accelerations`.

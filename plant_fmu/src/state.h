@@ -28,7 +28,7 @@ typedef union hxPlantMotion {
     double torso[HX_BODY_STATE];
     double actuator_work, push_work, dissipated; /* J */
     double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
-    double bristle[3][HX_SLOTS]; /* m  b of eq. 18, world axes; 0 and at rest with other laws. The last: they leave it out */
+    double bristle[3][HX_SLOTS]; /* m  b of eq. 16, world axes; 0 and at rest with other laws. The last: they leave it out */
   };
 } hxPlantMotion;
 
@@ -53,10 +53,10 @@ typedef struct hxModel {
   double gravity[3];
   double alpha, beta;               /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
-  double stiffness, damping_scale, impact_speed_floor; /* eq. 4; what damping_scale means is the law's business */
-  double mu, slope;                 /* eq. 5 */
-  double presliding, bristle_damping; /* eq. 18, 19 */
-  double static_rise, per_stribeck;   /* eq. 19: mu_s - mu, 1/v_s */
+  double stiffness, damping_scale, impact_speed_floor; /* eq. 14; what damping_scale means is the law's business */
+  double mu, slope;                 /* eq. 15 */
+  double presliding, bristle_damping; /* eq. 16, 17 */
+  double static_rise, per_stribeck;   /* eq. 18: mu_s - mu, 1/v_s */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;
@@ -70,7 +70,7 @@ typedef struct hxCommand {
   double torque[HX_JOINTS][HX_SLOTS];
   double push_force[3], push_torque[3];
   double acceleration[HX_JOINTS][HX_SLOTS];
-  double time;  /* s  when it was given: the kinematic drive goes on from there (eq. 14) */
+  double time;  /* s  when it was given: the kinematic drive goes on from there (eq. 13) */
 } hxCommand;
 
 /* Changes at touch-down and lift-off only, never within a step. */

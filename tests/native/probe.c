@@ -367,7 +367,7 @@ static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIE
   }
 }
 
-/* k/h of a stage (eq. 15) with h gamma = z after changes s_x, s_v (linear, angular rows): the bodies' rates and the angular velocities theirs
+/* k/h of a stage (eq. 19) with h gamma = z after changes s_x, s_v (linear, angular rows): the bodies' rates and the angular velocities theirs
  * stand for. The slopes are this point's, `ahead` of it. */
 HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead, const double s_x[HX_BODIES][6],
                            const double s_v[HX_BODIES][6], double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {

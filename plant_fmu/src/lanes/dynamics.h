@@ -7,7 +7,7 @@
 
 #include "stage.h"
 
-/* ---- the sweeps of eq. 11-12 ----------------------------------------------------------------------------------------------- */
+/* ---- the sweeps of eq. 10-11 ----------------------------------------------------------------------------------------------- */
 
 /* 1/d, d = S.U + what the joint itself resists with */
 static inline hxReal sweep_inverse(const hxModel *model, const hxSweep *sweep, hxReal resists) {
@@ -122,7 +122,7 @@ static inline hxMotion6 from_felt(const hxModel *model, hxMotion6 felt) {
   return (hxMotion6){felt.ang, hx_add3(felt.lin, hx_splat_vec3(model->gravity))};
 }
 
-/* nu of eq. 16, what positions advance with: v + z dv + s_v in a linearly implicit stage, else v */
+/* nu of eq. 20, what positions advance with: v + z dv + s_v in a linearly implicit stage, else v */
 static inline void store_torso_rate(const hxModel *model, const hxPlantMotion *motion, const hxImplicit *implicit, const hxWork *work,
                                     hxRate *rate) {
   const hxMotion6 dv = from_felt(model, work->torso_acceleration);
@@ -190,7 +190,7 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
 }
 
 /* Powers of motors and pushes, and what contact damping, friction and gears take. They are rates for the
- * solvers of others: a step of ours takes its works from its impulses (eq. 22). */
+ * solvers of others: a step of ours takes its works from its impulses (eq. 27). */
 static inline void store_powers(const hxModel *model, const hxCommand *command, const hxPlantMotion *motion, const hxWork *work,
                                 hxPlantMotion *rate) {
   const hxLossPowers losses = hx_loss_powers(model, work);
@@ -241,7 +241,7 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
   }
 }
 
-/* Everything at (t, y): work, and dy/dt into rate. With implicit, rate is k/h of that stage (eq. 15) instead. The multipliers are found when
+/* Everything at (t, y): work, and dy/dt into rate. With implicit, rate is k/h of that stage (eq. 19) instead. The multipliers are found when
  * asked for, and in kinematic mode. */
 static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact, const hxCommand *command, double t,
                                  const hxPlantMotion *motion, hxImplicit *implicit, int multipliers, hxWork *work, hxRate *rate) {

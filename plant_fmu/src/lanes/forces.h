@@ -17,7 +17,7 @@ typedef struct {
 } hxChain;
 
 /* The drive's acceleration: the rheonomic constraint q = q_ref + qd_ref s + qdd_ref s^2/2,
- * s = t - t_command, with Baumgarte (eq. 14). */
+ * s = t - t_command, with Baumgarte (eq. 13). */
 static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *command, double t, int joint, int slot,
                                         const hxJointWork *k) {
   const hxReal angle_ref = hx_load(&command->angle[joint][slot]), speed_ref = hx_load(&command->speed[joint][slot]);
@@ -28,7 +28,7 @@ static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *c
   return acceleration_ref - 2.0 * model->alpha * slower - model->beta * model->beta * error;
 }
 
-/* dw of eq. 10: rows 4 and 5 of D on it are c = gamma - 2 alpha dPhi - beta^2 Phi, s.dw is 0 or the drive's qdd.
+/* dw of eq. 9: rows 4 and 5 of D on it are c = gamma - 2 alpha dPhi - beta^2 Phi, s.dw is 0 or the drive's qdd.
  * With x = w_i x w_j taken out, gamma is Phi |w|^2 - w qd of the relative w, w_ij_j in the child's axes,
  * in which what is left is solved. */
 static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i, const hxBody *j, hxReal speed,

@@ -94,7 +94,7 @@ static inline void combine(const hxModel *model, double *out, const double *base
 
 static inline double larger(double a, double b) { return b > a ? b : a; }
 
-/* largest error over scale; NaN is the caller's to find */
+/* largest error over scale and tolerance (eq. 22); NaN is the caller's to find */
 static double error_norm(const hxModel *model, const hxPlantMotion *error) {
   hxReal links = hx_splat(0.0);
   double largest[HX_LANES];
@@ -139,7 +139,7 @@ static void move_drive(const hxCommand *from, const hxCommand *rate, double elap
       from->angle[joint][slot] + elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
 }
 
-/* The command at a time; in kinematic mode drives go on between rates as without (eq. 14). */
+/* The command at a time; in kinematic mode drives go on between rates as without (eq. 13). */
 static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
   enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   const double *from = (const double *)start->command, *rate = (const double *)start->ramp;
@@ -199,7 +199,7 @@ static double open_depth(const hxContactState *contact, const hxFeet *feet) {
   return depth;
 }
 
-/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends: bisection. */
+/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends (eq. 24): bisection. */
 static double cubic_crossing(double from, double slope_from, double to, double slope_to, double level) {
   const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise, curve = rise - slope_from - bend;
   double low = 0.0, high = 1.0;
@@ -258,7 +258,7 @@ static double inverse_root(double x, int n) {
   return r;
 }
 
-/* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5. */
+/* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5 (eq. 23). */
 static double step_factor(const hxMethodRow *method, double error) {
   const int n = method->error_order + 1;
   double large = 1.0, small = 1.0;

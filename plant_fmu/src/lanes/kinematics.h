@@ -17,7 +17,7 @@ typedef struct {
   hxVec3 sP_i, sP_j; /* centres of mass to the joint's point, world axes; body-fixed they are point_i, point_j */
 } hxJointKinematics;
 
-/* Phi and its rate (eq. 2): rows 1-3, rows 4-5. */
+/* Phi (eq. 4) and its rate, D of eq. 2 times the velocities: rows 1-3, rows 4-5. */
 typedef struct {
   hxVec3 phi_lin, dphi_lin;
   hxReal phi[2], dphi[2];

@@ -1,9 +1,9 @@
 /* measure.h - what a step did: works, losses, slip, impulses and peaks of joints and feet
  *
- * Works and losses are the impulses of the step's own forces times the mean of the speeds at its ends (eq. 22), so that they explain
- * the change of kinetic energy. What is no work is integrated along the step's path between its ends (hxMoment, eq. 23): angles and
+ * Works and losses are the impulses of the step's own forces times the mean of the speeds at its ends (eq. 27), so that they explain
+ * the change of kinetic energy. What is no work is integrated along the step's path between its ends (hxMoment, eq. 28): angles and
  * depths follow cubics through values and rates, sliding velocities parabolas through values and mean. A landing's rise of force is
- * taken over a millisecond (eq. 24): its derivative jumps with every command, so its largest value is that of an instant. Nothing
+ * taken over a millisecond (eq. 29): its derivative jumps with every command, so its largest value is that of an instant. Nothing
  * depends on how often anyone looks at the plant.
  */
 #ifndef HX_MEASURE_H
@@ -108,7 +108,7 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
   if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
 }
 
-/* ---- works and losses (eq. 22) ----------------------------------------------------------------------------------------------- */
+/* ---- works and losses (eq. 27) ----------------------------------------------------------------------------------------------- */
 
 static inline hxReal mean_of(const double *from, const double *to) { return 0.5 * (hx_load(from) + hx_load(to)); }
 

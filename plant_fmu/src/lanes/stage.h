@@ -1,11 +1,11 @@
-/* stage.h - what a stage of a linearly implicit method adds to the forces and to the inertia (eq. 15, 16, 20) */
+/* stage.h - what a stage of a linearly implicit method adds to the forces and to the inertia (eq. 19, 20, 21) */
 #ifndef HX_STAGE_H
 #define HX_STAGE_H
 
 #include "forces.h"
 
-/* The slopes of this stage's forces, the contact's where it will be a step ahead: a foot that has just touched down has none yet, and a W
- * without them lets go of the very contact that it is there for. */
+/* The slopes of this stage's forces, the contact's where it will be a step ahead: a foot that has just touched down has none yet, and W
+ * would miss the contact. */
 static inline void keep_slopes(const hxModel *model, const hxContactState *contact, int pack, const hxLegWork *leg, hxImplicit *implicit) {
   const hxFootWork *foot = &leg->foot;
   const int slot = pack * HX_LANES;
@@ -83,7 +83,7 @@ static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion 
   push_tibia(leg, contact_point(leg), leg->response);
 }
 
-/* what the bristles' own shift s_b + z db/dt, shared out by how they let go, takes off the foot's force (eq. 20) */
+/* what the bristles' own shift s_b + z db/dt, shared out by how they let go, takes off the foot's force (eq. 21) */
 static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegWork *leg) {
   const hxVec3 own = hx_scale(hx_splat(implicit->z), leg->foot.bristle.rate);
   const hxVec3 moved = implicit->change ? hx_add3(hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES), own) : own;
@@ -125,7 +125,7 @@ static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *le
   return hx_add3(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm), hx_splat_vec3(model->gravity));
 }
 
-/* db/dt of a stage (eq. 20): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the ground, f what the law says */
+/* db/dt of a stage (eq. 21): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the ground, f what the law says */
 static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *contact, const hxImplicit *implicit, int pack,
                                   const hxLegWork *leg) {
   hxVec3 rate = leg->foot.bristle.rate;
