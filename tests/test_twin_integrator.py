@@ -19,6 +19,7 @@ from hexapod_cosim.models.integrator import (
     Start,
     State,
     cubic_crossing,
+    error_norm,
     integrate,
     project,
     start_state,
@@ -112,6 +113,21 @@ def test_the_step_factor_aims_at_the_tolerance_within_its_limits() -> None:
     assert step_factor(METHOD["ros2"], 8.1e-1) == pytest.approx(1.0)  # 0.9^2
     assert step_factor(METHOD["dp54"], 0.0) == step_factor(METHOD["dp54"], 1e-9) == 5.0
     assert step_factor(METHOD["dp54"], 1e9) == step_factor(METHOD["dp54"], math.nan) == 0.2
+
+
+def test_an_error_counts_by_its_scale_and_quaternions_by_their_joints_axes() -> None:
+    """A coxa's axes a, b, s are its link's turned by 90 degrees about z: 1 becomes 0.7071."""
+    robot = changed(load_robot("athena"), solver={"tolerance": 1e-3})
+    for row, entry, expected in [
+        (0, 0, 1e4),  # 0.1 m
+        (5, 8, 1e3),  # 1 m/s
+        (5, 12, 1e2),  # 10 rad/s
+        (0, 3, 1e3),
+        (1, 3, 707.10678),
+    ]:
+        estimate = np.zeros(19 * 13 + 18)
+        estimate[13 * row + entry] = 1.0
+        assert error_norm(robot, estimate) == pytest.approx(expected)
 
 
 def test_a_cubic_is_crossed_where_it_reaches_the_level() -> None:
@@ -216,6 +232,15 @@ def test_steps_in_flight_are_the_plants(core: ct.CDLL, name: str) -> None:
     command = random_command(robot, 1)
     state = assert_same_steps(core, robot, body_states(robot, **flying), command, [2.0 * h])
     assert np.all(np.isnan(state.damping))
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_a_step_cut_short_by_the_end_does_not_shorten_the_next(core: ct.CDLL, name: str) -> None:
+    robot = changed(lopsided(), solver={"method": name, "step": 0.0, "tolerance": 1e-4})
+    flying = random_pose(robot, 1) | {"position": np.array([0.0, 0.0, 2.0])}
+    body, command = body_states(robot, **flying), random_command(robot, 1)
+    state = assert_same_steps(core, robot, body, command, [2e-3, 2.001e-3])
+    assert state.next_step > 5e-5  # five times the last step would be 5e-6
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -1,4 +1,4 @@
-/* integrator.h - from one time to another, stopping at every touch-down */
+/* integrator.h - from one time to another, stopping at every touch-down; its readable form is models/integrator.py */
 #ifndef HX_INTEGRATOR_H
 #define HX_INTEGRATOR_H
 

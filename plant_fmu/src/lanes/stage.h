@@ -1,4 +1,5 @@
-/* stage.h - what a stage of a linearly implicit method adds to the forces and to the inertia (eq. 19, 20, 21) */
+/* stage.h - what a stage of a linearly implicit method adds to the forces and to the inertia (eq. 19-21);
+ * its readable form is models/stage.py */
 #ifndef HX_STAGE_H
 #define HX_STAGE_H
 
