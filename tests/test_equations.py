@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "equations.md"
 OF_PAPER = 5  # equations that the source has
 TAG = re.compile(r"\\tag\{([^}]*)\}")
-CITED = re.compile(r"(paper )?\b[Ee]q\. (\d+(?:(?:-|, | and )\d+\b(?!\.\d))*)")
+CITED = re.compile(r"(paper )?\b[Ee]qs?\. (\d+(?:(?:-|, | and )\d+\b(?!\.\d))*)")
 IN_PAGE = re.compile(r"(?<![\w$\\{}])\((\d{1,2})\)(?!\d)")  # in the page's prose a number alone
 TEXTS = {".c", ".h", ".py", ".md", ".toml", ".ipynb", ".cpp"}
 
