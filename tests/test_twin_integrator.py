@@ -83,9 +83,13 @@ def test_each_method_has_its_order_with_a_wrong_matrix_that_moves(name: str, slo
 
 def amplified(name: str, matrix: Array, y: Array) -> Array:
     """y_1 of y' = matrix y over h = 1 with the exact A."""
-    m, one = METHOD[name], np.eye(len(y))
-    W = one - m.gamma * matrix
-    return method_step(m, lambda _, at, s: np.linalg.solve(W, matrix @ (at + s)), y, 1.0)[0]
+    m = METHOD[name]
+    W = np.eye(len(y)) - m.gamma * matrix
+
+    def stage(elapsed: float, y_i: Array, change: Array) -> Array:
+        return np.asarray(np.linalg.solve(W, matrix @ (y_i + change)), dtype=np.float64)
+
+    return method_step(m, stage, y, 1.0)[0]
 
 
 @pytest.mark.parametrize("name", IMPLICIT)
