@@ -94,7 +94,7 @@ def step_works(robot: Robot, before: Array, after: Array, h: float, impulses: Im
 
 
 def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
-    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n) of the friction cone (eq. 25).
+    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n) of the friction cone (eq. 30).
 
     The share is that of the step's impulses. Bins begin at 0.9 (i/30)^2.
     """
@@ -168,10 +168,10 @@ def _feet(robot: Robot, before: Array, after: Array, h: float, damping: Array) -
 
 
 def landing_rate(robot: Robot, time: Array, delta: Array, ddelta: Array, damping: Array) -> float:
-    """Largest rise [N/s] of one foot's normal force over 1 ms, in windows that end every 0.1 ms of the 20 ms after touch-down (eq. 24).
+    """Largest rise [N/s] of one foot's normal force over 1 ms, in windows that end every 0.1 ms of the 20 ms after touch-down (eq. 29).
 
     time (n,) [s]: ends of the steps since touch-down, which is the first; delta, ddelta (n,) [m, m/s]: penetration and approach speed
-    there; damping (n - 1,): d of eq. 4 [s/m] during the steps, nan where the foot is open. Before touch-down there is no force.
+    there; damping (n - 1,): d of eq. 14 [s/m] during the steps, nan where the foot is open. Before touch-down there is no force.
     """
     samples = np.arange(1, LANDING_SAMPLES + 1) * LANDING_SAMPLE + time[0]
     force = [_force_at(robot, t, time, delta, ddelta, damping) for t in samples[samples <= time[-1]]]

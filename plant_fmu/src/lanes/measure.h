@@ -267,7 +267,7 @@ static inline double force_within(const hxPath *path, int leg, double x) {
 }
 
 /* The samples of one leg's landing that are within a step: the force at times t_n after touch-down, and its rise over the window that
- * ends there (eq. 24). Before touch-down there was none. */
+ * ends there (eq. 29). Before touch-down there was none. */
 static inline void measure_landing(const hxPath *path, int leg, hxMeasured *measured) {
   for (; measured->landing_left[leg] > 0.0; measured->landing_left[leg] -= 1.0) {
     const int n = LANDING_SAMPLES + 1 - (int)measured->landing_left[leg];
