@@ -1,4 +1,4 @@
-"""What a step of the integrator did: works and losses (eq. 22), and what is integrated along the step's path (eq. 23).
+"""What a step of the integrator did: works and losses (eq. 27), and what is integrated along the step's path (eq. 28).
 
 A step of h [s] leads from one set of body states (19, 13) to another. The integrator adds up the impulses of its own stage forces;
 everything else here follows from both ends. The fast form is plant_fmu/src/lanes/measure.h.
@@ -77,7 +77,7 @@ def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
 
 
 def step_works(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array) -> Works:
-    """Works of a step (eq. 22): impulses times the mean of the speeds at its ends. closed (6,): feet in contact during the step.
+    """Works of a step (eq. 27): impulses times the mean of the speeds at its ends. closed (6,): feet in contact during the step.
 
     Contact takes the work of the normal force less the growth of its stored energy 2/5 K delta^(5/2).
     """
@@ -94,7 +94,7 @@ def step_works(robot: Robot, before: Array, after: Array, h: float, impulses: Im
 
 
 def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
-    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n) of the friction cone (eq. 25).
+    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n) of the friction cone (eq. 30).
 
     The share is that of the step's impulses. Bins begin at 0.9 (i/30)^2.
     """
@@ -111,7 +111,7 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
 
 
 def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array) -> tuple[Array, Array, Array]:
-    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates per step at both ends (eq. 23)."""
+    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates per step at both ends (eq. 28)."""
     bend = slope_start + slope_end - 2.0 * rise
     curve = rise - slope_start - bend
     x = x.reshape(-1, *(1 for _ in np.shape(start)))
@@ -122,7 +122,7 @@ def cubic(start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Ar
 def measured_step(robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array, damping: Array) -> Measured:
     """What a step did along its path, in position or torque mode.
 
-    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 4 [s/m], nan for feet that are open during the step.
+    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 14 [s/m], nan for feet that are open during the step.
     """
     joints = _joints(robot, before, after, h, command, work)
     return Measured(*joints, *_feet(robot, before, after, h, damping))
@@ -168,10 +168,10 @@ def _feet(robot: Robot, before: Array, after: Array, h: float, damping: Array) -
 
 
 def landing_rate(robot: Robot, time: Array, delta: Array, ddelta: Array, damping: Array) -> float:
-    """Largest rise [N/s] of one foot's normal force over 1 ms, in windows that end every 0.1 ms of the 20 ms after touch-down (eq. 24).
+    """Largest rise [N/s] of one foot's normal force over 1 ms, in windows that end every 0.1 ms of the 20 ms after touch-down (eq. 29).
 
     time (n,) [s]: ends of the steps since touch-down, which is the first; delta, ddelta (n,) [m, m/s]: penetration and approach speed
-    there; damping (n - 1,): d of eq. 4 [s/m] during the steps, nan where the foot is open. Before touch-down there is no force.
+    there; damping (n - 1,): d of eq. 14 [s/m] during the steps, nan where the foot is open. Before touch-down there is no force.
     """
     samples = np.arange(1, LANDING_SAMPLES + 1) * LANDING_SAMPLE + time[0]
     force = [_force_at(robot, t, time, delta, ddelta, damping) for t in samples[samples <= time[-1]]]

@@ -98,10 +98,10 @@ class Friction:
     mu: Annotated[float, Number("1", at_least=0.0)]
     # of a foot that sticks, bristle law; 0 or absent: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5, tanh law
-    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # b_max of eq. 18, bristle law; absent in a file: Mindlin
-    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]  # tau of eq. 19, bristle law
-    # v_s of eq. 19, bristle law
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law
+    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]  # b_max of eq. 16, bristle law; absent in a file: Mindlin
+    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]  # tau of eq. 17, bristle law
+    # v_s of eq. 18, bristle law
     stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = 0.005
 
 

@@ -1,4 +1,4 @@
-/* contact_law.h - what damps a contact (eq. 4): fixed at touch-down by the law and the speed of impact, held until lift-off */
+/* contact_law.h - what damps a contact (eq. 14): fixed at touch-down by the law and the speed of impact, held until lift-off */
 #ifndef HX_CONTACT_LAW_H
 #define HX_CONTACT_LAW_H
 
@@ -20,8 +20,8 @@ double hx_exact_restitution_chi(double e);
 /* The contact states of a motion that starts here: feet in the ground are closed and count as put down slowly. */
 void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
 
-/* The bristles of open feet are slack (eq. 18). */
-void hx_contact_slacken(const hxContactState *contact, hxMotion *motion);
+/* The bristles of open feet are slack (eq. 16). */
+void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
 /* Touch-down of open feet in the ground, lift-off of closed ones out of it; returns the number of touch-downs. */
 int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS], const double ddelta[HX_SLOTS], hxContactState *contact);

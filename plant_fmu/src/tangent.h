@@ -1,4 +1,4 @@
-/* tangent.h - derivatives of rates and outputs along a direction, from the physics on complex numbers (lanes/tangent.h) */
+/* tangent.h - derivatives of rates and outputs along a direction, from the physics on complex numbers (lanes/complex_step.h) */
 #ifndef HX_TANGENT_H
 #define HX_TANGENT_H
 

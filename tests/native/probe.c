@@ -318,7 +318,7 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   const int lane = leg % HX_LANES, pack = leg / HX_LANES;
   const hxFootWork *foot = &work.pack[pack].foot;
   const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
-  put3(hx_add(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3), put3(foot->kin.normal, lane, out + 6);
+  put3(hx_add3(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3), put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
   out[14] = hx_lane(implicit.slope[pack].stiffness, lane), out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
@@ -334,7 +334,7 @@ HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age, doub
   power[0] = rate.motion.actuator_work, power[1] = rate.motion.push_work, power[2] = rate.motion.dissipated;
 }
 
-static void fill_bristles(const double z[HX_LEGS][3], hxMotion *motion) {
+static void fill_bristles(const double z[HX_LEGS][3], hxPlantMotion *motion) {
   for (int i = 0; i < 3; ++i) {
     for (int leg = 0; leg < HX_LEGS; ++leg) motion->bristle[i][leg] = z[leg][i];
     hx_fill_slots(motion->bristle[i]);
@@ -367,7 +367,7 @@ static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIE
   }
 }
 
-/* k/h of a stage (eq. 15) with h gamma = z after changes s_x, s_v (linear, angular rows): the bodies' rates and the angular velocities theirs
+/* k/h of a stage (eq. 19) with h gamma = z after changes s_x, s_v (linear, angular rows): the bodies' rates and the angular velocities theirs
  * stand for. The slopes are this point's, `ahead` of it. */
 HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead, const double s_x[HX_BODIES][6],
                            const double s_v[HX_BODIES][6], double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {
@@ -394,7 +394,7 @@ HX_API void hx_probe_stain_stack(int byte) {
 /* dy/dt by the i-th kernel; its name, or NULL when there is none or it does not run here */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input, double body[HX_BODIES][HX_BODY_STATE]) {
   hxCommand command;
-  hxMotion rate;
+  hxPlantMotion rate;
   for (int k = 0; k <= i; ++k)
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->runs_here()) return NULL;

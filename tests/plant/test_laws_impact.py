@@ -83,7 +83,7 @@ def test_each_classic_law_asked_for_a_half_gives_its_reference_figure(core: ct.C
 def test_hertz_gives_everything_back(core: ct.CDLL) -> None:
     bounced = flown_off(falling(core, rigid("hertz"), speed=0.4))
     assert bounced.torso.velocity[2] == pytest.approx(0.4, rel=1e-6)
-    assert bounced.energy.dissipated == pytest.approx(0.0, abs=1e-6 * bounced.energy.kinetic)  # eq. 22 is of order 2 in the step
+    assert bounced.energy.dissipated == pytest.approx(0.0, abs=1e-6 * bounced.energy.kinetic)  # eq. 27 is of order 2 in the step
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.8])

@@ -79,7 +79,7 @@ typedef struct hxDefinition {
   double foot_radius;  /* m */
   struct {
     int law;                    /* hxContactLaw */
-    double stiffness;           /* N/m^1.5  K of eq. 4 */
+    double stiffness;           /* N/m^1.5  K of eq. 14 */
     double restitution;         /* 1        [0, 1]; the dissipative laws need > 0 */
     double damping_factor;      /* s/m      c of the constant law F = K d^1.5 (1 + 1.5 c dd) */
     double impact_speed_floor;  /* m/s      a slower touch-down counts as this fast */
@@ -87,11 +87,11 @@ typedef struct hxDefinition {
   struct {
     int law;                 /* hxFrictionLaw */
     double mu;               /* 1 */
-    double slope;            /* s/m  k_t of eq. 5, of the tanh law */
-    double presliding;       /* m    b_max of eq. 18, of the bristle law: a foot pushed this far slides */
-    double bristle_damping;  /* s    tau of eq. 19, of the bristle law: damping over stiffness */
+    double slope;            /* s/m  k_t of eq. 15, of the tanh law */
+    double presliding;       /* m    b_max of eq. 16, of the bristle law: a foot pushed this far slides */
+    double bristle_damping;  /* s    tau of eq. 17, of the bristle law: damping over stiffness */
     double mu_static;        /* 1    of a foot that sticks, of the bristle law; 0: mu */
-    double stribeck_speed;   /* m/s  v_s of eq. 19, of the bristle law: half-way from mu_static to mu */
+    double stribeck_speed;   /* m/s  v_s of eq. 18, of the bristle law: half-way from mu_static to mu */
   } friction;
   struct {
     int mode;                 /* hxServoMode, all joints */
@@ -157,7 +157,7 @@ typedef struct hxOutput {
     double position[HX_LEGS][3];          /* m    contact point: the foot's lowest towards the ground */
     double velocity[HX_LEGS][3];          /* m/s  of the foot's material point there */
     double slip_speed[HX_LEGS];           /* m/s  tangential part of it */
-    double bristle[HX_LEGS][3];           /* m    b of eq. 18, the bristle law's; 0 with others */
+    double bristle[HX_LEGS][3];           /* m    b of eq. 16, the bristle law's; 0 with others */
     double penetration[HX_LEGS];          /* m    < 0: clearance */
     double impact_speed[HX_LEGS];         /* m/s  at the last touch-down */
     double slip_distance[HX_LEGS];        /* m    along the ground while the foot bears more than 1 % of the weight, since the start */
@@ -272,7 +272,7 @@ HX_API void hx_plant_indicators(const hxPlant *plant,
 HX_API int hx_plant_update_contacts(hxPlant *plant); /* touch-downs and lift-offs that are due; whether coordinates changed (bristles) */
 
 /* What small changes of input and coordinates make of rates and outputs: derivatives along that direction, exact to rounding (complex
- * arithmetic, lanes/tangent.h), contacts held; contact and the solver's counts have none. Either change may be NULL, for none, and so
+ * arithmetic, lanes/complex_step.h), contacts held; contact and the solver's counts have none. Either change may be NULL, for none, and so
  * may either result. HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input, const hxCoordinates *dx,
                                  hxCoordinates *d_rate, hxOutput *d_output);

@@ -1,9 +1,9 @@
 /* measure.h - what a step did: works, losses, slip, impulses and peaks of joints and feet
  *
- * Works and losses are the impulses of the step's own forces times the mean of the speeds at its ends (eq. 22), so that they explain
- * the change of kinetic energy. What is no work is integrated along the step's path between its ends (hxMoment, eq. 23): angles and
+ * Works and losses are the impulses of the step's own forces times the mean of the speeds at its ends (eq. 27), so that they explain
+ * the change of kinetic energy. What is no work is integrated along the step's path between its ends (hxMoment, eq. 28): angles and
  * depths follow cubics through values and rates, sliding velocities parabolas through values and mean. A landing's rise of force is
- * taken over a millisecond (eq. 24): its derivative jumps with every command, so its largest value is that of an instant. Nothing
+ * taken over a millisecond (eq. 29): its derivative jumps with every command, so its largest value is that of an instant. Nothing
  * depends on how often anyone looks at the plant.
  */
 #ifndef HX_MEASURE_H
@@ -42,7 +42,7 @@ typedef struct {
 /* ---- moments ---------------------------------------------------------------------------------------------------------------- */
 
 /* Angles, speeds and feet of a motion. */
-static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hxMoment *moment) {
+static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motion, hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     hxBody i = torso, j = torso;
@@ -54,11 +54,11 @@ static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hx
       hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot), hx_link_quat(motion, joint, slot), &sine, &cosine);
       hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
       const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
-      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub(j.w, i.w)));
+      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);
     const hxVec3 to_point = hx_scale(hx_splat(-model->foot_radius), foot.normal);
-    const hxVec3 centre = hx_add(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub(foot.arm, to_point));
+    const hxVec3 centre = hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub3(foot.arm, to_point));
     hx_store_vec3(moment->centre, slot, centre);
     hx_store_vec3(moment->normal, slot, foot.normal);
     hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
@@ -108,12 +108,12 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
   if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
 }
 
-/* ---- works and losses (eq. 22) ----------------------------------------------------------------------------------------------- */
+/* ---- works and losses (eq. 27) ----------------------------------------------------------------------------------------------- */
 
 static inline hxReal mean_of(const double *from, const double *to) { return 0.5 * (hx_load(from) + hx_load(to)); }
 
 static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS], int slot) {
-  return hx_scale(hx_splat(0.5), hx_add(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
+  return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
 }
 
 /* 2/5 K delta^(5/2) of a closed foot */
@@ -224,9 +224,9 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   const hxReal zero = hx_splat(0.0), h = hx_splat(path->h), per_step = hx_splat(1.0 / path->h);
   const hxReal closed = hx_load(&path->contact->closed[slot]), damping = hx_load(&path->contact->damping[slot]);
   const hxVec3 slip_from = hx_load_vec3(from->slip, slot), slip_to = hx_load_vec3(to->slip, slot);
-  const hxVec3 way = hx_sub(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
+  const hxVec3 way = hx_sub3(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
   const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
-  const hxVec3 mean = hx_add(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
+  const hxVec3 mean = hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
   const hxReal delta = hx_load(&from->delta[slot]), slope_from = h * hx_load(&from->ddelta[slot]);
   const hxReal rise = hx_load(&to->delta[slot]) - delta, slope_to = h * hx_load(&to->ddelta[slot]);
   hxReal peak = hx_load(&measured->peak_force[slot]), steepest = hx_load(&measured->peak_rate[slot]);
@@ -267,7 +267,7 @@ static inline double force_within(const hxPath *path, int leg, double x) {
 }
 
 /* The samples of one leg's landing that are within a step: the force at times t_n after touch-down, and its rise over the window that
- * ends there (eq. 24). Before touch-down there was none. */
+ * ends there (eq. 29). Before touch-down there was none. */
 static inline void measure_landing(const hxPath *path, int leg, hxMeasured *measured) {
   for (; measured->landing_left[leg] > 0.0; measured->landing_left[leg] -= 1.0) {
     const int n = LANDING_SAMPLES + 1 - (int)measured->landing_left[leg];

@@ -22,7 +22,7 @@ static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
 static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) { return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w))); }
 
 /* of bodies and rotors */
-static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *motion, const hxWork *work) {
   const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J, hx_torso_vec3(motion, HX_V), work->torso.w);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -39,7 +39,7 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion, 
 }
 
 /* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
-static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion, const hxWork *work) {
+static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion, const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
   hxReal legs[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -73,7 +73,7 @@ static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, i
 
 static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot, hxVec3 tibia, int lane, int leg, hxOutput *o) {
   get3(foot->force, lane, o->foot.force[leg]);
-  get3(hx_add(tibia, foot->kin.arm), lane, o->foot.position[leg]);
+  get3(hx_add3(tibia, foot->kin.arm), lane, o->foot.position[leg]);
   get3(foot->kin.velocity, lane, o->foot.velocity[leg]);
   o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
   o->foot.tangential_force[leg] = tangential_force(model, foot, lane);
@@ -90,7 +90,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
   o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
 }
 
-static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) {
+static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
   const hxMat3 R = work->torso.axes;
   hxNumber x[3], y[3], z[3]; /* columns of R */
@@ -109,7 +109,7 @@ static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) 
 }
 
 /* norms of Phi and dPhi/dt over all joints */
-static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutput *o) {
+static void fill_constraint(const hxModel *model, const hxPlantMotion *motion, hxOutput *o) {
   hxReal position[HX_PACKS], velocity[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     position[pack] = velocity[pack] = hx_splat(0.0);
@@ -124,7 +124,7 @@ static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutp
 }
 
 static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work, hxOutput *o) {
-  const hxMotion *m = &state->motion;
+  const hxPlantMotion *m = &state->motion;
   o->energy.kinetic = hx_kinetic_energy(model, m, work);
   o->energy.potential = hx_potential_energy(model, m, work);
   o->energy.actuator_work = m->actuator_work;
@@ -187,7 +187,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
 #endif
 
 /* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's bodies */
-static inline void hx_accelerations_fill(const hxWork *work, const hxMotion *rate, hxNumber acceleration[HX_BODIES][6],
+static inline void hx_accelerations_fill(const hxWork *work, const hxPlantMotion *rate, hxNumber acceleration[HX_BODIES][6],
                                          hxNumber multiplier[HX_BODIES - 1][HX_MULTIPLIERS], hxNumber drive_torque[HX_BODIES - 1]) {
   for (int i = 0; i < 6; ++i) acceleration[0][i] = rate->torso[HX_V + i];
   for (int leg = 0; leg < HX_LEGS; ++leg) {

@@ -49,8 +49,8 @@ static inline hxVec3 hx_splat_vec3(const hxNumber a[3]) { return (hxVec3){hx_spl
 static inline hxQuat hx_splat_quat(const hxNumber p[4]) { return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])}; }
 
 static inline hxVec3 hx_zero3(void) { return (hxVec3){hx_splat(0.0), hx_splat(0.0), hx_splat(0.0)}; }
-static inline hxVec3 hx_add(hxVec3 a, hxVec3 b) { return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
-static inline hxVec3 hx_sub(hxVec3 a, hxVec3 b) { return (hxVec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
+static inline hxVec3 hx_add3(hxVec3 a, hxVec3 b) { return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
+static inline hxVec3 hx_sub3(hxVec3 a, hxVec3 b) { return (hxVec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
 static inline hxVec3 hx_neg(hxVec3 a) { return (hxVec3){-a.x, -a.y, -a.z}; }
 static inline hxVec3 hx_scale(hxReal s, hxVec3 a) { return (hxVec3){s * a.x, s * a.y, s * a.z}; }
 static inline hxReal hx_dot(hxVec3 a, hxVec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
@@ -72,7 +72,7 @@ static inline hxVec3 hx_sym_mul(hxSym3 S, hxVec3 b) {
   return (hxVec3){S.xx * b.x + S.xy * b.y + S.xz * b.z, S.xy * b.x + S.yy * b.y + S.yz * b.z, S.xz * b.x + S.yz * b.y + S.zz * b.z};
 }
 
-/* R of eq. 7; p need not have unit length */
+/* R of eq. 5; p need not have unit length */
 static inline hxMat3 hx_rotation_matrix(hxQuat p) {
   const hxReal two = 2.0 / (p.w * p.w + p.x * p.x + p.y * p.y + p.z * p.z);
   const hxReal x = two * p.x, y = two * p.y, z = two * p.z;
@@ -86,7 +86,7 @@ static inline hxQuat hx_quat_mul(hxQuat a, hxQuat b) {
                   a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 
-/* dp/dt = (0, w) p / 2, w in world axes (eq. 8) */
+/* dp/dt = (0, w) p / 2, w in world axes (eq. 6) */
 static inline hxQuat hx_quaternion_rate(hxQuat p, hxVec3 w) {
   const hxReal x = 0.5 * w.x, y = 0.5 * w.y, z = 0.5 * w.z;
   return (hxQuat){-x * p.x - y * p.y - z * p.z, x * p.w + y * p.z - z * p.y, y * p.w + z * p.x - x * p.z, z * p.w + x * p.y - y * p.x};

@@ -12,8 +12,8 @@ from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown
 
 # the robots, motions and problems of the tests
-ROOMS = ("support", "models", "plant", "controller", "cosim", "design")
-sys.path.extend(str(ROOT / "tests" / room) for room in ROOMS)
+for room in ("support", "models", "plant", "controller", "cosim", "design"):
+    sys.path.append(str(ROOT / "tests" / room))
 
 from building import built, shared_library
 
