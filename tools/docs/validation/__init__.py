@@ -12,8 +12,7 @@ from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown
 
 # the robots, motions and problems of the tests
-for room in ("support", "models", "plant", "controller", "cosim", "design"):
-    sys.path.append(str(ROOT / "tests" / room))
+sys.path.extend(str(ROOT / "tests" / room) for room in ("support", "models", "plant", "controller", "cosim", "design"))
 
 from building import built, shared_library
 
