@@ -29,3 +29,27 @@ def servo_torque(
 def gear_friction(servo: Servo, speed: Array) -> Array:
     """Gear torque on the child [N m], -tau_c tanh(qd / 0.05 rad/s), in every mode."""
     return -servo.coulomb_friction * np.tanh(speed / GEAR_SPEED)
+
+
+def servo_slopes(
+    servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array
+) -> tuple[Array, Array]:
+    """Minus the slopes of `servo_torque` by angle [N m/rad] and speed [N m s/rad], 0 where clipped.
+
+    Shapes are the inputs'. On the torque-speed line the slope by speed is the line's own.
+    """
+    kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
+    wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
+    load = speed / servo.speed_max
+    upper = servo.torque_max * np.clip(1.0 - load, 0.0, 1.0)
+    lower = -servo.torque_max * np.clip(1.0 + load, 0.0, 1.0)
+    torque = np.clip(wanted, lower, upper)
+    free = (lower < wanted) & (wanted < upper)
+    falling = ~free & (torque * load > 0.0) & (np.abs(load) < 1.0)
+    line = np.where(falling, servo.torque_max / servo.speed_max, 0.0)
+    return np.where(free, kp, 0.0), np.where(free, kd, line)
+
+
+def gear_drag(servo: Servo, speed: Array) -> Array:
+    """Minus the slope of `gear_friction` by speed [N m s/rad], shape as the input's."""
+    return servo.coulomb_friction / GEAR_SPEED * (1.0 - np.tanh(speed / GEAR_SPEED) ** 2)

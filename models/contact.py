@@ -1,4 +1,5 @@
-"""Foot on ground: normal force with restitution (eq. 4) and friction (eq. 5; bristles: eq. 18, 19).
+"""Foot on ground: normal force with restitution (eq. 14) and friction (eq. 15; bristles: eq.
+16-18).
 
 f_n = K delta^1.5 max(0, 1 + d ddelta), with d [s/m] fixed at touch-down from the approach speed
 there and held to lift-off. Most laws are of the form d = chi(e) / v0; chi(e) is what tells them
@@ -89,6 +90,20 @@ def normal_force(contact: Contact, damping: float, delta: float, ddelta: float) 
     return contact.stiffness * float(max(delta, 0.0) ** 1.5) * max(0.0, 1.0 + damping * ddelta)
 
 
+def normal_slopes(
+    contact: Contact,
+    damping: float,
+    delta: float,
+    ddelta: float,
+) -> tuple[float, float]:
+    """Slopes of `normal_force`: stiffness by delta [N/m] and viscosity by ddelta [N s/m]."""
+    factor = 1.0 + damping * ddelta
+    if math.isnan(damping) or factor <= 0.0:
+        return 0.0, 0.0
+    root = math.sqrt(max(delta, 0.0))
+    return 1.5 * contact.stiffness * root * factor, contact.stiffness * root**3 * damping
+
+
 def bristle_yield(share: Array) -> Array:
     """Y (any shape): how much of the slip along a bristle is sliding, from 0 at break-away to 1
     at the presliding, a share of 1; C1.
@@ -99,7 +114,7 @@ def bristle_yield(share: Array) -> Array:
 
 def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
     """(..., 3) Y (v_t.u)+ u/|u|, u = b/b_max: what of the slip velocity (..., 3) [m/s] the foot
-    does not get back (eq. 18).
+    does not get back (eq. 16).
     """
     u = bristle / presliding
     share = np.linalg.norm(u, axis=-1, keepdims=True)
@@ -108,12 +123,12 @@ def sliding_velocity(presliding: float, slip: Array, bristle: Array) -> Array:
 
 
 def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
-    """(3,) db/dt [m/s] of a closed foot's bristles (eq. 18)."""
+    """(3,) db/dt [m/s] of a closed foot's bristles (eq. 16)."""
     return slip - sliding_velocity(friction.presliding, slip, bristle)
 
 
 def sliding_friction(friction: Friction, sliding: float) -> float:
-    """mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) of a foot that slides at p [m/s] (eq. 19).
+    """mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) of a foot that slides at p [m/s] (eq. 18).
 
     Static at rest, kinetic well above v_s.
     """
@@ -123,7 +138,7 @@ def sliding_friction(friction: Friction, sliding: float) -> float:
 
 def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array) -> Array:
     """(3,) f_t = -mu(p) f_n (u (3 - u.u)/2 + d room/|(room, d)|) [N], u = b/b_max, d = 3/2 tau
-    db/dt / b_max (eq. 19).
+    db/dt / b_max (eq. 17).
 
     p is the speed of what the foot slides and does not get back: a foot that sticks has static
     friction however it swings.
@@ -146,6 +161,30 @@ def bristle_force(friction: Friction, normal: float, slip: Array, bristle: Array
     return -sliding_friction(friction, sliding) * normal * (spring + damped)
 
 
+@dataclass(frozen=True)
+class BristleSlopes:
+    """Secants of the bristles' friction -f_t/f_n, and of how fast they let go."""
+
+    stiffness: float  # 1/m  of friction over load, by b
+    damping: float  # s/m  of friction over load, by db/dt
+    beta: float  # 1/s  of db/dt, by -b
+
+
+def bristle_slopes(friction: Friction, slip: Array, bristle: Array) -> BristleSlopes:
+    """The secants at a slip velocity (3,) [m/s] and a deflection (3,) [m] (eq. 17, 21)."""
+    u = bristle / friction.presliding
+    size, sliding = float(np.linalg.norm(u)), sliding_velocity(friction.presliding, slip, bristle)
+    spring = (3.0 - min(size, 1.0) ** 2) / (2.0 * max(size, 1.0))
+    per_rate = 1.5 * friction.bristle_damping / friction.presliding
+    push = per_rate * float(np.linalg.norm(slip - sliding))
+    room = 1.0 - spring * size
+    share = room / math.hypot(room, push) if push > 0.0 or room > 0.0 else 0.0
+    mu = sliding_friction(friction, float(np.linalg.norm(sliding)))
+    beta = float(bristle_yield(np.array(size))) * max(float(slip @ u), 0.0)
+    beta /= max(size, BREAK_AWAY) * friction.presliding
+    return BristleSlopes(mu * spring / friction.presliding, mu * per_rate * share, beta)
+
+
 def friction_force(
     friction: Friction, normal: float, slip: Array, bristle: Array | None = None
 ) -> Array:
@@ -158,10 +197,19 @@ def friction_force(
         return np.zeros(3)
     if friction.law == "bristle":
         return bristle_force(friction, normal, slip, np.zeros(3) if bristle is None else bristle)
-    speed = float(np.linalg.norm(slip))
+    return -normal * friction_drag(friction, float(np.linalg.norm(slip))) * slip
+
+
+def friction_drag(friction: Friction, speed: float) -> float:
+    """mu tanh(k_t |v_t|)/|v_t| [s/m]: the tanh law's force over load and slip speed [m/s], eq.
+    15.
+    """
+    if friction.law == "none":
+        return 0.0
     x = friction.slope * speed
-    per_speed = math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
-    return -friction.mu * normal * per_speed * slip
+    return friction.mu * (
+        math.tanh(x) / speed if x > 1e-5 else friction.slope * (1.0 - x * x / 3.0)
+    )
 
 
 @dataclass(frozen=True)

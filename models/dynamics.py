@@ -49,7 +49,7 @@ class Command:
     acceleration_ref: Array = field(
         default_factory=lambda: np.zeros((LEGS, JOINTS))
     )  # rad/s2  kinematic
-    age: float = 0.0  # s  since it was given: a kinematic drive goes on from there (eq. 14)
+    age: float = 0.0  # s  since it was given: a kinematic drive goes on from there (eq. 13)
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class JointKinematics:
 
 
 def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKinematics:
-    """Eq. 2 and 3 for the joint between two bodies (13,), drift allowed. The lost dots of
-    gamma's first row are restored.
+    """Eq. 2-4 for the joint between two bodies (13,), drift allowed. The lost dots of gamma's
+    first row are restored.
     """
     (r_i, p_i, v_i, w_i), (r_j, p_j, v_j, w_j) = split(parent), split(child)
     R_i, R_j = rotation_matrix(p_i), rotation_matrix(p_j)
@@ -199,7 +199,7 @@ def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, A
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
     """(6, 3) s.(dw_j - dw_i) [rad/s2] that keeps a kinematically driven joint on its command.
 
-    The command is q_ref + qd_ref s + qdd_ref s^2/2, s its age; with Baumgarte's terms (eq. 14).
+    The command is q_ref + qd_ref s + qdd_ref s^2/2, s its age; with Baumgarte's terms (eq. 13).
     """
     alpha, beta, age = robot.baumgarte.alpha, robot.baumgarte.beta, command.age
     speed_ref = command.speed_ref + command.acceleration_ref * age

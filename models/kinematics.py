@@ -235,10 +235,10 @@ def joint_speeds(robot: Robot, body: Array) -> Array:
 def foot_centres(robot: Robot, body: Array) -> Array:
     """(6, 3) the feet's centres in the world [m] of bodies (19, 13)."""
     tibias = body[JOINTS::JOINTS]
-    arms = [np.array(leg.links[-1].tip) - np.array(leg.links[-1].com) for leg in robot.legs]
+    points = [np.array(leg.links[-1].tip) - np.array(leg.links[-1].com) for leg in robot.legs]
     return np.array(
         [
-            state[0:3] + rotation_matrix(state[3:7]) @ arm
-            for state, arm in zip(tibias, arms, strict=True)
+            state[0:3] + rotation_matrix(state[3:7]) @ point_foot
+            for state, point_foot in zip(tibias, points, strict=True)
         ]
     )

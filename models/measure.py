@@ -1,5 +1,5 @@
-"""What a step of the integrator did: works and losses (eq. 22), and what is integrated along the
-step's path (eq. 23).
+"""What a step of the integrator did: works and losses (eq. 27), and what is integrated along the
+step's path (eq. 28).
 
 A step of h [s] leads from one set of body states (19, 13) to another. The integrator adds up the
 impulses of its own stage forces; everything else here follows from both ends. The fast form is
@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from hexapod_cosim.models.actuator import servo_torque
-from hexapod_cosim.models.contact import foot_contacts
+from hexapod_cosim.models.contact import foot_contacts, normal_force
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import (
     JOINTS,
@@ -32,6 +32,13 @@ NODES = np.linspace(
 FOOT_WEIGHTS = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0  # Simpson's rule
 MOTOR_WEIGHTS = np.array([1.0, 4.0, 1.0]) / 6.0
 LOAD_SHARE = 0.01  # of the robot's weight: a foot that bears more slips under load
+LANDING_SAMPLE = 1e-4  # s    between two forces of a landing
+LANDING_SAMPLES = 200  # of a landing, which is over 20 ms after touch-down
+CONE_BINS, NEARLY_SLIDING = (
+    31,
+    0.9,
+)  # of the shares of the friction cone that feet use; where the last one begins
+RISE_SAMPLES = 10  # across the window of 1 ms over which a landing's force rises
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,7 @@ def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
 def step_works(
     robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array
 ) -> Works:
-    """Works of a step (eq. 22): impulses times the mean of the speeds at its ends. closed (6,):
+    """Works of a step (eq. 27): impulses times the mean of the speeds at its ends. closed (6,):
     feet in contact during the step.
 
     Contact takes the work of the normal force less the growth of its stored energy 2/5 K
@@ -115,11 +122,33 @@ def step_works(
     return Works(impulses.motor * speed, contact, friction, -float(np.sum(impulses.gear * speed)))
 
 
+def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
+    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n)
+    of the friction cone (eq. 30).
+
+    The share is that of the step's impulses. Bins begin at 0.9 (i/30)^2.
+    """
+    time = np.zeros(CONE_BINS)
+    least = h * LOAD_SHARE * robot.total_mass * float(np.linalg.norm(robot.gravity))
+    edges = NEARLY_SLIDING * (np.arange(CONE_BINS) / (CONE_BINS - 1)) ** 2
+    for leg, (first, last) in enumerate(
+        zip(foot_contacts(robot, before), foot_contacts(robot, after), strict=True)
+    ):
+        normal = 0.5 * (first.normal + last.normal)
+        pressed = float(impulses.foot[leg] @ normal)
+        if pressed > least:
+            share = float(np.linalg.norm(impulses.foot[leg] - pressed * normal)) / (
+                robot.friction.mu * pressed
+            )
+            time[np.flatnonzero(edges <= share)[-1]] += h
+    return time
+
+
 def cubic(
     start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array
 ) -> tuple[Array, Array, Array]:
     """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates
-    per step at both ends (eq. 23).
+    per step at both ends (eq. 28).
     """
     bend = slope_start + slope_end - 2.0 * rise
     curve = rise - slope_start - bend
@@ -139,8 +168,8 @@ def measured_step(
 ) -> Measured:
     """What a step did along its path, in position or torque mode.
 
-    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 4 [s/m], nan for feet
-    that are open during the step.
+    work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 14 [s/m], nan for
+    feet that are open during the step.
     """
     joints = _joints(robot, before, after, h, command, work)
     return Measured(*joints, *_feet(robot, before, after, h, damping))
@@ -210,6 +239,39 @@ def _feet(
     )
     slipped = _under_load(robot, h, force, np.linalg.norm(slip, axis=-1))
     return slipped, h * FOOT_WEIGHTS @ force, force.max(axis=0), np.maximum(rises.max(axis=0), 0.0)
+
+
+def landing_rate(robot: Robot, time: Array, delta: Array, ddelta: Array, damping: Array) -> float:
+    """Largest rise [N/s] of one foot's normal force over 1 ms, in windows that end every 0.1 ms of
+    the 20 ms after touch-down (eq. 29).
+
+    time (n,) [s]: ends of the steps since touch-down, which is the first; delta, ddelta (n,) [m,
+    m/s]: penetration and approach speed there; damping (n - 1,): d of eq. 14 [s/m] during the
+    steps, nan where the foot is open. Before touch-down there is no force.
+    """
+    samples = np.arange(1, LANDING_SAMPLES + 1) * LANDING_SAMPLE + time[0]
+    force = [
+        _force_at(robot, t, time, delta, ddelta, damping) for t in samples[samples <= time[-1]]
+    ]
+    before = [0.0] * RISE_SAMPLES + force
+    rises = [late - early for late, early in zip(force, before, strict=False)]
+    return max([0.0, *rises]) / (RISE_SAMPLES * LANDING_SAMPLE)
+
+
+def _force_at(
+    robot: Robot, t: float, time: Array, delta: Array, ddelta: Array, damping: Array
+) -> float:
+    """Normal force [N] of a foot at a time within its steps."""
+    k = max(int(np.searchsorted(time, t)) - 1, 0)
+    h = time[k + 1] - time[k]
+    depth, rate, _ = cubic(
+        delta[k],
+        h * ddelta[k],
+        delta[k + 1] - delta[k],
+        h * ddelta[k + 1],
+        np.array([(t - time[k]) / h]),
+    )
+    return normal_force(robot.contact, float(damping[k]), float(depth[0]), float(rate[0] / h))
 
 
 def _under_load(robot: Robot, h: float, force: Array, speed: Array) -> Array:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,14 +112,14 @@ class Friction:
     mu: Annotated[float, Number("1", at_least=0.0)]
     # of a foot that sticks, bristle law; 0 or absent: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
-    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 5, tanh law
+    slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law
     presliding: Annotated[
         float, Number("m", at_least=1e-7, at_most=1.0)
-    ]  # b_max of eq. 18, bristle law; absent in a file: Mindlin
+    ]  # b_max of eq. 16, bristle law; absent in a file: Mindlin
     bristle_damping: Annotated[
         float, Number("s", at_least=0.0, at_most=10.0, default=0.005)
-    ]  # tau of eq. 19, bristle law
-    # v_s of eq. 19, bristle law
+    ]  # tau of eq. 17, bristle law
+    # v_s of eq. 18, bristle law
     stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
         0.005
     )
@@ -171,6 +171,17 @@ class Gait:
     step_height: Annotated[float, Number("m", above=0.0)]
 
 
+def _plain(content: Any) -> Any:
+    """Nested content in which equal numbers are written alike: 0 and -0.0 as 0.0."""
+    if isinstance(content, dict):
+        return {key: _plain(value) for key, value in content.items()}
+    if isinstance(content, tuple | list):
+        return [_plain(value) for value in content]
+    if isinstance(content, int | float) and not isinstance(content, bool):
+        return float(content) + 0.0
+    return content
+
+
 @dataclass(frozen=True, kw_only=True)
 class Robot:
     """A six-legged robot with its laws and settings; `source` says where its numbers come from."""
@@ -217,6 +228,6 @@ class Robot:
     @cached_property
     def hash(self) -> str:
         """sha256 of everything but the provenance texts, in hex: equal robots, equal hash."""
-        content = asdict(self)
+        content = _plain(asdict(self))
         del content["source"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -311,10 +311,10 @@ def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> t
     for k, joint in reversed(list(enumerate(joint_models(robot)))):
         i, j = joint.parent, joint.child
         R_i = rotation_matrix(body[i, 3:7])
-        arm = R_i @ joint.point_i
-        at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + arm), force[j])
+        sP_i = R_i @ joint.point_i
+        at_joint = moment[j] + cross(body[j, 0:3] - (body[i, 0:3] + sP_i), force[j])
         torque[k] = at_joint @ (R_i @ joint.s_i)
-        carried = at_joint + cross(arm, force[j])
+        carried = at_joint + cross(sP_i, force[j])
         if i == 0:
             on_torso[k // JOINTS] = np.concatenate([force[j], carried])
         else:

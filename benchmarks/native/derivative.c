@@ -39,7 +39,7 @@ static int visit(const Walk *walk, Visited *visited) {
 /* us of one evaluation; the results are summed so that none can be left out */
 __attribute__((noinline)) static double measure(const hxKernel *kernel, const Visited *visited,
                                                 int multipliers, double *sum) {
-  hxMotion rate;
+  hxPlantMotion rate;
   const double begin = seconds_now();
   for (int round = 0; round < ROUNDS; ++round) {
     for (int k = 0; k < visited->count; ++k) {

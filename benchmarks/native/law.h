@@ -13,8 +13,8 @@
 #include "hexapod/hexapod.h"
 
 typedef struct {
-  double stiffness, chi, floor; /* eq. 4 */
-  double mu, slope;             /* eq. 5 */
+  double stiffness, chi, floor; /* eq. 14 */
+  double mu, slope;             /* eq. 15 */
   double ground, radius;        /* m */
   double kp, kd, torque_max, speed_max, gear;
 } Law;

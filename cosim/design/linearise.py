@@ -5,7 +5,7 @@
 x: torso's position and small rotation, joint angles, and the velocities of all these. One period of
 the FMU from x with the inputs u held is the exact sampled system, so nothing is approximated but
 the differences. Each column takes two fresh starts from the `initial` parameters, one on either
-side; those of angle_ref and speed_ref are kp and kd times torque_ref's, by eq. 13.
+side; those of angle_ref and speed_ref are kp and kd times torque_ref's, by eq. 12.
 
 Sizes of the differences. They must be small against what bends: the foot's depth in the ground (0.1
 mm and more), the slip speed at which friction saturates (10 mm/s), the joint speed at which the

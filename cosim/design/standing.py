@@ -32,6 +32,8 @@ PATIENCE = 10.0  # 1    times SETTLING and the feet's creep: who does not rest t
 SETTLING_SLOPE = 0.1  # 1    of the friction's: feet get to the same pose as much faster
 REST = 1e-3  # m/s or rad/s
 KEPT = 0.5  # 1    of its share of the load that a foot keeps, wherever the torso is pushed
+STIFFEN = "spread the feet of the stance, or stiffen the servos (servo.kp)"
+SHIFT = "shift masses, or the feet of the stance"
 BALANCED = 1e-9  # 1    of the load: feet that miss the balance by more cannot hold it
 
 
@@ -83,14 +85,14 @@ def settle(
         way, touching = bench.motion().less(motion), bench.force()[2::3] > 0.0
         if (touching != standing).any():
             got = f"{_names(touching) or 'no foot'} on the ground"
-            raise _not_standing(robot, standing, got=got)
+            raise _not_standing(robot, got=got, expected=f"rest on {_names(standing)}", fix=STIFFEN)
         line = float(np.abs(way[POSES : POSES + 3]).max())  # m/s
         turn = float(np.abs(way[POSES + 3 :]).max())  # rad/s
         if line < REST * size.speed and turn < REST / size.time:
             break
         if k * step > longest:
             got = f"{line:.3g} m/s and {turn:.3g} rad/s after {k * step:.3g} s"
-            raise _not_standing(robot, standing, got=got)
+            raise _not_standing(robot, got=got, expected=f"rest on {_names(standing)}", fix=STIFFEN)
     way[POSES:] = 0.0
     return motion.moved(way)
 
@@ -103,14 +105,9 @@ def _names(legs: Mask) -> str:
     return " ".join(leg for leg, chosen in zip(LEG_NAMES, legs, strict=True) if chosen)
 
 
-def _not_standing(robot: Robot, standing: Mask, *, got: str) -> StanceError:
-    return StanceError(
-        "the robot does not stay on its legs",
-        got=got,
-        expected=f"rest on {_names(standing)}",
-        fix="spread the feet of the stance, or stiffen the servos (servo.kp)",
-        where=robot.name,
-    )
+def _not_standing(robot: Robot, *, got: str, expected: str, fix: str) -> StanceError:
+    what = "the robot does not stay on its legs"
+    return StanceError(what, got=got, expected=expected, fix=fix, where=robot.name)
 
 
 def creep_time(robot: Robot, angle: Array, share: Array) -> float:
@@ -166,13 +163,8 @@ def loads(
         got = f"the centre of mass at ({x:.0f}, {y:.0f}) mm"
         if missing <= BALANCED * total:
             got += f", under which foot {LEG_NAMES[least]} carries nothing"
-        raise StanceError(
-            "the robot does not stay on its legs",
-            got=got,
-            expected=f"between {' '.join(standing)}",
-            fix="shift masses, or the feet of the stance",
-            where=robot.name,
-        )
+        expected = f"between {' '.join(standing)}"
+        raise _not_standing(robot, got=got, expected=expected, fix=SHIFT)
     gain, short = at_centre - at_torso, stands & (at_torso < KEPT * at_centre)
     shift = float(((KEPT * at_centre - at_torso)[short] / gain[short]).max(initial=0.0))
     (x, y), push = shift * moment / robot.weight, robot.weight - total

@@ -90,7 +90,10 @@ _TABLE: dict[str, Metric] = {
     "peak_force": Metric("BW", True, "largest foot normal force, in body weights", 5e-3),
     "force_p95": Metric("BW", True, "95th percentile of the normal force of feet under load", 5e-3),
     "loading_rate": Metric(
-        "BW/s", True, "steepest rise of the force in 20 ms after touch-down, 95th percentile", 5e-2
+        "BW/s",
+        True,
+        "largest rise of the force over 1 ms in 20 ms after touch-down, 95th percentile",
+        5e-2,
     ),
     "torque_rms": Metric("N m", True, "motor torque over all joints and time", 5e-3),
     "servo_load_max": Metric(
@@ -145,6 +148,10 @@ FLOORS = {name: each.floor for name, each in _TABLE.items()}
 DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
 
 PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
+# Time of all feet under load by the share of the friction cone used: bins begin at 0.9 (i/30)^2,
+# the last holds all above 0.9
+CONE_TIMES = tuple(vector_names("feet.cone_time", 31))
+_CONE_EDGES = np.append(NEARLY_SLIDING * (np.arange(31) / 30.0) ** 2, 1.0)
 # what the plant integrates or tracks for the metrics
 MEASURED_BY_PLANT = (
     *(
@@ -157,6 +164,7 @@ MEASURED_BY_PLANT = (
         for quantity in ("slip_distance", "peak_force", "landing_rate", "landings")
         for name in foot_names(quantity)
     ),
+    *CONE_TIMES,
     "energy.residual",
 )
 # what metrics and the warnings of a run look at; of controllers, those that tell
@@ -291,14 +299,15 @@ def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
 
 
 def _cone(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
-    part, names = walk.recording, ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
-    loaded = bearing_load(part, parameters)
+    names = ("cone_use_p50", "cone_use_p95", "cone_use_over_90")
+    times = walk.gained(list(CONE_TIMES))
     slippery = parameters["friction.mu"] == 0.0 or parameters.get("friction.law", TANH) == NONE
-    if slippery or not loaded.any():
+    if slippery or not times.any():
         return dict.fromkeys(names, np.nan)
-    use, weights = cone_use(part, parameters)[loaded], _spread(walk)[loaded]
-    over = float(weights[use > NEARLY_SLIDING].sum() / weights.sum())
-    return dict(zip(names, (*_percentiles(use, weights, (50.0, 95.0)), over), strict=True))
+    # within a bin time is taken as even over the root of the share, by which bins are equally wide
+    reached = np.append(0.0, np.cumsum(times)) / times.sum()
+    p50, p95 = np.interp([0.50, 0.95], reached, np.sqrt(_CONE_EDGES)) ** 2
+    return dict(zip(names, (float(p50), float(p95), float(times[-1] / times.sum())), strict=True))
 
 
 def _spread(walk: Walk) -> Array:
@@ -378,8 +387,8 @@ def _force(walk: Walk) -> dict[str, float]:
 
 
 def landing_rates(walk: Walk) -> Array:
-    """(landings,) steepest rise of the force [N/s] in the 20 ms after touch-down, of all feet's
-    landings between begin and end.
+    """(landings,) largest rise of the force over 1 ms [N/s] in the 20 ms after touch-down, of all
+    feet's landings from begin to end.
 
     A foot that touches down again within half a gait cycle has bounced: both are one landing, and
     the steeper rise counts.

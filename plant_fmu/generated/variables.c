@@ -483,6 +483,37 @@ static const hxVariable outputs[] = {
     {"energy.contact_loss", "J", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.energy.contact_loss), HX_REAL, 1},
     {"energy.friction_loss", "J", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.energy.friction_loss), HX_REAL, 1},
     {"energy.gear_loss", "J", -DBL_MAX, DBL_MAX, offsetof(struct hxVariables, output.energy.gear_loss), HX_REAL, 1},
+    {"feet.cone_time[1]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[0]), HX_REAL, 31},
+    {"feet.cone_time[2]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[1]), HX_REAL, 0},
+    {"feet.cone_time[3]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[2]), HX_REAL, 0},
+    {"feet.cone_time[4]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[3]), HX_REAL, 0},
+    {"feet.cone_time[5]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[4]), HX_REAL, 0},
+    {"feet.cone_time[6]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[5]), HX_REAL, 0},
+    {"feet.cone_time[7]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[6]), HX_REAL, 0},
+    {"feet.cone_time[8]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[7]), HX_REAL, 0},
+    {"feet.cone_time[9]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[8]), HX_REAL, 0},
+    {"feet.cone_time[10]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[9]), HX_REAL, 0},
+    {"feet.cone_time[11]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[10]), HX_REAL, 0},
+    {"feet.cone_time[12]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[11]), HX_REAL, 0},
+    {"feet.cone_time[13]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[12]), HX_REAL, 0},
+    {"feet.cone_time[14]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[13]), HX_REAL, 0},
+    {"feet.cone_time[15]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[14]), HX_REAL, 0},
+    {"feet.cone_time[16]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[15]), HX_REAL, 0},
+    {"feet.cone_time[17]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[16]), HX_REAL, 0},
+    {"feet.cone_time[18]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[17]), HX_REAL, 0},
+    {"feet.cone_time[19]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[18]), HX_REAL, 0},
+    {"feet.cone_time[20]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[19]), HX_REAL, 0},
+    {"feet.cone_time[21]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[20]), HX_REAL, 0},
+    {"feet.cone_time[22]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[21]), HX_REAL, 0},
+    {"feet.cone_time[23]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[22]), HX_REAL, 0},
+    {"feet.cone_time[24]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[23]), HX_REAL, 0},
+    {"feet.cone_time[25]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[24]), HX_REAL, 0},
+    {"feet.cone_time[26]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[25]), HX_REAL, 0},
+    {"feet.cone_time[27]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[26]), HX_REAL, 0},
+    {"feet.cone_time[28]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[27]), HX_REAL, 0},
+    {"feet.cone_time[29]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[28]), HX_REAL, 0},
+    {"feet.cone_time[30]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[29]), HX_REAL, 0},
+    {"feet.cone_time[31]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[30]), HX_REAL, 0},
 };
 
 static const hxVariable parameters[] = {
@@ -1045,7 +1076,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{a60078f8-2477-4254-b5d4-5e1d97d488ce}";
+const char hx_default_guid[] = "{c4d5747b-3525-4d94-acbf-007d24514b6c}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -87,7 +87,7 @@ void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxCont
   fill_contact_slots(contact);
 }
 
-void hx_contact_slacken(const hxContactState *contact, hxMotion *motion) {
+void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion) {
   for (int i = 0; i < 3; ++i) {
     for (int leg = 0; leg < HX_LEGS; ++leg)
       if (contact->closed[leg] == 0.0) motion->bristle[i][leg] = 0.0;

@@ -1,4 +1,4 @@
-/* contact_law.h - what damps a contact (eq. 4): fixed at touch-down by the law and the speed of
+/* contact_law.h - what damps a contact (eq. 14): fixed at touch-down by the law and the speed of
  * impact, held until lift-off */
 #ifndef HX_CONTACT_LAW_H
 #define HX_CONTACT_LAW_H
@@ -23,8 +23,8 @@ double hx_exact_restitution_chi(double e);
  * down slowly. */
 void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
 
-/* The bristles of open feet are slack (eq. 18). */
-void hx_contact_slacken(const hxContactState *contact, hxMotion *motion);
+/* The bristles of open feet are slack (eq. 16). */
+void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
 /* Touch-down of open feet in the ground, lift-off of closed ones out of it; returns the number of
  * touch-downs. */

@@ -2,8 +2,6 @@
 
 #include <stddef.h>
 
-#include "kernels.h"
-
 const hxKernel *const hx_kernels[] = {
 #if HX_HAS_X86_KERNELS
     &hx_kernel_avx512,

@@ -1,7 +1,8 @@
-/* kernel.h - the physics of one instruction set behind a table of functions
+/* kernel.h - the physics of one instruction set behind a table of functions, and which of these
+ * this build has
  *
- * The headers in lanes/ are compiled once for each kernel_*.c, at its width. All kernels give the
- * same bits (lanes/lanes.h), so a state saved under one goes on under another.
+ * lanes/entry_points.h and what it includes are compiled once for each kernel_*.c, at its width.
+ * All kernels give the same bits (lanes/lanes.h), so a state saved under one goes on under another.
  */
 #ifndef HX_KERNEL_H
 #define HX_KERNEL_H
@@ -30,16 +31,16 @@ typedef struct hxKernel {
 
   /* dy/dt, with or without the multipliers on the way. */
   void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command,
-                     int multipliers, hxMotion *rate);
+                     int multipliers, hxPlantMotion *rate);
 
   /* A motion on its joints at coordinates; coordinates of a motion and their rates, either of which
    * may be NULL. */
-  void (*place)(const hxModel *model, const hxCoordinates *x, hxMotion *motion);
+  void (*place)(const hxModel *model, const hxCoordinates *x, hxPlantMotion *motion);
   void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command,
                       hxCoordinates *x, hxCoordinates *rate);
 
   /* All feet: penetration, approach speed; m, m/s. */
-  void (*feet)(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS],
+  void (*feet)(const hxModel *model, const hxPlantMotion *motion, double delta[HX_SLOTS],
                double ddelta[HX_SLOTS]);
 
   /* Touch-downs and lift-offs that are due at the state's time by these penetrations. */
@@ -62,6 +63,19 @@ typedef struct hxKernel {
                         double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                         double drive_torque[HX_BODIES - 1]);
 } hxKernel;
+
+extern const hxKernel hx_kernel_baseline;
+
+/* Kernels of wider instruction sets, where the compiler can build them. Not by GCC for Windows,
+ * which aligns the stack to 16 bytes and then stores wider vectors there as if aligned (its bug
+ * 54412). */
+#if defined(__GNUC__) && defined(__x86_64__) && !defined(HX_BASELINE_ONLY) &&                      \
+    (defined(__clang__) || !defined(_WIN32))
+#define HX_HAS_X86_KERNELS 1
+extern const hxKernel hx_kernel_avx2, hx_kernel_avx512;
+#else
+#define HX_HAS_X86_KERNELS 0
+#endif
 
 /* All kernels of this build, fastest first, ended by NULL. */
 extern const hxKernel *const hx_kernels[];

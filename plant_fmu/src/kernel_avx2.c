@@ -1,5 +1,5 @@
 /* kernel_avx2.c - the physics on lanes four legs at a time */
-#include "kernels.h"
+#include "kernel.h"
 
 #if HX_HAS_X86_KERNELS
 
@@ -20,7 +20,7 @@
 
 #define HX_LANES 4
 
-#include "kernel_functions.h"
+#include "lanes/entry_points.h"
 
 #if defined(__clang__)
 #pragma clang attribute pop

@@ -1,5 +1,5 @@
 /* kernel_avx512.c - the physics on lanes all legs at a time */
-#include "kernels.h"
+#include "kernel.h"
 
 #if HX_HAS_X86_KERNELS
 
@@ -21,7 +21,7 @@
 
 #define HX_LANES 8
 
-#include "kernel_functions.h"
+#include "lanes/entry_points.h"
 
 #if defined(__clang__)
 #pragma clang attribute pop

@@ -1,8 +1,8 @@
 /* kernel_baseline.c - the physics on lanes for any processor: two legs at a time, or one where the
  * compiler has no vectors */
-#include "kernels.h"
+#include "kernel.h"
 
-#include "kernel_functions.h"
+#include "lanes/entry_points.h"
 
 static int anywhere(void) { return 1; }
 

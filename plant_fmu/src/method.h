@@ -1,5 +1,5 @@
 /* method.h - integration methods as coefficients: explicit Runge-Kutta and linearly implicit
- * Rosenbrock-W (eq. 15) */
+ * Rosenbrock-W (eq. 19) */
 #ifndef HX_METHOD_H
 #define HX_METHOD_H
 

@@ -16,13 +16,13 @@ typedef struct {
   uint64_t magic, version, size, checksum;
   hxModel model;
   hxState state;
-} hxSaved;
+} hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 6;
+static const uint64_t saved_version = 7;
 
-static uint64_t checksum(const hxSaved *saved) {
-  return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model));
+static uint64_t checksum(const hxSavedPlant *saved) {
+  return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSavedPlant, model));
 }
 
 static hxStatus refuse(hxPlant *plant, hxStatus status, const char *text) {
@@ -143,20 +143,20 @@ void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
   hx_kernel()->output(&plant->model, &plant->state, &command, output);
 }
 
-size_t hx_plant_state_size(void) { return sizeof(hxSaved); }
+size_t hx_plant_state_size(void) { return sizeof(hxSavedPlant); }
 
 void hx_plant_get_state(const hxPlant *plant, void *bytes) {
-  hxSaved saved = {.magic = magic,
-                   .version = saved_version,
-                   .size = sizeof saved,
-                   .model = plant->model,
-                   .state = plant->state};
+  hxSavedPlant saved = {.magic = magic,
+                        .version = saved_version,
+                        .size = sizeof saved,
+                        .model = plant->model,
+                        .state = plant->state};
   saved.checksum = checksum(&saved);
   memcpy(bytes, &saved, sizeof saved);
 }
 
 hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
-  hxSaved saved;
+  hxSavedPlant saved;
   if (size != sizeof saved)
     return refuse(plant, HX_BAD_STATE,
                   "saved state: its size is not that of this version's states; save it again");
@@ -238,7 +238,7 @@ static double switching_depth(int closed, double delta, double ddelta) {
 
 int hx_plant_update_contacts(hxPlant *plant) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  const hxMotion before = plant->state.motion;
+  const hxPlantMotion before = plant->state.motion;
   all_feet(plant, delta, ddelta);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
     delta[slot] =

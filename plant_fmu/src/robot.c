@@ -52,14 +52,14 @@ void hx_axis_normals(const double axis[3], double a[3], double b[3]) {
   cross(axis, a, b);
 }
 
-/* Joint position in the parent's axes, from the parent's centre of mass. */
-static void joint_on_parent(const hxDefinition *d, int leg, int joint, double sP_i[3]) {
+/* The joint's point from the parent's centre of mass, in the parent link's axes. */
+static void joint_on_parent(const hxDefinition *d, int leg, int joint, double point[3]) {
   if (joint == 0) {
-    for (int i = 0; i < 3; ++i) sP_i[i] = d->leg[leg].hip_position[i] - d->torso.com[i];
+    for (int i = 0; i < 3; ++i) point[i] = d->leg[leg].hip_position[i] - d->torso.com[i];
   } else {
     const hxLink *parent = &d->leg[leg].link[joint - 1];
-    link_tip(parent, sP_i);
-    for (int i = 0; i < 3; ++i) sP_i[i] -= parent->com[i];
+    link_tip(parent, point);
+    for (int i = 0; i < 3; ++i) point[i] -= parent->com[i];
   }
 }
 
@@ -121,8 +121,8 @@ static void inertia_in_frame(const double S[6], const double p[4], double out[6]
 
 static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int joint, int slot) {
   const hxLink *link = &d->leg[leg].link[joint];
-  double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], s[3], s_i[3],
-      sP[3], sP_i[3], sP_j[3], inertia[6];
+  double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], axis[3],
+      s_i[3], point[3], point_i[3], point_j[3], inertia[6];
   joint_frame(d, leg, joint - 1, frame_i);
   joint_frame(d, leg, joint, frame_j);
   conjugate(frame_i, to_i);
@@ -131,17 +131,17 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   quat_mul(to_i, turn, from);
   quat_mul(from, frame_j, zero);
   normalise(link->axis, 3, s_j);
-  rotate(turn, s_j, s);
-  rotate(to_i, s, s_i);
-  joint_on_parent(d, leg, joint, sP);
-  rotate(to_i, sP, sP_i);
-  for (int i = 0; i < 3; ++i) sP[i] = -link->com[i];
-  rotate(to_j, sP, sP_j);
+  rotate(turn, s_j, axis); /* in the parent link's axes, as point */
+  rotate(to_i, axis, s_i);
+  joint_on_parent(d, leg, joint, point);
+  rotate(to_i, point, point_i);
+  for (int i = 0; i < 3; ++i) point[i] = -link->com[i];
+  rotate(to_j, point, point_j);
   inertia_in_frame(link->inertia, frame_j, inertia);
   m->mass[slot] = link->mass;
   for (int i = 0; i < 6; ++i) m->inertia[i][slot] = inertia[i];
   for (int i = 0; i < 3; ++i)
-    m->s_i[i][slot] = s_i[i], m->sP_i[i][slot] = sP_i[i], m->sP_j[i][slot] = sP_j[i];
+    m->s_i[i][slot] = s_i[i], m->point_i[i][slot] = point_i[i], m->point_j[i][slot] = point_j[i];
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
 }
 
@@ -208,7 +208,7 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
     joint_frame(d, leg, HX_JOINTS - 1, frame);
     conjugate(frame, to_joint);
     rotate(to_joint, tip, foot);
-    for (int i = 0; i < 3; ++i) model->foot_centre[i][slot] = foot[i];
+    for (int i = 0; i < 3; ++i) model->point_foot[i][slot] = foot[i];
   }
   compile_ground(model, d);
   compile_settings(model, d);
@@ -220,8 +220,8 @@ static void place_child(const hxDefinition *d, int leg, int joint,
                         const double parent[HX_BODY_STATE], double child[HX_BODY_STATE]) {
   const hxLink *link = &d->leg[leg].link[joint];
   const double half = 0.5 * d->initial.angle[leg][joint], speed = d->initial.speed[leg][joint];
-  double axis[3], zero[4], turned[4], p[4], s[3], sP_i[3], sP_j[3], com[3], arm[3], w_arm[3], sine,
-      cosine;
+  double axis[3], zero[4], turned[4], p[4], s[3], point_i[3], point_j[3], sP_i[3], sP_j[3],
+      dsP_i[3], dsP_j[3], sine, cosine;
   normalise(link->axis, 3, axis);
   hx_sin_cos(half, &sine, &cosine);
   const double turn[4] = {cosine, sine * axis[0], sine * axis[1], sine * axis[2]};
@@ -230,16 +230,16 @@ static void place_child(const hxDefinition *d, int leg, int joint,
   quat_mul(turned, turn, p);
   normalise(p, 4, child + HX_P);
   rotate(child + HX_P, axis, s);
-  joint_on_parent(d, leg, joint, arm);
-  rotate(parent + HX_P, arm, sP_i);
-  for (int i = 0; i < 3; ++i) com[i] = -link->com[i];
-  rotate(child + HX_P, com, sP_j);
-  cross(parent + HX_W, sP_i, arm);
+  joint_on_parent(d, leg, joint, point_i);
+  rotate(parent + HX_P, point_i, sP_i);
+  for (int i = 0; i < 3; ++i) point_j[i] = -link->com[i];
+  rotate(child + HX_P, point_j, sP_j);
+  cross(parent + HX_W, sP_i, dsP_i);
   for (int i = 0; i < 3; ++i) child[HX_W + i] = parent[HX_W + i] + speed * s[i];
-  cross(child + HX_W, sP_j, w_arm);
+  cross(child + HX_W, sP_j, dsP_j);
   for (int i = 0; i < 3; ++i) {
     child[HX_R + i] = parent[HX_R + i] + sP_i[i] - sP_j[i];
-    child[HX_V + i] = parent[HX_V + i] + arm[i] - w_arm[i];
+    child[HX_V + i] = parent[HX_V + i] + dsP_i[i] - dsP_j[i];
   }
 }
 
@@ -266,7 +266,7 @@ static void frame_of(const hxModel *model, int leg, int joint, double p[4]) {
 }
 
 void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE],
-                           hxMotion *motion) {
+                           hxPlantMotion *motion) {
   memcpy(motion->torso, body[0], sizeof motion->torso);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     double (*to)[HX_SLOTS] = motion->link[joint];
@@ -282,7 +282,7 @@ void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX
   }
 }
 
-void hx_bodies_from_motion(const hxModel *model, const hxMotion *motion,
+void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
                            double body[HX_BODIES][HX_BODY_STATE]) {
   memcpy(body[0], motion->torso, sizeof motion->torso);
   for (int joint = 0; joint < HX_JOINTS; ++joint)

@@ -18,8 +18,8 @@ void hx_initial_bodies(const hxDefinition *definition, double body[HX_BODIES][HX
 
 /* Between the bodies of hexapod.h, in link axes, and a motion, in joint axes. */
 void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE],
-                           hxMotion *motion);
-void hx_bodies_from_motion(const hxModel *model, const hxMotion *motion,
+                           hxPlantMotion *motion);
+void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
                            double body[HX_BODIES][HX_BODY_STATE]);
 
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time);

@@ -25,16 +25,16 @@ enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
 
 /* y of y' = f(t, y). The same doubles as a vector for the integrator and by name for the physics.
  */
-typedef union hxMotion {
+typedef union hxPlantMotion {
   double y[HX_MOTION_SIZE];
   struct {
     double torso[HX_BODY_STATE];
     double actuator_work, push_work, dissipated; /* J */
     double link[HX_JOINTS][HX_BODY_STATE][HX_SLOTS];
-    double bristle[3][HX_SLOTS]; /* m  b of eq. 18, world axes; 0 and at rest with other laws. The
+    double bristle[3][HX_SLOTS]; /* m  b of eq. 16, world axes; 0 and at rest with other laws. The
                                     last: they leave it out */
   };
-} hxMotion;
+} hxPlantMotion;
 
 /* A joint and the link it moves; i = parent, j = child (equations.md: s, s^P, a, b). The child's
  * axes here and in its motion are the joint's: x = a, y = b, z = s, so that its rotation matrix
@@ -43,8 +43,8 @@ typedef struct hxJointModel {
   double mass[HX_SLOTS];
   double inertia[6][HX_SLOTS];  /* child's axes */
   double s_i[3][HX_SLOTS];      /* joint axis, parent's axes */
-  double sP_i[3][HX_SLOTS];     /* parent's centre of mass to the joint, parent's axes */
-  double sP_j[3][HX_SLOTS];     /* child's centre of mass to the joint, child's axes */
+  double point_i[3][HX_SLOTS];  /* parent's centre of mass to the joint's point, parent's axes */
+  double point_j[3][HX_SLOTS];  /* child's centre of mass to the joint's point, child's axes */
   double zero[4][HX_SLOTS];     /* the turn from the parent's to the child's axes at angle 0 */
   double frame[4][HX_SLOTS]; /* the turn from the link's axes, those of hexapod.h, to the child's
                                 axes here */
@@ -54,16 +54,16 @@ typedef struct hxModel {
   double torso_mass;
   double torso_inertia[6];
   hxJointModel joint[HX_JOINTS];
-  double foot_centre[3][HX_SLOTS]; /* tibia's centre of mass to the foot's centre, tibia's axes */
+  double point_foot[3][HX_SLOTS]; /* tibia's centre of mass to the foot's centre, tibia's axes */
   double foot_radius;
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
   double stiffness, damping_scale,
-      impact_speed_floor; /* eq. 4; what damping_scale means is the law's business */
-  double mu, slope; /* eq. 5 */
-  double presliding, bristle_damping; /* eq. 18, 19 */
-  double static_rise, per_stribeck; /* eq. 19: mu_s - mu, 1/v_s */
+      impact_speed_floor; /* eq. 14; what damping_scale means is the law's business */
+  double mu, slope; /* eq. 15 */
+  double presliding, bristle_damping; /* eq. 16, 17 */
+  double static_rise, per_stribeck; /* eq. 18: mu_s - mu, 1/v_s */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
   double step, tolerance, step_max;
@@ -77,7 +77,7 @@ typedef struct hxCommand {
   double torque[HX_JOINTS][HX_SLOTS];
   double push_force[3], push_torque[3];
   double acceleration[HX_JOINTS][HX_SLOTS];
-  double time; /* s  when it was given: the kinematic drive goes on from there (eq. 14) */
+  double time; /* s  when it was given: the kinematic drive goes on from there (eq. 13) */
 } hxCommand;
 
 /* Changes at touch-down and lift-off only, never within a step. */
@@ -111,6 +111,8 @@ typedef struct hxCompleted {
 
 enum { HX_MOMENT_ROWS = offsetof(hxMoment, time) / (HX_SLOTS * sizeof(double)) };
 
+enum { HX_RISE_SAMPLES = 10 }; /* across the window of 1 ms over which a landing's force rises */
+
 /* What was measured since the start, along the path that the steps went. */
 typedef struct hxMeasured {
   double positive_work[HX_JOINTS][HX_SLOTS]; /* J       of the motors, where they drive */
@@ -120,12 +122,17 @@ typedef struct hxMeasured {
   double impulse[HX_SLOTS]; /* N s     integral of the normal force */
   double peak_force[HX_SLOTS]; /* N       largest normal force of the last call */
   double peak_rate[HX_SLOTS]; /* N/s     steepest rise of the normal force in the last call */
-  double
-      landing_rate[HX_SLOTS]; /* N/s     steepest rise within landing_time of the last touch-down */
+  double landing_rate[HX_SLOTS]; /* N/s     largest rise over a window within 20 ms of the last
+                                    touch-down */
+  double landing_force[HX_RISE_SAMPLES][HX_SLOTS]; /* N  the last samples of a landing's normal
+                                                      force, the oldest is next */
+  double landing_left[HX_SLOTS]; /* 1       samples of the landing that are still to come */
   double landed_at[HX_SLOTS]; /* s       time of the last touch-down */
   double landings[HX_SLOTS]; /* 1       touch-downs */
   double contact_loss, friction_loss,
       gear_loss; /* J    their sum is what the motion has dissipated */
+  double cone_time[HX_CONE_BINS]; /* s  of all feet under load, by the share of the friction cone
+                                     that they use */
 } hxMeasured;
 
 enum { HX_MEASURED_ROWS = offsetof(hxMeasured, contact_loss) / (HX_SLOTS * sizeof(double)) };
@@ -137,7 +144,7 @@ typedef struct hxState {
   double stored_at_start; /* J  energy the audit starts from */
   double call_start; /* s  when the call began that an event broke off */
   double call_input; /* 1  checksum of its input, a whole number; 0: no call was broken off */
-  hxMotion motion;
+  hxPlantMotion motion;
   hxContactState contact;
   double evaluations, steps, rejected, touchdowns;
   hxMoment moment; /* the last step's end */

@@ -1,5 +1,5 @@
 /* tangent.h - derivatives of rates and outputs along a direction, from the physics on complex
- * numbers (lanes/tangent.h) */
+ * numbers (lanes/complex_step.h) */
 #ifndef HX_TANGENT_H
 #define HX_TANGENT_H
 

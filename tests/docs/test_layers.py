@@ -218,3 +218,31 @@ def test_only_the_fmi_layer_names_the_standard(component: str) -> None:
         assert not re.search(r"\bfmi[23][A-Z]", path.read_text(encoding="utf-8")), (
             f"{path.relative_to(ROOT)} names an FMI type or function"
         )
+
+
+# A second definition stands for the first: complex numbers for lanes, and each component's side of
+# component.h.
+STAND_INS = {"complex_step.h": "hx_", "component.c": "hx_component_"}
+DEFINED = re.compile(r"^\}\s*(hx[A-Z]\w*);|^\w[\w ]*?[ *]+(hx_\w+)\([^;{]*\)\s*\{", re.MULTILINE)
+
+
+def test_no_two_types_or_functions_of_c_share_a_name() -> None:
+    places: dict[str, set[str]] = {}  # within a file alternatives stand behind #if
+    for component in ("plant_fmu", "controller_fmu", "master", "fmi"):
+        folders = ("", "src", "src/lanes", "include/hexapod")
+        for path in c_files(*folders, component=component):
+            text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+            for match in DEFINED.finditer(text):
+                name = match[1] or match[2]
+                stand_in = name.startswith(STAND_INS.get(path.name, "no stand-in"))
+                if not stand_in:
+                    places.setdefault(name, set()).add(str(path.relative_to(ROOT)))
+    assert len(places) > 200
+    assert not {name: where for name, where in places.items() if len(where) > 1}
+
+
+def test_no_two_headers_of_the_plant_share_a_name() -> None:
+    names = [
+        path.name for path in c_files("src", "src/lanes", "include/hexapod") if path.suffix == ".h"
+    ]
+    assert len(names) == len(set(names))

@@ -37,7 +37,8 @@ CONTRACT = {
     "energy.kinetic energy.potential energy.actuator_work energy.dissipated energy.residual energy.push_work "
     "constraint.position_error constraint.velocity_error solver.evaluations solver.steps solver.rejected solver.touchdowns "
     "L.J.positive_work L.J.negative_work L.J.torque_squared L.foot.slip_distance L.foot.impulse L.foot.peak_force "
-    "L.foot.peak_force_rate L.foot.landing_rate L.foot.landings energy.contact_loss energy.friction_loss energy.gear_loss",
+    "L.foot.peak_force_rate L.foot.landing_rate L.foot.landings energy.contact_loss energy.friction_loss energy.gear_loss "
+    "feet.cone_time[31]",
     "parameter": "torso.mass torso.com[3] torso.inertia_I "
     "L.J.mass L.J.length L.J.offset_y L.J.offset_z L.J.com[3] L.J.inertia_I L.J.axis[3] "
     "L.hip_position[3] L.hip_yaw foot.radius contact.law contact.stiffness contact.restitution contact.damping_factor "

@@ -103,6 +103,23 @@ def test_hash_follows_the_content_and_not_the_provenance() -> None:
     assert robot_from_table(table, where="a").hash != load_robot("athena").hash
 
 
+def test_equal_robots_hash_equal() -> None:
+    """Whole numbers and minus zero, which a caller may write, are the same numbers; a mass of
+    2.6 kg and a tenth of it are not.
+    """
+    robot = load_robot("athena")
+    assert robot.torso.com == (0.0, 0.0, 0.0)
+    for com in ((0, 0, 0), (-0.0, 0.0, 0.0)):
+        same = dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, com=com))
+        assert same == robot
+        assert same.hash == robot.hash
+    assert dataclasses.replace(robot, gravity=(0, 0, -9.81)).hash == robot.hash
+    assert (
+        dataclasses.replace(robot, torso=dataclasses.replace(robot.torso, mass=0.26)).hash
+        != robot.hash
+    )
+
+
 def test_a_heavier_torso_gets_its_own_inertia_and_a_softer_foot_its_own_stiffness() -> None:
     table = athena_table()
     put(table, "torso.mass", 5.2)

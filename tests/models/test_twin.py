@@ -176,7 +176,7 @@ def test_a_positive_femur_angle_raises_the_foot_and_a_positive_tibia_angle_lower
     assert foot_positions(robot, flat + np.array([0.1, 0.0, 0.0]))[1, 0] < 0.0
 
 
-# constraints, eq. 2-3
+# constraints, eq. 2-4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -335,7 +335,7 @@ def test_a_kinematic_drive_on_its_path_stays_on_it() -> None:
     assert close(drive_acceleration(robot, body, command), np.zeros((6, 3)), 1e-9)
 
 
-# feet on the ground, eq. 4 and 5
+# feet on the ground, eq. 14 and 15
 
 
 def test_the_contact_point_is_the_material_point_that_the_foot_presses() -> None:

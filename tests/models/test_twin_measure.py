@@ -10,14 +10,26 @@ import numpy as np
 import pytest
 from plant import Plant
 from states import changed, lopsided, random_command, random_pose
+from test_laws_impact import above
 from test_plant_stages import coefficients, rates
 
-from hexapod_cosim.models import Robot
+from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import gear_friction, servo_torque
-from hexapod_cosim.models.contact import foot_contacts, foot_force, standing_damping
+from hexapod_cosim.models.contact import (
+    contact_damping,
+    foot_contacts,
+    foot_force,
+    standing_damping,
+)
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.kinematics import joint_angles, joint_speeds
-from hexapod_cosim.models.measure import Impulses, measured_step, step_works
+from hexapod_cosim.models.measure import (
+    Impulses,
+    cone_time,
+    landing_rate,
+    measured_step,
+    step_works,
+)
 from hexapod_cosim.models.records import Array
 
 H = 2e-4  # s
@@ -52,6 +64,7 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
         terrain=terrain,
         servo={"torque_max": 3.0, "speed_max": 8.0},
     )
+    robot = changed(robot, friction={"slope": 0.3})  # sliding feet use a part of their cones
     command = random_command(robot, seed)
     plant, there = (Plant(core, robot, **random_pose(robot, seed)) for _ in range(2))
     before, damping = plant.bodies, standing_damping(robot, plant.bodies)
@@ -65,6 +78,10 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
     plant.step(H, command)
     output, after = plant.output(command), plant.bodies
     works = step_works(robot, before, after, H, Impulses(*sums), ~np.isnan(damping))
+    np.testing.assert_allclose(
+        output.cone_time, cone_time(robot, before, after, H, Impulses(*sums)), rtol=0.0, atol=1e-15
+    )
+    assert float(np.sum(output.cone_time[:30])) > 0.0
     measured = measured_step(robot, before, after, H, command, works.motor, damping)
 
     assert int(np.count_nonzero(~np.isnan(damping))) > 1
@@ -88,3 +105,56 @@ def test_a_step_s_measures_are_those_of_the_readable_equations(
             atol=1e-6 * float(np.max(expected)),
             err_msg=name,
         )
+
+
+def step_ends(plant: Plant, duration: float, h: float) -> tuple[Array, Array]:
+    """Of a plant in fixed steps of h [s], which touch-downs split: times (n,) [s], and for each
+    foot (n, 4, 6) penetration, approach speed, whether it is closed, impact speed.
+    """
+    command, times, feet = plant.hold(), [], []
+    for k in range(1, round(duration / h) + 1):
+        while plant.time < k * h:
+            plant.step_to_event(k * h, command)
+            foot = plant.output(command).foot
+            times.append(plant.time)
+            feet.append(
+                [foot.penetration, -np.array(foot.velocity)[:, 2], foot.contact, foot.impact_speed]
+            )
+    return np.array(times), np.array(feet, dtype=float)
+
+
+@pytest.mark.parametrize(
+    "restitution", [0.1, 0.9]
+)  # feet that stay on the ground, and feet that bounce within 20 ms
+def test_the_rise_of_a_landing_is_that_of_the_readable_equations(
+    core: ct.CDLL, restitution: float
+) -> None:
+    """A robot dropped with a roll and a pitch rate, so that no two feet land alike, in steps
+    that are no multiple of 0.1 ms.
+    """
+    settings = {"law": "exact_restitution", "restitution": restitution}
+    robot = changed(
+        load_robot("athena"), contact=settings, solver={"method": "bs32", "step": 2.3e-4}
+    )
+    plant = Plant(
+        core,
+        robot,
+        position=above(robot, 2e-3),
+        velocity=(0.0, 0.0, -0.1),
+        angular_velocity=(0.1, 0.05, 0.0),
+    )
+    time, feet = step_ends(plant, 0.06, 2.3e-4)
+    output = plant.output()
+    expected, landed = [], feet[:, 2] > 0.0
+    for leg in range(6):
+        first = 1 + int(np.flatnonzero(landed[1:, leg] & ~landed[:-1, leg])[-1])
+        delta, ddelta, closed, speed = feet[first:, :, leg].T
+        damping = [
+            contact_damping(robot.contact, v) if on else np.nan
+            for on, v in zip(closed[:-1], speed, strict=False)
+        ]
+        expected.append(landing_rate(robot, time[first:], delta, ddelta, np.array(damping)))
+    assert min(expected) > 100.0
+    assert len({round(each) for each in expected}) == 6
+    np.testing.assert_allclose(output.foot.landing_rate, expected, rtol=1e-6)
+    assert (max(output.foot.landings) > 1.0) == (restitution == 0.9)

@@ -144,6 +144,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, solver.steps),
     FIELD(hxOutput, solver.rejected),
     FIELD(hxOutput, solver.touchdowns),
+    FIELD(hxOutput, cone_time),
 };
 
 /* the name of the i-th field, its place and size; NULL past the last */
@@ -351,7 +352,7 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   const int lane = leg % HX_LANES, pack = leg / HX_LANES;
   const hxFootWork *foot = &work.pack[pack].foot;
   const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
-  put3(hx_add(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
+  put3(hx_add3(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
       put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
@@ -372,7 +373,7 @@ HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age,
   power[2] = rate.motion.dissipated;
 }
 
-static void fill_bristles(const double z[HX_LEGS][3], hxMotion *motion) {
+static void fill_bristles(const double z[HX_LEGS][3], hxPlantMotion *motion) {
   for (int i = 0; i < 3; ++i) {
     for (int leg = 0; leg < HX_LEGS; ++leg) motion->bristle[i][leg] = z[leg][i];
     hx_fill_slots(motion->bristle[i]);
@@ -407,7 +408,7 @@ static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIE
   }
 }
 
-/* k/h of a stage (eq. 15) with h gamma = z after changes s_x, s_v (linear, angular rows): the
+/* k/h of a stage (eq. 19) with h gamma = z after changes s_x, s_v (linear, angular rows): the
  * bodies' rates and the angular velocities theirs stand for. The slopes are this point's, `ahead`
  * of it. */
 HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead,
@@ -438,7 +439,7 @@ HX_API void hx_probe_stain_stack(int byte) {
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
                                    double body[HX_BODIES][HX_BODY_STATE]) {
   hxCommand command;
-  hxMotion rate;
+  hxPlantMotion rate;
   for (int k = 0; k <= i; ++k)
     if (!hx_kernels[k]) return NULL;
   if (!hx_kernels[i]->runs_here()) return NULL;

@@ -103,7 +103,7 @@ def test_hertz_gives_everything_back(core: ct.CDLL) -> None:
     assert bounced.torso.velocity[2] == pytest.approx(0.4, rel=1e-6)
     assert bounced.energy.dissipated == pytest.approx(
         0.0, abs=1e-6 * bounced.energy.kinetic
-    )  # eq. 22 is of order 2 in the step
+    )  # eq. 27 is of order 2 in the step
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.8])

@@ -248,7 +248,7 @@ def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str,
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
 def test_the_books_close_with_the_tolerance(core: ct.CDLL, law: str) -> None:
     """Steps of an order of 3 shorten by 10 for a tolerance of a thousandth; works of order 2 in
-    the step (eq. 22) gain 100.
+    the step (eq. 27) gain 100.
     """
     robot, residuals = changed(load_robot("athena"), friction={"law": law}), []
     for tolerance in (1e-3, 1e-6):

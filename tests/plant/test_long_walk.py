@@ -82,7 +82,7 @@ def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL
 
 def test_the_books_of_feet_that_stick_balance(core: ct.CDLL) -> None:
     """To a tenth of the usual at a tenth of the usual tolerance: works are of order 2 in the
-    step (eq. 22).
+    step (eq. 27).
     """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver={"tolerance": 1e-5})
     energy = walk(core, robot, 5.0).output().energy

@@ -124,7 +124,7 @@ def test_inertias_are_taken_to_another_point_by_the_congruence(core: ct.CDLL) ->
         assert distance(inverse, np.linalg.inv(expected)) < SAME * np.linalg.cond(expected)
 
 
-# joints, eq. 2-3
+# joints, eq. 2-4
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -176,7 +176,7 @@ def test_bodies_come_back_as_they_were_set(core: ct.CDLL) -> None:
     assert np.array_equal(plant.bodies[:, others], body[:, others])
 
 
-# ground and feet, eq. 4-5
+# ground and feet, eq. 14-15
 
 
 @pytest.mark.parametrize("terrain", TERRAINS.values(), ids=TERRAINS)

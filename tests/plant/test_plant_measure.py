@@ -35,6 +35,27 @@ def weight(robot: Robot) -> float:
     return G * (robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links))
 
 
+def hertz_forces(mass: float, stiffness: float, speed: float, duration: float) -> Array:
+    """(n,) normal force [N] of a mass [kg] on a Hertzian contact, m d'' = -K d^(3/2), in steps
+    of 1 us from touch-down on.
+    """
+    depth, approach, forces = 0.0, speed, [0.0]
+    for _ in range(round(duration / 1e-6)):
+        approach -= 1e-6 * forces[-1] / mass
+        depth += 1e-6 * approach
+        forces.append(stiffness * max(depth, 0.0) ** 1.5)
+    return np.array(forces)
+
+
+def rises(forces: Array) -> Array:
+    """(windows,) rise [N/s] over 1 ms up to every 0.1 ms after the first of forces 1 us apart,
+    which follows on none.
+    """
+    late = forces[100::100]
+    early = np.concatenate([np.zeros(1000), forces])[100 : 100 + 100 * len(late) : 100]
+    return np.asarray((late - early) / 1e-3)
+
+
 # ---- closed forms
 # -----------------------------------------------------------------------------------------------------------
 
@@ -68,25 +89,38 @@ def test_peak_and_steepest_rise_of_an_elastic_impact_have_their_closed_forms(cor
     )
     expected = np.full(6, 1.5 * stiffness * math.sqrt(steep) * approach)
     assert bounced.foot.peak_force_rate == pytest.approx(expected, rel=2 * CLOSED)
-    assert bounced.foot.landing_rate == pytest.approx(expected, rel=2 * CLOSED)
+    assert bounced.foot.landing_rate == pytest.approx(
+        np.full(6, rises(hertz_forces(mass, stiffness, speed, 0.004)).max()), rel=CLOSED
+    )
+    assert float(bounced.foot.landing_rate[0]) == pytest.approx(
+        0.994 * float(expected[0]), rel=CLOSED
+    )
     assert bounced.foot.landings == pytest.approx(np.ones(6))
 
 
 def test_the_landing_rate_is_that_of_the_first_20_milliseconds(core: ct.CDLL) -> None:
-    """A soft Hertzian contact, whose force rises ever more steeply for more than 40 ms: m d'' =
-    -K d^(3/2), solved in steps of 1 us.
-    """
+    """A soft Hertzian contact, whose force rises ever more steeply for more than 40 ms."""
     stiffness, speed = 1200.0, 0.1
     robot = rigid("hertz", stiffness=stiffness)
-    mass, depth, approach, rates = weight(robot) / G / 6.0, 0.0, speed, []
-    for _ in range(40_000):
-        approach -= 1e-6 * stiffness / mass * depth**1.5
-        depth += 1e-6 * approach
-        rates.append(1.5 * stiffness * math.sqrt(depth) * approach)
-    assert rates[-1] > 1.2 * rates[19_999]
+    rates = rises(hertz_forces(weight(robot) / G / 6.0, stiffness, speed, 0.040))
+    assert rates[-1] > 1.2 * rates[199]
     plant = falling(core, robot, clearance=1e-4, speed=speed)
     plant.step(0.1)
-    assert plant.output().foot.landing_rate == pytest.approx(np.full(6, rates[19_999]), rel=0.02)
+    assert plant.output().foot.landing_rate == pytest.approx(np.full(6, rates[199]), rel=CLOSED)
+
+
+@pytest.mark.parametrize("step", [2e-5, 3.7e-4, 5e-2])
+def test_the_landing_rate_does_not_depend_on_the_communication_step(
+    core: ct.CDLL, step: float
+) -> None:
+    """Of 1 ms windows that begin and end within calls of 0.02, 0.37 and 50 ms."""
+    robot, mass = rigid("hertz", stiffness=1e6), weight(load_robot("athena")) / G / 6.0
+    plant = falling(core, robot, clearance=1e-4, speed=0.5)
+    while plant.time < 0.03:
+        plant.step(plant.time + step)
+    assert plant.output().foot.landing_rate == pytest.approx(
+        np.full(6, rises(hertz_forces(mass, 1e6, 0.5, 0.004)).max()), rel=CLOSED
+    )
 
 
 def test_the_loss_of_an_impact_is_the_kinetic_energy_it_takes(core: ct.CDLL) -> None:

@@ -1,5 +1,5 @@
 """A step of the integrator, stage by stage, against the textbook's formula: the dense system of
-eq. 15 and 16, bristles of eq. 20.
+eq. 19 and 20, bristles of eq. 21.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Ar
 
 @dataclass
 class DenseStages:
-    """The stages of eq. 15 one after the other, solved as the dense system: nu (114,) that
+    """The stages of eq. 19 one after the other, solved as the dense system: nu (114,) that
     positions advance with, and alpha.
     """
 
@@ -137,7 +137,7 @@ def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str
 
 @dataclass
 class StuckStages(DenseStages):
-    """The same on bristles that do not let go, for which eq. 20 has beta = 0. rate leaves their
+    """The same on bristles that do not let go, for which eq. 21 has beta = 0. rate leaves their
     own in bristle_rate.
     """
 

@@ -22,6 +22,14 @@ def walker(plant_build: Path) -> Iterator[Walker]:
 
 @pytest.mark.parametrize("name", list_scenarios())
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
+def test_the_books_close_on_the_other_robot_too(walker: Walker, name: str, control: str) -> None:
+    scenario = load_scenario(name, overrides=[f"control={control}", "robot=phantomx_mk4"])
+    missing = walker.simulate(scenario).metrics["energy_residual"]
+    assert missing < (3e-3 if (name, control) == STANDING else 1e-4)
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+@pytest.mark.parametrize("control", ["kinematic", "compliant"])
 def test_the_books_of_every_shipped_scenario_close(walker: Walker, name: str, control: str) -> None:
     """To 1e-4 of the motors' gross work at the default solver, to 1e-3 at the fastest setting."""
     missing = [

@@ -21,6 +21,10 @@ from hexapod_cosim.models import load_robot
 
 PERIOD, CYCLES = 0.8, 3  # s, 1
 AGREED = 5e-3  # relative
+TIGHT, DEFAULT = 1e-6, 1e-4  # tolerances of the solver
+# relative: of slip at the default tolerance, a creep of 0.5 mm/s beside errors of 0.004 mm/s in the
+# motion itself
+CREPT = 1e-2
 
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -33,32 +37,42 @@ class Twice:
     walk: Walk
     samples: Samples
     before: Samples  # and half a cycle before it
+    crept: float  # relative, how near slip is
 
 
-@pytest.fixture(scope="module", params=CONTROLS)
+@pytest.fixture(
+    scope="module",
+    params=[(control, tolerance) for control in CONTROLS for tolerance in (DEFAULT, TIGHT)],
+)
 def twice(request: pytest.FixtureRequest, plant_build: Path) -> Twice:
-    """At a tight tolerance: what both ways differ in is how they measure, not how they
-    integrate.
+    """Told by steps of the error control, sampled along steps of 0.1 ms: at a tight tolerance
+    both are the same motion.
     """
+    control, tolerance = request.param
     settings = (
-        f"control={request.param}",
+        f"control={control}",
         "macro_step=0.005",
         f"gait.period={PERIOD}",
-        "solver.tolerance=1e-6",
+        f"solver.tolerance={tolerance}",
     )
     plan = load_scenario("walk_flat", overrides=[*settings, f"duration={CYCLES * PERIOD}"])
-    gains = None if request.param == "kinematic" else make_gains(load_robot("athena"), period=0.005)
+    gains = None if control == "kinematic" else make_gains(load_robot("athena"), period=0.005)
     result = simulate(plan, gains=gains)
     walk = View(result.outcome.judged, result.parameters, PERIOD).walk
     assert walk is not None
     before = sampled(plan, result.outcome.recording, begin=1.5 * PERIOD)
-    return Twice(dict(result.metrics), walk, before.after(2.0 * PERIOD), before)
+    return Twice(
+        dict(result.metrics),
+        walk,
+        before.after(2.0 * PERIOD),
+        before,
+        CREPT if tolerance == DEFAULT else AGREED,
+    )
 
 
 def test_slip_is_the_way_of_loaded_feet_along_the_ground(twice: Twice) -> None:
-    assert twice.told["slip_per_metre"] == pytest.approx(
-        slipped(twice.samples, twice.walk.weight) / twice.walk.distance, rel=AGREED
-    )
+    slip = slipped(twice.samples, twice.walk.weight) / twice.walk.distance
+    assert twice.told["slip_per_metre"] == pytest.approx(slip, rel=twice.crept)
 
 
 def test_cost_of_transport_is_the_positive_power_of_the_motors(twice: Twice) -> None:
@@ -88,10 +102,27 @@ def test_the_peak_is_the_largest_force_of_all_samples(twice: Twice) -> None:
 
 
 def test_landings_are_counted_and_as_steep_as_sampled(twice: Twice) -> None:
-    """Of each landing but the steepest, whose rise changes within 0.1 ms: differences of samples
-    flatten it.
+    """Each of them, but for the softest of a walk, 1.5 % off at the default tolerance: it comes
+    after a bounce, whose motion is.
     """
     told = np.sort(told_rates(twice.walk))
     seen = np.sort(landing_rates(twice.before, apart=0.5 * PERIOD, after=2.0 * PERIOD))
     assert len(told) == len(seen) == 6
-    assert np.median(told) == pytest.approx(np.median(seen), rel=AGREED)
+    np.testing.assert_allclose(told[1:], seen[1:], rtol=AGREED)
+    assert told[0] == pytest.approx(seen[0], rel=1.5e-2)
+    assert twice.told["loading_rate"] == pytest.approx(
+        np.percentile(seen, 95) / twice.walk.weight, rel=AGREED
+    )
+
+
+def test_the_use_of_the_friction_cone_is_that_of_the_samples(twice: Twice) -> None:
+    """Percentiles within a bin of the plant's, which is 0.063 sqrt(share) wide; shares of time
+    above 0.9 within 0.1 % of the time.
+    """
+    loaded = twice.samples.normal[1] > 0.01 * twice.walk.weight
+    across = twice.samples.tangential[1][loaded]
+    use = across / (0.7 * twice.samples.normal[1][loaded])
+    p50, p95 = np.percentile(use, [50.0, 95.0])
+    assert twice.told["cone_use_p50"] == pytest.approx(p50, abs=0.063 * np.sqrt(p50) / 2.0)
+    assert twice.told["cone_use_p95"] == pytest.approx(p95, abs=0.063 * np.sqrt(p95) / 2.0)
+    assert twice.told["cone_use_over_90"] == pytest.approx(float(np.mean(use > 0.9)), abs=1e-3)

@@ -20,10 +20,12 @@ Array = NDArray[np.float64]
 FINE = 1e-4  # s
 LOADED = 0.01  # of the weight
 AFTER = 0.020  # s    after touch-down
+WINDOW = 0.001  # s    over which a force rises
 QUANTITIES = {
     "torque": joint_names("torque"),
     "speed": joint_names("speed"),
     "normal": foot_names("normal_force"),
+    "tangential": foot_names("tangential_force"),
     "velocity": foot_vector_names("velocity"),
 }
 
@@ -38,12 +40,13 @@ class Samples:
     torque: Array  # N m    (2, n, 18)
     speed: Array  # rad/s    (2, n, 18)
     normal: Array  # N    (2, n, 6)
+    tangential: Array  # N    (2, n, 6)
     velocity: Array  # m/s    (2, n, 6, 3)
 
     def after(self, time: float) -> Samples:
         """The intervals from a time [s] on."""
         k = int(np.searchsorted(self.time, time - 0.5 * FINE))
-        parts = (self.torque, self.speed, self.normal, self.velocity)
+        parts = (self.torque, self.speed, self.normal, self.tangential, self.velocity)
         return Samples(self.time[k:], *(part[:, k:] for part in parts))
 
 
@@ -74,7 +77,7 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
             if k >= first:
                 seen.get()
                 rows[1, k - first] = seen.values
-    torque, speed, normal, velocity = np.split(
+    torque, speed, normal, across, velocity = np.split(
         rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2
     )
     return Samples(
@@ -82,6 +85,7 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
         torque,
         speed,
         normal,
+        across,
         velocity.reshape(2, -1, 6, 3),
     )
 
@@ -103,16 +107,17 @@ def driven(samples: Samples) -> float:
 
 
 def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float]:
-    """Steepest rise [N/s] of each landing in the 20 ms after its touch-downs, of landings after a
-    time [s].
+    """Largest rise [N/s] over 1 ms of each landing in the 20 ms after its touch-downs, of landings
+    after a time [s].
 
-    Touch-downs of a foot less than `apart` [s] after another are one landing.
+    Touch-downs of a foot less than `apart` [s] after another are one landing. Before a touch-down
+    there is no force.
     """
     found: list[float] = []
     for begin, end in samples.normal.transpose(2, 0, 1):
-        rate, last, judged = (end - begin) / FINE, -np.inf, False
+        last, judged = -np.inf, False
         for k in np.flatnonzero((end > 0.0) & (begin == 0.0)):
-            steepest = float(rate[k : k + round(AFTER / FINE)].max())
+            steepest = _steepest(samples.time + FINE, end, int(k))
             if samples.time[k] - last > apart:
                 judged = bool(samples.time[k] > after)
                 found += [steepest] if judged else []
@@ -120,3 +125,18 @@ def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float
                 found[-1] = max(found[-1], steepest)
             last = samples.time[k]
     return found
+
+
+def _steepest(time: Array, force: Array, k: int) -> float:
+    """Largest rise [N/s] over 1 ms in the 20 ms after a touch-down in the interval that ends at
+    sample k.
+
+    A Hertzian contact's depth, in proportion to force^(2/3), grows evenly at first: that tells when
+    within the interval.
+    """
+    depth = force[k : k + 2] ** (2.0 / 3.0)
+    touch = time[k] - FINE * min(depth[0] / max(depth[1] - depth[0], 1e-300), 1.0)
+    late = touch + FINE * np.arange(1.0, 0.5 + AFTER / FINE)
+    early = late - WINDOW
+    before = np.where(early > touch, np.interp(early, time, force), 0.0)
+    return float((np.interp(late, time, force) - before).max()) / WINDOW

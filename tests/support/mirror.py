@@ -7,7 +7,7 @@ from __future__ import annotations
 import ctypes as ct
 from typing import Any
 
-LEGS, JOINTS, BODIES, BODY_STATE, MULTIPLIERS, MESSAGE_SIZE = 6, 3, 19, 13, 5, 512
+LEGS, JOINTS, BODIES, BODY_STATE, MULTIPLIERS, MESSAGE_SIZE, CONE_BINS = 6, 3, 19, 13, 5, 512, 31
 
 OK, INVALID_ARGUMENT, INVALID_MODEL, STEP_TOO_SMALL, NOT_FINITE, OUT_OF_MEMORY, BAD_STATE = range(7)
 
@@ -166,4 +166,5 @@ HxOutput = record(
     ),
     ("constraint", record("ConstraintOutput", *reals("position_error velocity_error"))),
     ("solver", record("SolverOutput", *reals("evaluations steps rejected touchdowns"))),
+    ("cone_time", Real * CONE_BINS),
 )

@@ -22,7 +22,8 @@ extern "C" {
 enum {
   HX_BODIES = 1 + HX_LEGS * HX_JOINTS,   /* 19 */
   HX_BODY_STATE = 13,                    /* r[3] p[4] v[3] w[3] */
-  HX_MULTIPLIERS = 5                     /* per joint */
+  HX_MULTIPLIERS = 5,                    /* per joint */
+  HX_CONE_BINS = 31                      /* of the shares of the friction cone that feet use */
 };
 
 typedef enum hxContactLaw {
@@ -87,7 +88,7 @@ typedef struct hxDefinition {
   double foot_radius; /* m */
   struct {
     int law; /* hxContactLaw */
-    double stiffness; /* N/m^1.5  K of eq. 4 */
+    double stiffness; /* N/m^1.5  K of eq. 14 */
     double restitution; /* 1        [0, 1]; the dissipative laws need > 0 */
     double damping_factor; /* s/m      c of the constant law F = K d^1.5 (1 + 1.5 c dd) */
     double impact_speed_floor; /* m/s      a slower touch-down counts as this fast */
@@ -95,12 +96,12 @@ typedef struct hxDefinition {
   struct {
     int law; /* hxFrictionLaw */
     double mu; /* 1 */
-    double slope; /* s/m  k_t of eq. 5, of the tanh law */
-    double presliding; /* m    b_max of eq. 18, of the bristle law: a foot pushed this far slides */
-    double bristle_damping; /* s    tau of eq. 19, of the bristle law: damping over stiffness */
+    double slope; /* s/m  k_t of eq. 15, of the tanh law */
+    double presliding; /* m    b_max of eq. 16, of the bristle law: a foot pushed this far slides */
+    double bristle_damping; /* s    tau of eq. 17, of the bristle law: damping over stiffness */
     double mu_static; /* 1    of a foot that sticks, of the bristle law; 0: mu */
     double
-        stribeck_speed; /* m/s  v_s of eq. 19, of the bristle law: half-way from mu_static to mu */
+        stribeck_speed; /* m/s  v_s of eq. 18, of the bristle law: half-way from mu_static to mu */
   } friction;
   struct {
     int mode; /* hxServoMode, all joints */
@@ -170,7 +171,7 @@ typedef struct hxOutput {
     double position[HX_LEGS][3]; /* m    contact point: the foot's lowest towards the ground */
     double velocity[HX_LEGS][3]; /* m/s  of the foot's material point there */
     double slip_speed[HX_LEGS]; /* m/s  tangential part of it */
-    double bristle[HX_LEGS][3]; /* m    b of eq. 18, the bristle law's; 0 with others */
+    double bristle[HX_LEGS][3]; /* m    b of eq. 16, the bristle law's; 0 with others */
     double penetration[HX_LEGS]; /* m    < 0: clearance */
     double impact_speed[HX_LEGS]; /* m/s  at the last touch-down */
     double slip_distance[HX_LEGS]; /* m    along the ground while the foot bears more than 1 % of
@@ -179,7 +180,8 @@ typedef struct hxOutput {
     double peak_force[HX_LEGS]; /* N    largest normal force of the last step, a call of
                                    hx_plant_step */
     double peak_force_rate[HX_LEGS]; /* N/s  steepest rise of the normal force in the last step */
-    double landing_rate[HX_LEGS]; /* N/s  steepest rise within 20 ms after the last touch-down */
+    double landing_rate[HX_LEGS]; /* N/s  largest rise over 1 ms within 20 ms after the last
+                                     touch-down */
     double landings[HX_LEGS]; /* 1    touch-downs since the start */
     int contact[HX_LEGS];
   } foot;
@@ -212,6 +214,8 @@ typedef struct hxOutput {
   struct {
     double evaluations, steps, rejected, touchdowns; /* 1, since start */
   } solver;
+  double cone_time[HX_CONE_BINS]; /* s  of all feet under load since the start, by |f_t|/(mu f_n):
+                                     from 0.9 (i/30)^2 on, the last from 0.9 on */
 } hxOutput;
 
 /* The least numbers that tell where everything is: the torso as it is, joints by angle and speed.
@@ -300,8 +304,8 @@ HX_API int hx_plant_update_contacts(hxPlant *plant); /* touch-downs and lift-off
                                                         whether coordinates changed (bristles) */
 
 /* What small changes of input and coordinates make of rates and outputs: derivatives along that
- * direction, exact to rounding (complex arithmetic, lanes/tangent.h), contacts held; contact and
- * the solver's counts have none. Either change may be NULL, for none, and so may either result.
+ * direction, exact to rounding (complex arithmetic, lanes/complex_step.h), contacts held; contact
+ * and the solver's counts have none. Either change may be NULL, for none, and so may either result.
  * HX_INVALID_ARGUMENT where the compiler has no complex numbers (MSVC). */
 HX_API hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d_input,
                                  const hxCoordinates *dx, hxCoordinates *d_rate,

@@ -14,7 +14,7 @@ typedef struct {
 
 static const double hx_gear_speed = 0.05; /* rad/s, where the gear's dry friction saturates */
 
-/* The motor: clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line (eq. 13). */
+/* The motor: clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line (eq. 12). */
 typedef struct {
   hxReal torque; /* N m        motor on child */
   hxReal wanted; /* N m        before the limits */
@@ -33,7 +33,7 @@ static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, load};
 }
 
-/* The motor with its slopes, and the gear: -tau_c tanh(qd / 0.05) (eq. 13). */
+/* The motor with its slopes, and the gear: -tau_c tanh(qd / 0.05) (eq. 12). */
 static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);

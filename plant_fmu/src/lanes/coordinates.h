@@ -20,7 +20,7 @@ static inline void scatter_joint(hxReal x, int joint, int slot, hxNumber (*table
 /* p_j = p_i zero turn(q), about the child's z; w_j = w_i + qd s; r and v as the joint's point has
  * them on both sides */
 static inline void place_link(const hxModel *model, int joint, int slot, hxReal angle, hxReal speed,
-                              hxMotion *motion) {
+                              hxPlantMotion *motion) {
   const hxJointModel *m = &model->joint[joint];
   const hxReal zero = hx_splat(0.0);
   hxReal sine, cosine;
@@ -35,13 +35,13 @@ static inline void place_link(const hxModel *model, int joint, int slot, hxReal 
   const hxJointKinematics k = hx_joint_kinematics(m, slot, &i, &j);
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
-  hx_store_vec3(&motion->link[joint][HX_R], slot, hx_sub(hx_add(r_i, k.sP_i), k.sP_j));
+  hx_store_vec3(&motion->link[joint][HX_R], slot, hx_sub3(hx_add3(r_i, k.sP_i), k.sP_j));
   hx_store_vec3(&motion->link[joint][HX_V], slot,
-                hx_sub(hx_add(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
+                hx_sub3(hx_add3(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
 }
 
 static inline void hx_motion_from_coordinates(const hxModel *model, const hxCoordinates *x,
-                                              hxMotion *motion) {
+                                              hxPlantMotion *motion) {
   memset(motion, 0, sizeof *motion);
   memcpy(&motion->torso[HX_R], x->position, sizeof x->position);
   memcpy(&motion->torso[HX_P], x->quaternion, sizeof x->quaternion);
@@ -64,7 +64,7 @@ static inline void hx_motion_from_coordinates(const hxModel *model, const hxCoor
 }
 
 /* what the torso, the audit and the bristles have in common with a motion, or with its rate */
-static inline void copy_common(const hxMotion *motion, hxCoordinates *x) {
+static inline void copy_common(const hxPlantMotion *motion, hxCoordinates *x) {
   memcpy(x->position, &motion->torso[HX_R], sizeof x->position);
   memcpy(x->quaternion, &motion->torso[HX_P], sizeof x->quaternion);
   memcpy(x->velocity, &motion->torso[HX_V], sizeof x->velocity);
@@ -76,7 +76,8 @@ static inline void copy_common(const hxMotion *motion, hxCoordinates *x) {
 }
 
 /* the motion an evaluation was made at; joints that have drifted count by their angle and speed */
-static inline void hx_coordinates_of(const hxMotion *motion, const hxWork *work, hxCoordinates *x) {
+static inline void hx_coordinates_of(const hxPlantMotion *motion, const hxWork *work,
+                                     hxCoordinates *x) {
   copy_common(motion, x);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -86,7 +87,7 @@ static inline void hx_coordinates_of(const hxMotion *motion, const hxWork *work,
     }
 }
 
-static inline void hx_coordinates_rate(const hxMotion *rate, const hxWork *work,
+static inline void hx_coordinates_rate(const hxPlantMotion *rate, const hxWork *work,
                                        hxCoordinates *dx) {
   copy_common(rate, dx);
   for (int pack = 0; pack < HX_PACKS; ++pack)

@@ -1,5 +1,5 @@
 /* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels
- * there (eq. 4, 5, 18, 19) */
+ * there (eq. 14-18) */
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
@@ -54,10 +54,10 @@ static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
     return (hxGround){point.z - model->ground_point[2],
                       {hx_splat(0.0), hx_splat(0.0), hx_splat(1.0)}};
   const hxVec3 n = hx_splat_vec3(model->ground_normal);
-  return (hxGround){hx_dot(n, hx_sub(point, hx_splat_vec3(model->ground_point))), n};
+  return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
 }
 
-/* g of f_t = -mu f_n g(|v_t|) v_t (eq. 5): tanh(k_t v) / v, whose limit at rest is k_t; the series
+/* g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t; the series
  * k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
 static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
   if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
@@ -67,12 +67,12 @@ static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
                                   hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
 }
 
-/* Elasto-plastic bristles (eq. 18, 19), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+
+/* Elasto-plastic bristles (eq. 16, 17), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+
  * u/|u|, of which friction is the share w = u (3 - u.u)/2 + d room/|(room, d)|, d = 3/2 tau db/dt /
  * b_max. The room that the spring leaves, 1 - |u| (3 - u.u)/2, is all that the damping can have: w
  * never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages
  * scatter. Friction is static where nothing slides and falls with the speed p of what does: mu(p) =
- * mu + (mu_s - mu)/(1 + (p/v_s)^2). */
+ * mu + (mu_s - mu)/(1 + (p/v_s)^2) (eq. 18). */
 static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
@@ -99,7 +99,7 @@ static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b
   };
 }
 
-/* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 4) while the contact is closed */
+/* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 14) while the contact is closed */
 static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping,
                                             hxReal delta, hxReal ddelta) {
   const hxReal zero = hx_splat(0.0);
@@ -116,14 +116,14 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
   };
 }
 
-static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxMotion *motion,
+static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxPlantMotion *motion,
                                                   int slot, const hxBody *tibia) {
   const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot);
-  const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->foot_centre, slot));
-  const hxGround ground = hx_ground(model, hx_add(r, to_centre));
+  const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->point_foot, slot));
+  const hxGround ground = hx_ground(model, hx_add3(r, to_centre));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-model->foot_radius), ground.normal);
-  const hxVec3 velocity = hx_add(v, hx_cross(tibia->w, arm));
+  const hxVec3 velocity = hx_add3(v, hx_cross(tibia->w, arm));
   return (hxFootKinematics){arm, ground.normal, model->foot_radius - ground.distance,
                             -hx_dot(velocity, ground.normal), velocity};
 }
@@ -139,7 +139,7 @@ static inline void hx_foot_force(const hxModel *model, const hxContactState *con
   foot->slip_speed = hx_sqrt(hx_dot(foot->slip, foot->slip));
   if (model->friction_law == HX_FRICTION_BRISTLE) {
     foot->bristle = hx_bristle(model, hx_load(&contact->closed[slot]), bristle, foot->slip);
-    foot->force = hx_scale(foot->normal.force, hx_sub(kin->normal, foot->bristle.grip));
+    foot->force = hx_scale(foot->normal.force, hx_sub3(kin->normal, foot->bristle.grip));
     return;
   }
   foot->drag_per_load = model->mu * hx_friction(model, foot->slip_speed);

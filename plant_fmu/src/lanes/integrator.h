@@ -1,4 +1,5 @@
-/* integrator.h - from one time to another, stopping at every touch-down */
+/* integrator.h - from one time to another, stopping at every touch-down; its readable form is
+ * models/integrator.py */
 #ifndef HX_INTEGRATOR_H
 #define HX_INTEGRATOR_H
 
@@ -29,7 +30,7 @@ typedef struct {
   double t;
   double touch; /* m  how deep a foot may be that has just touched down */
   double last_step; /* count of steps, kept and rejected, at which the error control gives up */
-  const hxMotion *y;
+  const hxPlantMotion *y;
 } hxStart;
 
 /* All feet: penetration, approach speed. */
@@ -38,12 +39,12 @@ typedef struct {
 } hxFeet;
 
 typedef struct {
-  hxMotion y;
+  hxPlantMotion y;
   hxImpulses impulses;
   double error; /* of the step over the tolerance; 0 without an estimate */
 } hxTrial;
 
-static inline hxFeet feet_of(const hxModel *model, const hxMotion *motion) {
+static inline hxFeet feet_of(const hxModel *model, const hxPlantMotion *motion) {
   hxFeet feet;
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     const hxBody tibia = hx_link_body(motion, HX_JOINTS - 1, slot);
@@ -103,8 +104,8 @@ static inline void combine(const hxModel *model, double *out, const double *base
 
 static inline double larger(double a, double b) { return b > a ? b : a; }
 
-/* largest error over scale; NaN is the caller's to find */
-static double error_norm(const hxModel *model, const hxMotion *error) {
+/* largest error over scale and tolerance (eq. 22); NaN is the caller's to find */
+static double error_norm(const hxModel *model, const hxPlantMotion *error) {
   hxReal links = hx_splat(0.0);
   double largest[HX_LANES];
   double worst = 0.0;
@@ -124,7 +125,7 @@ static double error_norm(const hxModel *model, const hxMotion *error) {
   return worst / model->tolerance;
 }
 
-static void normalise_quaternions(hxMotion *m) {
+static void normalise_quaternions(hxPlantMotion *m) {
   double *p = &m->torso[HX_P];
   const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
   for (int i = 0; i < 4; ++i) p[i] *= scale;
@@ -151,7 +152,7 @@ static void move_drive(const hxCommand *from, const hxCommand *rate, double elap
       elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
 }
 
-/* The command at a time; in kinematic mode drives go on between rates as without (eq. 14). */
+/* The command at a time; in kinematic mode drives go on between rates as without (eq. 13). */
 static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
   enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   const double *from = (const double *)start->command, *rate = (const double *)start->ramp;
@@ -171,7 +172,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   const hxModel *model = start->model;
   hxImplicit implicit = {.z = h * m->gamma, .ahead = h};
   hxRate k[HX_STAGES], change;
-  hxMotion y;
+  hxPlantMotion y;
   hxWork work;
   hxCommand now;
   memset(&trial->impulses, 0, sizeof trial->impulses);
@@ -215,8 +216,8 @@ static double open_depth(const hxContactState *contact, const hxFeet *feet) {
   return depth;
 }
 
-/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends:
- * bisection. */
+/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends
+ * (eq. 24): bisection. */
 static double cubic_crossing(double from, double slope_from, double to, double slope_to,
                              double level) {
   const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise,
@@ -285,7 +286,8 @@ static double inverse_root(double x, int n) {
   return r;
 }
 
-/* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5. */
+/* Factor by which the step may change, from the error of an attempt: 0.9 error^(-1/n), 0.2 to 5
+ * (eq. 23). */
 static double step_factor(const hxMethodRow *method, double error) {
   const int n = method->error_order + 1;
   double large = 1.0, small = 1.0;
@@ -315,7 +317,7 @@ static hxStatus give_up(const hxTrial *trial, double t, double h, char *message)
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
 }
 
-static int all_finite(const hxMotion *y) {
+static int all_finite(const hxPlantMotion *y) {
   hxReal sum = hx_splat(0.0);
   double lanes[HX_LANES], total = 0.0;
   for (int i = 0; i < HX_MOTION_SIZE; i += HX_LANES) sum += 0.0 * hx_load(&y->y[i]);
@@ -329,7 +331,8 @@ static int all_finite(const hxMotion *y) {
  */
 
 /* Work of the push: its impulses times the mean of the torso's velocities at both ends. */
-static double push_work(const hxImpulses *impulses, const hxMotion *from, const hxMotion *to) {
+static double push_work(const hxImpulses *impulses, const hxPlantMotion *from,
+                        const hxPlantMotion *to) {
   double work = 0.0;
   for (int i = 0; i < 6; ++i)
     work += impulses->push[i] * (0.5 * (from->torso[HX_V + i] + to->torso[HX_V + i]));
@@ -354,7 +357,7 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
         command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
-  hx_measure_path(&path, &works, measured);
+  hx_measure_path(&path, &trial->impulses, &works, measured);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     work[pack] = (works.motor[0][pack] + works.motor[1][pack]) + works.motor[2][pack];
   trial->y.actuator_work += hx_lane(hx_sum_legs(work), 0);

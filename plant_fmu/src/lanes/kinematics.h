@@ -12,50 +12,51 @@ typedef struct {
 
 /* Joint between parent i and child j. */
 typedef struct {
-  hxVec3 s;          /* axis, fixed in i */
+  hxVec3 s;          /* axis, fixed in i, world axes */
   hxReal sx, sy,
       sz; /* the same in the child's axes (a, b, their normal): (0, 0, 1) but for drift */
-  hxVec3 sP_i, sP_j; /* centres of mass to the joint's point */
+  hxVec3 sP_i, sP_j; /* centres of mass to the joint's point, world axes; body-fixed they are
+                        point_i, point_j */
 } hxJointKinematics;
 
-/* Phi and its rate (eq. 2): rows 1-3, rows 4-5. */
+/* Phi (eq. 4) and its rate, D of eq. 2 times the velocities: rows 1-3, rows 4-5. */
 typedef struct {
   hxVec3 phi_lin, dphi_lin;
   hxReal phi[2], dphi[2];
 } hxConstraint;
 
-static inline hxVec3 hx_torso_vec3(const hxMotion *motion, int row) {
+static inline hxVec3 hx_torso_vec3(const hxPlantMotion *motion, int row) {
   return hx_splat_vec3(&motion->torso[row]);
 }
-static inline hxVec3 hx_link_vec3(const hxMotion *motion, int joint, int row, int slot) {
+static inline hxVec3 hx_link_vec3(const hxPlantMotion *motion, int joint, int row, int slot) {
   return hx_load_vec3(&motion->link[joint][row], slot);
 }
-static inline hxQuat hx_torso_quat(const hxMotion *motion) {
+static inline hxQuat hx_torso_quat(const hxPlantMotion *motion) {
   return hx_splat_quat(&motion->torso[HX_P]);
 }
-static inline hxQuat hx_link_quat(const hxMotion *motion, int joint, int slot) {
+static inline hxQuat hx_link_quat(const hxPlantMotion *motion, int joint, int slot) {
   return hx_load_quat(&motion->link[joint][HX_P], slot);
 }
 
-static inline hxBody hx_torso_body(const hxMotion *motion) {
+static inline hxBody hx_torso_body(const hxPlantMotion *motion) {
   return (hxBody){hx_rotation_matrix(hx_torso_quat(motion)), hx_torso_vec3(motion, HX_W)};
 }
 
-static inline hxBody hx_link_body(const hxMotion *motion, int joint, int slot) {
+static inline hxBody hx_link_body(const hxPlantMotion *motion, int joint, int slot) {
   return (hxBody){hx_rotation_matrix(hx_link_quat(motion, joint, slot)),
                   hx_link_vec3(motion, joint, HX_W, slot)};
 }
 
 /* the same of a joint's parent: the link before, or the torso */
-static inline hxVec3 hx_parent_vec3(const hxMotion *motion, int joint, int row, int slot) {
+static inline hxVec3 hx_parent_vec3(const hxPlantMotion *motion, int joint, int row, int slot) {
   return joint > 0 ? hx_link_vec3(motion, joint - 1, row, slot) : hx_torso_vec3(motion, row);
 }
 
-static inline hxQuat hx_parent_quat(const hxMotion *motion, int joint, int slot) {
+static inline hxQuat hx_parent_quat(const hxPlantMotion *motion, int joint, int slot) {
   return joint > 0 ? hx_link_quat(motion, joint - 1, slot) : hx_torso_quat(motion);
 }
 
-static inline hxBody hx_parent_body(const hxMotion *motion, int joint, int slot) {
+static inline hxBody hx_parent_body(const hxPlantMotion *motion, int joint, int slot) {
   return joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion);
 }
 
@@ -75,32 +76,32 @@ static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, i
                              hx_dot(j->axes.x, s),
                              hx_dot(j->axes.y, s),
                              hx_dot(j->axes.z, s),
-                             hx_mul(i->axes, hx_load_vec3(model->sP_i, slot)),
-                             hx_mul(j->axes, hx_load_vec3(model->sP_j, slot))};
+                             hx_mul(i->axes, hx_load_vec3(model->point_i, slot)),
+                             hx_mul(j->axes, hx_load_vec3(model->point_j, slot))};
 }
 
 /* Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s); the rates of rows 4, 5 are (a x s).(w_j - w_i), (b x
  * s).(w_j - w_i). */
-static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxMotion *motion,
+static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxPlantMotion *motion,
                                                int joint, int slot) {
   const hxBody i = hx_parent_body(motion, joint, slot), j = hx_link_body(motion, joint, slot);
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
   const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
-  const hxVec3 w = hx_tmul(j.axes, hx_sub(j.w, i.w)); /* child's axes */
+  const hxVec3 w_ij_j = hx_tmul(j.axes, hx_sub3(j.w, i.w)); /* child's axes */
   const hxVec3 v_j = hx_link_vec3(motion, joint, HX_V, slot);
   return (hxConstraint){
       .phi_lin =
-          hx_sub(hx_add(hx_link_vec3(motion, joint, HX_R, slot), k.sP_j), hx_add(r_i, k.sP_i)),
-      .dphi_lin = hx_sub(hx_add(v_j, hx_cross(j.w, k.sP_j)), hx_add(v_i, hx_cross(i.w, k.sP_i))),
+          hx_sub3(hx_add3(hx_link_vec3(motion, joint, HX_R, slot), k.sP_j), hx_add3(r_i, k.sP_i)),
+      .dphi_lin = hx_sub3(hx_add3(v_j, hx_cross(j.w, k.sP_j)), hx_add3(v_i, hx_cross(i.w, k.sP_i))),
       .phi = {k.sx, k.sy},
-      .dphi = {k.sy * w.z - k.sz * w.y, k.sz * w.x - k.sx * w.z}};
+      .dphi = {k.sy * w_ij_j.z - k.sz * w_ij_j.y, k.sz * w_ij_j.x - k.sx * w_ij_j.z}};
 }
 
 /* Puts links back on their joints, hip to foot: turned by the least turn that brings the child's z
  * on the axis, moved to the point, and what they turn and move otherwise than about the joint taken
  * away. */
-static inline void project_link(const hxModel *model, int joint, int slot, hxMotion *motion) {
+static inline void project_link(const hxModel *model, int joint, int slot, hxPlantMotion *motion) {
   const hxBody i = hx_parent_body(motion, joint, slot), drifted = hx_link_body(motion, joint, slot);
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
@@ -110,16 +111,16 @@ static inline void project_link(const hxModel *model, int joint, int slot, hxMot
   const hxQuat turn = {scale * twice, u.x, u.y, u.z};
   hx_store_quat(&motion->link[joint][HX_P], slot,
                 hx_quat_mul(turn, hx_link_quat(motion, joint, slot)));
-  const hxVec3 w_j = hx_add_scaled(i.w, hx_dot(s, hx_sub(drifted.w, i.w)), s);
+  const hxVec3 w_j = hx_add_scaled(i.w, hx_dot(s, hx_sub3(drifted.w, i.w)), s);
   hx_store_vec3(&motion->link[joint][HX_W], slot, w_j);
   const hxBody j = hx_link_body(motion, joint, slot);
   const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
-  hx_store_vec3(&motion->link[joint][HX_R], slot, hx_sub(hx_add(r_i, k.sP_i), k.sP_j));
+  hx_store_vec3(&motion->link[joint][HX_R], slot, hx_sub3(hx_add3(r_i, k.sP_i), k.sP_j));
   hx_store_vec3(&motion->link[joint][HX_V], slot,
-                hx_sub(hx_add(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
+                hx_sub3(hx_add3(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
 }
 
-static inline void hx_project(const hxModel *model, hxMotion *motion) {
+static inline void hx_project(const hxModel *model, hxPlantMotion *motion) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
       project_link(model, joint, slot, motion);

@@ -183,7 +183,7 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
 }
 
 #else
-#include "tangent.h"
+#include "complex_step.h"
 #endif
 
 enum { HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES }; /* a pack is HX_LANES legs */

@@ -1,10 +1,11 @@
 /* measure.h - what a step did: works, losses, slip, impulses and peaks of joints and feet
  *
  * Works and losses are the impulses of the step's own forces times the mean of the speeds at its
- * ends (eq. 22), so that they explain the change of kinetic energy. What is no work is integrated
- * along the step's path between its ends (hxMoment, eq. 23): angles and depths follow cubics
- * through values and rates, sliding velocities parabolas through values and mean. Nothing depends
- * on how often anyone looks at the plant.
+ * ends (eq. 27), so that they explain the change of kinetic energy. What is no work is integrated
+ * along the step's path between its ends (hxMoment, eq. 28): angles and depths follow cubics
+ * through values and rates, sliding velocities parabolas through values and mean. A landing's rise
+ * of force is taken over a millisecond (eq. 29): its derivative jumps with every command, so its
+ * largest value is that of an instant. Nothing depends on how often anyone looks at the plant.
  */
 #ifndef HX_MEASURE_H
 #define HX_MEASURE_H
@@ -12,8 +13,8 @@
 #include "../contact_law.h"
 #include "dynamics.h"
 
-static const double landing_time =
-    0.02; /* s  after touch-down, in which a rise of the normal force counts as the landing's */
+static const double landing_sample = 1e-4; /* s  between two forces of a landing */
+static const double nearly_sliding = 0.9; /* of the friction cone */
 static const double shortest_bend =
     1e-7; /* s  in shorter steps second differences of depths are rounding */
 static const double half_turn = 3.14159265358979323846;
@@ -21,6 +22,7 @@ static const double half_turn = 3.14159265358979323846;
 /* Nodes of a step, at which laws are evaluated: all of them for feet, every second one for motors;
  * and Simpson's weights there. */
 enum { INTERVALS = 4, MOTOR_STRIDE = 2 };
+enum { LANDING_SAMPLES = 200 }; /* of a landing, which is over 20 ms after touch-down */
 static const double foot_weight[INTERVALS + 1] = {1.0 / 12, 4.0 / 12, 2.0 / 12, 4.0 / 12, 1.0 / 12};
 static const double motor_weight[INTERVALS + 1] = {1.0 / 6, 0.0, 4.0 / 6, 0.0, 1.0 / 6};
 
@@ -45,7 +47,8 @@ typedef struct {
  */
 
 /* Angles, speeds and feet of a motion. */
-static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hxMoment *moment) {
+static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motion,
+                                hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
     hxBody i = torso, j = torso;
@@ -58,12 +61,12 @@ static inline void hx_moment_of(const hxModel *model, const hxMotion *motion, hx
                           hx_link_quat(motion, joint, slot), &sine, &cosine);
       hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
       const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
-      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub(j.w, i.w)));
+      hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);
     const hxVec3 to_point = hx_scale(hx_splat(-model->foot_radius), foot.normal);
     const hxVec3 centre =
-        hx_add(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub(foot.arm, to_point));
+        hx_add3(hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot), hx_sub3(foot.arm, to_point));
     hx_store_vec3(moment->centre, slot, centre);
     hx_store_vec3(moment->normal, slot, foot.normal);
     hx_store_vec3(moment->slip, slot, hx_add_scaled(foot.velocity, foot.ddelta, foot.normal));
@@ -107,12 +110,14 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
     if (before.closed[slot] == 0.0 && state->contact.closed[slot] != 0.0) {
       state->measured.landings[slot] += 1.0;
       state->measured.landed_at[slot] = t;
+      state->measured.landing_left[slot] = LANDING_SAMPLES;
       state->measured.landing_rate[slot] = 0.0;
+      for (int i = 0; i < HX_RISE_SAMPLES; ++i) state->measured.landing_force[i][slot] = 0.0;
     }
   if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
 }
 
-/* ---- works and losses (eq. 22)
+/* ---- works and losses (eq. 27)
  * -----------------------------------------------------------------------------------------------
  */
 
@@ -122,7 +127,7 @@ static inline hxReal mean_of(const double *from, const double *to) {
 
 static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to)[HX_SLOTS],
                                int slot) {
-  return hx_scale(hx_splat(0.5), hx_add(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
+  return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
 }
 
 /* 2/5 K delta^(5/2) of a closed foot */
@@ -256,15 +261,14 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   const hxReal closed = hx_load(&path->contact->closed[slot]),
                damping = hx_load(&path->contact->damping[slot]);
   const hxVec3 slip_from = hx_load_vec3(from->slip, slot), slip_to = hx_load_vec3(to->slip, slot);
-  const hxVec3 way = hx_sub(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
+  const hxVec3 way = hx_sub3(hx_load_vec3(to->centre, slot), hx_load_vec3(from->centre, slot));
   const hxVec3 along = along_ground(way, mean_vec3(from->normal, to->normal, slot));
-  const hxVec3 mean = hx_add(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
+  const hxVec3 mean = hx_add3(hx_scale(per_step, along), mean_vec3(from->roll, to->roll, slot));
   const hxReal delta = hx_load(&from->delta[slot]), slope_from = h * hx_load(&from->ddelta[slot]);
   const hxReal rise = hx_load(&to->delta[slot]) - delta, slope_to = h * hx_load(&to->ddelta[slot]);
-  const hxReal landing_end = hx_load(&measured->landed_at[slot]) + landing_time;
   hxReal peak = hx_load(&measured->peak_force[slot]),
          steepest = hx_load(&measured->peak_rate[slot]);
-  hxReal landing = hx_load(&measured->landing_rate[slot]), impulse = zero, slipped = zero;
+  hxReal impulse = zero, slipped = zero;
   const hxReal bends = path->h < shortest_bend ? zero : per_step * per_step;
   hxReal last_force = zero, last_speed = zero;
   for (int node = 0; node <= INTERVALS; ++node) {
@@ -277,8 +281,6 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
     const hxReal rate = f.stiffness * approach + f.viscosity * (bends * depth.second);
     peak = hx_max(peak, f.force);
     steepest = hx_max(steepest, rate);
-    landing = hx_max(landing,
-                     hx_select(hx_less(landing_end, hx_splat(path->t + x * path->h)), zero, rate));
     impulse += hx_splat(path->h * foot_weight[node]) * f.force;
     if (node > 0) {
       hxReal middle;
@@ -289,9 +291,72 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   }
   hx_store(&measured->peak_force[slot], peak);
   hx_store(&measured->peak_rate[slot], steepest);
-  hx_store(&measured->landing_rate[slot], landing);
   hx_store(&measured->impulse[slot], hx_load(&measured->impulse[slot]) + impulse);
   hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
+}
+
+/* Normal force of one leg's foot at x in [0, 1] of a step. */
+static inline double force_within(const hxPath *path, int leg, double x) {
+  const double h = path->h, delta = path->from->delta[leg];
+  const hxCubic depth =
+      cubic(hx_splat(delta), hx_splat(h * path->from->ddelta[leg]),
+            hx_splat(path->to->delta[leg] - delta), hx_splat(h * path->to->ddelta[leg]), x);
+  const hxReal closed = hx_splat(path->contact->closed[leg]),
+               damping = hx_splat(path->contact->damping[leg]);
+  return hx_lane(
+      hx_normal_force(path->model, closed, damping, depth.value, hx_splat(1.0 / h) * depth.rate)
+          .force,
+      0);
+}
+
+/* The samples of one leg's landing that are within a step: the force at times t_n after touch-down,
+ * and its rise over the window that ends there (eq. 29). Before touch-down there was none. */
+static inline void measure_landing(const hxPath *path, int leg, hxMeasured *measured) {
+  for (; measured->landing_left[leg] > 0.0; measured->landing_left[leg] -= 1.0) {
+    const int n = LANDING_SAMPLES + 1 - (int)measured->landing_left[leg];
+    const double x = (measured->landed_at[leg] + n * landing_sample - path->t) / path->h;
+    if (x > 1.0) return;
+    double *oldest = &measured->landing_force[n % HX_RISE_SAMPLES][leg];
+    const double force = force_within(path, leg, fmax(x, 0.0));
+    const double rate = (force - *oldest) / (HX_RISE_SAMPLES * landing_sample);
+    measured->landing_rate[leg] = fmax(measured->landing_rate[leg], rate);
+    *oldest = force;
+  }
+}
+
+/* ---- the friction cone
+ * ------------------------------------------------------------------------------------------------------
+ */
+
+/* Where a share |f_t|/(mu f_n) is among the bins, whose number is the whole part: bin i begins at
+ * 0.9 (i/30)^2, so they are finer where shares are small; the last holds all above 0.9. */
+static inline hxReal hx_cone_place(hxReal share) {
+  const double last = HX_CONE_BINS - 1;
+  return hx_min(last * hx_sqrt((1.0 / nearly_sliding) * share), hx_splat(last));
+}
+
+static inline int hx_has_cone(const hxModel *model) {
+  return model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE;
+}
+
+/* Time of the feet under load by the share of the cone that the step's impulses use. */
+static inline void measure_cone(const hxPath *path, const hxImpulses *impulse,
+                                hxMeasured *measured) {
+  double place[HX_SLOTS], pressed[HX_SLOTS];
+  if (!hx_has_cone(path->model)) return;
+  for (int pack = 0; pack < HX_PACKS; ++pack) {
+    const int slot = pack * HX_LANES;
+    const hxVec3 normal = mean_vec3(path->from->normal, path->to->normal, slot);
+    const hxReal along = hx_dot(impulse->foot[pack], normal);
+    const hxVec3 across = hx_add_scaled(impulse->foot[pack], -along, normal);
+    const hxReal share =
+        hx_sqrt(hx_dot(across, across)) / hx_max(path->model->mu * along, hx_splat(1e-300));
+    hx_store(&place[slot], hx_cone_place(share));
+    hx_store(&pressed[slot], along);
+  }
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    if (pressed[leg] > path->h * path->model->load_threshold)
+      measured->cone_time[(int)place[leg]] += path->h;
 }
 
 /* ---- the whole step
@@ -299,14 +364,16 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
  */
 
 /* Adds what a step did to what was measured. */
-static inline void hx_measure_path(const hxPath *path, const hxStepWorks *works,
-                                   hxMeasured *measured) {
+static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse,
+                                   const hxStepWorks *works, hxMeasured *measured) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       measure_joint(path, joint, pack * HX_LANES, works->motor[joint][pack],
                     works->mean_torque[joint][pack], measured);
     measure_feet(path, pack * HX_LANES, measured);
   }
+  for (int leg = 0; leg < HX_LEGS; ++leg) measure_landing(path, leg, measured);
+  measure_cone(path, impulse, measured);
   measured->contact_loss += hx_lane(hx_sum_legs(works->contact), 0);
   measured->friction_loss += hx_lane(hx_sum_legs(works->friction), 0);
   measured->gear_loss += hx_lane(hx_sum_legs(works->gear), 0);

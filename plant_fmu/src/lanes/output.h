@@ -3,6 +3,9 @@
 #define HX_OUTPUT_H
 
 #include "dynamics.h"
+#ifndef HX_TANGENT
+#include "measure.h"
+#endif
 
 static void get3(hxVec3 a, int lane, hxNumber out[3]) {
   out[0] = hx_lane(a.x, lane);
@@ -21,7 +24,7 @@ static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) {
 }
 
 /* of bodies and rotors */
-static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion,
+static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *motion,
                                   const hxWork *work) {
   const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J,
                                     hx_torso_vec3(motion, HX_V), work->torso.w);
@@ -41,7 +44,7 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxMotion *motion,
 }
 
 /* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
-static hxNumber hx_potential_energy(const hxModel *model, const hxMotion *motion,
+static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion,
                                     const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
   hxReal legs[HX_PACKS];
@@ -74,17 +77,20 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
 
+static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, int lane) {
+  const hxVec3 grip = foot->bristle.grip;
+  return hx_lane(has_bristles(model) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
+                                     : foot->drag * foot->slip_speed,
+                 lane);
+}
+
 static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot,
                       hxVec3 tibia, int lane, int leg, hxOutput *o) {
   get3(foot->force, lane, o->foot.force[leg]);
-  get3(hx_add(tibia, foot->kin.arm), lane, o->foot.position[leg]);
+  get3(hx_add3(tibia, foot->kin.arm), lane, o->foot.position[leg]);
   get3(foot->kin.velocity, lane, o->foot.velocity[leg]);
   o->foot.normal_force[leg] = hx_lane(foot->normal.force, lane);
-  o->foot.tangential_force[leg] =
-      hx_lane(has_bristles(model)
-                  ? foot->normal.force * hx_sqrt(hx_dot(foot->bristle.grip, foot->bristle.grip))
-                  : foot->drag * foot->slip_speed,
-              lane);
+  o->foot.tangential_force[leg] = tangential_force(model, foot, lane);
   o->foot.slip_speed[leg] = hx_lane(foot->slip_speed, lane);
   o->foot.penetration[leg] = hx_lane(foot->kin.delta, lane);
   o->foot.impact_speed[leg] = state->contact.impact_speed[leg];
@@ -98,7 +104,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
   o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
 }
 
-static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) {
+static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
   const hxMat3 R = work->torso.axes;
   hxNumber x[3], y[3], z[3]; /* columns of R */
@@ -117,7 +123,7 @@ static void fill_torso(const hxMotion *motion, const hxWork *work, hxOutput *o) 
 }
 
 /* norms of Phi and dPhi/dt over all joints */
-static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutput *o) {
+static void fill_constraint(const hxModel *model, const hxPlantMotion *motion, hxOutput *o) {
   hxReal position[HX_PACKS], velocity[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     position[pack] = velocity[pack] = hx_splat(0.0);
@@ -134,7 +140,7 @@ static void fill_constraint(const hxModel *model, const hxMotion *motion, hxOutp
 
 static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work,
                         hxOutput *o) {
-  const hxMotion *m = &state->motion;
+  const hxPlantMotion *m = &state->motion;
   o->energy.kinetic = hx_kinetic_energy(model, m, work);
   o->energy.potential = hx_potential_energy(model, m, work);
   o->energy.actuator_work = m->actuator_work;
@@ -159,6 +165,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     fill_foot(model, state, &w->foot, tibia, lane, leg, o);
   }
   fill_torso(&state->motion, work, o);
+  for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
   fill_energy(model, state, work, o);
   fill_constraint(model, &state->motion, o);
   o->solver.evaluations = state->evaluations;
@@ -168,22 +175,19 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
 }
 
 #ifndef HX_TANGENT /* derivatives of state and input do not see them */
+static int cone_bin(double share) {
+  const double place = hx_lane(hx_cone_place(hx_splat(share)), 0);
+  return (int)place;
+}
+
 /* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0
  */
 static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
-  hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
-  for (int pack = 0; pack < HX_PACKS; ++pack) {
-    const hxLegWork *w = &work->pack[pack];
-    const hxNormalForce *f = &w->foot.normal;
-    contact[pack] = (f->force - f->elastic) * w->foot.kin.ddelta;
-    friction[pack] = hx_friction_power(model, &w->foot);
-    gear[pack] = hx_splat(0.0);
-    for (int joint = 0; joint < HX_JOINTS; ++joint)
-      gear[pack] -= w->joint[joint].servo.friction * w->joint[joint].speed;
-  }
-  rate->energy.contact_loss = hx_lane(hx_sum_legs(contact), 0);
-  rate->energy.friction_loss = hx_lane(hx_sum_legs(friction), 0);
-  rate->energy.gear_loss = hx_lane(hx_sum_legs(gear), 0);
+  const hxLossPowers losses = hx_loss_powers(model, work);
+  rate->energy.contact_loss = losses.contact;
+  rate->energy.friction_loss = losses.friction;
+  rate->energy.gear_loss = losses.gear;
+  memset(rate->cone_time, 0, sizeof rate->cone_time);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     int lane;
     const hxLegWork *w = leg_work(work, leg, &lane);
@@ -194,7 +198,10 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
       rate->negative_work[leg][joint] = fmax(-power, 0.0);
       rate->torque_squared[leg][joint] = torque * torque;
     }
-    const double force = hx_lane(w->foot.normal.force, lane);
+    const double force = hx_lane(w->foot.normal.force, lane),
+                 across = tangential_force(model, &w->foot, lane);
+    if (force > model->load_threshold && hx_has_cone(model))
+      rate->cone_time[cone_bin(across / (model->mu * force))] += 1.0;
     rate->foot.impulse[leg] = force;
     rate->foot.slip_distance[leg] =
         force > model->load_threshold ? hx_lane(w->foot.slip_speed, lane) : 0.0;
@@ -206,7 +213,7 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
 
 /* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's
  * bodies */
-static inline void hx_accelerations_fill(const hxWork *work, const hxMotion *rate,
+static inline void hx_accelerations_fill(const hxWork *work, const hxPlantMotion *rate,
                                          hxNumber acceleration[HX_BODIES][6],
                                          hxNumber multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
                                          hxNumber drive_torque[HX_BODIES - 1]) {

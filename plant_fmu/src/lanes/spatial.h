@@ -37,13 +37,13 @@ static inline hxRigid6 hx_rigid_inertia(hxReal mass, hxSym3 J, hxVec3 c) {
 }
 
 static inline hxForce6 hx_rigid_mul(const hxRigid6 *I, hxMotion6 a) {
-  return (hxForce6){hx_add(hx_sym_mul(I->C, a.ang), hx_cross(I->h, a.lin)),
+  return (hxForce6){hx_add3(hx_sym_mul(I->C, a.ang), hx_cross(I->h, a.lin)),
                     hx_add_scaled(hx_cross(a.ang, I->h), I->mass, a.lin)};
 }
 
 static inline hxForce6 hx_inertia_mul(const hxInertia6 *I, hxMotion6 a) {
-  return (hxForce6){hx_add(hx_sym_mul(I->C, a.ang), hx_mul(I->H, a.lin)),
-                    hx_add(hx_tmul(I->H, a.ang), hx_sym_mul(I->A, a.lin))};
+  return (hxForce6){hx_add3(hx_sym_mul(I->C, a.ang), hx_mul(I->H, a.lin)),
+                    hx_add3(hx_tmul(I->H, a.ang), hx_sym_mul(I->A, a.lin))};
 }
 
 static inline hxReal hx_power(hxForce6 f, hxMotion6 v) {
@@ -51,7 +51,7 @@ static inline hxReal hx_power(hxForce6 f, hxMotion6 v) {
 }
 
 static inline hxForce6 hx_force_add(hxForce6 a, hxForce6 b) {
-  return (hxForce6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)};
+  return (hxForce6){hx_add3(a.ang, b.ang), hx_add3(a.lin, b.lin)};
 }
 
 static inline hxForce6 hx_force_add_scaled(hxForce6 a, hxReal s, hxForce6 b) {
@@ -63,7 +63,7 @@ static inline hxMotion6 hx_motion_add_scaled(hxMotion6 a, hxReal s, hxMotion6 b)
 }
 
 static inline hxMotion6 hx_motion_add(hxMotion6 a, hxMotion6 b) {
-  return (hxMotion6){hx_add(a.ang, b.ang), hx_add(a.lin, b.lin)};
+  return (hxMotion6){hx_add3(a.ang, b.ang), hx_add3(a.lin, b.lin)};
 }
 
 static inline hxSym3 hx_sym_add(hxSym3 A, hxSym3 B) {
@@ -134,8 +134,8 @@ static inline hxMotion6 hx_inertia_solve(const hxInertia6 *I, hxForce6 f) {
                     I->C.xy - (G.x.x * H.x.y + G.y.x * H.y.y + G.z.x * H.z.y),
                     I->C.xz - (G.x.x * H.x.z + G.y.x * H.y.z + G.z.x * H.z.z),
                     I->C.yz - (G.x.y * H.x.z + G.y.y * H.y.z + G.z.y * H.z.z)};
-  const hxVec3 ang = hx_sym_mul(hx_sym_inverse(S), hx_sub(f.ang, hx_mul(G, f.lin)));
-  return (hxMotion6){ang, hx_sub(hx_sym_mul(A, f.lin), hx_tmul(G, ang))};
+  const hxVec3 ang = hx_sym_mul(hx_sym_inverse(S), hx_sub3(f.ang, hx_mul(G, f.lin)));
+  return (hxMotion6){ang, hx_sub3(hx_sym_mul(A, f.lin), hx_tmul(G, ang))};
 }
 
 #endif

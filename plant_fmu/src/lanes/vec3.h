@@ -56,10 +56,10 @@ static inline hxQuat hx_splat_quat(const hxNumber p[4]) {
 static inline hxVec3 hx_zero3(void) {
   return (hxVec3){hx_splat(0.0), hx_splat(0.0), hx_splat(0.0)};
 }
-static inline hxVec3 hx_add(hxVec3 a, hxVec3 b) {
+static inline hxVec3 hx_add3(hxVec3 a, hxVec3 b) {
   return (hxVec3){a.x + b.x, a.y + b.y, a.z + b.z};
 }
-static inline hxVec3 hx_sub(hxVec3 a, hxVec3 b) {
+static inline hxVec3 hx_sub3(hxVec3 a, hxVec3 b) {
   return (hxVec3){a.x - b.x, a.y - b.y, a.z - b.z};
 }
 static inline hxVec3 hx_neg(hxVec3 a) { return (hxVec3){-a.x, -a.y, -a.z}; }
@@ -90,7 +90,7 @@ static inline hxVec3 hx_sym_mul(hxSym3 S, hxVec3 b) {
                   S.xz * b.x + S.yz * b.y + S.zz * b.z};
 }
 
-/* R of eq. 7; p need not have unit length */
+/* R of eq. 5; p need not have unit length */
 static inline hxMat3 hx_rotation_matrix(hxQuat p) {
   const hxReal two = 2.0 / (p.w * p.w + p.x * p.x + p.y * p.y + p.z * p.z);
   const hxReal x = two * p.x, y = two * p.y, z = two * p.z;
@@ -107,7 +107,7 @@ static inline hxQuat hx_quat_mul(hxQuat a, hxQuat b) {
       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 
-/* dp/dt = (0, w) p / 2, w in world axes (eq. 8) */
+/* dp/dt = (0, w) p / 2, w in world axes (eq. 6) */
 static inline hxQuat hx_quaternion_rate(hxQuat p, hxVec3 w) {
   const hxReal x = 0.5 * w.x, y = 0.5 * w.y, z = 0.5 * w.z;
   return (hxQuat){-x * p.x - y * p.y - z * p.z, x * p.w + y * p.z - z * p.y,

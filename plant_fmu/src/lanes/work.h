@@ -7,7 +7,7 @@
 #include "foot.h"
 #include "kinematics.h"
 
-/* What the O(n) sweeps of eq. 11-12 keep of joint k. */
+/* What the O(n) sweeps of eq. 10-11 keep of joint k. */
 typedef struct {
   hxMotion6 S;      /* (s, P x s) */
   hxForce6 U;       /* I S, I the articulated inertia of the child with all it carries */
@@ -26,13 +26,13 @@ typedef struct {
                     too) */
   hxReal driven; /* rad/s2  the drive's qdd in kinematic mode, else 0 */
   hxServo servo;
-  hxMotion6 bias; /* the child's acceleration from a_k of eq. 10, summed from the hip to here, with
-                     S qdd in kinematic mode */
+  hxMotion6 bias; /* the child's acceleration from a_k of eq. 8, summed from the hip to here, with S
+                     qdd in kinematic mode */
   hxForce6 p; /* what that bias takes less what is applied */
   hxSweep sweep;
   hxReal qdd;
   hxReal turned,
-      sped; /* rad, rad/s  shifts of angle and speed before this stage's own share (eq. 16) */
+      sped; /* rad, rad/s  shifts of angle and speed before this stage's own share (eq. 20) */
   hxMotion6 acceleration; /* a - g of the child at its centre of mass */
   struct { /* for the multipliers, when they are asked for */
     hxJointKinematics kin;
@@ -47,9 +47,9 @@ typedef struct {
   hxVec3 response; /* N  what a stage adds to the foot's force, but for the share of its own
                       acceleration */
   hxVec3 foot_moved,
-      foot_sped; /* m, m/s  shifts of the contact point before this stage's own share (eq. 16) */
+      foot_sped; /* m, m/s  shifts of the contact point before this stage's own share (eq. 20) */
   hxVec3 bristle_force; /* N  what bristles add to friction in a stage, but for the contact point's
-                           own share (eq. 20) */
+                           own share (eq. 21) */
 } hxLegWork;
 
 typedef struct {
@@ -68,7 +68,7 @@ typedef union {
   struct {
     hxNumber torso_turn[8]; /* the last five are padding */
     hxNumber link_turn[HX_JOINTS][3][HX_SLOTS];
-    hxMotion motion;
+    hxPlantMotion motion;
   };
 } hxRate;
 
@@ -76,7 +76,7 @@ static inline int has_bristles(const hxModel *model) {
   return model->friction_law == HX_FRICTION_BRISTLE;
 }
 
-/* A stage of a linearly implicit method (eq. 15). The slopes of contact and servo are the first
+/* A stage of a linearly implicit method (eq. 19). The slopes of contact and servo are the first
  * stage's, kept for the others. */
 typedef struct {
   double z; /* h gamma */

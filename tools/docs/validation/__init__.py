@@ -14,11 +14,26 @@ from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown
 
 # the robots, motions and problems of the tests
-sys.path.extend(str(ROOT / "tests" / room) for room in ("support", "models", "plant"))
+sys.path.extend(
+    str(ROOT / "tests" / room)
+    for room in ("support", "models", "plant", "controller", "cosim", "design")
+)
 
 from building import built, shared_library
 
-from tools.docs.validation import agreement, benchmarks, books, impacts, motion, orders, quoted
+from tools.docs.validation import (
+    agreement,
+    benchmarks,
+    books,
+    control,
+    drive,
+    effort,
+    impacts,
+    motion,
+    orders,
+    quoted,
+    robots,
+)
 
 PLACE = re.compile(r"<!-- result: ([\w-]+) -->")
 COMPUTED: Mapping[str, Callable[[ctypes.CDLL], Shown]] = {
@@ -33,9 +48,14 @@ READ: Mapping[str, Callable[[], Shown]] = {
     "books": books.books,
     "books-of-scenarios": books.scenarios,
     **quoted.RESULTS,
+    **control.RESULTS,
+    **drive.RESULTS,
+    **effort.RESULTS,
+    **robots.RESULTS,
     "peers": benchmarks.peers,
     "speed": benchmarks.speed,
     "control": benchmarks.control,
+    "slip-pid": benchmarks.slip_pid,
 }
 
 

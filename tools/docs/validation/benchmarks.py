@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from tools.docs.stage import ROOT
 from tools.docs.validation.shown import Shown, short
+from tools.docs.validation.walked import shown
 
 RESULTS = ROOT / "benchmarks" / "results"
 ENGINES = {
@@ -102,7 +103,8 @@ def control() -> Shown:
 
     def draw(figure: Figure) -> None:
         panels = figure.subplots(len(tables), len(SHOWN), sharex=True, sharey=True)
-        for line, (robot, changes) in zip(panels, tables.items(), strict=True):
+        for number, (robot, changes) in enumerate(tables.items()):
+            line = panels[number]
             for axes, (metric, title) in zip(line, SHOWN.items(), strict=True):
                 values = np.array(
                     [
@@ -125,9 +127,9 @@ def control() -> Shown:
                         color=shade,
                         fontsize=8,
                     )
-                if line is panels[0]:
+                if number == 0:
                     axes.set_title(title, fontsize=9)
-                if line is panels[-1]:
+                if number == len(tables) - 1:
                     axes.set_xlabel("m/s")
             line[0].set_ylabel(robot)
 
@@ -144,3 +146,44 @@ def _changes(path: Path) -> dict[tuple[str, str], float]:
         for row in _rows(path)
         if row["relative"]
     }
+
+
+PID, WITHOUT, ALL = "slip_pid alone", "all but slip_pid", "all parts"
+ADDED = {  # what the PID changes beside the other parts
+    "slip_per_metre": "PID added to the rest: slip [%]",
+    "foot_error_stance": "the same: feet in stance [%]",
+    "roll_rms": "the same: roll [%]",
+}
+Cases = Mapping[tuple[str, str], Mapping[str, str]]  # by case and metric
+
+
+def slip_pid() -> Shown:
+    """The slip PID by itself, and what it adds to the other parts, by how wrong the model is."""
+    known, sticking, wrong = map(_cases, ("ablation", "sticking", "model_errors"))
+    errors = sorted({case.rpartition(", ")[0] for case, _ in wrong})
+    plants = {"as modelled": _of_pid(known), "bristle law": _of_pid(sticking)}
+    plants |= {error: _of_pid(wrong, before=f"{error}, ") for error in errors}
+    titles = (
+        "slip [m/m]: kinematic", "PID alone", "all but the PID", "all parts",
+        "PID alone, against kinematic: slip [%]", *ADDED.values(),
+    )  # fmt: skip
+    rows = zip(titles, *plants.values(), strict=True)
+    return Shown(columns=("the plant", *plants), rows=list(rows))
+
+
+def _cases(name: str) -> Cases:
+    rows = _rows(RESULTS / "control" / f"{name}.csv")
+    return {(row["case"], row["metric"]): row for row in rows}
+
+
+def _of_pid(cells: Cases, before: str = "") -> list[str]:
+    def value(part: str, metric: str = "slip_per_metre") -> float:
+        row = cells.get((before + part, metric))
+        return float("nan") if row is None else float(row["compliant"])
+
+    kinematic = float(cells[before + ALL, "slip_per_metre"]["kinematic"])
+    slips = [kinematic, *(value(part) for part in (PID, WITHOUT, ALL))]
+    gains = [(slips[1], kinematic), *((value(ALL, name), value(WITHOUT, name)) for name in ADDED)]
+    changes = [100.0 * (after / plain - 1.0) for after, plain in gains]
+    told = (f"{each:+.1f}" if np.isfinite(each) else "-" for each in changes)
+    return [*map(shown, slips), *told]

@@ -4,24 +4,19 @@ is read, and on the friction assumed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from measured import driven, integral, landing_rates, sampled, slipped
 
-from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.interface.names import joint_names
-from hexapod_cosim.cosim.results.metrics import METRICS, compute_metrics, shown_metrics
+from hexapod_cosim.cosim.results.metrics import compute_metrics, shown_metrics
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.models import load_robot
 from tools.docs.validation.shown import Shown
+from tools.docs.validation.walked import figures, heading, judged, walk
 
 PERIOD = 1.0  # s    of the judged walk's gait
 FINE_STEP, COARSE = 0.001, 0.02  # s
@@ -42,16 +37,6 @@ OF_FRICTION = (
     "electrical_cost",
     "servo_load_max",
 )
-
-
-@cache
-def walk(*settings: str) -> Result:
-    """The judged walk with some settings."""
-    with TemporaryDirectory() as folder:
-        fmu = export_fmu(load_robot("athena"), Path(folder) / "athena.fmu")
-        return simulate(
-            load_scenario("walk_flat", overrides=[*settings, "outputs.plots=false"]), fmu=fmu
-        )
 
 
 def intervals() -> Shown:
@@ -93,19 +78,17 @@ def sampled_again() -> Shown:
     for control in CONTROLS:
         settings = (f"control={control}", "duration=6")
         result = walk(*settings)
-        plan = load_scenario("walk_flat", overrides=[*settings, "outputs.plots=false"])
-        part = View(result.outcome.judged, result.parameters, PERIOD).walk
-        assert part is not None
-        seen = sampled(plan, result.outcome.recording, begin=1.4)
-        judged = seen.after(2.0)
-        squares, load = integral(judged.torque**2), part.weight * part.distance
+        part = judged(result)
+        seen = sampled(result.scenario, result.outcome.recording, begin=1.4)
+        later = seen.after(2.0)
+        squares, load = integral(later.torque**2), part.weight * part.distance
         own = {
-            "slip_per_metre": slipped(judged, part.weight) / part.distance,
-            "cost_of_transport": driven(judged) / load,
+            "slip_per_metre": slipped(later, part.weight) / part.distance,
+            "cost_of_transport": driven(later) / load,
             "torque_rms": float(np.sqrt(squares.mean() / part.duration)),
             "servo_load_max": float(np.sqrt(squares.max() / part.duration))
             / load_robot("athena").servo.torque_continuous,
-            "peak_force": float(judged.normal.max()) / part.weight,
+            "peak_force": float(later.normal.max()) / part.weight,
             "loading_rate": float(
                 np.percentile(landing_rates(seen, apart=0.5 * PERIOD, after=2.0), 95)
             )
@@ -142,9 +125,7 @@ def work_by_step() -> Shown:
 
 def _sampled_cost(result: Result) -> float:
     """What rows at macro-steps would make of it."""
-    recording = result.outcome.recording
-    part = View(recording, result.parameters, PERIOD).walk
-    assert part is not None
+    part = judged(result)
     power = np.maximum(
         part.recording.columns(joint_names("torque"))
         * part.recording.columns(joint_names("speed")),
@@ -161,13 +142,8 @@ def friction() -> Shown:
         for control in CONTROLS
     }
     columns = ("metric", *(f"{law}: {control}" for law, control in runs))
-    return Shown(columns=columns, rows=[_row(name, runs) for name in OF_FRICTION])
-
-
-def _row(name: str, runs: Mapping[tuple[str, str], Result]) -> Sequence[str]:
-    unit = METRICS[name][0]
-    heading = f"`{name}`" + (f" [{unit}]" if unit != "1" else "")
-    return (heading, *(f"{run.metrics[name]:.3g}" for run in runs.values()))
+    rows = [(heading(name), *figures(name, list(runs.values()))) for name in OF_FRICTION]
+    return Shown(columns=columns, rows=rows)
 
 
 RESULTS: Mapping[str, Callable[[], Shown]] = {

@@ -1,13 +1,13 @@
-/* tangent.h - one leg at a time, its derivative along: hxReal is the complex number x + i step x',
- * which takes the place of lanes.h's.
+/* complex_step.h - one leg at a time, its derivative along: hxReal is the complex number x + i step
+ * x', which takes the place of lanes.h's.
  *
  * Arithmetic on complex numbers differentiates itself: (a + i h a')(b + i h b') = ab + i h (a b' +
  * a' b) but for h^2 a' b', which is nothing where h is 1e-170. Derivatives come out exact to
  * rounding; there is no difference of values in them. What chooses, by order or by sign, looks at
  * the real part; at a kink that is the side that the values are computed on.
  */
-#ifndef HX_LANES_TANGENT_H
-#define HX_LANES_TANGENT_H
+#ifndef HX_COMPLEX_STEP_H
+#define HX_COMPLEX_STEP_H
 
 static const double hx_tangent_step = 1e-170;
 

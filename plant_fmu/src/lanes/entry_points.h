@@ -1,10 +1,10 @@
-/* kernel_functions.h - a kernel's functions from the physics on lanes: included once in each
- * kernel's file, at its width */
-#include "kernel.h"
-#include "lanes/coordinates.h"
-#include "lanes/dynamics.h"
-#include "lanes/integrator.h"
-#include "lanes/output.h"
+/* entry_points.h - the functions of a kernel's table, made of the physics on lanes: included once
+ * in each kernel_*.c, at its width */
+#include "../kernel.h"
+#include "coordinates.h"
+#include "dynamics.h"
+#include "integrator.h"
+#include "output.h"
 
 static const double cautious_step = 1e-4; /* s  tried after a reset */
 
@@ -25,14 +25,13 @@ static void kernel_start(const hxModel *model, double t, hxState *state) {
   memset(&state->measured, 0, sizeof state->measured);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     hx_store(&state->measured.peak_force[pack * HX_LANES], work.pack[pack].foot.normal.force);
-  for (int slot = 0; slot < HX_SLOTS; ++slot) state->measured.landed_at[slot] = -HUGE_VAL;
   hx_fill_measured_slots(state);
   state->stored_at_start = hx_kinetic_energy(model, &state->motion, &work) +
                            hx_potential_energy(model, &state->motion, &work);
 }
 
 static void kernel_derivative(const hxModel *model, const hxState *state, const hxCommand *command,
-                              int multipliers, hxMotion *rate) {
+                              int multipliers, hxPlantMotion *rate) {
   hxRate all;
   hxWork work;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL,
@@ -51,7 +50,7 @@ static void kernel_coordinates(const hxModel *model, const hxState *state, const
   if (rate) hx_coordinates_rate(&all.motion, &work, rate);
 }
 
-static void kernel_feet(const hxModel *model, const hxMotion *motion, double delta[HX_SLOTS],
+static void kernel_feet(const hxModel *model, const hxPlantMotion *motion, double delta[HX_SLOTS],
                         double ddelta[HX_SLOTS]) {
   const hxFeet feet = feet_of(model, motion);
   memcpy(delta, feet.delta, sizeof feet.delta);
@@ -80,8 +79,8 @@ static void halve_impulses(const hxWork *work, double h, hxCompleted *completed,
       hx_store(gear, servo->friction);
     }
     impulses->foot[pack] =
-        hx_scale(half, hx_add(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot),
-                              leg->foot.force));
+        hx_scale(half, hx_add3(hx_load_vec3((const double (*)[HX_SLOTS])completed->foot, slot),
+                               leg->foot.force));
     hx_store_vec3(completed->foot, slot, leg->foot.force);
   }
   completed->known = 1.0;
@@ -113,7 +112,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
     hx_step_works(&path, &impulses, &works);
-    hx_measure_path(&path, &works, &state->measured);
+    hx_measure_path(&path, &impulses, &works, &state->measured);
   }
   state->moment = end;
   hx_fill_measured_slots(state);

@@ -1,0 +1,358 @@
+"""From one time to another, with error control and a stop at every touch-down.
+
+The readable form of plant_fmu/src/lanes/integrator.h, under the same names. It leaves out what
+the C plant measures along the way (models/measure.py has that), commands that change within a
+step, and calls that an event breaks off.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexapod_cosim.models.contact import contact_damping, foot_contacts, standing_damping
+from hexapod_cosim.models.dynamics import Command
+from hexapod_cosim.models.errors import HexapodError
+from hexapod_cosim.models.kinematics import (
+    BODIES,
+    BODY_STATE,
+    LEGS,
+    cross,
+    joint_models,
+    quaternion_product,
+    quaternion_rate,
+    rotation_matrix,
+)
+from hexapod_cosim.models.method import METHOD, Method, method_step
+from hexapod_cosim.models.records import Array, Robot
+from hexapod_cosim.models.stage import Slopes, keep_slopes, solve_stage
+
+STEP_FLOOR = 1e-11  # s  below this the error control gives up
+TOUCH_DEPTH = (1e-10, 1e-6)  # m, m over the tolerance  a touch-down is found when in by less
+CAUTIOUS_STEP = 1e-4  # s  tried first
+ERROR_SCALE = np.array([0.1] * 3 + [1.0] * 4 + [1.0] * 3 + [10.0] * 3)  # of r p v w
+BRISTLE_SCALE = 10.0  # preslidings
+TURN, BODY = 3 * BODIES, BODY_STATE * BODIES  # sizes of a stage's first two parts
+
+
+@dataclass(frozen=True)
+class State:
+    """Where the integration is."""
+
+    body: Array  # (19, 13) r p v w
+    bristle: Array  # (6, 3) m
+    damping: Array  # (6,) s/m  of the contacts, nan for open feet
+    impact_speed: Array  # (6,) m/s  at the last touch-down
+    time: float = 0.0  # s
+    next_step: float = CAUTIOUS_STEP  # s  what the error control would take next
+    first_step: float = CAUTIOUS_STEP  # s  the same for the first step of a call
+    steps: int = 0
+    rejected: int = 0
+    touchdowns: int = 0
+    evaluations: int = 0
+
+
+@dataclass(frozen=True)
+class Feet:
+    """All feet: penetration [m] and approach speed [m/s], each (6,)."""
+
+    delta: Array
+    ddelta: Array
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Where one step leads, kept or not."""
+
+    body: Array  # (19, 13)
+    bristle: Array  # (6, 3)
+    error: float  # 1  over the tolerance; 0 without an estimate
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a step starts. The command's age is that at state.time."""
+
+    robot: Robot
+    command: Command
+    state: State
+
+    @property
+    def method(self) -> Method:
+        """The solver's method."""
+        return METHOD[self.robot.solver.method]
+
+    @property
+    def touch(self) -> float:
+        """How deep a foot may be that has just touched down [m]."""
+        return max(TOUCH_DEPTH[0], TOUCH_DEPTH[1] * self.robot.solver.tolerance)
+
+
+def start_state(robot: Robot, body: Array, time: float = 0.0) -> State:
+    """The state at bodies (19, 13): feet in the ground are closed, as if put down slowly."""
+    first = min(CAUTIOUS_STEP, robot.solver.step_max)
+    closed = standing_damping(robot, body)
+    still = np.zeros((LEGS, 3))
+    return State(body, still, closed, np.zeros(LEGS), time, first, first)
+
+
+def feet_of(robot: Robot, body: Array) -> Feet:
+    """The feet of bodies (19, 13)."""
+    feet = foot_contacts(robot, body)
+    delta = np.array([foot.penetration for foot in feet])
+    return Feet(delta, np.array([foot.approach_speed for foot in feet]))
+
+
+# one step
+
+
+def try_step(start: Start, h: float) -> Trial:
+    """One step of h [s] by the solver's method (eq. 19, 20), with its error (eq. 22).
+
+    The vector that eq. 19 advances is what bodies turned by (57,), bodies (247,) and bristles
+    (18,): the first part tells later stages the angular velocities behind quaternion rates.
+    """
+    robot, method, solver = start.robot, start.method, start.robot.solver
+    z, kept = h * method.gamma, list[Slopes]()
+
+    def stage(elapsed: float, y: Array, change: Array) -> Array:
+        body, bristle = y[TURN : TURN + BODY].reshape(BODIES, BODY_STATE), y[TURN + BODY :]
+        command = replace(start.command, age=start.command.age + elapsed)
+        at = (robot, body, bristle.reshape(LEGS, 3), command, start.state.damping)
+        if not kept:
+            kept.append(keep_slopes(*at, ahead=h))
+        rate = solve_stage(*at, kept[0], z, _shifts(change))
+        nu, alpha = rate.nu.reshape(BODIES, 6), rate.alpha.reshape(BODIES, 6)
+        turns = [quaternion_rate(p, w) for p, w in zip(body[:, 3:7], nu[:, 3:6], strict=True)]
+        moved = np.hstack([nu[:, 0:3], turns, alpha])
+        return np.concatenate([nu[:, 3:6].ravel(), moved.ravel(), rate.bristle.ravel()])
+
+    y_0 = np.concatenate([np.zeros(TURN), start.state.body.ravel(), start.state.bristle.ravel()])
+    y_1, estimate = method_step(method, stage, y_0, h)
+    body, bristle = y_1[TURN : TURN + BODY].reshape(BODIES, BODY_STATE), y_1[TURN + BODY :]
+    controlled = method.error_order > 0 and solver.step == 0.0
+    error = error_norm(robot, estimate[TURN:]) if controlled else 0.0
+    body[:, 3:7] /= np.linalg.norm(body[:, 3:7], axis=1, keepdims=True)
+    if solver.projection == "step":
+        body = project(robot, body)
+    return Trial(body, bristle.reshape(LEGS, 3), error)
+
+
+def _shifts(change: Array) -> tuple[Array, Array, Array]:
+    """s_x (114,), s_v (114,) and s_b (6, 3) of the sums over earlier stages."""
+    body = change[TURN : TURN + BODY].reshape(BODIES, BODY_STATE)
+    s_x = np.hstack([body[:, 0:3], change[:TURN].reshape(BODIES, 3)])
+    return s_x.ravel(), body[:, 7:13].ravel(), change[TURN + BODY :].reshape(LEGS, 3)
+
+
+def error_norm(robot: Robot, estimate: Array) -> float:
+    """The largest entry of an error estimate (265,) over its scale and the tolerance (eq. 22).
+
+    Quaternions of links are those of their joints' axes a, b, s, as the C plant has them.
+    """
+    body = estimate[:BODY].reshape(BODIES, BODY_STATE).copy()
+    for joint in joint_models(robot):
+        turn = frame_quaternion(joint.a_j, joint.b_j, joint.s_j)
+        body[joint.child, 3:7] = quaternion_product(body[joint.child, 3:7], turn)
+    largest = float(np.max(np.abs(body) / ERROR_SCALE))
+    if robot.friction.law == "bristle":
+        bristle = float(np.max(np.abs(estimate[BODY:])))
+        largest = max(largest, bristle / (BRISTLE_SCALE * robot.friction.presliding))
+    return largest / robot.solver.tolerance
+
+
+def frame_quaternion(x: Array, y: Array, z: Array) -> Array:
+    """(4,) quaternion of a right-handed frame given by its axes (3,), up to its sign."""
+    R = np.column_stack([x, y, z])
+    # K = 4 p p^T, so each of its rows is parallel to p; the largest is the best known
+    K = np.zeros((4, 4))
+    turn = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    K[0, 0], K[0, 1:], K[1:, 0] = 1.0 + np.trace(R), turn, turn
+    K[1:, 1:] = R + R.T + (1.0 - np.trace(R)) * np.eye(3)
+    p = K[int(np.argmax(np.diag(K)))]
+    return np.asarray(p / np.linalg.norm(p))
+
+
+def project(robot: Robot, body: Array) -> Array:
+    """Bodies (19, 13) put back on their joints, hip to foot.
+
+    Each link is turned by the least turn that aligns the axis, moved to the joint's point, and
+    keeps of its relative motion the turning about the axis alone.
+    """
+    body = body.copy()
+    for joint in joint_models(robot):
+        parent, child = body[joint.parent], body[joint.child]
+        R_i = rotation_matrix(parent[3:7])
+        s, z = R_i @ joint.s_i, rotation_matrix(child[3:7]) @ joint.s_j
+        turn = np.concatenate([[1.0 + z @ s], cross(z, s)])
+        child[3:7] = quaternion_product(turn / np.linalg.norm(turn), child[3:7])
+        child[10:13] = parent[10:13] + (s @ (child[10:13] - parent[10:13])) * s
+        sP_i, sP_j = R_i @ joint.point_i, rotation_matrix(child[3:7]) @ joint.point_j
+        child[0:3] = parent[0:3] + sP_i - sP_j
+        child[7:10] = parent[7:10] + cross(parent[10:13], sP_i) - cross(child[10:13], sP_j)
+    return body
+
+
+# touch-down
+
+
+def open_depth(damping: Array, feet: Feet) -> float:
+    """How deep the deepest open foot is in the ground [m]."""
+    return float(np.max(np.where(np.isnan(damping), feet.delta, -math.inf)))
+
+
+def cubic_crossing(
+    start: float,
+    slope_start: float,
+    end: float,
+    slope_end: float,
+    level: float,
+) -> float:
+    """Where on [0, 1] the cubic with these ends and slopes reaches a level (eq. 24)."""
+    bend = slope_start + slope_end - 2.0 * (end - start)
+    curve = end - start - slope_start - bend
+    low, high = 0.0, 1.0
+    while high - low > 1e-14:
+        x = 0.5 * (low + high)
+        above = start + x * (slope_start + x * (curve + x * bend)) > level
+        low, high = (low, x) if above else (x, high)
+    return high
+
+
+def expected_touch(start: Start, t_low: float, low: Feet, t_high: float, high: Feet) -> float:
+    """When the first open foot will be half a touch depth in, between two times [s] (eq. 24)."""
+    h, level, first = t_high - t_low, 0.5 * start.touch, 1.0
+    for leg in range(LEGS):
+        if np.isnan(start.state.damping[leg]) and high.delta[leg] > level:
+            ends = (low.delta[leg], h * low.ddelta[leg], high.delta[leg], h * high.ddelta[leg])
+            first = min(first, cubic_crossing(*ends, level))
+    return t_low + first * h
+
+
+def find_touchdown(start: Start, h: float, trial: Trial) -> tuple[float, Trial, int]:
+    """Shortens a step of h [s] that ends below the ground to one that ends on it.
+
+    Each guess is a step of its own; every third halves what is left, should the cubics crawl.
+
+    Returns:
+        The step [s], where it leads, and how many steps were tried.
+    """
+    damping, tried = start.state.damping, 0
+    low, high = 0.0, h
+    feet_low, feet = feet_of(start.robot, start.state.body), feet_of(start.robot, trial.body)
+    while open_depth(damping, feet) > start.touch and high - low > STEP_FLOOR:
+        tried += 1
+        middle = expected_touch(start, low, feet_low, high, feet) if tried % 3 else low
+        if not low < middle < high:
+            middle = 0.5 * (low + high)
+        nearer = try_step(start, middle)
+        found = feet_of(start.robot, nearer.body)
+        if open_depth(damping, found) > 0.0:
+            high, feet, trial = middle, found, nearer
+        else:
+            low, feet_low = middle, found
+    return high, trial, tried
+
+
+def switch_contacts(robot: Robot, state: State) -> State:
+    """Closes feet that are in the ground and opens those that are not.
+
+    The damping is fixed by the approach speed at touch-down; the bristles of open feet are slack.
+    """
+    feet, damping = feet_of(robot, state.body), state.damping.copy()
+    impact_speed, touchdowns = state.impact_speed.copy(), state.touchdowns
+    for leg in range(LEGS):
+        is_open = bool(np.isnan(damping[leg]))
+        if is_open and feet.delta[leg] > 0.0:
+            impact_speed[leg] = feet.ddelta[leg]
+            damping[leg] = contact_damping(robot.contact, impact_speed[leg])
+            touchdowns += 1
+        elif not is_open and feet.delta[leg] <= 0.0:
+            damping[leg] = math.nan
+    bristle = np.where(np.isnan(damping)[:, None], 0.0, state.bristle)
+    return replace(
+        state,
+        damping=damping,
+        bristle=bristle,
+        impact_speed=impact_speed,
+        touchdowns=touchdowns,
+    )
+
+
+# error control
+
+
+def step_factor(method: Method, error: float) -> float:
+    """Factor by which the step may change after an attempt with this error (eq. 23)."""
+    if error <= 0.0 or math.isnan(error):
+        return 0.2 if math.isnan(error) else 5.0
+    return float(np.clip(0.9 * error ** (-1.0 / (method.error_order + 1)), 0.2, 5.0))
+
+
+def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float, float]:
+    """One accepted step of at most h_max [s], shortened by the error control and by touch-downs.
+
+    Returns:
+        The state at its end (its time is the caller's to set), its length [s], and the next
+        step that the error control would take [s].
+    """
+    robot, method, state = start.robot, start.method, start.state
+    solver, stages = robot.solver, method.stages
+    h = h_max if solver.step > 0.0 else h_max / math.ceil(max(1.0, h_max / next_step - 1e-9))
+    tried, rejected = 1, 0
+    while not (trial := try_step(start, h)).error <= 1.0:  # nan is rejected, too
+        tried, rejected = tried + 1, rejected + 1
+        h *= min(step_factor(method, trial.error), 0.9)
+        if h < STEP_FLOOR:
+            raise HexapodError(f"error control: got a step of {h:.3g} s, expected at least 1e-11 s")
+    if solver.step == 0.0:
+        next_step = min(solver.step_max, h * step_factor(method, trial.error))
+        kept = next_step if h < h_max else max(next_step, state.next_step)
+        state = replace(state, next_step=kept)
+        next_step = kept
+    taken, more = h, 0
+    if open_depth(state.damping, feet_of(robot, trial.body)) > 0.0:
+        taken, trial, more = find_touchdown(start, h, trial)
+    state = replace(
+        state,
+        body=trial.body,
+        bristle=trial.bristle,
+        steps=state.steps + 1,
+        rejected=state.rejected + rejected,
+        evaluations=state.evaluations + stages * (tried + more),
+    )
+    return switch_contacts(robot, state), taken, next_step
+
+
+def run_to(robot: Robot, command: Command, state: State, t_call: float, t_end: float) -> State:
+    """From state.time to t_end [s]; the last step lands on it exactly. The call began at t_call."""
+    first = t_call == state.time
+    while state.time < t_end:
+        left, aged = t_end - state.time, command.age + state.time - t_call
+        start = Start(robot, replace(command, age=aged), state)
+        # new inputs make a larger error than the last step's
+        size = min(state.first_step, state.next_step) if first else state.next_step
+        after, taken, size = advance(start, left, size)
+        if first:
+            after, first = replace(after, first_step=size), False
+        t = state.time + taken
+        state = replace(after, time=t_end if taken >= left or t_end - t < STEP_FLOOR else t)
+    return state
+
+
+def integrate(robot: Robot, command: Command, state: State, t_end: float) -> State:
+    """Advances the state to t_end [s] exactly under a held command whose age is that at its start.
+
+    With solver.step = 0 the error control chooses the steps; else a call is cut into equal steps
+    of at most solver.step. Raises HexapodError when the error control finds no step.
+    """
+    t_start, solver = state.time, robot.solver
+    if solver.step == 0.0:
+        return run_to(robot, command, state, t_start, t_end)
+    count = max(1, math.ceil((t_end - t_start) / solver.step - 1e-9))
+    for i in range(1, count + 1):
+        t = t_start + (t_end - t_start) * (i / count) if i < count else t_end
+        state = run_to(robot, command, state, t_start, t)
+    return state

@@ -1,0 +1,146 @@
+"""Integration methods: explicit Runge-Kutta and linearly implicit Rosenbrock-W, as coefficients.
+
+The same rows stand in plant_fmu/src/method.c.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexapod_cosim.models.records import Array
+
+Stage = Callable[[float, Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class Method:
+    """Coefficients of a method with s stages, as eq. 19 and its error estimate use them."""
+
+    order: int
+    error_order: int  # of the embedded method; 0: there is none, so steps are fixed
+    gamma: float  # 0: explicit
+    a: Array  # (s, s)
+    g: Array  # (s, s)
+    c: Array  # (s,)
+    b: Array  # (s,)
+    e: Array  # (s,)  b less the weights of the embedded method
+
+    @property
+    def stages(self) -> int:
+        """s"""
+        return len(self.b)
+
+
+def method_step(method: Method, stage: Stage, y_0: Array, h: float) -> tuple[Array, Array]:
+    """One step of eq. 19 from y_0 (n,) over h [s].
+
+    Args:
+        method: the coefficients.
+        stage: gives k_i/h (n,) from c_i h, y_i (n,) and sum g_ij k_j (n,). An explicit method's
+            stage returns f(t_0 + c_i h, y_i) and looks at nothing else.
+        y_0: where the step starts.
+        h: its length.
+
+    Returns:
+        y_1 (n,) and the estimate of its error (n,), which is 0 without an embedded method.
+    """
+    k = np.zeros((method.stages, len(y_0)))
+    for i in range(method.stages):
+        k[i] = h * stage(method.c[i] * h, y_0 + method.a[i] @ k, method.g[i] @ k)
+    return y_0 + method.b @ k, method.e @ k
+
+
+def _lower(rows: Sequence[Sequence[float]]) -> Array:
+    """(s, s) matrix whose row i holds the i numbers of rows[i] left of the diagonal."""
+    matrix = np.zeros((len(rows), len(rows)))
+    for i, row in enumerate(rows):
+        matrix[i, : len(row)] = row
+    return matrix
+
+
+def _row(
+    order: int,
+    a: Sequence[Sequence[float]],
+    b: Sequence[float],
+    e: Sequence[float] | None = None,
+    gamma: float = 0.0,
+    g: Sequence[Sequence[float]] = ((),),
+) -> Method:
+    """A method with c as the row sums of a; its embedded method is of one order less."""
+    s, matrix = len(b), _lower(a)
+    return Method(
+        order=order,
+        error_order=0 if e is None else order - 1,
+        gamma=gamma,
+        a=matrix,
+        g=_lower(g) if gamma > 0.0 else np.zeros((s, s)),
+        c=matrix.sum(axis=1),
+        b=np.array(b),
+        e=np.zeros(s) if e is None else np.array(e),
+    )
+
+
+ROS2_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
+
+METHOD: dict[str, Method] = {
+    # near ROS34PW2 (Rang and Angermann 2005), made by tools/rosw3.py: L-stable, stiffly accurate
+    "rosw3": _row(
+        order=3,
+        gamma=0.435866521508459,
+        a=[
+            [],
+            [0.8600765640643095],
+            [0.8279797393140516, -0.11004647855982283],
+            [0.0, 0.0, 1.0],
+        ],
+        g=[
+            [],
+            [-0.8600765640643084],
+            [-0.8859926672530537, 0.05043946654533214],
+            [0.23418392804962088, -1.2153107048931744, 0.5452602553350947],
+        ],
+        b=[0.23418392804962088, -1.2153107048931744, 1.5452602553350947, 0.435866521508459],
+        e=[-0.13692238301635248, -1.1228581716475137, 1.0424361172393994, 0.21734443742446677],
+    ),
+    # Verwer, Spee, Blom and Hundsdorfer 1999: L-stable
+    "ros2": _row(
+        order=2,
+        gamma=ROS2_GAMMA,
+        a=[[], [1.0]],
+        g=[[], [-2.0 * ROS2_GAMMA]],
+        b=[0.5, 0.5],
+        e=[-0.5, 0.5],
+    ),
+    # Dormand and Prince 1980
+    "dp54": _row(
+        order=5,
+        a=[
+            [],
+            [1 / 5],
+            [3 / 40, 9 / 40],
+            [44 / 45, -56 / 15, 32 / 9],
+            [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+            [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+            [35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+        ],
+        b=[35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0.0],
+        e=[71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40],
+    ),
+    # Bogacki and Shampine 1989
+    "bs32": _row(
+        order=3,
+        a=[[], [1 / 2], [0.0, 3 / 4], [2 / 9, 1 / 3, 4 / 9]],
+        b=[2 / 9, 1 / 3, 4 / 9, 0.0],
+        e=[2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8],
+    ),
+    # the classic method of Kutta
+    "rk4": _row(
+        order=4,
+        a=[[], [1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0]],
+        b=[1 / 6, 1 / 3, 1 / 3, 1 / 6],
+    ),
+}

@@ -1,0 +1,201 @@
+"""A stage of the integrator (eq. 20), dense: the fast form is plant_fmu/src/lanes/stage.h.
+
+A linearly implicit stage solves eq. 1 with the stiff part of the forces taken where the step leads.
+Without it (z = 0) it is eq. 1 itself, as explicit methods need it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexapod_cosim.models.actuator import gear_drag, servo_slopes
+from hexapod_cosim.models.contact import (
+    BristleSlopes,
+    FootContact,
+    bristle_rate,
+    bristle_slopes,
+    foot_contacts,
+    friction_drag,
+    normal_force,
+    normal_slopes,
+)
+from hexapod_cosim.models.dynamics import (
+    Command,
+    applied_forces,
+    constraints,
+    drive_acceleration,
+    joint_torques,
+    mass_matrix,
+)
+from hexapod_cosim.models.kinematics import (
+    BODIES,
+    JOINTS,
+    LEGS,
+    joint_angles,
+    joint_speeds,
+    skew,
+)
+from hexapod_cosim.models.records import Array, Robot
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes that W keeps of the forces: those of the step's first stage."""
+
+    motor_stiffness: Array  # (6, 3) N m/rad
+    motor_damping: Array  # (6, 3) N m s/rad
+    gear_drag: Array  # (6, 3) N m s/rad
+    stiffness: Array  # (6,) N/m    of the normal force by delta
+    viscosity: Array  # (6,) N s/m  of the normal force by ddelta
+    drag: Array  # (6,) N s/m  of friction by slip velocity; bristles: by their rate
+    bristle: Array  # (6,) N/m    of friction by the bristles' deflection, -G_b
+    beta: Array  # (6,) 1/s    at which sliding bristles let go
+
+
+@dataclass(frozen=True)
+class StageRate:
+    """k/h of a stage: what positions, velocities and bristles advance with."""
+
+    nu: Array  # (114,)  m/s and rad/s, body by body
+    alpha: Array  # (114,)  m/s2 and rad/s2
+    bristle: Array  # (6, 3)  m/s
+
+
+def slip_velocity(foot: FootContact) -> Array:
+    """(3,) velocity of the contact point's material along the ground [m/s]."""
+    return foot.velocity + foot.approach_speed * foot.normal
+
+
+def _foot_bristle_slopes(robot: Robot, foot: FootContact, bristle: Array) -> BristleSlopes:
+    """Friction over load as a spring and a damper; laws without bristles are a damper alone."""
+    slip = slip_velocity(foot)
+    if robot.friction.law == "bristle":
+        return bristle_slopes(robot.friction, slip, bristle)
+    return BristleSlopes(0.0, friction_drag(robot.friction, float(np.linalg.norm(slip))), 0.0)
+
+
+def keep_slopes(
+    robot: Robot,
+    body: Array,
+    bristle: Array,
+    command: Command,
+    damping: Array,
+    ahead: float,
+) -> Slopes:
+    """The slopes at bodies (19, 13) and bristles (6, 3), contacts a time `ahead` [s] further.
+
+    A foot that has just touched down has no depth and no slopes yet. Its slopes are taken at
+    delta + ahead max(ddelta, 0), or W would miss the contact that it is there for.
+    damping: (6,) of the contacts [s/m], nan for open feet.
+    """
+    angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
+    told = (command.angle_ref, command.speed_ref, command.torque_ref)
+    motor_stiffness, motor_damping = servo_slopes(robot.servo, angle, speed, *told)
+    feet = []
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        deeper = foot.penetration + ahead * max(foot.approach_speed, 0.0)
+        f_n = normal_force(robot.contact, damping[leg], deeper, foot.approach_speed)
+        normal = normal_slopes(robot.contact, damping[leg], deeper, foot.approach_speed)
+        along = _foot_bristle_slopes(robot, foot, bristle[leg])
+        feet.append([*normal, f_n * along.damping, f_n * along.stiffness, along.beta])
+    gear = gear_drag(robot.servo, speed)
+    return Slopes(motor_stiffness, motor_damping, gear, *np.array(feet).T)
+
+
+def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
+    """(3, 114) J: the velocity of the contact point's material is J v."""
+    tibia = JOINTS * (leg + 1)
+    J = np.zeros((3, 6 * BODIES))
+    J[:, 6 * tibia : 6 * tibia + 3] = np.eye(3)
+    J[:, 6 * tibia + 3 : 6 * tibia + 6] = -skew(foot.point - body[tibia, 0:3])
+    return J
+
+
+def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Array]:
+    """(114, 114) twice: G_x and G_v of eq. 20 where the bodies (19, 13) are.
+
+    They are servos and gears on the joints' axes, and each contact along its normal n and, by
+    its drag alone, across it.
+    """
+    G = constraints(robot, body).G
+    G_x = -G.T @ (slopes.motor_stiffness.reshape(-1, 1) * G)
+    G_v = -G.T @ ((slopes.motor_damping + slopes.gear_drag).reshape(-1, 1) * G)
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        J, nn = contact_jacobian(body, leg, foot), np.outer(foot.normal, foot.normal)
+        across = slopes.drag[leg] * (np.eye(3) - nn)
+        G_x -= J.T @ (slopes.stiffness[leg] * nn) @ J
+        G_v -= J.T @ (slopes.viscosity[leg] * nn + across) @ J
+    return G_x, G_v
+
+
+def law_bristle_rates(robot: Robot, body: Array, bristle: Array, damping: Array) -> Array:
+    """(6, 3) db/dt as the law has it [m/s], 0 for open feet and with laws without bristles."""
+    rate = np.zeros((LEGS, 3))
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        if robot.friction.law == "bristle" and not np.isnan(damping[leg]):
+            rate[leg] = bristle_rate(robot.friction, slip_velocity(foot), bristle[leg])
+    return rate
+
+
+def solve_stage(
+    robot: Robot,
+    body: Array,
+    bristle: Array,
+    command: Command,
+    damping: Array,
+    slopes: Slopes,
+    z: float,
+    change: tuple[Array, Array, Array],
+) -> StageRate:
+    """Eq. 20 at bodies (19, 13) and bristles (6, 3), dense.
+
+    Args:
+        robot, command: as in `accelerations`.
+        body, bristle: y_i of the stage.
+        damping: (6,) of the contacts [s/m], nan for open feet.
+        slopes: those of the step's first stage.
+        z: h gamma [s]; 0 for explicit methods.
+        change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
+    """
+    s_x, s_v, s_b = change
+    v, joints = body[:, 7:13].ravel(), constraints(robot, body)
+    G_x, G_v = slope_matrices(robot, body, slopes)
+    rate = law_bristle_rates(robot, body, bristle, damping)
+
+    # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
+    motor, gear = joint_torques(robot, body, command)
+    g = applied_forces(robot, body, command, damping, bristle).ravel()
+    g += joints.G.T @ (motor + gear).ravel()
+    W = mass_matrix(robot, body) - z * G_v - z * z * G_x
+    right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
+
+    # bristles: a spring across the normal, -G_b/(1 + z beta), stretched by s_b + z (db/dt + s_v)
+    along = []
+    for leg, foot in enumerate(foot_contacts(robot, body)):
+        nn = np.outer(foot.normal, foot.normal)
+        T = (np.eye(3) - nn) @ contact_jacobian(body, leg, foot)
+        spring = slopes.bristle[leg] / (1.0 + z * slopes.beta[leg])
+        W += z * z * spring * T.T @ T
+        right -= spring * T.T @ (s_b[leg] + z * (rate[leg] + T @ s_v))
+        along.append(T)
+
+    # [W  D^T; D  0] [alpha; lambda] = [right; c];  a kinematic drive adds G alpha = qdd
+    c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi
+    c = c - robot.baumgarte.beta**2 * joints.phi
+    D = joints.D
+    if robot.servo.mode == "kinematic":
+        drive = drive_acceleration(robot, body, command).ravel()
+        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive])
+    none = np.zeros((len(c), len(c)))
+    both = np.linalg.solve(np.block([[W, D.T], [D, none]]), np.concatenate([right, c]))
+    alpha = both[: 6 * BODIES]
+
+    # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
+    for leg, T in enumerate(along):
+        if not np.isnan(damping[leg]) and robot.friction.law == "bristle":
+            beta = slopes.beta[leg]
+            moved = rate[leg] + T @ (s_v + z * alpha) - beta * s_b[leg]
+            rate[leg] = moved / (1.0 + z * beta)
+    return StageRate(v + s_v + z * alpha, alpha, rate)

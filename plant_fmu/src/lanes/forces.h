@@ -1,0 +1,192 @@
+/* forces.h - where bodies and joints are at (t, y), how they move, and the forces they feel there
+ *
+ * All legs of a pack at once. Points, and the spatial vectors of the sweeps, are from and about the
+ * torso's centre of mass. Accelerations are what a body feels, a - g, until they are stored:
+ * gravity is then no force at all.
+ */
+#ifndef HX_FORCES_H
+#define HX_FORCES_H
+
+#include "work.h"
+
+/* ---- root to leaf: where everything is and what it feels there
+ * ------------------------------------------------------------ */
+
+/* along a leg, up to the present link */
+typedef struct {
+  hxVec3 c, dc, ddc; /* centre of mass from the torso's by the joints alone, its rate, its second
+                        rate without angular accelerations */
+  hxMotion6 bias;    /* sums of dw and P x dw */
+} hxChain;
+
+/* The drive's acceleration: the rheonomic constraint q = q_ref + qd_ref s + qdd_ref s^2/2,
+ * s = t - t_command, with Baumgarte (eq. 13). */
+static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *command, double t,
+                                        int joint, int slot, const hxJointWork *k) {
+  const hxReal angle_ref = hx_load(&command->angle[joint][slot]),
+               speed_ref = hx_load(&command->speed[joint][slot]);
+  const hxReal acceleration_ref = hx_load(&command->acceleration[joint][slot]);
+  const hxNumber since = t - command->time;
+  const hxReal error =
+      k->angle - (angle_ref + since * (speed_ref + (0.5 * since) * acceleration_ref));
+  const hxReal slower = k->speed - (speed_ref + since * acceleration_ref);
+  return acceleration_ref - 2.0 * model->alpha * slower - model->beta * model->beta * error;
+}
+
+/* dw of eq. 9: rows 4 and 5 of D on it are c = gamma - 2 alpha dPhi - beta^2 Phi, s.dw is 0 or the
+ * drive's qdd. With x = w_i x w_j taken out, gamma is Phi |w|^2 - w qd of the relative w, w_ij_j in
+ * the child's axes, in which what is left is solved. */
+static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i,
+                                const hxBody *j, hxReal speed, hxReal driven) {
+  const hxVec3 w_ij_j = hx_tmul(j->axes, hx_sub3(j->w, w_i)), x = hx_cross(w_i, j->w);
+  const hxReal twice = hx_splat(2.0 * model->alpha),
+               rest = hx_dot(w_ij_j, w_ij_j) - model->beta * model->beta;
+  const hxReal along = driven - hx_dot(kin->s, x), inverse_sz = 1.0 / kin->sz;
+  const hxReal c4 =
+      kin->sx * rest - w_ij_j.x * speed - twice * (kin->sy * w_ij_j.z - kin->sz * w_ij_j.y);
+  const hxReal c5 =
+      kin->sy * rest - w_ij_j.y * speed - twice * (kin->sz * w_ij_j.x - kin->sx * w_ij_j.z);
+  const hxReal dz = kin->sz * along + kin->sy * c4 - kin->sx * c5;
+  const hxReal dx = (c5 + kin->sx * dz) * inverse_sz, dy = (kin->sy * dz - c4) * inverse_sz;
+  return hx_add3(x, hx_mul(j->axes, (hxVec3){dx, dy, dz}));
+}
+
+/* a motion about the torso's centre of mass, at c from it */
+static inline hxVec3 motion_at(hxMotion6 a, hxVec3 c) { return hx_add3(a.lin, hx_cross(a.ang, c)); }
+
+/* Attitude and inertia of a link. */
+static inline void link_pass(const hxModel *model, const hxPlantMotion *motion, int joint, int slot,
+                             hxJointWork *k) {
+  k->body = hx_link_body(motion, joint, slot);
+  k->J = hx_rotate_sym3(k->body.axes, hx_load_sym3(model->joint[joint].inertia, slot));
+  k->gyroscopic = hx_cross(hx_sym_mul(k->J, k->body.w), k->body.w);
+}
+
+/* One joint and its child: positions, velocities, bias acceleration and the force it takes. */
+static inline void joint_pass(const hxModel *model, const hxCommand *command, double t,
+                              const hxPlantMotion *motion, int joint, int slot, int reactions,
+                              const hxBody *i, hxChain *chain, hxJointWork *k) {
+  const hxJointModel *m = &model->joint[joint];
+  const hxBody *j = &k->body;
+  const hxJointKinematics kin = hx_joint_kinematics(m, slot, i, j);
+  const hxVec3 P = hx_add3(chain->c, kin.sP_i);
+  const hxVec3 dsP_i = hx_cross(i->w, kin.sP_i), dsP_j = hx_cross(j->w, kin.sP_j);
+  chain->c = hx_sub3(P, kin.sP_j);
+  chain->dc = hx_add3(chain->dc, hx_sub3(dsP_i, dsP_j));
+  chain->ddc = hx_add3(chain->ddc, hx_sub3(hx_cross(i->w, dsP_i), hx_cross(j->w, dsP_j)));
+  k->c = chain->c;
+  k->sweep.S = (hxMotion6){kin.s, hx_cross(P, kin.s)};
+  k->speed = hx_dot(kin.s, hx_sub3(j->w, i->w));
+  k->driven = model->servo_mode == HX_SERVO_KINEMATIC
+                  ? drive_acceleration(model, command, t, joint, slot, k)
+                  : hx_splat(0.0);
+
+  /* rows 1-3 of a_k telescope: ddc - 2 alpha (v_j - v_0 - dc) - beta^2 (r_j - r_0 - c) */
+  const hxVec3 dw = joint_bias(model, &kin, i->w, j, k->speed, k->driven);
+  const hxVec3 drift = hx_sub3(
+      hx_sub3(hx_link_vec3(motion, joint, HX_R, slot), hx_torso_vec3(motion, HX_R)), chain->c);
+  const hxVec3 drift_rate = hx_sub3(
+      hx_sub3(hx_link_vec3(motion, joint, HX_V, slot), hx_torso_vec3(motion, HX_V)), chain->dc);
+  const hxVec3 rows =
+      hx_add_scaled(hx_add_scaled(chain->ddc, hx_splat(-2.0 * model->alpha), drift_rate),
+                    hx_splat(-model->beta * model->beta), drift);
+  chain->bias.ang = hx_add3(chain->bias.ang, dw);
+  chain->bias.lin = hx_add3(chain->bias.lin, hx_cross(P, dw));
+  k->bias = (hxMotion6){chain->bias.ang, hx_add3(chain->bias.lin, rows)};
+
+  /* p of the child: (J dw + w x (J w), m a) at its centre of mass */
+  const hxVec3 lin = hx_scale(hx_load(&m->mass[slot]), motion_at(k->bias, chain->c));
+  const hxVec3 ang = hx_sub3(hx_sym_mul(k->J, k->bias.ang), k->gyroscopic);
+  k->p = (hxForce6){hx_add3(ang, hx_cross(chain->c, lin)), lin};
+  if (reactions) k->reaction.kin = kin;
+}
+
+/* first all half-angles, then all angles: their long chains of operations overlap */
+static inline void joint_angles(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
+  hxReal sine[HX_JOINTS * HX_PACKS], cosine[HX_JOINTS * HX_PACKS];
+  for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack, ++n) {
+      const int slot = pack * HX_LANES;
+      hx_joint_half_angle(&model->joint[joint], slot, hx_parent_quat(motion, joint, slot),
+                          hx_link_quat(motion, joint, slot), &sine[n], &cosine[n]);
+    }
+  for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack, ++n)
+      work->pack[pack].joint[joint].angle = hx_angle_from_half(sine[n], cosine[n]);
+}
+
+static inline void leg_pass(const hxModel *model, const hxCommand *command, double t,
+                            const hxPlantMotion *motion, const hxBody *torso, int slot,
+                            int reactions, hxLegWork *leg) {
+  const hxVec3 o = hx_zero3();
+  hxChain chain = {o, o, o, {o, o}};
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    joint_pass(model, command, t, motion, joint, slot, reactions,
+               joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
+}
+
+static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
+                                hxJointWork *k) {
+  k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
+                             hx_load(&command->speed[joint][slot]),
+                             hx_load(&command->torque[joint][slot]));
+  k->torque = model->servo_mode == HX_SERVO_KINEMATIC ? k->servo.friction
+                                                      : k->servo.torque + k->servo.friction;
+}
+
+static inline hxMotion6 torso_velocity(const hxPlantMotion *m) {
+  return (hxMotion6){hx_torso_vec3(m, HX_W), hx_torso_vec3(m, HX_V)};
+}
+
+static inline hxMotion6 link_velocity(const hxPlantMotion *m, int joint, int slot) {
+  return (hxMotion6){hx_link_vec3(m, joint, HX_W, slot), hx_link_vec3(m, joint, HX_V, slot)};
+}
+
+/* where the foot touches, from the torso's centre of mass */
+static inline hxVec3 contact_point(const hxLegWork *leg) {
+  return hx_add3(leg->joint[HX_JOINTS - 1].c, leg->foot.kin.arm);
+}
+
+/* a force on the tibia at x: taken off its p */
+static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
+  hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
+  p->lin = hx_sub3(p->lin, force);
+  p->ang = hx_sub3(p->ang, hx_cross(x, force));
+}
+
+static inline void leg_foot(const hxModel *model, const hxContactState *contact,
+                            const hxPlantMotion *motion, int slot, hxLegWork *leg) {
+  leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
+  hx_foot_force(model, contact, slot, hx_load_vec3(motion->bristle, slot), &leg->foot);
+  push_tibia(leg, contact_point(leg), leg->foot.force);
+}
+
+static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
+  const hxNumber *J = model->torso_inertia;
+  const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]),
+                       hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};
+  work->torso = hx_torso_body(motion);
+  work->torso_J = hx_rotate_sym3(work->torso.axes, body);
+}
+
+/* Positions, velocities and forces at (t, y); work is filled up to the sweeps, with what the
+ * multipliers take if they are wanted. */
+static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
+                                      const hxCommand *command, double t,
+                                      const hxPlantMotion *motion, int reactions, hxWork *work) {
+  torso_pass(model, motion, work);
+  joint_angles(model, motion, work);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack)
+      link_pass(model, motion, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    leg_pass(model, command, t, motion, &work->torso, pack * HX_LANES, reactions,
+             &work->pack[pack]);
+  for (int joint = 0; joint < HX_JOINTS; ++joint)
+    for (int pack = 0; pack < HX_PACKS; ++pack)
+      joint_torque(model, command, joint, pack * HX_LANES, &work->pack[pack].joint[joint]);
+  for (int pack = 0; pack < HX_PACKS; ++pack)
+    leg_foot(model, contact, motion, pack * HX_LANES, &work->pack[pack]);
+}
+
+#endif

@@ -1,0 +1,178 @@
+/* stage.h - what a stage of a linearly implicit method adds to the forces and to the inertia (eq.
+ * 19-21); its readable form is models/stage.py */
+#ifndef HX_STAGE_H
+#define HX_STAGE_H
+
+#include "forces.h"
+
+/* The slopes of this stage's forces, the contact's where it will be a step ahead: a foot that has
+ * just touched down has none yet, and W would miss the contact. */
+static inline void keep_slopes(const hxModel *model, const hxContactState *contact, int pack,
+                               const hxLegWork *leg, hxImplicit *implicit) {
+  const hxFootWork *foot = &leg->foot;
+  const int slot = pack * HX_LANES;
+  const hxReal deeper = foot->kin.delta + implicit->ahead * hx_max(foot->kin.ddelta, hx_splat(0.0));
+  const hxNormalForce ahead =
+      hx_normal_force(model, hx_load(&contact->closed[slot]), hx_load(&contact->damping[slot]),
+                      deeper, foot->kin.ddelta);
+  implicit->slope[pack].stiffness = ahead.stiffness;
+  implicit->slope[pack].viscosity = ahead.viscosity;
+  if (has_bristles(model)) {
+    implicit->slope[pack].yield = foot->bristle.yield;
+    implicit->slope[pack].bristle =
+        ahead.force * foot->bristle.stiffness / (1.0 + implicit->z * foot->bristle.yield);
+    implicit->slope[pack].drag =
+        ahead.force * foot->bristle.damping + implicit->z * implicit->slope[pack].bristle;
+  } else {
+    implicit->slope[pack].drag = ahead.force * foot->drag_per_load;
+  }
+  for (int joint = 0; joint < HX_JOINTS; ++joint) {
+    implicit->slope[pack].motor_stiffness[joint] = leg->joint[joint].servo.stiffness;
+    implicit->slope[pack].motor_damping[joint] = leg->joint[joint].servo.damping;
+    implicit->slope[pack].gear_drag[joint] = leg->joint[joint].servo.drag;
+  }
+}
+
+/* N m s/rad  of motor and gear together */
+static inline hxReal servo_damping(const hxImplicit *implicit, int pack, int joint) {
+  return implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
+}
+
+/* displacement and velocity change of a body before this stage's own share: dx = s_x + z (v + s_v),
+ * dv = s_v */
+typedef struct {
+  hxMotion6 x, v;
+} hxShift;
+
+static inline hxShift shift(double z, hxMotion6 v, hxMotion6 s_x, hxMotion6 s_v) {
+  return (hxShift){hx_motion_add_scaled(s_x, hx_splat(z), hx_motion_add(v, s_v)), s_v};
+}
+
+static inline hxShift link_shift(const hxImplicit *implicit, const hxPlantMotion *motion, int joint,
+                                 int slot) {
+  const hxPlantMotion *s = &implicit->change->motion;
+  const hxMotion6 s_x = {hx_load_vec3(implicit->change->link_turn[joint], slot),
+                         hx_link_vec3(s, joint, HX_R, slot)};
+  return shift(implicit->z, link_velocity(motion, joint, slot), s_x, link_velocity(s, joint, slot));
+}
+
+static inline hxShift torso_shift(const hxImplicit *implicit, const hxPlantMotion *motion) {
+  const hxPlantMotion *s = &implicit->change->motion;
+  const hxMotion6 s_x = {hx_splat_vec3(implicit->change->torso_turn), hx_torso_vec3(s, HX_R)};
+  return shift(implicit->z, torso_velocity(motion), s_x, torso_velocity(s));
+}
+
+/* G_v dv + G_x dx: what servos and contact answer the shifts with, added to torques and p */
+static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion *motion, int pack,
+                                hxLegWork *leg) {
+  const hxReal k = implicit->slope[pack].stiffness, drag = implicit->slope[pack].drag,
+               rest = implicit->slope[pack].viscosity - drag;
+  const hxVec3 n = leg->foot.kin.normal, arm = leg->foot.kin.arm;
+  if (!implicit->change) { /* dx = z v, dv = 0 */
+    for (int joint = 0; joint < HX_JOINTS; ++joint) {
+      hxJointWork *work = &leg->joint[joint];
+      work->turned = implicit->z * work->speed, work->sped = hx_splat(0.0);
+      work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->turned;
+    }
+    leg->foot_moved = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity),
+    leg->foot_sped = hx_zero3();
+    leg->response = hx_scale(implicit->z * k * leg->foot.kin.ddelta, n);
+    push_tibia(leg, contact_point(leg), leg->response);
+    return;
+  }
+  hxShift i = torso_shift(implicit, motion), j = i;
+  for (int joint = 0; joint < HX_JOINTS; ++joint, i = j) {
+    hxJointWork *work = &leg->joint[joint];
+    j = link_shift(implicit, motion, joint, pack * HX_LANES);
+    work->turned = hx_dot(work->sweep.S.ang, hx_sub3(j.x.ang, i.x.ang)),
+    work->sped = hx_dot(work->sweep.S.ang, hx_sub3(j.v.ang, i.v.ang));
+    work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->turned +
+                    servo_damping(implicit, pack, joint) * work->sped;
+  }
+  const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
+  leg->foot_moved = x, leg->foot_sped = v;
+  const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
+  leg->response = hx_add_scaled(hx_scale(-along, n), -drag, v);
+  push_tibia(leg, contact_point(leg), leg->response);
+}
+
+/* what the bristles' own shift s_b + z db/dt, shared out by how they let go, takes off the foot's
+ * force (eq. 21) */
+static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegWork *leg) {
+  const hxVec3 own = hx_scale(hx_splat(implicit->z), leg->foot.bristle.rate);
+  const hxVec3 moved =
+      implicit->change
+          ? hx_add3(hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES), own)
+          : own;
+  leg->bristle_force = hx_scale(implicit->slope[pack].bristle, moved);
+  leg->response = hx_sub3(leg->response, leg->bristle_force);
+  push_tibia(leg, contact_point(leg), hx_neg(leg->bristle_force));
+}
+
+/* The contact's share of W: B = across 1 + along n n^T at the contact point, z c_t and z c_n + z^2
+ * k_n - z c_t. */
+typedef struct {
+  hxVec3 n;
+  hxReal across, along;
+} hxContactBlock;
+
+static inline hxContactBlock contact_block(const hxImplicit *implicit, int pack,
+                                           const hxLegWork *leg) {
+  const double z = implicit->z;
+  const hxReal across = z * implicit->slope[pack].drag;
+  const hxReal along =
+      z * implicit->slope[pack].viscosity + z * z * implicit->slope[pack].stiffness - across;
+  return (hxContactBlock){leg->foot.kin.normal, across, along};
+}
+
+/* B a: what an acceleration of the contact point takes off the foot's force in a stage */
+static inline hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
+  return hx_add_scaled(hx_scale(B->across, a), B->along * hx_dot(B->n, a), B->n);
+}
+
+/* B as part of the tibia's inertia; what the bias acceleration meets of it goes to p */
+static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
+                                         hxLegWork *leg) {
+  const hxContactBlock B = contact_block(implicit, pack, leg);
+  const hxVec3 n = B.n, x = contact_point(leg), an = hx_scale(B.along, n);
+  const hxVec3 bias =
+      hx_add3(motion_at(leg->joint[HX_JOINTS - 1].bias, x), hx_splat_vec3(model->gravity));
+  push_tibia(leg, x, hx_neg(contact_resistance(&B, bias)));
+  return hx_inertia_at((hxSym3){B.across + an.x * n.x, B.across + an.y * n.y, B.across + an.z * n.z,
+                                an.x * n.y, an.x * n.z, an.y * n.z},
+                       x);
+}
+
+/* acceleration of the contact point's material */
+static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *leg) {
+  return hx_add3(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm),
+                 hx_splat_vec3(model->gravity));
+}
+
+/* db/dt of a stage (eq. 21): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the ground, f what
+ * the law says */
+static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *contact,
+                                  const hxImplicit *implicit, int pack, const hxLegWork *leg) {
+  hxVec3 rate = leg->foot.bristle.rate;
+  if (!implicit) return rate;
+  const hxVec3 n = leg->foot.kin.normal, dv = hx_add_scaled(leg->foot_sped, hx_splat(implicit->z),
+                                                            foot_acceleration(model, leg));
+  const hxReal yield = implicit->slope[pack].yield,
+               closed = hx_load(&contact->closed[pack * HX_LANES]);
+  rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
+  if (implicit->change)
+    rate = hx_add_scaled(rate, -yield,
+                         hx_load_vec3(implicit->change->motion.bristle, pack * HX_LANES));
+  return hx_scale(1.0 / (1.0 + implicit->z * yield), rate);
+}
+
+/* ground on foot, as a stage's accelerations contain it */
+static inline hxVec3 stage_force(const hxModel *model, const hxImplicit *implicit, int pack,
+                                 const hxLegWork *leg) {
+  if (!implicit) return leg->foot.force;
+  const hxContactBlock B = contact_block(implicit, pack, leg);
+  return hx_sub3(hx_add3(leg->foot.force, leg->response),
+                 contact_resistance(&B, foot_acceleration(model, leg)));
+}
+
+#endif

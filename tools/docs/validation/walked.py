@@ -1,0 +1,92 @@
+"""Walks that results show: each is walked once, and gains are designed once."""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+
+import numpy as np
+
+from hexapod_cosim.controller import Gains
+from hexapod_cosim.cosim.design.design import design_for
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.result import Result
+from hexapod_cosim.cosim.results.walk import View, Walk
+from hexapod_cosim.cosim.run.run import known_robot
+from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
+from hexapod_cosim.cosim.scenario.scenario import load_scenario
+from hexapod_cosim.models import Robot
+
+MILLI = 1e3
+
+
+@cache
+def walker() -> Walker:
+    """The walker of all results; it records all signals."""
+    made = Walker(everything=True)
+    atexit.register(made.close)
+    return made
+
+
+@cache
+def _designed(robot: Robot, period: float) -> Gains:
+    return design_for(robot, period)
+
+
+def gains_of(scenario: Scenario) -> Gains | None:
+    """The gains that a scenario runs with; None under kinematic control."""
+    kinematic = scenario.control == "kinematic"
+    return None if kinematic else _designed(known_robot(scenario), scenario.macro_step)
+
+
+@cache
+def walk(*settings: str, scenario: str = "walk_flat") -> Result:
+    """A shipped scenario, by default the judged walk, with some settings."""
+    plan = load_scenario(scenario, overrides=settings)
+    return walker().simulate(plan, gains=gains_of(plan))
+
+
+def under_both(*settings: str, scenario: str = "walk_flat") -> tuple[Result, Result]:
+    """The same under both controls, kinematic first. Raises RuntimeError unless both walk."""
+    first, second = (walk(f"control={name}", *settings, scenario=scenario) for name in CONTROLS)
+    for result in (first, second):
+        if not (result.completed and result.facts["walk"]["upright"]):
+            raise RuntimeError(f"{scenario} {settings}: {result.outcome.reason or 'fell'}")
+    return first, second
+
+
+def view(result: Result) -> View:
+    """A run as its metrics see it: all macro-steps."""
+    return View(result.outcome.judged, result.parameters, result.facts["gait_period"])
+
+
+def judged(result: Result) -> Walk:
+    """The part of a run that its metrics are of."""
+    part = view(result).walk
+    assert part is not None
+    return part
+
+
+def heading(name: str) -> str:
+    """A metric and its unit."""
+    unit = METRICS[name][0]
+    return f"`{name}`" + (f" [{unit}]" if unit != "1" else "")
+
+
+def figures(name: str, results: Sequence[Result]) -> list[str]:
+    """A metric of some runs."""
+    return [shown(result.metrics[name]) for result in results]
+
+
+def shown(value: float) -> str:
+    """Three digits, for people."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}"
+
+
+def changed(values: Iterable[float], *, told: Callable[[float], str] = shown) -> str:
+    """A figure under kinematic and under compliant control, in one line."""
+    return "\u00a0→\u00a0".join(map(told, values)).replace("-", "\u2011")
