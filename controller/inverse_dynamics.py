@@ -20,6 +20,8 @@ from hexapod_cosim.controller.posture import Posture
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 
+Wrench = tuple[Any, ...]  # push, weight, moment, twist of (C16)
+
 
 class Masses(NamedTuple):
     """Where the point masses are at one step; (6, 3): legs, links."""
@@ -119,13 +121,19 @@ class InverseDynamics:
         """The second difference of three steps, of numbers and points alike."""
         return (after - 2.0 * now + before) / (self.period * self.period)
 
-    def _force(self, push: Any, lift: Any, place: Any, height: Any) -> tuple[Any, Any, Any, Any]:
-        """What m (a + g) = (push, lift) of points at (place, height) adds to (C16)."""
-        moment = place * lift - push * (height - self.floor)
-        return push, lift, moment, across(place, push)
+    def _add_force(self, total: Wrench, push: Any, lift: Any, place: Any, height: Any) -> Wrench:
+        """Adds m (a + g) = (push, lift) of points at (place, height), walking frame (C16).
 
-    def _demand_torso(self, masses: tuple[Masses | None, Masses, Masses | None]) -> Any:
-        """The part of the torso in push, weight, moment and twist."""
+        `total` and the result are push, weight, moment and twist.
+        """
+        moment = place * lift - push * (height - self.floor)
+        parts = (push, lift, moment, across(place, push))
+        return tuple(a + np.sum(part) for a, part in zip(total, parts, strict=True))
+
+    def _demand_torso(
+        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None]
+    ) -> Wrench:
+        """Adds what the torso demands to push, weight, moment and twist (C16)."""
         before, now, after = masses
         acceleration, up, spin = 0j, 0.0, 0j
         if before is not None and after is not None:
@@ -136,8 +144,9 @@ class InverseDynamics:
             spin = self._acceleration(before.turn, now.turn, after.turn)
         push = self.torso_mass * acceleration * now.turn.conjugate()
         lift = self.torso_mass * (up + self.gravity)
-        push, lift, moment, twist = self._force(push, lift, now.torso_place, now.torso_height)
-        return push, lift, moment, twist + self.torso_inertia * across(now.turn, spin)
+        place, height = now.torso_place, now.torso_height
+        push, weight, moment, twist = self._add_force(total, push, lift, place, height)
+        return push, weight, moment, twist + self.torso_inertia * across(now.turn, spin)
 
     def _demand_links(
         self, masses: tuple[Masses | None, Masses, Masses | None]
@@ -197,9 +206,8 @@ class InverseDynamics:
         """
         now = motion.masses[1]
         push, lift = self._demand_links(motion.masses)
-        legs = [part.sum() for part in self._force(push, lift, now.place, now.height)]
-        torso = self._demand_torso(motion.masses)
-        total, weight, moment, twist = (a + b for a, b in zip(legs, torso, strict=True))
+        legs = self._add_force((0j, 0.0, 0j, 0.0), push, lift, now.place, now.height)
+        total, weight, moment, twist = self._demand_torso(legs, motion.masses)
         push, lift = posture.turn_back(push, lift)
         torque = self._demand_torques(motion, push, lift, speed)
         lever = self._lever_of(motion.pose[1], posture)

@@ -18,6 +18,13 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask
 from hexapod_cosim.controller.touchdown import EARLY
 
 
+def _least_of_others(values: Array) -> Array:
+    """(6,) the least of the other five values; 0 where that is infinite."""
+    first, second = np.sort(values)[:2]
+    least = np.where(np.arange(LEGS) == values.argmin(), second, first)
+    return np.where(np.isfinite(least), least, 0.0)
+
+
 class Landings(Stateful):
     """The last landings of all feet.
 
@@ -67,10 +74,3 @@ class Landings(Stateful):
         """
         settled = np.maximum(_least_of_others(self.met), self.before)
         return (self.met > expected + EARLY) & (height > settled + EARLY)
-
-
-def _least_of_others(values: Array) -> Array:
-    """(6,) the least of the other five values; 0 where that is infinite."""
-    first, second = np.sort(values)[:2]
-    least = np.where(np.arange(LEGS) == values.argmin(), second, first)
-    return np.where(np.isfinite(least), least, 0.0)

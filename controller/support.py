@@ -39,6 +39,32 @@ class Shares(NamedTuple):
         return np.stack([self.push.real, self.push.imag, self.normal], axis=-1)
 
 
+def indentation(load: Any, stiffness: float) -> Any:
+    """Depth [m] to which the ground gives way under loads [N], (f_n/K)^(2/3) (C21)."""
+    return np.cbrt(load / stiffness) ** 2
+
+
+def _smooth(x: Array) -> Array:
+    """From 0 to 1 over [0, 1] without a jump in rate or acceleration."""
+    x = clamp(x, 0.0, 1.0)
+    return np.asarray(x * x * x * (10.0 + x * (6.0 * x - 15.0)))
+
+
+def _solve(system: Array, needed: tuple[float, float, float]) -> Array:
+    """x of S x = b, S (3, 3) symmetric and positive definite, by S = L D L^T: (3,)."""
+    (d0, s01, s02), (_, s11, s12), (_, _, s22) = system.tolist()
+    b0, b1, b2 = needed
+    l10, l20 = s01 / d0, s02 / d0
+    d1 = s11 - l10 * s01
+    l21 = (s12 - l20 * s01) / d1
+    d2 = s22 - l20 * s02 - l21 * l21 * d1
+    y1 = b1 - l10 * b0
+    y2 = b2 - l20 * b0 - l21 * y1
+    x2 = y2 / d2
+    x1 = y1 / d1 - l21 * x2
+    return np.array([b0 / d0 - l10 * x1 - l20 * x2, x1, x2])
+
+
 class Support:
     """Hand-over and shares of one gait on one robot."""
 
@@ -47,11 +73,7 @@ class Support:
         self.duty, self.stiffness, self.rest = gait.duty, robot.contact.stiffness, rest
         # the hand-overs of a leg never overlap, whatever the gait
         self.handover = min(gains.handover_time / gait.period, gait.duty, 1.0 - gait.duty)  # cycles
-        self.rest_depth = self.indentation(rest.weight / LEGS)  # m
-
-    def indentation(self, load: Any) -> Any:
-        """Depth [m] to which the ground gives way under loads [N], (f_n/K)^(2/3) (C21)."""
-        return np.cbrt(load / self.stiffness) ** 2
+        self.rest_depth = indentation(rest.weight / LEGS, self.stiffness)  # m
 
     def activation(self, phase: Array, stayed: Mask, stays: Mask, *, walking: bool) -> Array:
         """The activations of legs at gait phases (C18), (6,) in [0, 1].
@@ -92,7 +114,7 @@ class Support:
         share_normal(); returns (6,) [m].
         """
         normal = self.share_normal(feet, activation, self.rest.weight, self.rest.moment)
-        return np.asarray(self.indentation(normal) - self.rest_depth)
+        return np.asarray(indentation(normal, self.stiffness) - self.rest_depth)
 
     def shares(self, feet: Plane, activation: Array, demand: Demand) -> Shares:
         """The shares (C19, C20) of feet (6,) x + i y, walking frame [m]."""
@@ -105,24 +127,3 @@ class Support:
         if spread >= LEAST_SPREAD:
             turn = (demand.twist - across(centre, demand.push)) / spread
         return Shares(activation, normal, part * (demand.push + 1j * turn * arm))
-
-
-def _solve(system: Array, needed: tuple[float, float, float]) -> Array:
-    """x of S x = b, S (3, 3) symmetric and positive definite, by S = L D L^T: (3,)."""
-    (d0, s01, s02), (_, s11, s12), (_, _, s22) = system.tolist()
-    b0, b1, b2 = needed
-    l10, l20 = s01 / d0, s02 / d0
-    d1 = s11 - l10 * s01
-    l21 = (s12 - l20 * s01) / d1
-    d2 = s22 - l20 * s02 - l21 * l21 * d1
-    y1 = b1 - l10 * b0
-    y2 = b2 - l20 * b0 - l21 * y1
-    x2 = y2 / d2
-    x1 = y1 / d1 - l21 * x2
-    return np.array([b0 / d0 - l10 * x1 - l20 * x2, x1, x2])
-
-
-def _smooth(x: Array) -> Array:
-    """From 0 to 1 over [0, 1] without a jump in rate or acceleration."""
-    x = clamp(x, 0.0, 1.0)
-    return np.asarray(x * x * x * (10.0 + x * (6.0 * x - 15.0)))

@@ -270,6 +270,10 @@ class FootPaths(Stateful):
         """(6,) the parts tau of their swings that legs at these phases have done."""
         return (phase - self.gait.duty) / (1.0 - self.gait.duty)
 
+    def _ground_of(self, feet: PlannedFeet) -> Plane:
+        """(6,) where the feet are on the ground (C5) [m]."""
+        return feet.goal - feet.pull * (1.0 - feet.blend)
+
     def _place_feet(self, feet: PlannedFeet, carried: Plane) -> PlannedFeet:
         """Places and velocities of feet whose phases, goals, pulls and frame are known (C5 to C8).
 
@@ -277,23 +281,21 @@ class FootPaths(Stateful):
         """
         back, tau = cis(-feet.turn), self._progress(feet.phase)
         s, slope = blend(tau)
-        s = np.where(self.swinging, s, 0.0)
+        feet = feet._replace(blend=np.where(self.swinging, s, 0.0))
         lift, climb = hop(
             tau,
             top=self.gait.step_height,
             down=self.gait.touchdown_speed * self.swing_time,
         )
-        ground = feet.goal - feet.pull * (1.0 - s)
         was = back * (carried - feet.way)
         pulled = back * feet.pull * (slope / self.swing_time)
         # a foot on the ground: dp/dt = -(v + i w p)
         velocity = pulled - (feet.twist.velocity + 1j * feet.twist.yaw_rate * was)
         return feet._replace(
-            plane=back * (ground - feet.way),
+            plane=back * (self._ground_of(feet) - feet.way),
             height=self.home_height + np.where(self.swinging, lift, 0.0),
             velocity=velocity,
             rise=np.where(self.swinging, climb / self.swing_time, 0.0),
-            blend=s,
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
@@ -301,8 +303,8 @@ class FootPaths(Stateful):
         phase = self._phase_after(self.before)
         s = np.where(self.swinging, blend(self._progress(phase))[0], 0.0)
         pull = np.where(self.swinging, now.pull, 0.0)
-        feet = now._replace(phase=phase, pull=pull, twist=twist)
-        return self._place_feet(feet, now.goal - pull * (1.0 - s))
+        feet = now._replace(phase=phase, blend=s, pull=pull, twist=twist)
+        return self._place_feet(feet, self._ground_of(feet))
 
     def plan(self, now: PlannedFeet, number: int, *, going: bool, twist: Twist) -> PlannedFeet:
         """Begins a new section after the present step.
@@ -370,4 +372,4 @@ class FootPaths(Stateful):
         left = np.maximum(1.0 - before.blend, NEARLY_DONE)
         pull = before.pull + (goal - before.goal) / left
         feet = before._replace(phase=phase, goal=goal, pull=pull, way=way, turn=turn, twist=twist)
-        return self._place_feet(feet, before.goal - before.pull * (1.0 - before.blend))
+        return self._place_feet(feet, self._ground_of(before))

@@ -8,15 +8,17 @@
 HX_HIDDEN_BEGIN
 
 typedef struct hxBurdenModel {
-  double most;         /* N m  that a servo may be asked for */
+  double most; /* N m  that a servo may be asked for */
   double fade, follow; /* 1    of the smoothings, over a period */
 } hxBurdenModel;
 
 typedef struct hxBurden {
-  double heft;      /* 1    measured over modelled weight */
-  double peak;      /* N m  largest torque that any joint is asked for to carry the model's weight, of late */
-  double strength;  /* 1    less than 1: of the support, so that no servo is asked for more than it may */
-  double freedom;   /* 1    of the squeeze that the slip PID may take away */
+  double heft; /* 1    measured over modelled weight */
+  double
+      peak; /* N m  largest torque that any joint is asked for to carry the model's weight, of late */
+  double
+      strength; /* 1    less than 1: of the support, so that no servo is asked for more than it may */
+  double freedom; /* 1    of the squeeze that the slip PID may take away */
   int overburdened; /* far too heavy: kinematic control */
 } hxBurden;
 

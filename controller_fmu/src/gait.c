@@ -13,7 +13,8 @@ static const hxTiming timings[] = {
     [HX_PATTERN_AMBLE] = {2, 1, 1, {1, 2, 0, 1, 2, 0}},
 };
 
-static const int around_to_legs[HX_LEGS] = {5, 4, 3, 0, 1, 2}; /* LF LM LR RF RM RR in the order around the robot */
+static const int around_to_legs[HX_LEGS] = {
+    5, 4, 3, 0, 1, 2}; /* LF LM LR RF RM RR in the order around the robot */
 
 void hx_gait_offsets(const hxGait *gait, double offset[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -21,7 +22,8 @@ void hx_gait_offsets(const hxGait *gait, double offset[HX_LEGS]) {
     if (gait->pattern == HX_PATTERN_CUSTOM) continue;
     const hxTiming *timing = &timings[gait->pattern];
     const int parts = timing->stance + timing->swing;
-    offset[leg] = (double)(timing->multiplier[around_to_legs[leg]] * timing->offset % parts) / parts;
+    offset[leg] =
+        (double)(timing->multiplier[around_to_legs[leg]] * timing->offset % parts) / parts;
   }
 }
 

@@ -8,22 +8,26 @@
 HX_HIDDEN_BEGIN
 
 typedef struct hxLandings {
-  double met[HX_LEGS]; /* m  height of each foot's path over its end when it last came down; infinite until it first has */
+  double met
+      [HX_LEGS]; /* m  height of each foot's path over its end when it last came down; infinite until it first has */
   double before[HX_LEGS]; /* m  and the time before that; 0 until then */
-  int flew[HX_LEGS];   /* it has been off the ground in a swing since */
+  int flew[HX_LEGS]; /* it has been off the ground in a swing since */
 } hxLandings;
 
 void hx_landings_reset(hxLandings *landings);
 
 /* One period on. height: of the paths over their ends [m]. */
-void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS], const int swinging[HX_LEGS], hxLandings *landings);
+void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
+                      const int swinging[HX_LEGS], hxLandings *landings);
 
 /* m  the height at which each foot meets the ground without any bump; 0 while nothing tells */
-void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS], const double height[HX_LEGS],
-                          const int swinging[HX_LEGS], double expected[HX_LEGS]);
+void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],
+                          const double height[HX_LEGS], const int swinging[HX_LEGS],
+                          double expected[HX_LEGS]);
 
 /* Feet that met the ground well above the height expected, and have still some way to go to where feet met it before. */
-void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS], const double height[HX_LEGS], int early[HX_LEGS]);
+void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS],
+                       const double height[HX_LEGS], int early[HX_LEGS]);
 
 HX_HIDDEN_END
 

@@ -8,26 +8,26 @@
 
 HX_HIDDEN_BEGIN
 
-typedef struct hxSlipPid {
-  double h;                    /* s */
+typedef struct hxSlipPidModel {
+  double h; /* s */
   double kp, ki, kd;
-  double filter, derivative;   /* s  T_f, T_d */
-} hxSlipPid;
+  double filter, derivative; /* s  T_f, T_d */
+} hxSlipPidModel;
 
 /* What one PID remembers, of the last period. */
-typedef struct hxSlipState {
-  double force;     /* N   e */
-  double smooth;    /* N   e', filtered */
-  double integral;  /* N */
-  double slope;     /* N   filtered derivative */
-} hxSlipState;
+typedef struct hxSlipPid {
+  double force; /* N   e */
+  double smooth; /* N   e', filtered */
+  double integral; /* N */
+  double slope; /* N   filtered derivative */
+} hxSlipPid;
 
 /* Tangential forces d on feet that carry normal forces [N] at these places [m], less what pushes and turns the body as one, shared by load:
  * e = d - (n / sum n) (D + i w (p - c)), with neither a sum nor a moment about the vertical. */
-void hx_slip_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
+void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
 
 /* One period on under a force [N]; returns the answer [N]. */
-double hx_slip_pid_step(const hxSlipPid *pid, double force, hxSlipState *state);
+double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state);
 
 HX_HIDDEN_END
 

@@ -6,8 +6,10 @@
  *   z(t)  = e^(-sigma t) ((cosh mu t + sigma sinh(mu t)/mu) z + sinh(mu t)/mu z')
  *   z'(t) = e^(-sigma t) (-omega^2 sinh(mu t)/mu z + (cosh mu t - sigma sinh(mu t)/mu) z')
  */
-void hx_suspension_discretise(double mass, double damping, double stiffness, double period, hxSuspension *suspension) {
-  const double sigma = 0.5 * damping / mass, omega2 = stiffness / mass, mu2 = sigma * sigma - omega2;
+void hx_suspension_discretise(double mass, double damping, double stiffness, double period,
+                              hxSuspension *suspension) {
+  const double sigma = 0.5 * damping / mass, omega2 = stiffness / mass,
+               mu2 = sigma * sigma - omega2;
   const double mu = sqrt(fabs(mu2)), x = mu * period, decay = exp(-sigma * period);
   double even, odd; /* e^(-sigma t) cosh mu t, e^(-sigma t) sinh(mu t)/mu [s] */
   if (mu2 < 0.0) {

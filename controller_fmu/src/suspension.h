@@ -12,7 +12,8 @@ typedef struct hxSuspension {
   double a[2][2], b[2];
 } hxSuspension;
 
-void hx_suspension_discretise(double mass, double damping, double stiffness, double period, hxSuspension *suspension);
+void hx_suspension_discretise(double mass, double damping, double stiffness, double period,
+                              hxSuspension *suspension);
 
 HX_HIDDEN_END
 
