@@ -2,24 +2,21 @@
 
 #include <string.h>
 
-static const double load_floor = 1e-6; /* N  below it no foot carries anything */
-static const double sliding_drag =
-    0.55; /* 1  common tangential over normal force beyond the plan: only a robot that slides has it */
+/* 1  common tangential over normal force beyond the plan: only a robot that slides has it */
+static const double sliding_drag = 0.55;
 static const double calm_cycles = 0.5; /* 1  gait cycles without it until feet are trusted again */
 static const double sliding_time = 0.04; /* s  longer than a foot skids when it touches down */
-static const double settled_share =
-    0.5; /* 1  of the weight: feet that carry less together have only just met the ground */
-static const double
-    joints_follow = 0.35,
-    joints_do_not = 0.45; /* 1  share of the time in which paths ask more speed than a servo has */
+/* 1  of the weight: feet that carry less together have only just met the ground */
+static const double settled_share = 0.5;
+/* 1  share of the time in which joints are asked for more speed than a servo has */
+static const double joints_follow = 0.35, joints_do_not = 0.45;
 static const double gripped = 0.99; /* 1  of its share: a leg with more carries it */
-static const double largest_load =
-    2.0; /* 1  in thirds of the weight: the design's margins hold up to it */
-static const double least_scale = 0.5,
-                    largest_scale =
-                        3.0; /* 1  measured over modelled weight that the support believes */
-static const double high_share =
-    0.25; /* 1  of the step height: a foot planned higher is certainly in the air */
+/* 1  in thirds of the weight: the design's margins hold up to it */
+static const double largest_load = 2.0;
+/* 1  measured over modelled weight that the support believes */
+static const double least_scale = 0.5, largest_scale = 3.0;
+/* 1  of the step height: a foot planned higher is certainly in the air */
+static const double high_share = 0.25;
 
 enum {
   HX_TRIPOD_LEGS = 3
@@ -89,7 +86,7 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
   }
 }
 
-/* ---------------------------------------------------------------------------------------------- contacts */
+/* ----------------------------------------------------------------------------------- contacts */
 
 /* feet whose sensors are not believed feel what is planned */
 static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
@@ -154,11 +151,11 @@ static int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
   return found;
 }
 
-/* ---------------------------------------------------------------------------------------------- inputs and weight */
+/* -------------------------------------------------------------------------- inputs and weight */
 
-/* Gives the plan of the load up while it does not hold (C33): for a robot that slides, whose joints cannot
- * follow or that is far too heavy. drag: the common tangential force of the feet beyond the plan over the
- * normal one. */
+/* Gives the plan of the load up while it does not hold (C33): for a robot that slides, whose joints
+ * cannot follow or that is far too heavy. drag: the common tangential force of the feet beyond the
+ * plan over the normal one. */
 static void update_trust(const hxComplianceModel *model, const hxPlan *plan, double drag,
                          hxCompliance *laws) {
   laws->asked += model->follow_cycle * ((double)plan->hurried - laws->asked);
@@ -189,7 +186,7 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
     common = hx_plane_add(common, push[leg]);
     total += normal[leg];
   }
-  const double share = total > load_floor ? 1.0 / total : 0.0;
+  const double share = total > hx_load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
     update_trust(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0,
                  laws);
@@ -202,7 +199,7 @@ static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
  * total: the sum of the normal forces felt [N]. */
 static void update_weight(const hxComplianceModel *model, const hxPlan *plan, double total,
                           hxCompliance *laws) {
-  const double ratio = total / fmax(plan->weight, load_floor),
+  const double ratio = total / fmax(plan->weight, hx_load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
@@ -220,7 +217,7 @@ static double excess(const hxComplianceModel *model, const hxPlan *plan, int leg
   return live ? normal - laws->scale * plan->shares.normal[leg] : 0.0;
 }
 
-/* ---------------------------------------------------------------------------------------------- laws */
+/* --------------------------------------------------------------------------------------- laws */
 
 /* limits the answers of the PID, their direction kept; the integrals give way (C27) */
 static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
@@ -269,15 +266,15 @@ static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
     answer[leg][0] = given.x;
     answer[leg][1] = given.y;
     answer[leg][2] = law->deflection / (model->softness * vertical); /* z/C_zz, C = J kp^-1 J^T */
-    /* a foot in the air forgets, within the time in which a leg gives up its load; and all forget what they
-     * may not take away */
+    /* a foot in the air forgets, within the time in which a leg gives up its load; and all
+     * forget what they may not take away */
     const double left = plan->swinging[leg] && !laws->touching[leg] ? kept * model->memory : kept;
     law->x.integral *= left;
     law->y.integral *= left;
   }
 }
 
-/* ---------------------------------------------------------------------------------------------- joints */
+/* ------------------------------------------------------------------------------------- joints */
 
 /* gives a leg that stands only in the plan its share back as it loads (C29) */
 static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {

@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-static const double steering_time =
-    0.1; /* s  in which a change of the added velocity is led over */
+/* s  in which a change of the added velocity is led over */
+static const double steering_time = 0.1;
 
 void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model) {
@@ -34,7 +34,7 @@ void hx_compliant_reset(hxCompliant *compliant) {
   hx_compliance_reset(&compliant->laws);
 }
 
-/* ---------------------------------------------------------------------------------------------- steering */
+/* ----------------------------------------------------------------------------------- steering */
 
 hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
                               int64_t steps) {
@@ -59,9 +59,9 @@ void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
   s->past = 0;
 }
 
-/* ---------------------------------------------------------------------------------------------- sensors */
+/* ------------------------------------------------------------------------------------ sensors */
 
-/* foot forces in the walking frame K: f_K = R_KT R_TW f_W */
+/* the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W */
 static void sense(const hxControllerInput *input, const hxPosture *posture,
                   double force[HX_LEGS][3]) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
@@ -113,9 +113,9 @@ static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
   hx_hold_look(&model->hold, &seen, &compliant->hold);
 }
 
-/* ---------------------------------------------------------------------------------------------- step */
+/* --------------------------------------------------------------------------------------- step */
 
-/* adds to a leg's command what raises its foot by so much, and the laws' bend */
+/* the joint angles of a leg, bent by the laws and with the foot raised (C41) */
 static void correct(const hxLegSolver *leg, const double climb[HX_JOINTS],
                     const double bend[HX_JOINTS], double raised, double angle[HX_JOINTS]) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)

@@ -1,4 +1,5 @@
-/* compliant.h - compliant control around its laws: from the sensors to the corrected feet. Python: controller/compliant.py. */
+/* compliant.h - compliant control around its laws: from the sensors to the corrected feet.
+ * Python: controller/compliant.py. */
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
@@ -47,15 +48,16 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegS
                           hxCompliantModel *model);
 void hx_compliant_reset(hxCompliant *compliant);
 
-/* Before new steps are planned, `steps` after the last: looks at what the lost way asks for when a leg lifts off or touches down. */
+/* Before new steps are planned: takes over what the slow loops ask for, when a leg lifts off or
+ * touches down (afresh) and at a stop (not moves) (C40). steps: periods since the last planning. */
 void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh,
                         hxCompliant *compliant);
 
-/* The addition so many steps after the first planned one. */
+/* What is added to the commanded velocity so many periods after the first planned step (C40). */
 hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
                               int64_t steps);
 
-/* The joint commands of this step, corrected in place. */
+/* One period on: corrects the joint commands of this step in place (C41). */
 void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                        const hxStance *stance, const hxControllerInput *input,
                        hxCompliant *compliant, hxControllerOutput *output);

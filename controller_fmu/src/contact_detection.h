@@ -1,4 +1,5 @@
-/* contact_detection.h - what the foot force sensors say, and whether they can be believed. Python: controller/contact_detection.py. */
+/* contact_detection.h - what the foot force sensors say, and whether they can be believed.
+ * Python: controller/contact_detection.py. */
 #ifndef HX_CONTACT_DETECTION_H
 #define HX_CONTACT_DETECTION_H
 
@@ -7,7 +8,8 @@
 
 HX_HIDDEN_BEGIN
 
-/* Touch-down and lift-off with hysteresis (C23) under normal forces [N]; weight: of the robot [N]. */
+/* Touch-down and lift-off with hysteresis (C23) under normal forces [N]; weight: of the robot
+ * [N]. */
 void hx_contact_detector_step(double weight, const double normal[HX_LEGS], int touching[HX_LEGS]);
 
 /* Which foot sensors contradict the plan for too long (C34). */

@@ -12,7 +12,7 @@ void hx_controller_compile(const hxControllerDefinition *definition, hxControlle
   if (model->compliant) hx_compliant_compile(definition, model->leg, &model->laws);
 }
 
-/* ---------------------------------------------------------------------------------------------- planning */
+/* ----------------------------------------------------------------------------------- planning */
 
 /* -1: the step before, 0: the present one, 1: the step after */
 static hxPlannedStep *step_at(hxControllerState *state, int neighbour) {
@@ -50,9 +50,9 @@ static void lower(const hxControllerModel *model, const hxFootPaths *paths, hxPl
   for (int k = 0; k < HX_LEGS; ++k) step->height[k] = step->feet.height[k] - step->lowering[k];
 }
 
-/* The shift of a foot as the ground rolls off it (C9), and the leg. A tibia that pitches by dB rolls the
- * sphere of its foot by -R dB along the outward direction of the leg. The shift s changes B itself:
- * s = R (C + s dC/du) is solved by one Newton step. */
+/* The shift of a foot as the ground rolls off it (C9), and the leg. A tibia that pitches by dB
+ * rolls the sphere of its foot by -R dB along the outward direction of the leg. The shift s
+ * changes B itself: s = R (C + s dC/du) is solved by one Newton step. */
 static void place_leg(const hxLegSolver *leg, const hxPosture *posture, hxPlane plane,
                       double height, hxPlane *shift, hxPose *pose) {
   double slope[HX_JOINTS], z = height;
@@ -105,8 +105,8 @@ static void plan_afresh(const hxControllerModel *model, hxControllerState *state
   plan_step(model, state, 1, 1, first, step_at(state, 1));
 }
 
-/* Goes to the next step, as planned, and plans the one after it. told: the command has changed, so that
- * the plan is void. */
+/* Goes to the next step, as planned, and plans the one after it. told: the command has changed, so
+ * that the plan is void. */
 static void advance(const hxControllerModel *model, int told, hxControllerState *state) {
   if (told || !state->has_after) plan_afresh(model, state);
   state->present = (state->present + 1) % 3;
@@ -120,7 +120,7 @@ static void advance(const hxControllerModel *model, int told, hxControllerState 
   if (state->has_after) plan_step(model, state, next, 1, step_at(state, 0), step_at(state, 1));
 }
 
-/* ---------------------------------------------------------------------------------------------- joints */
+/* ------------------------------------------------------------------------------------- joints */
 
 /* rate of a quantity of the present step, one-sided at the end of a section */
 static double rate_of(const hxControllerState *state, double before, double now, double after,
@@ -201,7 +201,7 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   stance->height = now->height;
 }
 
-/* ---------------------------------------------------------------------------------------------- ticks */
+/* -------------------------------------------------------------------------------------- ticks */
 
 void hx_controller_begin(const hxControllerModel *model, double t, hxControllerState *state) {
   hxPlannedStep *step;

@@ -1,5 +1,5 @@
-/* foot_law.h - the linear part of a foot's laws: the slip PID along x and along y, the virtual suspension and the smoothing of the load.
- * Python: controller/foot_law.py. */
+/* foot_law.h - the linear part of the laws of a foot: the slip PID along x and along y, the virtual
+ * suspension and the smoothed load. Python: controller/foot_law.py. */
 #ifndef HX_FOOT_LAW_H
 #define HX_FOOT_LAW_H
 
@@ -25,8 +25,8 @@ typedef struct hxFootLaw {
 
 void hx_foot_law_compile(const hxControllerDefinition *definition, hxFootLawModel *model);
 
-/* One period on. push, excess: tangential and normal force to give way to [N] (C25, C26); load: measured,
- * in thirds of the weight [1] (C27). */
+/* One period on. push, excess: tangential and normal force to give way to [N] (C25, C26); load:
+ * measured, in thirds of the weight [1] (C27). */
 void hx_foot_law_step(const hxFootLawModel *model, hxPlane push, double excess, double load,
                       hxFootLaw *law);
 

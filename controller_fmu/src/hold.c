@@ -1,13 +1,13 @@
 #include "hold.h"
 
 static const double look_time = 0.04;          /* s   between two looks, at least a period */
-static const double loaded =
-    0.3;              /* 1   thirds of the weight on a foot that certainly does not slip along */
+/* 1  thirds of the weight on a foot that certainly does not slip along */
+static const double loaded = 0.3;
 static const double determinant_floor = 1e-6;  /* m4  feet on one line tell no tilt */
 static const double turn = 6.283185307179586;  /* rad */
 
-/* The plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y. Returns whether
- * the feet span a plane. */
+/* The plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y. Returns
+ * whether the feet span a plane. */
 static int fit_plane(const hxSight *seen, double fit[3]) {
   double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0,
          yz = 0.0;

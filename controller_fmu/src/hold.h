@@ -1,5 +1,5 @@
-/* hold.h - slow loops on what the standing legs say about the torso: its height and tilt over the ground, and the way it has walked.
- * Python: controller/hold.py. */
+/* hold.h - slow loops on what the standing legs say about the torso: its posture and the way it has
+ * walked. Python: controller/hold.py. */
 #ifndef HX_HOLD_H
 #define HX_HOLD_H
 

@@ -1,4 +1,5 @@
-/* inverse_dynamics.h - what the planned motion asks of servos and ground. Python: controller/inverse_dynamics.py. */
+/* inverse_dynamics.h - what the planned motion demands of servos and ground.
+ * Python: controller/inverse_dynamics.py. */
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
@@ -34,7 +35,7 @@ typedef struct hxMasses {
   hxPlane turn; /* 1   e^(i yaw) of the walking frame */
 } hxMasses;
 
-/* What a planned motion asks for at one step. */
+/* What a planned motion demands at one step. */
 typedef struct hxDemand {
   double torque
       [HX_LEGS]

@@ -1,11 +1,11 @@
 #include "kinematics.h"
 
-static const double flag_tolerance =
-    1e-9;            /* rad or 1  round-off at the edge of the reach is not "unreachable" */
-static const double singular_sine =
-    0.02;             /* 1   floor of sin(gamma): a straight leg has no finite joint speed */
-static const double folded_cosine =
-    -1.0 + 1e-12;     /* 1   least cos(gamma): a folded leg of equal links has no direction */
+/* rad or 1  round-off at the edge of the reach is not "unreachable" */
+static const double flag_tolerance = 1e-9;
+/* 1  floor of sin(gamma): a straight leg has no finite joint speed */
+static const double singular_sine = 0.02;
+/* 1  least cos(gamma): a folded leg of equal links has no direction */
+static const double folded_cosine = -1.0 + 1e-12;
 static const double radius_floor = 1e-9; /* m2  floor of the squared distance from the coxa axis */
 
 void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hxLegSolver *model) {
@@ -51,13 +51,13 @@ double hx_leg_solver_rolling(const hxLegSolver *model, const double angle[HX_JOI
 void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose) {
   const double a = model->femur, b = model->tibia, side = model->offset_y;
   const hxPlane point = hx_plane_sub(plane, hx_plane(model->hip[0], model->hip[1]));
-  /* rho^2 = x^2 + y^2 - Y^2, the foot's distance along the coxa's x axis;  e^i psi = (x + i y)/(rho + i Y) */
+  /* rho^2 = x^2 + y^2 - Y^2;  e^(i psi) = (x + i y)/(rho + i Y) */
   const double square = point.x * point.x + point.y * point.y - side * side;
   const double rho = sqrt(square < radius_floor ? radius_floor : square);
   pose->point = point;
   pose->heading = hx_over(point, hx_plane(rho, side));
   pose->foot = hx_plane(rho - model->coxa_length, height - model->hip[2] - model->coxa_height);
-  /* u + i w = e^i B (b + a e^i gamma), so cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b) */
+  /* cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a e^(i gamma)) */
   const double wanted = (hx_square(pose->foot) - a * a - b * b) / (2.0 * a * b);
   const double cosine = hx_clamp(wanted, folded_cosine, 1.0);
   const hxPlane knee = hx_plane(cosine, sqrt(1.0 - cosine * cosine));
@@ -73,11 +73,9 @@ void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, 
 
 void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose, hxPlane velocity,
                           double rise, double speed[HX_JOINTS]) {
-  /* velocity in the coxa frame v e^-i psi: dq_1 = v_y / rho; then u + i rise, u = v_x + Y dq_1, is left for the leg's plane */
   const hxPlane v = hx_times(velocity, hx_conj(pose->heading));
   const double turn = v.y / (pose->foot.x + model->coxa_length);
   const hxPlane left = hx_plane(v.x + model->offset_y * turn, rise);
-  /* dq_2 = -Re((u + i rise)^* e^i B)/(a sin gamma);  dq_3 = -Re((u + i rise)^* foot)/(a b sin gamma) */
   const double sine = hx_across(pose->tibia, pose->femur);
   const double lever = -model->femur * (sine < singular_sine ? singular_sine : sine);
   speed[0] = turn;

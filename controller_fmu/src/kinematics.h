@@ -1,4 +1,5 @@
-/* kinematics.h - closed-form kinematics of three-joint legs, torso frame. Python: controller/kinematics.py. */
+/* kinematics.h - closed-form kinematics of three-joint legs, torso frame.
+ * Python: controller/kinematics.py. */
 #ifndef HX_LEG_KINEMATICS_H
 #define HX_LEG_KINEMATICS_H
 
@@ -37,26 +38,28 @@ typedef struct hxPose {
 
 void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hxLegSolver *model);
 
-/* The foot's centre at joint angles. */
+/* The centre of the foot at joint angles (C11). */
 void hx_leg_solver_forward(const hxLegSolver *model, const double angle[HX_JOINTS], double foot[3]);
 
-/* m  how far the round foot has rolled outwards since the stance */
+/* How far the round foot has rolled outwards since the stance (C9) [m]. */
 double hx_leg_solver_rolling(const hxLegSolver *model, const double angle[HX_JOINTS]);
 
-/* Inverse kinematics without joint limits: whatever comes in, something comes out. */
+/* Inverse kinematics without joint limits (C12): every target gives a pose. */
 void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose);
 
-/* rad/s  joint speeds of a foot that moves so, torso frame [m/s] */
+/* Joint speeds [rad/s] of a foot that moves with this velocity, torso frame [m/s] (C13). */
 void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose, hxPlane velocity,
                           double rise, double speed[HX_JOINTS]);
 
-/* Angles within the joints' limits and speeds that servos reach. Returns whether the foot misses its target. */
+/* Angles within the joints' limits and speeds that servos can reach. Returns whether the foot
+ * misses its target. */
 int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *pose, hxPlane velocity, double rise,
                         double angle[HX_JOINTS], double speed[HX_JOINTS]);
 
-/* rad/s2  that lead the joints to the angles of a neighbouring step, `ahead` [s] of this one (< 0:
- * that led from there); none without a neighbour. A joint that its limits hold, of angle or of
- * speed, has none, and none has more than turns its speed round in that time. */
+/* Joint accelerations [rad/s2] that lead to the angles of a neighbouring step (C14), `ahead` [s]
+ * of this one, negative when it lies before; none without a neighbour. A joint that its limits
+ * hold, of angle or of speed, has none, and none has more than reverses the largest speed within
+ * that time. */
 void hx_leg_solver_accelerations(const hxLegSolver *model, const hxPose *neighbour, double ahead,
                                  const double angle[HX_JOINTS], const double speed[HX_JOINTS],
                                  double acceleration[HX_JOINTS]);

@@ -20,7 +20,7 @@ static inline hxPlane hx_times(hxPlane a, hxPlane b) {
 }
 static inline double hx_square(hxPlane a) { return a.x * a.x + a.y * a.y; }
 
-/* Re(a^* b) and Im(a^* b): the dot and the cross product of two arrows */
+/* Re(a^* b) and Im(a^* b): the dot and the cross product of two vectors */
 static inline double hx_along(hxPlane a, hxPlane b) { return a.x * b.x + a.y * b.y; }
 static inline double hx_across(hxPlane a, hxPlane b) { return a.x * b.y - a.y * b.x; }
 

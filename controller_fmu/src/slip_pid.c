@@ -1,14 +1,14 @@
 #include "slip_pid.h"
 
-static const double load_floor = 1e-6;   /* N   below it no foot carries anything */
-static const double least_spread =
-    1e-4; /* m2  of the feet about their centre: less takes no moment about the vertical */
+const double hx_load_floor = 1e-6;
+/* m2  of the feet about their centre: less takes no moment about the vertical */
+static const double least_spread = 1e-4;
 
 void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]) {
   double total = 0.0, spread = 0.0, moment = 0.0, share[HX_LEGS];
   hxPlane arm[HX_LEGS], common = {0.0, 0.0}, centre = {0.0, 0.0};
   for (int leg = 0; leg < HX_LEGS; ++leg) total += normal[leg];
-  if (total <= load_floor) return;
+  if (total <= hx_load_floor) return;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     share[leg] = normal[leg] / total;
     common = hx_plane_add(common, push[leg]);

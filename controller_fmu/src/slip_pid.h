@@ -1,4 +1,5 @@
-/* slip_pid.h - the law against slip: one discrete PID per foot and direction. Python: controller/slip_pid.py. */
+/* slip_pid.h - the law against slip: one discrete PID per foot and direction.
+ * Python: controller/slip_pid.py. */
 #ifndef HX_SLIP_PID_H
 #define HX_SLIP_PID_H
 
@@ -22,11 +23,13 @@ typedef struct hxSlipPid {
   double slope; /* N   filtered derivative */
 } hxSlipPid;
 
-/* Tangential forces d on feet that carry normal forces [N] at these places [m], less what pushes and turns the body as one, shared by load:
- * e = d - (n / sum n) (D + i w (p - c)), with neither a sum nor a moment about the vertical. */
+extern const double hx_load_floor; /* N  below it no foot carries anything */
+
+/* Tangential forces on feet [N] less what pushes and turns the body as one, shared by load
+ * (C24), in place; normal: forces on the feet [N]; feet: their places [m]. */
 void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
 
-/* One period on under a force [N]; returns the answer [N]. */
+/* The answer of this period to a force [N] (C25). */
 double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state);
 
 HX_HIDDEN_END

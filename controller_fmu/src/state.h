@@ -1,5 +1,5 @@
-/* state.h - what a controller is made of: constants compiled from the definition, and the state that
- * moves, without pointers; and its tick, from body command and measurement to joint commands.
+/* state.h - what a controller is made of: constants compiled from the definition, and the state
+ * that moves, without pointers; and its tick, from body command and measurement to joint commands.
  * Python: controller/controller.py.
  *
  *   command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics ---------> angle_ref
@@ -55,8 +55,8 @@ typedef struct hxControllerState {
   hxControllerOutput output; /* of the last tick */
 } hxControllerState;
 
-/* The next tick, computed for its outputs alone: the tick itself takes it over when time goes on under
- * the same input. Not part of the state. */
+/* The next tick, computed for its outputs alone: the tick itself takes it over when time goes on
+ * under the same input. Not part of the state. */
 typedef struct hxAhead {
   int known;
   hxControllerInput input;

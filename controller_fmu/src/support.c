@@ -1,11 +1,11 @@
 #include "support.h"
 
-static const double ridge_share =
-    1e-9;    /* 1   of the mean square arm: feet on one line share no moment about it */
-static const double least_arm =
-    1e-12;     /* m2  keeps the equations of no standing foot at all solvable */
-static const double least_spread =
-    1e-4;   /* m2  of the feet about their centre: less takes no moment about the vertical */
+/* 1  of the mean square arm: feet on one line share no moment about it */
+static const double ridge_share = 1e-9;
+/* m2  keeps the equations of no standing foot at all solvable */
+static const double least_arm = 1e-12;
+/* m2  of the feet about their centre: less takes no moment about the vertical */
+static const double least_spread = 1e-4;
 static const double least_load = 1e-6;     /* N   less is no load to share by */
 
 /* depth [m] to which the ground gives way under a load [N] (C21) */
@@ -54,7 +54,7 @@ double hx_support_activation(const hxSupport *model, double phase, int stayed, i
   return fmin(rising, falling);
 }
 
-/* the vertical shares (C19), whose sums of f_n and of p f_n shall be weight and moment; never negative */
+/* the vertical shares (C19): sums of f_n and of p f_n are weight and moment; never negative */
 static void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                          double weight, hxPlane moment, double normal[HX_LEGS]) {
   const double needed[3] = {weight, moment.x, moment.y};

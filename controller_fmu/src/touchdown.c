@@ -7,8 +7,8 @@ const double hx_early = 0.002;
 static const double reach_speed = 0.08;  /* m/s  downwards */
 static const double reach_limit = 0.020; /* m */
 static const double hold_limit = 0.030;  /* m    upwards: as high as a swing of the robots goes */
-static const double grace =
-    0.040; /* s    after the planned touch-down, in which a foot may be late without anyone minding */
+/* s  after the planned touch-down, in which a foot may be late */
+static const double grace = 0.040;
 static const double return_time = 0.060; /* s    in which an offset goes in the swing */
 static const double negligible = 1e-5; /* m    an offset less than this is none */
 

@@ -18,9 +18,9 @@ typedef struct hxTouchdown {
 /* Whether some foot has an offset or misses the ground. */
 int hx_touchdown_busy(const hxTouchdown *touchdown);
 
-/* One period [s] on (C36). touching: feet that report a force; falling: how far the path of a foot that met
- * the ground early comes down in this period [m], 0 of the others; swinging: legs planned in the air;
- * loaded: legs planned to carry their whole share. */
+/* One period [s] on (C36). touching: feet that report a force; falling: how far the path of a
+ * foot that met the ground early comes down in this period [m], 0 of the others; swinging: legs
+ * planned in the air; loaded: legs planned to carry their whole share. */
 void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
                        const int swinging[HX_LEGS], const int loaded[HX_LEGS],
                        hxTouchdown *touchdown);

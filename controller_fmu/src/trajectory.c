@@ -5,16 +5,16 @@
 #include <string.h>
 
 static const double dwell = 0.1; /* 1   share of the swing at each end with vertical motion only */
-static const double freeze =
-    0.75; /* 1   part of the swing after which the landing point stays fixed to the ground */
-static const double home_tolerance =
-    1e-9; /* m   a foot this close to its stance position need not step any more */
-static const double clock_epsilon =
-    1e-9; /* cycles  the clock starts this much before the first lift-off */
+/* 1  part of the swing after which the landing point stays fixed to the ground */
+static const double freeze = 0.75;
+/* m  a foot this close to its stance position need not step any more */
+static const double home_tolerance = 1e-9;
+/* cycles  the clock starts this much before the first lift-off */
+static const double clock_epsilon = 1e-9;
 static const double nearly_done = 1e-12; /* 1   floor of 1 - s */
 static const double small_angle = 1e-12; /* rad below it sin(a)/a is 1 */
 
-/* ---------------------------------------------------------------------------------------------- command */
+/* ------------------------------------------------------------------------------------ command */
 
 void hx_command_ramp_compile(double duration, double period, hxCommandRampModel *model) {
   model->duration = duration;
@@ -68,7 +68,7 @@ void hx_command_ramp_ahead(const hxCommandRampModel *model, const hxCommandRamp 
   }
 }
 
-/* ---------------------------------------------------------------------------------------------- shapes */
+/* ------------------------------------------------------------------------------------- shapes */
 
 /* the horizontal progress s in [0, 1] at the part tau of a swing, and ds/dtau (C6) */
 static void blend(double tau, double *s, double *slope) {
@@ -78,8 +78,8 @@ static void blend(double tau, double *s, double *slope) {
   *slope = 45.0 / 32.0 * flat * flat / (1.0 - 2.0 * dwell);
 }
 
-/* The lift z of the foot at the part tau of a swing, and dz/dtau [m] (C7). top: the step height; down: the
- * touch-down speed times the duration of the swing [m]. */
+/* The lift z of the foot at the part tau of a swing, and dz/dtau [m] (C7). top: the step height;
+ * down: the touch-down speed times the duration of the swing [m]. */
 static void hop(double tau, double top, double down, double *lift, double *climb) {
   const double arch = tau * (1.0 - tau), bow = 64.0 * top * arch * arch, fall = down * tau * tau;
   *lift = (bow + fall) * arch;
@@ -93,7 +93,7 @@ static hxPlane travel(hxTwist twist, double time) {
   return hx_times(hx_scaled(twist.velocity, time * chord), hx_cis(half));
 }
 
-/* ---------------------------------------------------------------------------------------------- paths */
+/* -------------------------------------------------------------------------------------- paths */
 
 void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                            hxFootPathsModel *model) {
@@ -158,8 +158,8 @@ static int lift_off(const hxFootPathsModel *model, const hxFootPaths *old, hxFoo
   return any;
 }
 
-/* Keeps the feet that are home there. Returns whether all are home and on the ground; place: where they
- * are, those that have just landed at their goals. */
+/* Keeps the feet that are home there. Returns whether all are home and on the ground; place: where
+ * they are, those that have just landed at their goals. */
 static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
                      const hxPlannedFeet *now, int any_swinging, hxFootPaths *paths,
                      hxPlane place[HX_LEGS]) {
@@ -187,8 +187,8 @@ static hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
   return hx_plane_sub(feet->goal[leg], hx_scaled(feet->pull[leg], 1.0 - feet->blend[leg]));
 }
 
-/* Place and velocity of a foot whose phase, goal, pull and frame are known (C5 to C8); carried: where it
- * was on the ground at the step before, back: e^(-i turn). */
+/* Place and velocity of a foot whose phase, goal, pull and frame are known (C5 to C8); carried:
+ * where it was on the ground at the step before, back: e^(-i turn). */
 static void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, int leg,
                        hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
   const double tau = progress(model, feet->phase[leg]), w = feet->twist.yaw_rate;

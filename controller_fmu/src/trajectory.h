@@ -10,8 +10,8 @@ HX_HIDDEN_BEGIN
 
 enum { HX_COMMANDS = 6 }; /* vx vy yaw_rate height roll pitch */
 
-/* Turns steps of the command into smooth changes (C1): a cubic from the present value and rate to the new
- * value and rate 0. */
+/* Turns steps of the command into smooth changes (C1): a cubic from the present value and rate
+ * to the new value and rate 0. */
 typedef struct hxCommandRampModel {
   double duration, period; /* s */
   int64_t end; /* steps that a change takes */
@@ -54,8 +54,8 @@ typedef struct hxTwist {
   double yaw_rate; /* rad/s */
 } hxTwist;
 
-/* The feet at one step as the command plans them. Walking frame, but goal, pull, way and turn: ground
- * frame. */
+/* The feet at one step as the command plans them. Walking frame, but goal, pull, way and turn:
+ * ground frame. */
 typedef struct hxPlannedFeet {
   hxPlane plane[HX_LEGS]; /* m    centres, x + i y */
   double height[HX_LEGS]; /* m    z */
@@ -63,22 +63,22 @@ typedef struct hxPlannedFeet {
   double rise[HX_LEGS]; /* m/s  of z */
   double phase[HX_LEGS]; /* 1    in [0, 1) */
   double blend[HX_LEGS]; /* 1    s of swinging feet, else 0 */
-  hxPlane
-      goal[HX_LEGS]; /* m    where a swinging foot will touch down, where a standing one stands */
+  /* m  where a swinging foot will touch down, where a standing one stands */
+  hxPlane goal[HX_LEGS];
   hxPlane pull[HX_LEGS]; /* m    (goal - foot)/(1 - s) of swinging feet, 0 of standing ones */
   hxPlane way; /* m    of the walking frame over the ground */
   double turn; /* rad  of the walking frame over the ground */
   hxTwist twist; /* of the body */
 } hxPlannedFeet;
 
-/* The paths of the feet, between a lift-off or touch-down and the next. The same legs are in the air
- * throughout such a section of the walk. */
+/* The paths of the feet, between a lift-off or touch-down and the next. The same legs are in the
+ * air throughout such a section of the walk. */
 typedef struct hxFootPaths {
   int walking; /* the gait clock runs */
   int64_t before; /* periods from the begin of the walk to the first step of the section */
   int swinging[HX_LEGS]; /* in the air */
-  int standing
-      [HX_LEGS]; /* by the clock; a foot with nowhere to step neither stands by it nor swings */
+  /* by the clock; a foot with nowhere to step neither stands by it nor swings */
+  int standing[HX_LEGS];
   int lifted[HX_LEGS]; /* lifts off at the begin of the section */
   int stayed[HX_LEGS]; /* had nowhere to step at its last lift-off and stood through its swing */
   int stays[HX_LEGS]; /* will have nowhere to at its next one: home under a body at rest */
@@ -90,14 +90,14 @@ void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLeg
 /* All feet in the stance, the gait clock stopped. */
 void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet);
 
-/* Begins a new section after the present step; first: the feet at that step, from which it sets out.
+/* Begins a new section after the present step; first: the feet at that step, from which it begins.
  * number: periods since the last section began; twist: of the body now; going: the body moves or is
  * commanded to, otherwise feet step home and the gait clock then stops. */
 void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
                         int going, hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first);
 
-/* Whether the step so many periods after the first still belongs to the section: no leg lifts off or
- * touches down before it. */
+/* Whether the step so many periods after the first still belongs to the section: no leg lifts off
+ * or touches down before it. */
 int hx_foot_paths_reach(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number);
 
 /* The feet so many periods after the first step of the section, from the step before. */
