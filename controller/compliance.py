@@ -30,7 +30,7 @@ from hexapod_cosim.controller.inverse_dynamics import Demand
 from hexapod_cosim.controller.landing import Landings
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, square
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, rows_of, square
 from hexapod_cosim.controller.slip_pid import LOAD_FLOOR, squeeze
 from hexapod_cosim.controller.support import Shares
 from hexapod_cosim.controller.touchdown import EARLY, Touchdown
@@ -315,7 +315,7 @@ class Compliance(Stateful):
         kept = 1.0 - (1.0 - freedom) * self.follow_load
         forgets = plan.swinging & ~self.touching
         law.pid.integral = law.pid.integral * np.where(forgets, kept * self.memory, kept)
-        return np.stack([given.real, given.imag, lift], axis=-1)
+        return rows_of(given.real, given.imag, lift)
 
     # ---------------------------------------------------------------------------------- joints
 

@@ -27,7 +27,7 @@ from hexapod_cosim.controller.inverse_dynamics import Masses, Neighbours
 from hexapod_cosim.controller.kinematics import Feet, LegSolver, Pose
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, rows_of
 from hexapod_cosim.controller.posture import Posture
 from hexapod_cosim.controller.trajectory import (
     BodyCommand,
@@ -273,7 +273,7 @@ class Controller(Stateful):
         """
         now = self._now
         plane, height = now.posture.see_place(now.feet.plane + now.shift, now.feet.height)
-        return np.stack([plane.real, plane.imag, height], axis=-1)
+        return rows_of(plane.real, plane.imag, height)
 
     def _follow_paths(self) -> None:
         """Joint commands that lead the feet along their paths (C10 to C14)."""

@@ -128,7 +128,10 @@ class InverseDynamics:
         """
         moment = place * lift - push * (height - self.floor)
         parts = (push, lift, moment, across(place, push))
-        return tuple(a + np.sum(part) for a, part in zip(total, parts, strict=True))
+        return tuple(
+            a + (part.sum() if isinstance(part, np.ndarray) else part)
+            for a, part in zip(total, parts, strict=True)
+        )
 
     def _demand_torso(
         self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None]
@@ -194,7 +197,7 @@ class InverseDynamics:
         row[:, 1], up[:, 1] = -femur.imag * pose.heading, femur.real
         row[:, 2], up[:, 2] = tibia.imag * pose.heading, -tibia.real
         row, up = posture.turn(row, up)
-        return np.stack([row.real, row.imag, up], axis=-1)
+        return np.array((row.real, row.imag, up)).transpose(1, 2, 0)
 
     def demand(self, motion: Neighbours, speed: Array, posture: Posture) -> Demand:
         """What the middle one of three steps demands.

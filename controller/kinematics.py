@@ -123,8 +123,9 @@ class LegSolver:
         tibia = foot / (b + a * knee)
         femur = tibia * knee
         angle = np.empty((*cosine.shape, 3))
-        angle[..., 0] = np.angle(heading * self.upright)
-        angle[..., 1] = np.angle(femur * self.femur_zero)
+        coxa, thigh = heading * self.upright, femur * self.femur_zero
+        angle[..., 0] = np.arctan2(coxa.imag, coxa.real)
+        angle[..., 1] = np.arctan2(thigh.imag, thigh.real)
         angle[..., 2] = np.arccos(cosine) - self.femur_tilt + self.tibia_tilt
         lost = ~((distance2 >= RADIUS_FLOOR) & (np.abs(wanted - cosine) <= FLAG_TOLERANCE))
         return Pose(point, heading, foot, femur, tibia, angle, lost)

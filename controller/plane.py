@@ -6,6 +6,7 @@ vertical plane of a leg u + i w (outward and up).
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,15 @@ def square(a: Any) -> Any:
 
 
 def cis(angle: Any) -> Any:
-    """e^(i angle) of an angle [rad]."""
+    """e^(i angle) of an angle [rad], a number or an array."""
+    if isinstance(angle, float):
+        return complex(math.cos(angle), math.sin(angle))
     return np.cos(angle) + 1j * np.sin(angle)
+
+
+def rows_of(x: Array, y: Array, z: Array) -> Array:
+    """(6, 3) rows x y z of three arrays (6,)."""
+    return np.array((x, y, z)).T
 
 
 def clamp(x: Any, low: Any, high: Any) -> Any:

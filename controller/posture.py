@@ -6,6 +6,7 @@ frame T lies in it at a height and is turned by R_KT, roll about x first and the
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,15 +27,16 @@ class Posture(NamedTuple):
     @classmethod
     def of(cls, value: Array, rate: Array) -> Posture:
         """The posture of height, roll and pitch (3,) [m, rad, rad] and their rates per second."""
+        if not (value.any() or rate.any()):
+            return LEVEL
         height, roll, pitch = value.tolist()
         height_rate, roll_rate, pitch_rate = rate.tolist()
-        cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
         rotation = np.array(
             [[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]],
         )
-        level = not (value.any() or rate.any())
         spin = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
-        return cls(level, height, rotation, height_rate, spin)
+        return cls(False, height, rotation, height_rate, spin)
 
     def turn(self, plane: Any, z: Any) -> tuple[Any, Any]:
         """R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
@@ -60,6 +62,9 @@ class Posture(NamedTuple):
         velocity = velocity - ((y - 1j * x) * height + 1j * z * plane)
         rise = rise - (x * plane.imag - y * plane.real)
         return Feet(plane, height, velocity, rise)
+
+
+LEVEL = Posture(True, 0.0, np.eye(3), 0.0, (0.0, 0.0, 0.0))
 
 
 def _product(rotation: Array, plane: Any, z: Any) -> tuple[Any, Any]:

@@ -17,7 +17,7 @@ import numpy as np
 from hexapod_cosim.controller.gains import SupportGains
 from hexapod_cosim.controller.gait import Gait
 from hexapod_cosim.controller.inverse_dynamics import Demand
-from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, clamp, square
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, across, clamp, rows_of, square
 from hexapod_cosim.models import Robot
 
 RIDGE_SHARE = 1e-9  # 1    of the mean square arm: feet on one line share no moment about it
@@ -36,7 +36,7 @@ class Shares(NamedTuple):
 
     def forces(self) -> Array:
         """(6, 3) the forces [N]."""
-        return np.stack([self.push.real, self.push.imag, self.normal], axis=-1)
+        return rows_of(self.push.real, self.push.imag, self.normal)
 
 
 def indentation(load: Any, stiffness: float) -> Any:
