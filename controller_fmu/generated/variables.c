@@ -504,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{7e6b92eb-d02d-4494-9ce4-cfbf94b84685}";
+const char hx_default_guid[] = "{6761ec69-dce2-4a56-8074-ad4efd850b76}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");
