@@ -1,14 +1,48 @@
 """How the robot walks: joint commands from a body velocity and from foot forces."""
 
-from hexapod_cosim.controller.controller import Controller, ControllerError, Diagnostics, JointCommand, Measurement
-from hexapod_cosim.controller.gains import Gains, GainsError, Margins, Requirements, SlipGains, SuspensionGains, load_gains, save_gains
+from hexapod_cosim.controller.controller import (
+    Controller,
+    ControllerError,
+    Diagnostics,
+    JointCommand,
+    Measurement,
+)
+from hexapod_cosim.controller.gains import (
+    Gains,
+    GainsError,
+    Margins,
+    Requirements,
+    SlipGains,
+    SuspensionGains,
+    load_gains,
+    save_gains,
+)
 from hexapod_cosim.controller.gait import PATTERNS, Gait, Pattern, make_gait
 from hexapod_cosim.controller.kinematics import LegSolver
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
 
 __all__ = [
-    "PATTERNS", "BodyCommand", "CommandRamp", "Controller", "ControllerError", "Diagnostics", "FootPaths", "Gains", "GainsError", "Gait",
-    "JointCommand", "LegSolver", "Margins", "Measurement", "Parts", "Pattern", "Requirements", "SlipGains",
-    "SuspensionGains", "load_gains", "make_gait", "save_gains",
-]  # fmt: skip
+    "PATTERNS",
+    "BodyCommand",
+    "CommandRamp",
+    "Controller",
+    "ControllerError",
+    "Diagnostics",
+    "FootPaths",
+    "Gains",
+    "GainsError",
+    "Gait",
+    "JointCommand",
+    "LegSolver",
+    "Margins",
+    "Measurement",
+    "Parts",
+    "Pattern",
+    "Requirements",
+    "SlipGains",
+    "SuspensionGains",
+    "load_gains",
+    "make_gait",
+    "save_gains",
+]

@@ -1,4 +1,8 @@
-"""How all static figures look: as wide as a page of two columns, in its size of type, colours that colour-blind readers tell apart."""
+"""How all static figures look.
+
+They are as wide as a page of two columns, in its size of type, with colours that colour-blind
+readers can tell apart.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,26 @@ WIDTH = 7.2  # in
 DPI = 200  # of PNGs
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#000000")  # Okabe and Ito
 SETTINGS: dict[str, Any] = {
-    "font.size": 8.0, "axes.titlesize": 8.0, "axes.labelsize": 8.0, "xtick.labelsize": 7.0, "ytick.labelsize": 7.0, "legend.fontsize": 7.5,
-    "axes.xmargin": 0.0, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6, "grid.linewidth": 0.5,
-    "axes.grid": True, "grid.alpha": 0.3, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
-    "svg.fonttype": "none", "svg.hashsalt": "hexapod", "path.simplify": True, "figure.constrained_layout.use": True,
-}  # fmt: skip
-UNDATED: dict[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}}  # metadata by format: equal data, equal files
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.5,
+    "axes.xmargin": 0.0,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "grid.linewidth": 0.5,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "hexapod",
+    "path.simplify": True,
+    "figure.constrained_layout.use": True,
+}
+# metadata by format: equal data, equal files
+UNDATED: dict[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}}

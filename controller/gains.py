@@ -1,4 +1,7 @@
-"""Gains of the compliant control: what the two laws run with, and what they were designed for. Kept in a TOML file."""
+"""Gains of the compliant control: what the laws run with, and what they were designed for.
+
+They are kept in a TOML file.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,9 @@ class GainsError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class SlipGains:
-    """PID from tangential force [N] to the force [N] that a leg's servos are relieved of; the foot's shift is C times it.
+    """PID from tangential force [N] to the force [N] that a leg is relieved of (C25).
 
+    The shift of the foot is C times that force (C28).
     In continuous time: (kp + ki/s + kd s/(derivative_time s + 1)) / (filter_time s + 1).
     """
 
@@ -39,7 +43,7 @@ class SlipGains:
 
 @dataclass(frozen=True, kw_only=True)
 class SuspensionGains:
-    """Virtual m z'' + b z' + k z = f_n - the leg's share of the load; z lifts the foot towards the torso."""
+    """Virtual m z'' + b z' + k z = f_n - the share of the leg; z lifts the foot (C26)."""
 
     mass: float  # kg
     damping: float  # N s/m
@@ -83,12 +87,12 @@ class Requirements:
 
     phase_margin: float = 60.0  # deg    at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
-    bandwidth: float = 5.0  # rad/s    crossover of the tangential loop, at least: quicker than feet creep
-    slip_rejection: float = 0.6  # 1    steady slip with the tangential law over that without, at most
+    bandwidth: float = 5.0  # rad/s    crossover of the tangential loop, at least
+    slip_rejection: float = 0.6  # 1    steady slip with the law over that without
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.010  # s    force filter of the tangential loop
-    load_time: float = 0.030  # s    smoothing of the measured load: the time in which legs really hand over the weight
+    load_time: float = 0.030  # s    smoothing of the load: the time of real hand-overs
     slip_limit: float = 1.0  # 1    clamp of the tangential answer, in thirds of the weight
     deflection: float = 0.003  # m    of the suspension under a third of the weight beyond the share
     frequency: float = 5.0  # Hz    natural frequency of the suspension, at most
@@ -105,12 +109,12 @@ class Requirements:
     speed_limit: float = 0.02  # m/s
     turn_limit: float = 0.05  # rad/s
     speed_share: float = 0.5  # 1    of the servo's largest speed at which corrections may change
-    torque_share: float = 0.9  # 1    of the servo's largest torque that feed-forward may ask; a tripod must stand within it
+    torque_share: float = 0.9  # 1    of the servo's largest torque: a tripod must stand within it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """What a design reached: the worst over stances, loads and eigenvalues of the loop, in discrete time."""
+    """What a design reached: the worst over stances, loads and eigenvalues of the sampled loop."""
 
     slip_crossover: float  # rad/s
     slip_phase_margin: float  # deg
@@ -143,23 +147,40 @@ class Gains:
     def mismatch(self, robot: Robot, *, period: float) -> str | None:
         """Why these gains are not for this robot and period; None when they are."""
         if self.robot_hash != robot.hash:
-            return f"the gains were designed for robot {self.robot!r} ({self.robot_hash[:12]}), not for {robot.name!r} ({robot.hash[:12]})"
+            designed, present = self.robot_hash[:12], robot.hash[:12]
+            return (
+                f"the gains were designed for robot {self.robot!r} ({designed}), "
+                f"not for {robot.name!r} ({present})"
+            )
         if not math.isclose(self.period, period, rel_tol=1e-9):
             return f"the gains were designed for a period of {self.period} s, not {period} s"
         return None
 
 
 PARTS: dict[str, type[Any]] = {
-    "requirements": Requirements, "slip": SlipGains, "suspension": SuspensionGains, "support": SupportGains, "hold": HoldGains,
-    "limits": LimitGains, "margins": Margins,
-}  # fmt: skip
+    "requirements": Requirements,
+    "slip": SlipGains,
+    "suspension": SuspensionGains,
+    "support": SupportGains,
+    "hold": HoldGains,
+    "limits": LimitGains,
+    "margins": Margins,
+}
 POSITIVE = {
     "slip": ("derivative_time", "filter_time", "load_time", "tracking_time", "limit"),
     "suspension": ("mass", "damping", "stiffness", "limit"),
     "support": ("handover_time", "weight_time"),
     "hold": ("ground_time",),
     "limits": ("speed", "torque"),
-    "requirements": ("phase_margin", "filter_time", "load_time", "deflection", "frequency", "damping_ratio", "handover_time"),
+    "requirements": (
+        "phase_margin",
+        "filter_time",
+        "load_time",
+        "deflection",
+        "frequency",
+        "damping_ratio",
+        "handover_time",
+    ),
     "margins": (),
 }
 TEXTS = ("binding",)  # the rest are numbers
@@ -167,8 +188,16 @@ Record = TypeVar("Record")
 
 
 def save_gains(gains: Gains, path: str | Path) -> Path:
-    """Writes a gains file (TOML, floats to the last bit). Raises GainsError when the file cannot be written."""
-    head = {"format": FORMAT, "robot": gains.robot, "robot_hash": gains.robot_hash, "period": gains.period}
+    """Writes a gains file (TOML, floats to the last bit).
+
+    Raises GainsError when the file cannot be written.
+    """
+    head = {
+        "format": FORMAT,
+        "robot": gains.robot,
+        "robot_hash": gains.robot_hash,
+        "period": gains.period,
+    }
     head |= {"caveats": list(gains.caveats)} if gains.caveats else {}
     lines = ["# Gains of the compliant control, SI units; made by `hexapod design`."]
     lines += _toml_lines(head)
@@ -180,49 +209,93 @@ def save_gains(gains: Gains, path: str | Path) -> Path:
         partial.write_text("\n".join(lines) + "\n", encoding="utf-8")
         partial.replace(target)
     except OSError as error:
-        raise GainsError("cannot write the gains file", got=error.strerror, fix="choose a writable folder", where=str(target)) from error
+        raise GainsError(
+            "cannot write the gains file",
+            got=error.strerror,
+            fix="choose a writable folder",
+            where=str(target),
+        ) from error
     return target
 
 
 def _toml_lines(table: Mapping[str, Any]) -> list[str]:
     # a JSON text is a TOML text too; repr gives floats to the last bit, and TOML knows its inf
-    return [f"{key} = {json.dumps(value) if isinstance(value, str | list) else repr(value)}" for key, value in table.items()]
+    return [
+        f"{key} = {json.dumps(value) if isinstance(value, str | list) else repr(value)}"
+        for key, value in table.items()
+    ]
 
 
 def load_gains(path: str | Path) -> Gains:
-    """Reads and checks a gains file. Raises GainsError: the file, the key, what was got and expected."""
+    """Reads and checks a gains file.
+
+    Raises GainsError: the file, the key, what was got and expected.
+    """
     where = str(path)
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
-        raise GainsError("cannot read the gains file", got=error.strerror, fix="make one with `hexapod design`", where=where) from error
+        raise GainsError(
+            "cannot read the gains file",
+            got=error.strerror,
+            fix="make one with `hexapod design`",
+            where=where,
+        ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise GainsError("not a TOML file", got=str(error), expected="TOML 1.0", fix="correct that line", where=where) from error
+        raise GainsError(
+            "not a TOML file",
+            got=str(error),
+            expected="TOML 1.0",
+            fix="correct that line",
+            where=where,
+        ) from error
     if table.pop("format", None) != FORMAT:
         raise GainsError(
-            "unknown format of gains", expected=f"format = {FORMAT}", fix="make the file again with `hexapod design`", where=where
+            "unknown format of gains",
+            expected=f"format = {FORMAT}",
+            fix="make the file again with `hexapod design`",
+            where=where,
         )
-    parts = {name: _read_part(kind, name, table.pop(name, None), where) for name, kind in PARTS.items()}
+    parts = {
+        name: _read_part(kind, name, table.pop(name, None), where) for name, kind in PARTS.items()
+    }
     for key in ("robot", "robot_hash"):
         _text(table.get(key), f"{where}: {key}")
     period = _number(table.get("period"), f"{where}: period", positive=True)
     caveats = _texts(table.pop("caveats", []), f"{where}: caveats")
     _refuse_unknown(table, ["robot", "robot_hash", "period"], where)
-    return Gains(robot=table["robot"], robot_hash=table["robot_hash"], period=period, caveats=caveats, **parts)
+    return Gains(
+        robot=table["robot"],
+        robot_hash=table["robot_hash"],
+        period=period,
+        caveats=caveats,
+        **parts,
+    )
 
 
 def _texts(value: Any, where: str) -> tuple[str, ...]:
     if not isinstance(value, list):
-        raise GainsError("wrong type", got=value, expected="a list of texts", fix="put it in brackets", where=where)
+        raise GainsError(
+            "wrong type",
+            got=value,
+            expected="a list of texts",
+            fix="put it in brackets",
+            where=where,
+        )
     return tuple(_text(entry, where) for entry in value)
 
 
 def _read_part(kind: type[Record], name: str, table: Any, where: str) -> Record:
     if not isinstance(table, dict):
-        raise GainsError("missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where)
+        raise GainsError(
+            "missing section", expected=f"a table [{name}]", fix=f"add [{name}]", where=where
+        )
     keys = [entry.name for entry in fields(kind)]  # type: ignore[arg-type]
     _refuse_unknown(table, keys, f"{where}: {name}")
-    values = {key: _value(table.get(key), key, f"{where}: {name}.{key}", positive=key in POSITIVE[name]) for key in keys}
+    values = {
+        key: _value(table.get(key), key, f"{where}: {name}.{key}", positive=key in POSITIVE[name])
+        for key in keys
+    }
     return kind(**values)
 
 
@@ -232,15 +305,29 @@ def _value(value: Any, key: str, where: str, *, positive: bool) -> Any:
 
 def _text(value: Any, where: str) -> str:
     if not isinstance(value, str):
-        raise GainsError("wrong type", got=value, expected="a text", fix="put it in quotes", where=where)
+        raise GainsError(
+            "wrong type", got=value, expected="a text", fix="put it in quotes", where=where
+        )
     return value
 
 
 def _number(value: Any, where: str, *, positive: bool) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
-        raise GainsError("wrong type", got=value, expected="a number", fix="give a number in SI units", where=where)
+        raise GainsError(
+            "wrong type",
+            got=value,
+            expected="a number",
+            fix="give a number in SI units",
+            where=where,
+        )
     if positive and not 0.0 < value < math.inf:
-        raise GainsError("impossible value", got=value, expected="a finite number > 0", fix="correct it", where=where)
+        raise GainsError(
+            "impossible value",
+            got=value,
+            expected="a finite number > 0",
+            fix="correct it",
+            where=where,
+        )
     return float(value)
 
 
@@ -249,4 +336,6 @@ def _refuse_unknown(table: dict[str, Any], known: list[str], where: str) -> None
         if key not in known:
             near = nearest_name(key, known)
             fix = f"did you mean {near!r}?" if near else "remove it"
-            raise GainsError("unknown key", got=key, expected="one of " + ", ".join(known), fix=fix, where=where)
+            raise GainsError(
+                "unknown key", got=key, expected="one of " + ", ".join(known), fix=fix, where=where
+            )

@@ -8,7 +8,8 @@ from scipy.linalg import block_diag
 
 from hexapod_cosim.controller.design.laws import Laws, delay
 from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze_matrix
-from hexapod_cosim.controller.kinematics import Array, LegSolver
+from hexapod_cosim.controller.kinematics import LegSolver
+from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import Robot
 
 RISE = 0.05  # s

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from hexapod_cosim.controller.design.standing import StandingPlant, answers, axes_of, relieved, squeeze_matrix
-from hexapod_cosim.controller.kinematics import Array
+from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import Robot
 
 Response = NDArray[np.complex128]

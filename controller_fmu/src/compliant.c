@@ -2,9 +2,11 @@
 
 #include <string.h>
 
-static const double steering_time = 0.1; /* s  in which a change of the added velocity is led over */
+/* s  in which a change of the added velocity is led over */
+static const double steering_time = 0.1;
 
-void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS], hxCompliantModel *model) {
+void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
+                          hxCompliantModel *model) {
   const double still[HX_LEGS][HX_JOINTS] = {{0.0}}, zero[3] = {0.0};
   hxPose pose[HX_LEGS];
   hxPosture level;
@@ -13,15 +15,15 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegM
   double foot[3];
   model->per_second = 1.0 / definition->period;
   model->leading = steering_time / definition->period;
-  hx_dynamics_compile(definition, leg, &model->dynamics);
+  hx_inverse_dynamics_compile(definition, leg, &model->dynamics);
   for (int k = 0; k < HX_LEGS; ++k) {
-    hx_leg_forward(&leg[k], leg[k].stance, foot);
-    hx_leg_pose(&leg[k], hx_plane(foot[0], foot[1]), foot[2], &pose[k]);
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
+    hx_leg_solver_pose(&leg[k], hx_plane(foot[0], foot[1]), foot[2], &pose[k]);
   }
-  hx_posture_set(&level, zero, zero);
-  hx_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
-  const hxMotion motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
-  hx_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
+  hx_posture_of(&level, zero, zero);
+  hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
+  const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
+  hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
   hx_support_compile(definition, &rest, &model->support);
   hx_compliance_compile(definition, &model->laws);
   hx_hold_compile(definition, &model->hold);
@@ -32,39 +34,48 @@ void hx_compliant_reset(hxCompliant *compliant) {
   hx_compliance_reset(&compliant->laws);
 }
 
-/* ---------------------------------------------------------------------------------------------- steering */
+/* ----------------------------------------------------------------------------------- steering */
 
-hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant, int64_t steps) {
+hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
+                              int64_t steps) {
   const hxSteering *s = &compliant->steering;
   const double part = fmin((double)(s->past + steps) / model->leading, 1.0);
-  return (hxTwist){hx_add(s->begin.velocity, hx_scaled(hx_sub(s->goal.velocity, s->begin.velocity), part)),
+  return (hxTwist){hx_plane_add(s->begin.velocity,
+                                hx_scaled(hx_plane_sub(s->goal.velocity, s->begin.velocity), part)),
                    s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
 }
 
-void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh, hxCompliant *compliant) {
+void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh,
+                        hxCompliant *compliant) {
   hxSteering *s = &compliant->steering;
-  const hxTwist none = {{0.0, 0.0}, 0.0}, lost = {compliant->hold.velocity, compliant->hold.yaw_rate};
+  const hxTwist none = {{0.0, 0.0}, 0.0},
+                lost = {compliant->hold.velocity, compliant->hold.yaw_rate};
   s->past += steps;
-  const int added = s->goal.velocity.x != 0.0 || s->goal.velocity.y != 0.0 || s->goal.yaw_rate != 0.0;
+  const int added =
+      s->goal.velocity.x != 0.0 || s->goal.velocity.y != 0.0 || s->goal.yaw_rate != 0.0;
   if (!afresh && (moves || !added)) return;
   s->begin = hx_compliant_addition(model, compliant, 0);
   s->goal = moves ? lost : none;
   s->past = 0;
 }
 
-/* ---------------------------------------------------------------------------------------------- sensors */
+/* ------------------------------------------------------------------------------------ sensors */
 
-/* foot forces in the walking frame K: f_K = R_KT R_TW f_W */
-static void sense(const hxControllerInput *input, const hxPosture *posture, double force[HX_LEGS][3]) {
-  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2], z = input->quaternion[3];
+/* the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W */
+static void sense(const hxControllerInput *input, const hxPosture *posture,
+                  double force[HX_LEGS][3]) {
+  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
+               z = input->quaternion[3];
   const double xx = x * x, yy = y * y, zz = z * z;
-  const double rotation[3][3] = {{1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
-                                 {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
-                                 {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
+  const double rotation[3][3] = {
+      {1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+      {2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)},
+      {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)}};
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double *f = input->foot_force[leg];
     double seen[3];
-    for (int i = 0; i < 3; ++i) seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
+    for (int i = 0; i < 3; ++i)
+      seen[i] = f[0] * rotation[0][i] + f[1] * rotation[1][i] + f[2] * rotation[2][i];
     hxPlane plane = {seen[0], seen[1]};
     hx_posture_turn(posture, &plane, &seen[2]);
     force[leg][0] = plane.x;
@@ -74,19 +85,21 @@ static void sense(const hxControllerInput *input, const hxPosture *posture, doub
 }
 
 /* shows the slow loops where the standing feet are */
-static void look(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS], const hxStance *stance, const hxControllerInput *input,
-                 hxCompliant *compliant) {
-  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2], z = input->quaternion[3];
+static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
+                 const hxStance *stance, const hxControllerInput *input, hxCompliant *compliant) {
+  const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
+               z = input->quaternion[3];
   hxSight seen;
   double foot[3];
   for (int k = 0; k < HX_LEGS; ++k) {
     const double *angle = input->angle[k];
-    hx_leg_forward(&leg[k], angle, foot);
+    hx_leg_solver_forward(&leg[k], angle, foot);
     seen.plane[k] = hx_plane(foot[0], foot[1]);
     seen.height[k] = foot[2];
     hx_posture_turn(stance->posture, &seen.plane[k], &seen.height[k]);
-    const hxPlane rolled = hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), hx_leg_rolling(&leg[k], angle));
-    seen.plane[k] = hx_sub(seen.plane[k], rolled);
+    const hxPlane rolled =
+        hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), hx_leg_solver_rolling(&leg[k], angle));
+    seen.plane[k] = hx_plane_sub(seen.plane[k], rolled);
     seen.height[k] += stance->value[3];
     seen.planned[k] = stance->plane[k];
     seen.planned_height[k] = stance->height[k];
@@ -100,16 +113,18 @@ static void look(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS], c
   hx_hold_look(&model->hold, &seen, &compliant->hold);
 }
 
-/* ---------------------------------------------------------------------------------------------- step */
+/* --------------------------------------------------------------------------------------- step */
 
-/* adds to a leg's command what raises its foot by so much, and the laws' bend */
-static void correct(const hxLegModel *leg, const double climb[HX_JOINTS], const double bend[HX_JOINTS], double raised,
-                    double angle[HX_JOINTS]) {
+/* the joint angles of a leg, bent by the laws and with the foot raised (C41) */
+static void correct(const hxLegSolver *leg, const double climb[HX_JOINTS],
+                    const double bend[HX_JOINTS], double raised, double angle[HX_JOINTS]) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
-    angle[joint] = hx_clamp(angle[joint] + bend[joint] + climb[joint] * raised, leg->angle_min[joint], leg->angle_max[joint]);
+    angle[joint] = hx_clamp(angle[joint] + bend[joint] + climb[joint] * raised,
+                            leg->angle_min[joint], leg->angle_max[joint]);
 }
 
-void hx_compliant_step(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS], const hxStance *stance, const hxControllerInput *input,
+void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
+                       const hxStance *stance, const hxControllerInput *input,
                        hxCompliant *compliant, hxControllerOutput *output) {
   hxCompliance *laws = &compliant->laws;
   double force[HX_LEGS][3];
@@ -128,7 +143,8 @@ void hx_compliant_step(const hxCompliantModel *model, const hxLegModel leg[HX_LE
     correct(&leg[k], stance->climb[k], laws->bend[k], raised, output->angle_ref[k]);
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       if (busy || compliant->moving)
-        output->speed_ref[k][joint] += stance->climb[k][joint] * ((offset - compliant->offset[k]) * model->per_second);
+        output->speed_ref[k][joint] +=
+            stance->climb[k][joint] * ((offset - compliant->offset[k]) * model->per_second);
       output->torque_ref[k][joint] = laws->torque[k][joint];
     }
     if (busy || compliant->moving) compliant->offset[k] = offset;

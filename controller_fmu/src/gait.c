@@ -1,7 +1,8 @@
 #include "gait.h"
 
-/* A gait's timing in whole numbers, OpenSHC's: stance : swing parts of a cycle, and each leg's offset in parts, around the robot from the
- * front right leg to the front left one. */
+/* The timing of a gait in whole numbers, as in OpenSHC: stance + swing parts of a cycle; the
+ * offset of a leg, around the robot from the front right to the front left one, is its
+ * multiplier times `offset`. */
 typedef struct {
   int stance, swing, offset, multiplier[HX_LEGS];
 } hxTiming;
@@ -13,7 +14,8 @@ static const hxTiming timings[] = {
     [HX_PATTERN_AMBLE] = {2, 1, 1, {1, 2, 0, 1, 2, 0}},
 };
 
-static const int around_to_legs[HX_LEGS] = {5, 4, 3, 0, 1, 2}; /* LF LM LR RF RM RR in the order around the robot */
+static const int around_to_legs[HX_LEGS] = {
+    5, 4, 3, 0, 1, 2}; /* LF LM LR RF RM RR in the order around the robot */
 
 void hx_gait_offsets(const hxGait *gait, double offset[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -21,7 +23,8 @@ void hx_gait_offsets(const hxGait *gait, double offset[HX_LEGS]) {
     if (gait->pattern == HX_PATTERN_CUSTOM) continue;
     const hxTiming *timing = &timings[gait->pattern];
     const int parts = timing->stance + timing->swing;
-    offset[leg] = (double)(timing->multiplier[around_to_legs[leg]] * timing->offset % parts) / parts;
+    offset[leg] =
+        (double)(timing->multiplier[around_to_legs[leg]] * timing->offset % parts) / parts;
   }
 }
 

@@ -1,9 +1,48 @@
 #include "hold.h"
 
 static const double look_time = 0.04;          /* s   between two looks, at least a period */
-static const double loaded = 0.3;              /* 1   thirds of the weight on a foot that certainly does not slip along */
+/* 1  thirds of the weight on a foot that certainly does not slip along */
+static const double loaded = 0.3;
 static const double determinant_floor = 1e-6;  /* m4  feet on one line tell no tilt */
 static const double turn = 6.283185307179586;  /* rad */
+
+/* The plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y. Returns
+ * whether the feet span a plane. */
+static int fit_plane(const hxSight *seen, double fit[3]) {
+  double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0,
+         yz = 0.0;
+  int feet = 0;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    const double w = seen->load[leg];
+    if (!(w > loaded)) continue;
+    ++feet;
+    total += w;
+    x0 += w * seen->planned[leg].x;
+    y0 += w * seen->planned[leg].y;
+    z0 += w * (seen->height[leg] - seen->planned_height[leg]);
+  }
+  if (feet < 3) return 0;
+  x0 /= total;
+  y0 /= total;
+  z0 /= total;
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    if (!(seen->load[leg] > loaded)) continue;
+    const double w = seen->load[leg] / total, x = seen->planned[leg].x - x0,
+                 y = seen->planned[leg].y - y0;
+    const double z = seen->height[leg] - seen->planned_height[leg] - z0;
+    xx += w * x * x;
+    yy += w * y * y;
+    xy += w * x * y;
+    xz += w * x * z;
+    yz += w * y * z;
+  }
+  const double determinant = xx * yy - xy * xy;
+  if (determinant < determinant_floor) return 0;
+  fit[1] = (xz * yy - yz * xy) / determinant;
+  fit[2] = (yz * xx - xz * xy) / determinant;
+  fit[0] = z0 - fit[1] * x0 - fit[2] * y0;
+  return 1;
+}
 
 void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *model) {
   const double every = nearbyint(look_time / definition->period);
@@ -21,74 +60,46 @@ void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *mode
   model->turn_limit = definition->gains.hold.turn_limit;
 }
 
-/* c, s_x, s_y of the weighted least squares height = c + s_x x + s_y y; returns whether the feet span a plane */
-static int fit_plane(const hxSight *seen, double fit[3]) {
-  double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0, yz = 0.0;
-  int feet = 0;
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double w = seen->load[leg];
-    if (!(w > loaded)) continue;
-    ++feet;
-    total += w;
-    x0 += w * seen->planned[leg].x;
-    y0 += w * seen->planned[leg].y;
-    z0 += w * (seen->height[leg] - seen->planned_height[leg]);
-  }
-  if (feet < 3) return 0;
-  x0 /= total;
-  y0 /= total;
-  z0 /= total;
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    if (!(seen->load[leg] > loaded)) continue;
-    const double w = seen->load[leg] / total, x = seen->planned[leg].x - x0, y = seen->planned[leg].y - y0;
-    const double z = seen->height[leg] - seen->planned_height[leg] - z0;
-    xx += w * x * x;
-    yy += w * y * y;
-    xy += w * x * y;
-    xz += w * x * z;
-    yz += w * y * z;
-  }
-  const double determinant = xx * yy - xy * xy;
-  if (determinant < determinant_floor) return 0;
-  fit[1] = (xz * yy - yz * xy) / determinant;
-  fit[2] = (yz * xx - xz * xy) / determinant;
-  fit[0] = z0 - fit[1] * x0 - fit[2] * y0;
-  return 1;
-}
-
+/* integrates height and tilt against the ground (C38) */
 static void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   double fit[3];
   if (!fit_plane(seen, fit)) return;
-  /* against the planned feet the torso is pitched by s_x and rolled by -s_y: with the sensor's tilt, the ground's inclination */
+  /* against the planned feet the torso is pitched by s_x and rolled by -s_y */
   const double leaning[2] = {seen->tilt[0] + fit[2], seen->tilt[1] - fit[1]};
   for (int i = 0; i < 2; ++i) {
     const double ground = hold->ground_known ? hold->ground[i] : leaning[i];
     hold->ground[i] = ground + model->smooth * (leaning[i] - ground);
-    const double correction = hold->angle[i] - model->attitude_step * (seen->tilt[i] - hold->ground[i]);
+    const double correction =
+        hold->angle[i] - model->attitude_step * (seen->tilt[i] - hold->ground[i]);
     hold->angle[i] = hx_clamp(correction, -model->angle_limit, model->angle_limit);
   }
   hold->ground_known = 1;
-  hold->height = hx_clamp(hold->height + model->height_step * fit[0], -model->height_limit, model->height_limit);
+  hold->height = hx_clamp(hold->height + model->height_step * fit[0], -model->height_limit,
+                          model->height_limit);
   for (int leg = 0; leg < HX_LEGS; ++leg)
-    hold->lift[leg] = seen->planned[leg].x * hold->angle[1] - seen->planned[leg].y * hold->angle[0] - hold->height;
+    hold->lift[leg] = seen->planned[leg].x * hold->angle[1] -
+                      seen->planned[leg].y * hold->angle[0] - hold->height;
 }
 
-/* from look to look the way over the ground is -d(e^(i yaw) p) of the feet that stood all the time */
-static void add_lost_way(const hxHoldModel *model, const hxSight *seen, const hxPlane foot[HX_LEGS], hxHold *hold) {
+/* Adds what was lost since the last look (C39). foot: turned by the yaw [m]. */
+static void add_lost_way(const hxHoldModel *model, const hxSight *seen, const hxPlane foot[HX_LEGS],
+                         hxHold *hold) {
   const hxPlane ahead = hx_cis(hold->yaw + hold->heading + 0.5 * seen->yaw_rate * model->time);
   const hxPlane commanded = hx_scaled(hx_times(ahead, seen->velocity), model->time);
   hxPlane walked = {0.0, 0.0};
   double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double least = fmin(hold->load[leg], seen->load[leg]), both = least > loaded ? least : 0.0;
+    const double least = fmin(hold->load[leg], seen->load[leg]),
+                 both = least > loaded ? least : 0.0;
     total += both;
-    walked = hx_add(walked, hx_scaled(hx_sub(foot[leg], hold->foot[leg]), both));
+    walked = hx_plane_add(walked, hx_scaled(hx_plane_sub(foot[leg], hold->foot[leg]), both));
   }
   walked = total > 0.0 ? hx_scaled(walked, -1.0 / total) : commanded;
-  hold->way = hx_add(hold->way, hx_sub(commanded, walked));
+  hold->way = hx_plane_add(hold->way, hx_plane_sub(commanded, walked));
   hold->heading += seen->yaw_rate * model->time - remainder(seen->yaw - hold->yaw, turn);
 }
 
+/* leads the robot back to its way (C39, C40) */
 static void hold_path(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   const hxPlane turned = hx_cis(seen->yaw);
   hxPlane foot[HX_LEGS];
@@ -101,8 +112,10 @@ static void hold_path(const hxHoldModel *model, const hxSight *seen, hxHold *hol
   hold->yaw = seen->yaw;
   hold->looked = 1;
   const hxPlane back = hx_times(hx_scaled(hold->way, model->path_rate), hx_conj(turned));
-  hold->velocity = hx_scaled(back, model->speed_limit / fmax(hypot(back.x, back.y), model->speed_limit));
-  hold->yaw_rate = hx_clamp(model->path_rate * hold->heading, -model->turn_limit, model->turn_limit);
+  hold->velocity =
+      hx_scaled(back, model->speed_limit / fmax(hypot(back.x, back.y), model->speed_limit));
+  hold->yaw_rate =
+      hx_clamp(model->path_rate * hold->heading, -model->turn_limit, model->turn_limit);
 }
 
 void hx_hold_look(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {

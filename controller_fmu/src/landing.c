@@ -4,6 +4,14 @@
 
 #include "touchdown.h"
 
+/* the least of the other five; 0 when that is infinite */
+static double least_of_others(const double values[HX_LEGS], int leg) {
+  double least = INFINITY;
+  for (int other = 0; other < HX_LEGS; ++other)
+    if (other != leg) least = fmin(least, values[other]);
+  return isfinite(least) ? least : 0.0;
+}
+
 void hx_landings_reset(hxLandings *landings) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     landings->met[leg] = INFINITY;
@@ -12,7 +20,8 @@ void hx_landings_reset(hxLandings *landings) {
   }
 }
 
-void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS], const int swinging[HX_LEGS], hxLandings *landings) {
+void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
+                      const int swinging[HX_LEGS], hxLandings *landings) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (touching[leg] && landings->flew[leg]) {
       if (isfinite(landings->met[leg])) landings->before[leg] = landings->met[leg];
@@ -22,22 +31,18 @@ void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
   }
 }
 
-/* the least of the other five; 0 when that is infinite */
-static double least_of_others(const double values[HX_LEGS], int leg) {
-  double least = INFINITY;
-  for (int other = 0; other < HX_LEGS; ++other)
-    if (other != leg) least = fmin(least, values[other]);
-  return isfinite(least) ? least : 0.0;
-}
-
-void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS], const double height[HX_LEGS],
-                          const int swinging[HX_LEGS], double expected[HX_LEGS]) {
+void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],
+                          const double height[HX_LEGS], const int swinging[HX_LEGS],
+                          double expected[HX_LEGS]) {
   double told[HX_LEGS];
-  for (int leg = 0; leg < HX_LEGS; ++leg) told[leg] = swinging[leg] && !touching[leg] ? fmax(height[leg], 0.0) : landings->met[leg];
-  for (int leg = 0; leg < HX_LEGS; ++leg) expected[leg] = fmax(least_of_others(told, leg), landings->before[leg]);
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    told[leg] = swinging[leg] && !touching[leg] ? fmax(height[leg], 0.0) : landings->met[leg];
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    expected[leg] = fmax(least_of_others(told, leg), landings->before[leg]);
 }
 
-void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS], const double height[HX_LEGS], int early[HX_LEGS]) {
+void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS],
+                       const double height[HX_LEGS], int early[HX_LEGS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double settled = fmax(least_of_others(landings->met, leg), landings->before[leg]);
     early[leg] = landings->met[leg] > expected[leg] + hx_early && height[leg] > settled + hx_early;

@@ -1,6 +1,6 @@
 #include "posture.h"
 
-void hx_posture_set(hxPosture *posture, const double value[3], const double rate[3]) {
+void hx_posture_of(hxPosture *posture, const double value[3], const double rate[3]) {
   const double cr = cos(value[1]), sr = sin(value[1]), cp = cos(value[2]), sp = sin(value[2]);
   const double rotation[3][3] = {{cp, sp * sr, sp * cr}, {0.0, cr, -sr}, {-sp, cp * sr, cp * cr}};
   for (int i = 0; i < 3; ++i)
@@ -19,7 +19,8 @@ void hx_posture_turn(const hxPosture *posture, hxPlane *plane, double *z) {
   const double p[3] = {plane->x, plane->y, *z};
   double q[3];
   if (posture->level) return;
-  for (int i = 0; i < 3; ++i) q[i] = rotation[i][0] * p[0] + rotation[i][1] * p[1] + rotation[i][2] * p[2];
+  for (int i = 0; i < 3; ++i)
+    q[i] = rotation[i][0] * p[0] + rotation[i][1] * p[1] + rotation[i][2] * p[2];
   *plane = hx_plane(q[0], q[1]);
   *z = q[2];
 }
@@ -29,7 +30,8 @@ void hx_posture_turn_back(const hxPosture *posture, hxPlane *plane, double *z) {
   const double p[3] = {plane->x, plane->y, *z};
   double q[3];
   if (posture->level) return;
-  for (int i = 0; i < 3; ++i) q[i] = rotation[0][i] * p[0] + rotation[1][i] * p[1] + rotation[2][i] * p[2];
+  for (int i = 0; i < 3; ++i)
+    q[i] = rotation[0][i] * p[0] + rotation[1][i] * p[1] + rotation[2][i] * p[2];
   *plane = hx_plane(q[0], q[1]);
   *z = q[2];
 }
@@ -40,7 +42,8 @@ void hx_posture_see_place(const hxPosture *posture, hxPlane *plane, double *heig
   hx_posture_turn_back(posture, plane, height);
 }
 
-void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height, hxPlane *velocity, double *rise) {
+void hx_posture_see(const hxPosture *posture, hxPlane *plane, double *height, hxPlane *velocity,
+                    double *rise) {
   const double *w = posture->spin;
   if (posture->level) return;
   hx_posture_see_place(posture, plane, height);

@@ -2,12 +2,15 @@
 
 #include <math.h>
 
-/* The matrix exponential in closed form. With sigma = b/2m, omega^2 = k/m, mu^2 = sigma^2 - omega^2:
+/* The matrix exponential in closed form. With sigma = b/2m, omega^2 = k/m and
+ * mu^2 = sigma^2 - omega^2:
  *   z(t)  = e^(-sigma t) ((cosh mu t + sigma sinh(mu t)/mu) z + sinh(mu t)/mu z')
  *   z'(t) = e^(-sigma t) (-omega^2 sinh(mu t)/mu z + (cosh mu t - sigma sinh(mu t)/mu) z')
  */
-void hx_suspension_discretise(double mass, double damping, double stiffness, double period, hxSuspension *suspension) {
-  const double sigma = 0.5 * damping / mass, omega2 = stiffness / mass, mu2 = sigma * sigma - omega2;
+void hx_suspension_discretise(double mass, double damping, double stiffness, double period,
+                              hxSuspension *suspension) {
+  const double sigma = 0.5 * damping / mass, omega2 = stiffness / mass,
+               mu2 = sigma * sigma - omega2;
   const double mu = sqrt(fabs(mu2)), x = mu * period, decay = exp(-sigma * period);
   double even, odd; /* e^(-sigma t) cosh mu t, e^(-sigma t) sinh(mu t)/mu [s] */
   if (mu2 < 0.0) {
@@ -25,7 +28,7 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
   suspension->a[0][1] = odd;
   suspension->a[1][0] = -omega2 * odd;
   suspension->a[1][1] = even - sigma * odd;
-  /* from rest, z approaches f/k as the deflection of a released spring leaves it; z' = dz/dt of that */
+  /* from rest, z approaches f/k as the deflection of a released spring leaves it */
   suspension->b[0] = (1.0 - suspension->a[0][0]) / stiffness;
   suspension->b[1] = odd / mass;
 }

@@ -1,4 +1,5 @@
-/* suspension.h - the virtual suspension m z'' + b z' + k z = f per foot. Python: controller/suspension.py. */
+/* suspension.h - the virtual suspension m z'' + b z' + k z = f of a foot (C26).
+ * Python: controller/suspension.py. */
 #ifndef HX_SUSPENSION_H
 #define HX_SUSPENSION_H
 
@@ -12,7 +13,8 @@ typedef struct hxSuspension {
   double a[2][2], b[2];
 } hxSuspension;
 
-void hx_suspension_discretise(double mass, double damping, double stiffness, double period, hxSuspension *suspension);
+void hx_suspension_discretise(double mass, double damping, double stiffness, double period,
+                              hxSuspension *suspension);
 
 HX_HIDDEN_END
 

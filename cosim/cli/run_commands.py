@@ -11,11 +11,13 @@ from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    Engine,
     FmuFile,
     FolderName,
     GainsFile,
     Name,
     Settings,
+    checked_engine,
     command_line,
     default_folder,
     drawing,
@@ -56,21 +58,23 @@ Control = Annotated[
 
 def simulate(
     scenario: Name = "walk_flat", control: Control = None, settings: Settings = None, output: FolderName = None,
-    fmu: FmuFile = None, gains: GainsFile = None, accuracy: CheckAccuracy = False, json: Json = False,
+    fmu: FmuFile = None, gains: GainsFile = None, accuracy: CheckAccuracy = False, engine: Engine = None, json: Json = False,
 ) -> int:  # fmt: skip
     """Run one co-simulation: results, metrics, plots."""
     plan = load_scenario(scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])])
     plan = titled(plan, settings or [])
-    given = given_gains(gains)
+    given, walks = given_gains(gains), checked_engine(engine, runs=1)
     if accuracy:
         halved(plan)  # refused before anything is run
     ready = chosen_gains(plan, given) if accuracy else given
     with results_folder(output or default_folder(scenario)) as folder:
-        command = command_line("simulate", scenario, control=control, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy)
-        result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready)
+        command = command_line(
+            "simulate", scenario, control=control, settings=settings, engine=engine, fmu=fmu, gains=gains, accuracy=accuracy
+        )
+        result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready, engine=walks)
         checked: dict[str, Accuracy] = {}
         if accuracy:
-            checked[plan.control] = check_accuracy([plan], [summarise(result)], folder.path, fmu=fmu, used=ready, given=given)
+            checked[plan.control] = check_accuracy([plan], [summarise(result)], folder.path, fmu=fmu, used=ready, given=given, engine=walks)
             write_accuracy(folder.path, result.metrics, checked[plan.control].as_table())
         if plan.outputs.plots:
             with drawing(folder.path):

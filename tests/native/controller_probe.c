@@ -13,9 +13,7 @@ void hx_probe_suspension(double mass, double damping, double stiffness, double p
   hx_suspension_discretise(mass, damping, stiffness, period, suspension);
 }
 
-void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]) {
-  hx_slip_squeeze(normal, feet, push);
-}
+void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]) { hx_squeeze(normal, feet, push); }
 
 /* asked: push x y, weight, moment x y, twist */
 void hx_probe_shares(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS], const double asked[6], double force[HX_LEGS][3]) {

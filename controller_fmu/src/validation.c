@@ -1,4 +1,4 @@
-#include "check.h"
+#include "validation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -12,11 +12,13 @@ static void legs(hxChecker *c, const hxControllerDefinition *d) {
       const hxKnownLink *link = &d->leg[leg].link[joint];
       hx_joint_label(leg, joint, "stance", name);
       if (!(link->stance >= link->angle_min && link->stance <= link->angle_max))
-        hx_check_fail(c, name, link->stance, "an angle between the joint's angle_min and angle_max");
+        hx_check_fail(c, name, link->stance,
+                      "an angle between the joint's angle_min and angle_max");
       /* femur and tibia are the arms of a planar linkage */
       hx_joint_label(leg, joint, "length", name);
       if (joint > 0 && !(hypot(link->length, link->offset_z) > 1e-6))
-        hx_check_fail(c, name, link->length, "a tip away from the joint: length and offset_z not both zero");
+        hx_check_fail(c, name, link->length,
+                      "a tip away from the joint: length and offset_z not both zero");
     }
   }
 }
@@ -24,11 +26,13 @@ static void legs(hxChecker *c, const hxControllerDefinition *d) {
 /* What numbers within their ranges must be together. */
 static void relations(hxChecker *c, const hxControllerDefinition *d) {
   char expected[96];
-  const double stance = d->gait.duty * d->gait.period, swing = (1.0 - d->gait.duty) * d->gait.period, shorter = fmin(stance, swing);
+  const double stance = d->gait.duty * d->gait.period,
+               swing = (1.0 - d->gait.duty) * d->gait.period, shorter = fmin(stance, swing);
   snprintf(expected, sizeof expected, "less than %.9g s, the gait's shorter phase", shorter);
   if (!(d->period < shorter)) hx_check_fail(c, "period", d->period, expected);
   if (d->control == HX_CONTROL_COMPLIANT && !(d->servo.kp > 0.0))
-    hx_check_fail(c, "servo.kp", d->servo.kp, "more than 0 under compliant control, which shifts the servos' targets");
+    hx_check_fail(c, "servo.kp", d->servo.kp,
+                  "more than 0 under compliant control, which shifts the servos' targets");
   legs(c, d);
 }
 
