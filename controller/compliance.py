@@ -1,28 +1,24 @@
-"""The force laws of compliant control: what the planned load and the measured foot forces ask of
-the joints.
+"""The force laws of compliant control: from planned load and measured foot forces to the joints.
 
-Support. The servos are told the torques that carry each leg's planned share of weight and
-acceleration (support.py), scaled by the weight that the feet really measure: a payload is carried
-too.
+C: compliance.c. In a period these steps follow each other:
 
-Tangential. Of its force a foot should give way only to what does no work for the body. What the
-plan asks of it is left alone, and so are the legs' common push and twist beyond that, shared in
-proportion to the load; the rest is legs squeezing against each other (slip_pid.py). The PID's
-answer g is a force, and the joints' angles are corrected by J^T g/kp: that is what the servos yield
-under g, so a foot that sticks answers with exactly -g, in every direction alike and without a
-vertical force: the loop's plant is at most 1, whatever leg, pose and servo, and the height does not
-feel it. The answer goes with the measured load, so that a foot is not dragged over the ground by it
-while it is being unloaded.
+1. Contacts. The detector says which feet touch the ground (C23). Where that contradicts the plan,
+   a sensor may be wrong (C34) or the ground may lie higher or lower than planned (C35, C36).
+2. Inputs. Of the forces beyond the planned ones the squeeze is what the slip PID answers (C24), the
+   normal force beyond the planned share what the virtual suspension answers (C26).
+3. Weight. The plan is scaled by the weight that the feet measure (C30): a payload is carried too.
+4. Laws. PID and suspension answer by forces (C25 to C27).
+5. Joints. The angles are corrected by what the servos yield under these forces (C28); the torques
+   are those of the planned load (C29).
 
-Normal. The virtual suspension answers the force beyond the planned share; its deflection z reaches
-the joints as the vertical force z/C_zz, C = J kp^-1 J^T, and so without a horizontal one.
+When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` takes all of
+this away and kinematic control is left (C33).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,76 +27,69 @@ from hexapod_cosim.controller.contact_detection import ContactDetector, SensorWa
 from hexapod_cosim.controller.foot_law import FootLaw
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
 from hexapod_cosim.controller.inverse_dynamics import Demand
-from hexapod_cosim.controller.kinematics import LEGS, Array, Mask, Plane
 from hexapod_cosim.controller.landing import Landings
+from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, rows_of, square
 from hexapod_cosim.controller.slip_pid import LOAD_FLOOR, squeeze
-from hexapod_cosim.controller.support import Shares, torques
+from hexapod_cosim.controller.support import Shares
 from hexapod_cosim.controller.touchdown import EARLY, Touchdown
 
-# 1    common tangential over normal force beyond the plan: only a robot that slides, or a slope of
-# 29 degrees, has it
-SLIDING = 0.55
-CALM = 0.5  # 1    gait cycles without it until feet are trusted again
+SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
+# slides has it, or one on a slope of 29 degrees
+CALM_CYCLES = 0.5  # 1    gait cycles without it until the feet are trusted again
 SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
-SETTLED = 0.5  # 1    of the weight: feet that carry less together have only just met the ground
-OUTRUN = (
-    0.35,
-    0.45,
-    # 1    share of the time in which paths ask more speed than a servo has: below joints follow,
-    # above they do not
-)
+SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
+JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
 GRIPPED = 0.99  # 1    of its share: a leg with more carries it
-LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the design's margins hold up to it
-SCALES = 0.5, 3.0  # 1    measured over modelled weight that the support believes
-HIGH = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
-
-REMEMBERED = (
-    "scale",
-    "trust",
-    "_plan",
-    "_at",
-    "_slack",
-    "_sliding",
-    "outrun",
-    "_asked",
-    "_dragged",
-)
+LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the margins of the design hold up to it
+LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
+HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What the coming steps ask, rows are steps. Never changed once made."""
+class Plan(NamedTuple):
+    """What a step asks of the laws; (6,) and walking frame unless said otherwise."""
 
-    own: Array  # N m    (n, 6, 3) torques for the legs' own weight and motion
-    carry: Array  # N m    (n, 6, 3) and for the planned load
-    # (n, 6, 6, 3) of a force on the foot: its shift x y z [m/N], and the bend of the joints [rad/N]
-    effect: Array
+    own: Array  # N m    (6, 3) torques for the legs' own weight and motion
+    carry: Array  # N m    (6, 3) torques for the planned load
+    lever: Array  # m    (6, 3, 3) J^T of the contact points
     shares: Shares
-    push: Array  # N    (n, 6, 4) planned tangential forces x y 0 0
-    feet: Plane  # m    (n, 6) contact points x + i y
-    weight: list[float]  # N    of all shares
-    live: Array  # 1    (n, 6) 1 of feet with a share, else 0
-    standing: Mask  # (n, 6) planned on the ground, where that is certain
-    sure: list[tuple[int, int]]  # n standing, and where that is certain, as `_bits`
-    falling: Array  # m    (n, 6) by which feet well above the ground come down in a period
-    height: Array  # m    (n, 6) of the paths over their ends
-    needed: list[float]  # N m    n largest of `carry`
-    swinging: Mask  # (6,)
-    hurried: list[bool]  # n some joint is asked for more speed than its servo has
+    feet: Plane  # m    contact points, x + i y
+    weight: float  # N    scalar: of all shares
+    standing: Mask  # the leg carries its whole share
+    well_up: Mask  # well above the ground: in the air even if the ground is met early
+    height: Array  # m    of the paths over their ends
+    needed: float  # N m    scalar: the largest of `carry`
+    swinging: Mask  # planned in the air
+    falling: Array  # m    by which feet well above the ground come down in a period
+    hurried: bool  # scalar: some joint is asked for more speed than its servo has
 
 
-class Compliance:
+class Compliance(Stateful):
     """The laws of all feet.
 
-    Attributes: bend: (6, 3) corrections of the joints' angles [rad]; torque: (6, 3) for the servos
-    [N m]; shift: (6, 3) of the feet that comes of `bend` [m], shift_plane: (6,) the same x + i y;
-    offset: (6,) by which paths are raised for ground met early or late [m]; doubted: (6,) sensors
-    not believed; fallback: (6,) legs that walk without feedback, for that or because the robot
-    slides; scale: measured over planned weight; trust: 1, or less while the robot slides, is far
-    too heavy or its joints cannot follow, which `outrun` tells;  burden: how much of the weight
-    servos carry;  landings: how high feet meet the ground.
+    Attributes, (6,) unless said otherwise:
+        law, detector, watch, touchdown, landings, burden: the parts that laws and decisions are
+            made of.
+        bend: (6, 3) corrections of the joint angles [rad].
+        torque: (6, 3) for the servos [N m].
+        shift: (6, 3) of the feet that comes of `bend`, walking frame [m].
+        doubted: sensors that are not believed.
+        fallback: legs that walk without feedback.
+        grip: part of its share that a leg is given back as it loads [1].
+        slack: some leg is given its share back (scalar).
+        scale: measured over planned weight (scalar) [1].
+        trust: 1, or less while the plan of the load is not to be relied on (scalar) [1].
+        outrun: the joints cannot follow (scalar).
+        asked: share of the time in which joints are asked for too much speed (scalar) [1].
+        dragged, sliding: periods for which the robot has slid, and until it is trusted again.
     """
+
+    STATE = (
+        "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
+        "doubted", "fallback", "grip", "slack", "scale", "trust", "outrun", "asked", "dragged",
+        "sliding",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -113,115 +102,43 @@ class Compliance:
         step_height: float,
         period: float,
     ) -> None:
-        """weight [N] of the robot, cycle [s] and step height [m] of its gait, kp [N m/rad] of
-        its servos.
-        """
-        self._parts, self._softness, self._high, self._period = (
-            parts,
-            1.0 / kp,
-            HIGH * step_height,
-            period,
-        )
-        share = weight / TRIPOD_LEGS
-        self.law = FootLaw(gains, period=period)
-        self.detector, self.watch, self.touchdown = (
-            ContactDetector(weight),
-            SensorWatch(weight, cycle=cycle),
-            Touchdown(period=period),
-        )
-        self.landings = Landings()
-        self.burden = Burden(
-            most=gains.limits.torque,
-            cycle=cycle,
-            period=period,
-            weight_time=gains.support.weight_time,
-        )
-        self._tracking, self._memory = (
-            min(period / gains.slip.tracking_time, 1.0),
-            math.exp(-period / gains.slip.load_time),
-        )
-        self._follow_load = 1.0 - self._memory
-        self._settled = SETTLED * weight
-        self._calm, self._follow_cycle = (
-            round(CALM * cycle / period),
-            1.0 - math.exp(-period / cycle),
-        )
-        self._follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
-        self._largest, self._deepest = gains.slip.limit * share, gains.suspension.limit
-        self._most, self._fastest = gains.limits.torque, gains.limits.speed * period
-        self._mixing = np.array([[0.0] * 4, [0.0] * 4, [0.0, 0.0, 1.0, 1.0 / share], [0.0] * 4])
-        if not parts.suspension:
-            self._mixing[2, 2] = 0.0
-        self.bend, self.torque, self._step = np.zeros((3, LEGS, 3))
-        self._felt, self._inputs, self._ones = (
-            np.zeros((LEGS, 4)),
-            np.zeros((LEGS, 4)),
-            np.ones(LEGS),
-        )
-        self._felt_push, self._felt_normal = self._felt.view(np.complex128)[:, 0], self._felt[:, 2]
-        self._squeezing = self._inputs.view(np.complex128)[:, 0]
-        self._force, self._moved = np.zeros((LEGS, 3, 1)), np.zeros((LEGS, 6, 1))
-        self.shift_plane = self._moved[..., 0].view(np.complex128)[:, 0]
-        self.shift, self._wanted = self._moved[:, :3, 0], self._moved[:, 3:, 0]
-        self._answer = self.law.row.view(np.complex128)[:, 0]
-        self.offset, self.grip = np.zeros(LEGS), np.ones(LEGS)
-        self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
-        self._remembering: tuple[Any, ...] = (
-            self.watch,
-            self.touchdown,
-            self.detector,
-            self.landings,
-            self.burden,
-        )
-        self._arrays = (
-            self.law.row,
-            self.bend,
-            self.offset,
-            self.doubted,
-            self.grip,
-            self.fallback,
-        )
+        """weight: of the robot [N]; cycle, step_height: of its gait [s, m]; kp: of its servos."""
+        self.parts, self.period = parts, period
+        self.share = weight / TRIPOD_LEGS  # N
+        self.settled = SETTLED_SHARE * weight  # N
+        self.softness = 1.0 / kp  # rad/N m
+        self.high = HIGH_SHARE * step_height  # m
+        self.law, self.landings = FootLaw(gains, period=period), Landings()
+        self.detector = ContactDetector(weight)
+        self.watch = SensorWatch(weight, cycle=cycle, period=period)
+        self.touchdown = Touchdown(period=period)
+        time = gains.support.weight_time
+        self.burden = Burden(most=gains.limits.torque, cycle=cycle, period=period, weight_time=time)
+        self.tracking = min(period / gains.slip.tracking_time, 1.0)
+        self.memory = math.exp(-period / gains.slip.load_time)
+        self.follow_load = 1.0 - self.memory
+        self.follow_cycle = 1.0 - math.exp(-period / cycle)
+        self.follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
+        self.calm = round(CALM_CYCLES * cycle / period)  # periods
+        self.largest, self.deepest = gains.slip.limit * self.share, gains.suspension.limit  # N, m
+        self.most, self.fastest = gains.limits.torque, gains.limits.speed * period  # N m, rad
         self.reset()
 
     def reset(self) -> None:
         """All laws at rest."""
-        for law in (
-            self.law,
-            self.detector,
-            self.watch,
-            self.touchdown,
-            self.landings,
-            self.burden,
-        ):
-            law.reset()
-        for array in (
-            self.bend,
-            self.torque,
-            self._moved,
-            self.offset,
-            self.doubted,
-            self.fallback,
-        ):
-            array[...] = 0
-        self.outrun, self._asked, self._dragged = False, 0.0, 0
-        self.scale, self.trust, self._at, self._slack, self._sliding = 0.0, 1.0, -1, False, 0
-        self.grip[...] = 1.0
+        for part in (self.law, self.detector, self.watch, self.touchdown, self.landings):
+            part.reset()
+        self.burden.reset()
+        self.bend, self.torque, self.shift = np.zeros((3, LEGS, 3))
+        self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
+        self.grip, self.slack = np.ones(LEGS), False
+        self.scale, self.trust = 0.0, 1.0
+        self.outrun, self.asked, self.dragged, self.sliding = False, 0.0, 0, 0
 
-    def save(self) -> dict[str, Any]:
-        """What the laws remember, and what is planned."""
-        own, kept = (
-            {name: getattr(self, name) for name in REMEMBERED},
-            [array.copy() for array in self._arrays],
-        )
-        return {"own": own, "arrays": kept, "parts": [part.save() for part in self._remembering]}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Restores a state returned by save()."""
-        vars(self).update(state["own"])
-        for array, kept in zip(self._arrays, state["arrays"], strict=True):
-            array[...] = kept
-        for part, remembered in zip(self._remembering, state["parts"], strict=True):
-            part.restore(remembered)
+    @property
+    def touching(self) -> Mask:
+        """(6,) feet on the ground, as far as the sensors are believed."""
+        return self.detector.touching
 
     def plan(
         self,
@@ -232,212 +149,217 @@ class Compliance:
         height: Array,
         rise: Array,
         swinging: Mask,
-        hurried: Mask | None = None,
-    ) -> None:
-        """Lays out the coming steps, rows of all arguments but `swinging`.
+        hurried: bool = False,
+    ) -> Plan:
+        """What a step asks of the laws.
 
         Args:
-            feet: (n, 6) contact points x + i y in the walking frame [m];
-            height, rise: (n, 6) of the feet's paths over the stance [m, m/s];  swinging: (6,) in
-            the air throughout;
-            hurried: (n,) some joint is asked for more speed than its servo has, default never.
+            feet: (6,) contact points x + i y, walking frame [m].
+            height, rise: (6,) of the paths over the stance [m, m/s].
+            swinging: (6,) legs planned in the air.
+            hurried: some joint is asked for more speed than its servo has.
         """
-        lever, none = demand.lever, np.zeros_like(demand.torque)
-        carry = torques(lever, shares) if self._parts.support else none
-        still = np.zeros_like(height)
-        standing, well_up, supports = shares.activation >= 1.0, height > EARLY, self._parts.support
-        self._plan = Plan(
-            own=demand.torque if supports else none,
+        supports = 1.0 if self.parts.support else 0.0
+        well_up = height > EARLY
+        carry = -supports * (demand.lever @ shares.forces()[:, :, None])[:, :, 0]
+        return Plan(
+            own=supports * demand.torque,
             carry=carry,
-            effect=self._softness
-            * np.concatenate([lever.swapaxes(-1, -2) @ lever, lever], axis=-2),
+            lever=demand.lever,
             shares=shares,
-            push=np.stack([shares.push.real, shares.push.imag, still, still], axis=-1),
             feet=feet,
-            weight=shares.normal.sum(axis=1).tolist(),
-            live=(shares.activation > 0.0).astype(np.float64),
-            standing=standing,
-            sure=list(zip(_bits(standing), _bits(standing | well_up), strict=True)),
-            falling=np.where(well_up, np.maximum(-self._period * rise, 0.0), 0.0),
+            weight=float(shares.normal.sum()),
+            standing=shares.activation >= 1.0,
+            well_up=well_up,
             height=height,
-            swinging=swinging.copy(),
-            needed=np.abs(carry).max(axis=(1, 2)).tolist(),
-            hurried=[False] * len(rise) if hurried is None else hurried.tolist(),
+            needed=float(np.abs(carry).max()),
+            swinging=swinging,
+            falling=np.where(well_up, np.maximum(-self.period * rise, 0.0), 0.0),
+            hurried=hurried,
         )
-        self._at = -1
 
-    def step(self, force: Array) -> None:
-        """One planned period on. force: (6, 4) ground on foot in the walking frame [N], the last
-        column 0.
+    # ------------------------------------------------------------------------------ contacts
+
+    def _replace_forces(self, plan: Plan, force: Array) -> Array:
+        """The forces, where a sensor is not believed those of the plan, (6, 3) [N]."""
+        planned = plan.shares.activation > 0.5
+        self.detector.touching = np.where(self.doubted, planned, self.touching)
+        return np.where(self.doubted[:, None], self.scale * plan.shares.forces(), force)
+
+    def _judge_sensors(self, plan: Plan, met: Array, force: Array) -> Array:
+        """Which sensors are believed (C34); all feet's are not once those of a tripod are not.
+
+        met: (6,) heights at which the feet meet the ground without any bump [m]. Returns the forces
+        (6, 3) to go by [N].
         """
-        self._at += 1
-        plan, at, parts = self._plan, self._at, self._parts
-        touching = self.detector.step(force[:, 2])
-        self.landings.look(touching, plan.height[at], plan.swinging)
-        standing, certain = plan.sure[at]
-        if (
-            (int.from_bytes(touching.tobytes(), "little") ^ standing) & certain
-            or self.watch.busy
-            or self.touchdown.busy
-        ):
-            force = self._wonder(force, touching)
-            touching = self.detector.touching
-        felt = np.subtract(force, self.scale * plan.push[at], out=self._felt)
-        felt *= touching[:, None]
-        total = self._mix()
-        low, high = SCALES
-        scale = min(max(total / max(plan.weight[at], LOAD_FLOOR), low), high)
+        total = float(force[self.touching, 2].sum())
+        high = plan.height > self.high + met
+        doubted = self.watch.look(self.touching, total, plan.standing, high)
+        self.doubted = doubted | (np.count_nonzero(doubted) >= TRIPOD_LEGS)
+        self.fallback = self.doubted | (self.trust < 1.0)
+        return self._replace_forces(plan, force) if doubted.any() else force
+
+    def _meet_ground(self, plan: Plan, met: Array) -> None:
+        """Answers ground that is met early or late (C36). met: as in _judge_sensors()."""
+        self.slack = True
+        early = self.landings.early(met, plan.height)
+        falling = np.where(early, plan.falling, 0.0)
+        self.touchdown.step(self.touching, falling, plan.swinging, plan.standing)
+
+    def _examine_contacts(self, plan: Plan, force: Array) -> Array:
+        """Decides between a wrong sensor and ground that is met early or late.
+
+        Returns the forces (6, 3) to go by [N].
+        """
+        met = self.landings.expected(self.touching, plan.height, plan.swinging)
+        if self.parts.fallback:
+            force = self._judge_sensors(plan, met, force)
+        if self.trust < 1.0:
+            self.touchdown.reset()
+        elif self.parts.touchdown:
+            self._meet_ground(plan, met)
+        return force
+
+    def _contacts_differ(self, plan: Plan) -> bool:
+        """Whether contacts contradict the plan, or did so and the answer to it is under way."""
+        certain = plan.standing | plan.well_up
+        differs = ((self.touching != plan.standing) & certain).any()
+        return bool(differs) or self.watch.busy() or self.touchdown.busy()
+
+    # ------------------------------------------------------------------------ inputs and weight
+
+    def _update_trust(self, plan: Plan, drag: float) -> None:
+        """Gives the plan of the load up while it does not hold (C33).
+
+        It does not hold for a robot that slides, whose joints cannot follow or that is far too
+        heavy. drag: the common tangential force of the feet beyond the plan over the normal one.
+        """
+        self.asked += self.follow_cycle * (float(plan.hurried) - self.asked)
+        self.outrun = self.asked > (JOINTS_FOLLOW if self.outrun else JOINTS_DO_NOT)
+        self.dragged = self.dragged + 1 if drag > SLIDING_DRAG else 0
+        if self.dragged * self.period > SLIDING_TIME:
+            self.sliding = self.calm
+        elif self.sliding:
+            self.sliding -= 1
+        goal = 0.0 if self.sliding or self.outrun or self.burden.overburdened else 1.0
+        if self.trust == goal:
+            return
+        self.trust += self.follow_load * (goal - self.trust)
+        if abs(goal - self.trust) < 1.0 - GRIPPED:
+            self.trust = goal
+        self.fallback = self.doubted | (goal == 0.0)
+
+    def _law_inputs(self, plan: Plan, force: Array) -> tuple[Plane, Array, float]:
+        """The squeeze (6,) and normal forces (6,) felt, and the sum of the latter [N] (C24)."""
+        horizontal = force[:, 0] + 1j * force[:, 1]
+        felt = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
+        normal = np.where(self.touching, force[:, 2], 0.0)
+        total = float(normal.sum())
+        if self.parts.fallback:
+            drag = abs(felt.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
+            self._update_trust(plan, drag)
+        if not self.parts.slip_pid:
+            return np.zeros(LEGS, dtype=np.complex128), normal, total
+        return squeeze(felt, normal, plan.feet), normal, total
+
+    def _update_weight(self, plan: Plan, total: float) -> None:
+        """Follows the measured over the planned weight (C30), and what the servos carry of it.
+
+        total: the sum of the normal forces felt [N].
+        """
         if not self.doubted.any():
-            self.scale += self._follow_weight * (scale - self.scale)
-            self.burden.weigh(total / max(plan.weight[at], LOAD_FLOOR))
-        self.burden.step(plan.needed[at], self.scale)
-        if parts.suspension:
-            excess = self._inputs[:, 2]
-            excess -= self.scale * plan.shares.normal[at]
-            excess *= plan.live[at]
-        self._answer_forces(touching)
-        self._actuate()
+            ratio = total / max(plan.weight, LOAD_FLOOR)
+            scale = min(max(ratio, LEAST_SCALE), LARGEST_SCALE)
+            self.scale += self.follow_weight * (scale - self.scale)
+            self.burden.weigh(ratio)
+        self.burden.step(plan.needed, self.scale)
 
-    def _mix(self) -> float:
-        """Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze
-        of these, f_n, load.
+    def _excess(self, plan: Plan, normal: Array) -> Array:
+        """(6,) normal forces beyond the shares [N], 0 of feet that have none (C26)."""
+        live = self.parts.suspension & (plan.shares.activation > 0.0)
+        return np.where(live, normal - self.scale * plan.shares.normal, 0.0)
 
-        Returns sum f_n [N].
-        """
-        mixing, felt = self._mixing, self._felt
-        x, y, total, _ = np.dot(self._ones, felt).tolist()
-        share = 1.0 / total if total > LOAD_FLOOR else 0.0
-        if self._parts.fallback:
-            self._judge(math.hypot(x, y) * share if total > self._settled else 0.0)
-        np.dot(felt, mixing, out=self._inputs)
-        if self._parts.slip_pid:
-            self._squeezing[:] = squeeze(
-                self._felt_push, self._felt_normal, self._plan.feet[self._at]
-            )
-        return float(total)
-
-    def _judge(self, drag: float) -> None:
-        """A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who
-        carries what: kinematic control for it.
-
-        drag: of the feet's common tangential force beyond the plan, the share of the normal one.
-        """
-        self._asked += self._follow_cycle * (self._plan.hurried[self._at] - self._asked)
-        self.outrun = self._asked > (OUTRUN[0] if self.outrun else OUTRUN[1])
-        self._dragged = self._dragged + 1 if drag > SLIDING else 0
-        if self._dragged * self._period > SLIDING_TIME:
-            self._sliding = self._calm
-        elif self._sliding:
-            self._sliding -= 1
-        goal = 0.0 if self._sliding or self.outrun or self.burden.overburdened else 1.0
-        if self.trust != goal:
-            self.trust += self._follow_load * (goal - self.trust)
-            if abs(goal - self.trust) < 1.0 - GRIPPED:
-                self.trust = goal
-            self.fallback[:] = self.doubted | (goal == 0.0)
-
-    def _answer_forces(self, touching: Mask) -> None:
-        """The laws one period on, limited, and the forces that come of them."""
-        law, plan, at = self.law, self._plan, self._at
-        law.inputs[...] = self._inputs
-        law.step()
-        # no single one is beyond its limit when all together are not
-        if np.vdot(self._answer, self._answer).real > self._largest**2:
-            self._limit_answers()
-        if np.dot(law.deflection, law.deflection) > self._deepest**2:
-            self._limit_deflections()
-        freedom = self.burden.freedom if self._parts.support else 1.0
-        np.multiply(
-            law.answer,
-            freedom * np.minimum(law.load, LARGEST_LOAD)[:, None],
-            out=self._force[:, :2, 0],
-        )
-        np.divide(law.deflection, plan.effect[at, :, 2, 2], out=self._force[:, 2, 0])
-        # a foot in the air forgets, within the time in which a leg gives up its load; and all do
-        # what they may not take away
-        kept = 1.0 - (1.0 - freedom) * self._follow_load
-        law.integral *= kept * np.where(plan.swinging > touching, self._memory, 1.0)[:, None]
+    # ------------------------------------------------------------------------------------ laws
 
     def _limit_answers(self) -> None:
-        """The PID's answers no larger than allowed, their direction kept; integrals give way."""
-        law, wanted = self.law, self.law.answer.copy()
-        law.answer *= (self._largest / np.maximum(np.abs(self._answer), self._largest))[:, None]
-        law.integral += self._tracking * (law.answer - wanted)
+        """Limits the answers of the PID, their direction kept; the integrals give way (C27)."""
+        law = self.law
+        wanted = law.answer
+        law.answer = wanted * (self.largest / np.maximum(np.abs(wanted), self.largest))
+        law.pid.integral = law.pid.integral + self.tracking * (law.answer - wanted)
 
     def _limit_deflections(self) -> None:
         """At its stop a suspension stands still."""
         law = self.law
-        law.rate[np.abs(law.deflection) > self._deepest] = 0.0
-        np.clip(law.deflection, -self._deepest, self._deepest, out=law.deflection)
+        law.rate = np.where(np.abs(law.deflection) > self.deepest, 0.0, law.rate)
+        law.deflection = clamp(law.deflection, -self.deepest, self.deepest)
 
-    def _actuate(self) -> None:
-        """bend = J^T f/kp, limited in rate; torque = own + strength x scale x carry, limited."""
-        plan, at, bend, torque, wanted = self._plan, self._at, self.bend, self.torque, self._wanted
-        np.matmul(plan.effect[at], self._force, out=self._moved)
-        strength = self.burden.strength if self._parts.limits else 1.0
-        np.multiply(plan.carry[at], strength * self.scale, out=torque)
-        if self._slack:
-            self._take_up(torque)
-        torque += plan.own[at]
-        if self.trust != 1.0:
-            torque *= self.trust
-            wanted *= self.trust
-        if not self._parts.limits:
-            bend[...] = wanted
+    def _step_laws(self, plan: Plan, push: Plane, normal: Array, excess: Array) -> Array:
+        """The laws one period on, limited, and the forces that they answer by (C25 to C27).
+
+        push, normal, excess: (6,) [N]. Returns (6, 3) [N].
+        """
+        law = self.law
+        law.step(push, excess, normal * (1.0 / self.share))
+        # no single one is beyond its limit when all together are not
+        if square(law.answer).sum() > self.largest**2:
+            self._limit_answers()
+        if (law.deflection * law.deflection).sum() > self.deepest**2:
+            self._limit_deflections()
+        freedom = self.burden.freedom if self.parts.support else 1.0
+        given = law.answer * (freedom * np.minimum(law.load, LARGEST_LOAD))
+        vertical = (plan.lever[:, :, 2] ** 2).sum(axis=1)
+        lift = law.deflection / (self.softness * vertical)  # z/C_zz, C = J kp^-1 J^T
+        # a foot in the air forgets, within the time in which a leg gives up its load; and all
+        # forget what they may not take away
+        kept = 1.0 - (1.0 - freedom) * self.follow_load
+        forgets = plan.swinging & ~self.touching
+        law.pid.integral = law.pid.integral * np.where(forgets, kept * self.memory, kept)
+        return rows_of(given.real, given.imag, lift)
+
+    # ---------------------------------------------------------------------------------- joints
+
+    def _restore_grip(self, plan: Plan, torque: Array) -> Array:
+        """Gives a leg that stands only in the plan its share back as it loads (C29).
+
+        torque: (6, 3) for the planned load [N m]. Returns what is left of it.
+        """
+        grip = self.grip + self.follow_load * (1.0 - self.grip)
+        self.grip = np.where(plan.standing & ~self.touching, 0.0, grip)
+        self.slack = bool((self.grip < GRIPPED).any())
+        return torque * self.grip[:, None]
+
+    def _limit_joints(self, wanted: Array, torque: Array) -> None:
+        """Leads the bends to the wanted ones and sets the torques, both limited (C28, C29)."""
+        if not self.parts.limits:
+            self.bend, self.torque = wanted, torque
             return
-        step = np.subtract(wanted, bend, out=self._step)
-        bend += np.maximum(np.minimum(step, self._fastest, out=step), -self._fastest, out=step)
-        np.maximum(np.minimum(torque, self._most, out=torque), -self._most, out=torque)
+        self.bend = self.bend + clamp(wanted - self.bend, -self.fastest, self.fastest)
+        self.torque = clamp(torque, -self.most, self.most)
 
-    def _take_up(self, torque: Array) -> None:
-        """A leg that stands in the plan and not on the ground is given its share back as it
-        loads.
+    def _actuate(self, plan: Plan, answer: Array) -> None:
+        """Turns the forces of the laws (6, 3) [N] and the planned load into angles and torques.
+
+        bend = J^T f/kp (C28); torque = trust (own + grip strength scale carry) (C29).
         """
-        missing = self._plan.standing[self._at] & ~self.detector.touching
-        self.grip += self._follow_load * (1.0 - self.grip)
-        self.grip[missing] = 0.0
-        torque *= self.grip[:, None]
-        self._slack = bool((self.grip < GRIPPED).any())
+        strength = self.burden.strength if self.parts.limits else 1.0
+        torque = plan.carry * (strength * self.scale)
+        if self.slack:
+            torque = self._restore_grip(plan, torque)
+        bend = self.softness * (plan.lever @ answer[:, :, None])[:, :, 0]
+        self.shift = (bend[:, None, :] @ plan.lever)[:, 0, :]  # J bend
+        self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
 
-    def _wonder(self, force: Array, touching: Mask) -> Array:
-        """Feet that touch and should not, or the other way round: ground met early or late, or a
-        sensor that is wrong.
+    def step(self, plan: Plan, force: Array) -> None:
+        """One period on.
 
-        Returns the forces; where a sensor is not believed, those of the plan, and of all feet once
-        a tripod's are not.
+        force: (6, 3) of the ground on the feet, walking frame [N].
         """
-        plan, at, parts, touches = self._plan, self._at, self._parts, touching.tolist()
-        standing, height = plan.standing[at].tolist(), plan.height[at]
-        expected = self.landings.expected(touching, height, plan.swinging)
-        if parts.fallback:
-            total = float(force[touching, 2].sum())
-            doubted = self.watch.look(
-                touches,
-                total,
-                standing,
-                (height > self._high + expected).tolist(),
-                time=self._period,
-            )
-            self.doubted[:] = doubted if sum(doubted) < TRIPOD_LEGS else True
-            self.fallback[:] = self.doubted | (self.trust < 1.0)
-            if self.doubted.any():
-                force = np.where(self.doubted[:, None], self.scale * plan.shares.forces(at), force)
-                touches = np.where(
-                    self.doubted, plan.shares.activation[at] > 0.5, touching
-                ).tolist()
-                self.detector.touching = np.array(touches)
-        if self.trust < 1.0:
-            self.touchdown.reset()
-            self.offset[:] = 0.0
-        elif parts.touchdown:
-            self._slack = True
-            falling = np.where(self.landings.early(expected, height), plan.falling[at], 0.0)
-            self.offset[:] = self.touchdown.step(
-                touches, falling.tolist(), plan.swinging.tolist(), standing
-            )
-        return force
-
-
-def _bits(flags: Mask) -> list[int]:
-    """Rows (n, 6) of flags as numbers, a byte for each flag: compared in no time."""
-    return [int.from_bytes(row.tobytes(), "little") for row in flags]
+        self.detector.step(force[:, 2])
+        self.landings.look(self.touching, plan.height, plan.swinging)
+        if self._contacts_differ(plan):
+            force = self._examine_contacts(plan, force)
+        push, normal, total = self._law_inputs(plan, force)
+        self._update_weight(plan, total)
+        answer = self._step_laws(plan, push, normal, self._excess(plan, normal))
+        self._actuate(plan, answer)

@@ -1,116 +1,91 @@
-"""What the foot force sensors say, and whether they can be believed.
+"""What the foot force sensors say, and whether they can be believed. C: contact_detection.c.
 
 A foot touches down when its force rises above one threshold and lifts off when it falls below a
-lower one, so that noise on a force near either makes no foot flicker. A sensor is not believed any
-more when it contradicts for too long what must be: a force on a foot in the middle of its swing, or
-none on a foot that is planned to carry its load while the others do not carry the whole weight in
-its place. It is believed again when it has not contradicted anything for one and a half gait
-cycles.
+lower one, so that noise on a force near either does not toggle it (C23). A sensor is not believed
+any more when it contradicts the plan for too long: a force on a foot in the middle of its swing, or
+none on a foot that is planned to carry its load while the other feet do not carry the whole weight
+in its place (C34). It is believed again when it has not contradicted anything for one and a half
+gait cycles.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
-from hexapod_cosim.controller.kinematics import LEGS, Array, Mask
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Mask
 
-TOUCH, LIFT = (
-    0.02,
-    0.005,
-)  # 1    of the weight: a foot with more has touched down, with less has lifted off
-AIRBORNE_TIME = 0.06  # s    a force this long on a foot in mid-swing, ...
-# s    or none this long on one that should carry, is a contradiction; both longer than the sensors'
-# lag
-ABSENT_TIME = 0.10
-MISSING = (
-    0.92  # 1    of the weight: less than this from all feet, and some force is not being reported
-)
-MEMORY = 1.5  # 1    gait cycles without contradiction until a sensor is believed again
+TOUCH = 0.02  # 1    of the weight: a foot with more has touched down
+LIFT = 0.005  # 1    of the weight: a foot with less has lifted off
+AIRBORNE_TIME = 0.06  # s    a force this long on a foot in mid-swing is a contradiction
+ABSENT_TIME = 0.10  # s    none this long on a foot that should carry: both exceed the sensors' lag
+MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
+MEMORY_CYCLES = 1.5  # 1    gait cycles without contradiction until a sensor is believed again
 
 
-class ContactDetector:
-    """Touch-down and lift-off with hysteresis. `touching`: (6,)."""
+class ContactDetector(Stateful):
+    """Touch-down and lift-off with hysteresis. `touching`: (6,) feet on the ground."""
+
+    STATE = ("touching",)
 
     def __init__(self, weight: float) -> None:
-        self._touch, self._lift = TOUCH * weight, LIFT * weight  # N
+        """weight: of the robot [N]."""
+        self.weight = weight
         self.reset()
 
     def reset(self) -> None:
         """All feet in the air."""
-        self.touching = np.zeros(LEGS, dtype=np.bool_)
-
-    def save(self) -> Mask:
-        """Returns the state that restore() takes."""
-        return self.touching
-
-    def restore(self, state: Mask) -> None:
-        """Restores a state returned by save()."""
-        self.touching = state
+        self.touching: Mask = np.zeros(LEGS, dtype=np.bool_)
 
     def step(self, normal: Array) -> Mask:
-        """normal: (6,) [N]. Returns `touching`, a new array at every step."""
-        self.touching = normal > np.where(self.touching, self._lift, self._touch)
+        """One period on under normal forces (6,) [N] (C23). Returns `touching`."""
+        limit = np.where(self.touching, LIFT * self.weight, TOUCH * self.weight)
+        self.touching = normal > limit
         return self.touching
 
 
-class SensorWatch:
-    """Which foot sensors contradict the plan for too long.
+class SensorWatch(Stateful):
+    """Which foot sensors contradict the plan for too long (C34).
 
-    `doubted`: of each leg; `busy`: there is something to look after.
+    Attributes, (6,) each:
+        contradicted: for how long a sensor has contradicted the plan [s].
+        left: time until a sensor is believed again [s].
     """
 
-    def __init__(self, weight: float, *, cycle: float) -> None:
-        """weight [N] of the robot without payload, cycle [s] of the gait."""
-        self._weight, self._memory = MISSING * weight, MEMORY * cycle
+    STATE = ("contradicted", "left")
+
+    def __init__(self, weight: float, *, cycle: float, period: float) -> None:
+        """weight: of the robot without payload [N]; cycle: of the gait [s]."""
+        self.period, self.missing = period, MISSING_SHARE * weight
+        self.memory = MEMORY_CYCLES * cycle
         self.reset()
 
     def reset(self) -> None:
-        """All believed."""
-        self.restore(([0.0] * LEGS, [0.0] * LEGS))
+        """All sensors are believed."""
+        self.contradicted, self.left = np.zeros((2, LEGS))
 
-    def save(self) -> tuple[Any, ...]:
-        """What it remembers: times of contradiction, and until each is believed again [s]."""
-        return self._contradicted, self._left
+    def busy(self) -> bool:
+        """Whether some sensor contradicts the plan or is not believed."""
+        return bool(self.contradicted.any() or self.left.any())
 
-    def restore(self, state: tuple[Any, ...]) -> None:
-        """Restores a state returned by save()."""
-        self._contradicted, self._left = state
-        self.doubted, self.busy = (
-            [left > 0.0 for left in self._left],
-            any(self._left) or any(self._contradicted),
-        )
+    @property
+    def doubted(self) -> Mask:
+        """(6,) sensors that are not believed."""
+        return self.left > 0.0
 
-    def look(
-        self,
-        touching: Sequence[bool],
-        total: float,
-        standing: Sequence[bool],
-        high: Sequence[bool],
-        *,
-        time: float,
-    ) -> list[bool]:
-        """After another `time` [s]. Returns `doubted`.
+    def look(self, touching: Mask, total: float, standing: Mask, high: Mask) -> Mask:
+        """One period on. Returns `doubted`.
 
         Args:
-            touching, total: which feet report a force, and the sum of all [N].
-            standing, high: which legs are planned to carry their whole share, and which to be well
-            above the ground.
+            touching: (6,) feet that report a force.
+            total: the sum of all normal forces [N].
+            standing: (6,) legs that are planned to carry their whole share.
+            high: (6,) feet that are planned well above the ground.
         """
-        missing = total < self._weight
-        wrong = [
-            (touches and up) or (missing and stands and not touches)
-            for touches, stands, up in zip(touching, standing, high, strict=True)
-        ]
-        contradicted = [
-            past + time if now else 0.0 for past, now in zip(self._contradicted, wrong, strict=True)
-        ]
-        limits = [AIRBORNE_TIME if up else ABSENT_TIME for up in high]
-        left = [
-            self._memory if past > limit else max(rest - time, 0.0)
-            for past, limit, rest in zip(contradicted, limits, self._left, strict=True)
-        ]
-        self.restore((contradicted, left))
+        absent = (total < self.missing) & standing & ~touching
+        wrong = (touching & high) | absent
+        self.contradicted = np.where(wrong, self.contradicted + self.period, 0.0)
+        too_long = self.contradicted > np.where(high, AIRBORNE_TIME, ABSENT_TIME)
+        rest = np.maximum(self.left - self.period, 0.0)
+        self.left = np.where(too_long, self.memory, rest)
         return self.doubted

@@ -1,48 +1,45 @@
-"""From body command and measurement to joint commands, once a period.
+"""From body command and measurement to joint commands, once a period. C: controller.c.
 
-    command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics ---------> angle_ref,
-    speed_ref
+    command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics ---------> angle_ref
                           ^                                      |                           ^
-                        hold                      inverse dynamics -> support -> compliance -+->
-                        torque_ref
-                          ^------ measured angles, attitude          measured forces --^
+                        hold                      inverse dynamics -> support -> compliance -+
+                          ^--- measured angles, attitude        measured forces --^          v
+                                                                                        torque_ref
 
-Kinematic control is the first line alone: the commands, without any measurement. All of it depends
-on the commands alone, so it is planned for many steps at once, in arrays over time; a step takes
-the next row and, under compliant control, answers to the forces.
+Kinematic control is the first line alone: the commands, without any measurement. Speeds, forces and
+accelerations are differences of successive steps. So every period the step after the present one is
+planned, and three steps are kept: before, now and after. Where a leg lifts off or touches down, a
+new section of the walk begins and the differences begin with it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+import math
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.compliant import Compliant
+from hexapod_cosim.controller.compliant import Compliant, Stance
 from hexapod_cosim.controller.gains import Gains
 from hexapod_cosim.controller.gait import Gait
-from hexapod_cosim.controller.kinematics import (
-    LEGS,
-    Array,
-    Feet,
-    Joints,
-    LegSolver,
-    Mask,
-    Plane,
-    Pose,
-    rates,
-)
+from hexapod_cosim.controller.inverse_dynamics import Masses, Neighbours
+from hexapod_cosim.controller.kinematics import Feet, LegSolver, Pose
+from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.posture import in_torso_frame
-from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, rows_of
+from hexapod_cosim.controller.posture import Posture
+from hexapod_cosim.controller.trajectory import (
+    BodyCommand,
+    CommandRamp,
+    FootPaths,
+    PlannedFeet,
+    Twist,
+)
 from hexapod_cosim.models import HexapodError, Robot
 
 ALL_PARTS = Parts()
 CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps counted
-# steps at most that are planned at once; nothing depends on it but how time is spread over the
-# calls
-PLANNED = 128
 
 
 class ControllerError(HexapodError):
@@ -51,6 +48,10 @@ class ControllerError(HexapodError):
 
 def _zeros() -> Array:
     return np.zeros((LEGS, 3))
+
+
+def _flags() -> Mask:
+    return np.zeros(LEGS, dtype=np.bool_)
 
 
 def _upright() -> Array:
@@ -64,43 +65,47 @@ class Measurement:
     angle: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
     foot_force: Array = field(default_factory=_zeros)  # N    (6, 3) ground on foot, world axes
-    contact: Mask = field(default_factory=lambda: np.zeros(LEGS, dtype=np.bool_))  # (6,)
+    contact: Mask = field(default_factory=_flags)  # (6,)
     quaternion: Array = field(default_factory=_upright)  # 1    (4,) torso to world, w x y z
-    angular_velocity: Array = field(
-        default_factory=lambda: np.zeros(3)
-    )  # rad/s    (3,) torso, world axes
+    # rad/s    (3,) torso, world axes
+    angular_velocity: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass
 class JointCommand:
-    """What the servos are told. The arrays belong to the controller, which writes them anew at
-    every step.
-    """
+    """What the servos are told. The arrays belong to the controller, which rewrites them."""
 
     angle_ref: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed_ref: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
     torque_ref: Array = field(default_factory=_zeros)  # N m    (6, 3)
-    acceleration_ref: Array = field(
-        default_factory=_zeros
-    )  # rad/s2    (6, 3) planned, for kinematic drives
+    # rad/s2    (6, 3) planned, for kinematic drives
+    acceleration_ref: Array = field(default_factory=_zeros)
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """The controller's insides for recorders and tests: arrays of six legs that change at every
-    step.
-    """
+    """Internals for recorders and tests: arrays of six legs that change at every step."""
 
     swinging: Mask  # planned to be in the air
-    # m    (6, 3) the feet's centres as the command plans them, torso frame, without any correction
-    planned: Array
-    # m    horizontal correction of the feet by the compliance, x + i y in the walking frame
-    shift: Plane
-    lift: Array  # m    vertical correction, of all parts
+    planned: Array  # m    (6, 3) centres of the feet as commanded, torso frame, uncorrected
+    shift: Plane  # m    horizontal correction of the feet, x + i y, walking frame
+    lift: Array  # m    vertical correction of the feet
     unreachable: Mask  # the joints could not follow at the last step
-    # walks without feedback: sensor not believed, or the robot slides, outruns its joints or is far
-    # too heavy
-    fallback: Mask
+    fallback: Mask  # walks without feedback
+
+
+class PlannedStep(NamedTuple):
+    """One planned step: what depends on the command alone. Feet in the walking frame, (6,) each."""
+
+    value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
+    posture: Posture
+    feet: PlannedFeet
+    activation: Array  # 1    of the legs
+    lowering: Array  # m    by what the ground will give way
+    height: Array  # m    of the feet, lowered
+    shift: Plane  # m    of the feet by the ground rolling off them
+    pose: Pose  # of the legs
+    masses: Masses | None  # of the links; None under kinematic control
 
 
 def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
@@ -111,13 +116,18 @@ def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[st
     return (*(() if mismatch is None else (mismatch,)), *gains.caveats)
 
 
-class Controller:
-    """Walks a robot. `gains` None: kinematic control; else compliant control with these gains.
+class Controller(Stateful):
+    """Walks a robot, under kinematic control or with `gains` under compliant control.
 
     `warnings` lists what is doubtful about the set-up (gains of another robot or period); nothing
     in it stops the run. Raises RobotError for a joint pattern without closed-form kinematics,
     ControllerError for an impossible period.
     """
+
+    STATE = (
+        "ramp", "paths", "compliant", "_start", "_count", "_at", "_last", "_cut", "_before", "_now",
+        "_after", "_shown",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -137,70 +147,208 @@ class Controller:
                 fix="shorten the period or slow the gait",
             )
         self.period, self.gait, self.gains, self.parts = period, gait, gains, parts
-        self.legs = LegSolver(robot)
+        self.legs, self.stance = LegSolver(robot), robot.stance
         self.ramp = CommandRamp(gait.period, period=period)
-        self.stance = robot.stance
         self.paths = FootPaths(gait, self.legs.forward(self.stance), period=period)
-        self.compliant = (
-            None
-            if gains is None
-            else Compliant(robot, gait, gains, parts, legs=self.legs, period=period)
-        )
+        self.compliant: Compliant | None = None
+        if gains is not None:
+            legs = self.legs
+            self.compliant = Compliant(robot, gait, gains, parts, legs=legs, period=period)
         self.warnings = gains_warnings(robot, gains, period)
         self._out = JointCommand()
-        self.diagnostics = self._make_diagnostics()
+        still, nothing = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
+        self.diagnostics = Diagnostics(_flags(), _zeros(), still, nothing, _flags(), _flags())
+        self._start: float | None = None  # s    time of the first step
+        self._count = 0  # steps done
+        self._at = 0  # the present step, counted from the begin of its section
+        self._last = math.inf  # the step at which the command comes to rest and is planned afresh
+        self._cut = True  # the present step is the last of its section
+        self._before: PlannedStep | None = None
+        self._now: PlannedStep
+        self._after: PlannedStep | None = None
         self.reset()
 
-    def _make_diagnostics(self) -> Diagnostics:
-        compliant, (swinging, lost) = self.compliant, np.zeros((2, LEGS), dtype=np.bool_)
-        if compliant is None:
-            still = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
-            return Diagnostics(swinging, _zeros(), *still, lost, np.zeros(LEGS, dtype=np.bool_))
-        return Diagnostics(
-            swinging, _zeros(), compliant.shift, compliant.lift, lost, compliant.laws.fallback
+    # ------------------------------------------------------------------------------- planning
+
+    def _look_ahead(self, ahead: int, number: int) -> tuple[Array, Posture, Twist]:
+        """The command so many periods ahead: its value, the posture and the motion of the body.
+
+        number: periods since the section began, for what the slow loops add.
+        """
+        value, rate = self.ramp.ahead(ahead)
+        vx, vy, yaw_rate = value[:3].tolist()
+        twist = Twist(complex(vx, vy), yaw_rate)
+        if self.compliant is not None:
+            added = self.compliant.addition(number)
+            twist = Twist(twist.velocity + added.velocity, twist.yaw_rate + added.yaw_rate)
+        return value, Posture.of(value[3:], rate[3:]), twist
+
+    def _lower(self, feet: PlannedFeet) -> tuple[Array, Array]:
+        """The activations of the legs (6,) and by how much their feet are lowered (6,) [m]."""
+        if self.compliant is None:
+            return np.ones(LEGS), np.zeros(LEGS)
+        support, paths = self.compliant.support, self.paths
+        activation = support.activation(
+            feet.phase, paths.stayed, paths.stays, walking=paths.walking
         )
+        if not self.parts.support:
+            return activation, np.zeros(LEGS)
+        return activation, support.lowering(feet.plane, activation)
+
+    def _place_legs(self, posture: Posture, plane: Plane, height: Array) -> tuple[Plane, Pose]:
+        """The shift of the feet as the ground rolls off them (C9) [m], and the legs.
+
+        A tibia that pitches by dB rolls the sphere of its foot by -R dB along the outward direction
+        of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton step.
+
+        plane, height: (6,) centres of the feet, walking frame [m].
+        """
+        legs = self.legs
+        pose = legs.pose(*posture.see_place(plane, height))
+        slope = legs.speeds(pose, pose.heading, 0.0)
+        turns = slope[:, 2] - slope[:, 1]
+        shift = pose.heading * (legs.rolling(pose.angle) / (1.0 - legs.radius * turns))
+        return shift, legs.pose(*posture.see_place(plane + shift, height))
+
+    def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
+        """Turns planned feet into legs and point masses."""
+        activation, lowering = self._lower(feet)
+        height = feet.height - lowering
+        shift, pose = self._place_legs(posture, feet.plane, height)
+        masses = None
+        if self.compliant is not None:
+            masses = self.compliant.dynamics.place(pose, feet.way, feet.turn, posture)
+        return PlannedStep(value, posture, feet, activation, lowering, height, shift, pose, masses)
+
+    def _plan_step(self, number: int, ahead: int, before: PlannedStep) -> PlannedStep:
+        """The step so many periods after the section began, `ahead` of the present command."""
+        value, posture, twist = self._look_ahead(ahead, number)
+        return self._lay_out(value, posture, self.paths.walk(number, twist, before.feet))
+
+    def _plan_afresh(self) -> None:
+        """Begins a new section at the present step, and plans the step after it."""
+        moves, settled = self.ramp.moves(), self.ramp.settled()
+        if self.compliant is not None:
+            self.compliant.steer(self._at, moves=moves, afresh=self._cut)
+        value, posture, twist = self._look_ahead(0, 0)
+        going = moves or not settled
+        feet = self.paths.plan(self._now.feet, self._at, going=going, twist=twist)
+        self._now = self._lay_out(value, posture, feet)
+        self._last = math.inf if moves or settled else self.ramp.end - self.ramp.steps
+        self._at = 0
+        self._after = self._plan_step(1, 1, self._now)
+
+    def _advance(self, told: bool) -> None:
+        """Goes to the next step, as planned, and plans the one after it.
+
+        told: the command has changed, so that the plan is void.
+        """
+        if told or self._after is None:
+            self._plan_afresh()
+        assert self._after is not None
+        self._before, self._now, self._after = self._now, self._after, None
+        self._at += 1
+        self.ramp.steps += 1
+        number = self._at + 1
+        reached, planned = self.paths.reach(number), number <= self._last
+        self._cut = planned and not reached
+        if reached and planned:
+            self._after = self._plan_step(number, 1, self._now)
+
+    # --------------------------------------------------------------------------------- joints
+
+    def _rate_of(self, name: str) -> Any:
+        """The rate of a quantity of the present step per second, one-sided at a section's end."""
+        if self._before is None:
+            return np.zeros(LEGS)
+        before = getattr(self._before, name)
+        if self._after is None:
+            return (getattr(self._now, name) - before) / self.period
+        return (getattr(self._after, name) - before) / (2.0 * self.period)
+
+    def _show_planned(self) -> Array:
+        """The feet as the command plans them: on their paths, rolling, not lowered.
+
+        Returns their centres in the torso frame (6, 3) [m].
+        """
+        now = self._now
+        plane, height = now.posture.see_place(now.feet.plane + now.shift, now.feet.height)
+        return rows_of(plane.real, plane.imag, height)
+
+    def _follow_paths(self) -> None:
+        """Joint commands that lead the feet along their paths (C10 to C14)."""
+        now, out, shown = self._now, self._out, self.diagnostics
+        feet = Feet(
+            plane=now.feet.plane + now.shift,
+            height=now.height,
+            velocity=now.feet.velocity + self._rate_of("shift"),
+            rise=now.feet.rise - self._rate_of("lowering"),
+        )
+        seen = now.posture.see(feet)
+        joints = self.legs.solve(now.pose, seen.velocity, seen.rise)
+        neighbour, ahead = self._after or self._before, self.period
+        if self._after is None:
+            ahead = -ahead
+        out.angle_ref[...], out.speed_ref[...] = joints.angle, joints.speed
+        out.acceleration_ref[...] = self.legs.accelerations(
+            None if neighbour is None else neighbour.pose, ahead, joints.angle, joints.speed
+        )
+        out.torque_ref[...] = 0.0
+        shown.swinging[...] = self.paths.swinging
+        shown.unreachable[...] = joints.unreachable
+        shown.planned[...] = self._show_planned()
+
+    def _ask(self, compliant: Compliant) -> Stance:
+        """What the present step asks of compliant control (C15 to C20)."""
+        before, now, after, speed = self._before, self._now, self._after, self._out.speed_ref
+        assert now.masses is not None
+        motion = Neighbours((None, now.masses, None), (None, now.pose, None))
+        if before is not None and after is not None:
+            motion = Neighbours(
+                (before.masses, now.masses, after.masses), (before.pose, now.pose, after.pose)
+            )
+        demand = compliant.dynamics.demand(motion, speed, now.posture)
+        feet = now.feet.plane + now.shift
+        plan = compliant.laws.plan(
+            demand,
+            compliant.support.shares(feet, now.activation, demand),
+            feet=feet,
+            height=now.feet.height - self.paths.home_height,
+            rise=now.feet.rise,
+            swinging=self.paths.swinging,
+            hurried=bool((np.abs(speed) >= self.legs.speed_max).any()),
+        )
+        climb = self.legs.speeds(now.pose, 0.0, 1.0)
+        return Stance(plan, climb, now.value, now.posture, now.feet.plane, now.height)
+
+    # ---------------------------------------------------------------------------------- steps
 
     def reset(self) -> None:
         """Standing in the stance, all memory cleared; the next step is the first."""
         self.ramp.reset()
-        self.paths.reset()
-        self._start: float | None = None
-        self._count, self._cut = 0, True
         if self.compliant is not None:
             self.compliant.reset()
-        self._lay_out(0, *self.ramp.ahead(0))
-
-    def save(self) -> dict[str, Any]:
-        """Everything the controller remembers between steps, and what it has planned."""
-        compliant = None if self.compliant is None else self.compliant.save()
-        own = {
-            name: getattr(self, name)
-            for name in (
-                "_start",
-                "_count",
-                "_plan",
-                "_planned",
-                "_acceleration",
-                "_at",
-                "_last",
-                "_cut",
-            )
-        }
-        return {
-            "ramp": self.ramp.save(),
-            "paths": self.paths.save(),
-            "compliant": compliant,
-            "own": own,
-        }
+        self._start = None
+        self._count, self._at, self._last, self._cut = 0, 0, math.inf, True
+        feet = self.paths.reset()
+        value, posture, _ = self._look_ahead(0, 0)
+        self._before, self._after = None, None
+        self._now = self._lay_out(value, posture, feet)
+        self._shown = np.zeros((LEGS, 3)), _flags()
+        self._follow_paths()
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Goes back to a saved state: the steps after it are the same again, bit for bit."""
-        self.ramp.restore(state["ramp"])
-        self.paths.restore(state["paths"])
-        if self.compliant is not None:
-            self.compliant.restore(state["compliant"])
-        vars(self).update(state["own"])
-        self.diagnostics.swinging[:] = self.paths.steps.swinging[-1]
+        """Restores a state returned by save(): the steps after it are the same again."""
+        super().restore(state)
+        self._follow_paths()
+        self._show(*self._shown)
+
+    def _show(self, shift: Array, fallback: Mask) -> None:
+        """Puts the corrections of the feet (6, 3) [m] and fallbacks (6,) into the diagnostics."""
+        shown = self.diagnostics
+        shown.shift[...], shown.lift[...] = shift[:, 0] + 1j * shift[:, 1], shift[:, 2]
+        shown.fallback[...] = fallback
+        self._shown = shift, fallback
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """The joint commands for [t, t + period). The result's arrays are reused by the next step.
@@ -211,21 +359,7 @@ class Controller:
             command: what the torso should do; changes are ramped over a gait period.
             measurement: sensor values at t; kinematic control does not look at it.
         """
-        self._advance(t, command)
-        at, out, plan, compliant = self._at, self._out, self._plan, self.compliant
-        out.angle_ref[...], out.speed_ref[...], out.acceleration_ref[...] = (
-            plan.angle[at],
-            plan.speed[at],
-            self._acceleration[at],
-        )
-        self.diagnostics.unreachable[...] = plan.unreachable[at]
-        self.diagnostics.planned[...] = self._planned[at]
-        if compliant is not None:
-            compliant.step(measurement, out)
-        return out
-
-    def _advance(self, t: float, command: BodyCommand) -> None:
-        """To the planned step at t."""
+        first = self._start is None
         due = t if self._start is None else self._start + (self._count + 1) * self.period
         if not abs(t - due) <= CLOCK_TOLERANCE * self.period:
             raise ControllerError(
@@ -234,90 +368,16 @@ class Controller:
                 expected=f"t = {due} s",
                 fix="step once per period, or reset the controller",
             )
-        if command is not self.ramp.target and command != self.ramp.target:
-            self.ramp.aim(command)
-            self._last = self._at
-        if self._start is None:
-            self._start = t
-            return
-        self._count += 1
-        if self._at == self._last:
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # absurd commands lead to legs that do not reach, and are told so
-                self._plan_ahead()
-        self._at += 1
-        self.paths.advance()
-        self.ramp.steps += 1
-
-    def _plan_ahead(self) -> None:
-        """Plans what depends on the command alone, up to the next lift-off or touch-down, and
-        looks one step further where there is one.
-        """
-        ramp, target, paths, compliant = self.ramp, self.ramp.target, self.paths, self.compliant
-        moves = (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
-        count = PLANNED + 1 if ramp.settled or moves else min(ramp.remaining, PLANNED + 1)
-        value, rate = ramp.ahead(count)
-        v, yaw_rate = value[:, 0] + 1j * value[:, 1], value[:, 2]
-        if compliant is not None:
-            compliant.advance(paths.at)
-            v, yaw_rate = compliant.steer(
-                v, yaw_rate, moves=moves, afresh=self._cut and not paths.left
-            )
-        paths.plan(v, yaw_rate, going=moves or not ramp.settled)
-        end = paths.left + 1
-        self._cut = end <= count
-        self._lay_out(1, value[:end], rate[:end])
-        if end == PLANNED + 2:
-            self._last -= 1
-
-    def _lay_out(self, first: int, value: Array, rate: Array) -> None:
-        """Turns planned steps, rows of commands and their rates, into joint angles and speeds
-        from the row `first` on.
-        """
-        steps, compliant, rows = self.paths.steps, self.compliant, slice(first, None)
-        self.diagnostics.swinging[:] = steps.swinging[-1]  # in all of them the same
-        feet = Feet(steps.plane, steps.height, steps.plane_velocity, steps.rise)
-        if compliant is not None:
-            feet = compliant.lower(feet, steps, walking=self.paths.walking)
-        level = not (value[:, 3:].any() or rate[:, 3:].any())
-        posture = None if level else (value[:, 3:], rate[:, 3:])
-        pose, seen, shift = self._pose(feet, posture)
-        joints = self.legs.solve(pose, seen.velocity, seen.rise)
-        if compliant is not None:
-            compliant.plan(first, steps, value, pose, joints.speed, shift=shift, level=level)
-        self._plan = Joints(joints.angle[rows], joints.speed[rows], joints.unreachable[rows])
-        self._planned = _centres(
-            Feet(steps.plane + shift, steps.height, steps.plane_velocity, steps.rise), posture
-        )[rows]
-        self._acceleration = self.legs.accelerations(joints, self.period)[rows]
-        self._at, self._last = -first, len(value) - first - 1
-
-    def _pose(self, feet: Feet, posture: tuple[Array, Array] | None) -> tuple[Pose, Feet, Plane]:
-        """The legs, with the ground rolling off the round foot along the planned path; the feet in
-        the torso frame; their shift by that.
-
-        A tibia that pitches by dB rolls its foot's sphere by -R dB along the leg's outward
-        direction. The shift s changes B itself: s = R (C + s dC/du), C = q_3 - q_2 less that of the
-        stance, is solved by one Newton step.
-        """
-        seen = feet if posture is None else in_torso_frame(feet, *posture)
-        pose = self.legs.pose(seen.plane, seen.height)
-        slope = self.legs.speeds(pose, pose.heading, np.zeros(1))
-        shift = pose.heading * (
-            self.legs.rolling(pose.angles)
-            / (1.0 - self.legs.radius * (slope[..., 2] - slope[..., 1]))
-        )
-        rolling = replace(
-            feet, plane=feet.plane + shift, velocity=feet.velocity + rates(shift, self.period)
-        )
-        seen = rolling if posture is None else in_torso_frame(rolling, *posture)
-        return self.legs.pose(seen.plane, seen.height), seen, shift
-
-
-def _centres(feet: Feet, posture: tuple[Array, Array] | None) -> Array:
-    """(n, 6, 3) feet of the walking frame in the torso frame [m], under the commanded height,
-    roll and pitch; None: these are 0.
-    """
-    seen = feet if posture is None else in_torso_frame(feet, *posture)
-    return np.stack([seen.plane.real, seen.plane.imag, seen.height], axis=-1)
+        told = self.ramp.aim(command)
+        # absurd commands lead to legs that do not reach, which is reported
+        with np.errstate(over="ignore", invalid="ignore"):
+            if first:  # the first step is the stance itself, whatever is commanded
+                self._start = t
+            else:
+                self._count += 1
+                self._advance(told)
+            self._follow_paths()
+            if self.compliant is not None:
+                shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)
+                self._show(shift, self.compliant.laws.fallback)
+        return self._out

@@ -1,5 +1,7 @@
-"""How all static figures look: as wide as a page of two columns, in its size of type, colours
-that colour-blind readers tell apart.
+"""How all static figures look.
+
+They are as wide as a page of two columns, in its size of type, with colours that colour-blind
+readers can tell apart.
 """
 
 from __future__ import annotations
@@ -31,7 +33,5 @@ SETTINGS: dict[str, Any] = {
     "path.simplify": True,
     "figure.constrained_layout.use": True,
 }
-UNDATED: dict[str, dict[str, Any]] = {
-    "png": {},
-    "svg": {"Date": None},
-}  # metadata by format: equal data, equal files
+# metadata by format: equal data, equal files
+UNDATED: dict[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}}

@@ -1,9 +1,6 @@
-"""The linear part of a foot's laws as one discrete system, stepped for all feet by one product of
-matrices.
+"""The linear part of the laws of all feet: slip PID, virtual suspension and smoothed load.
 
-A foot's row holds its inputs and states; the system is the block-diagonal of the slip PID along x
-and along y, the virtual suspension and the smoothing of the load. Attributes are views of the new
-row, so that what limits and forgets works in place.
+C: foot_law.c.
 """
 
 from __future__ import annotations
@@ -12,56 +9,47 @@ import math
 
 import numpy as np
 
-from hexapod_cosim.controller import slip_pid, suspension
 from hexapod_cosim.controller.gains import Gains
-from hexapod_cosim.controller.kinematics import LEGS, Array
-
-# columns of a row: answers of the PID, its states by direction, those of the suspension, the load,
-# the inputs
-ANSWER, LAST, SMOOTH, SUM, SLOPE = (slice(k, k + 2) for k in (0, 2, 4, 6, 8))
-SUSPENSION, LOAD, INPUTS = slice(10, 12), 12, slice(13, 17)
-PUSH_X, PUSH_Y, EXCESS, SHARE = range(13, 17)
-COLUMNS = 18  # one more, so that columns pair up to complex numbers
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Plane
+from hexapod_cosim.controller.slip_pid import SlipPid
+from hexapod_cosim.controller.suspension import discretise
 
 
-class FootLaw:
-    """Six feet. Inputs: tangential force x, y and normal force to give way to [N], load [1].
+class FootLaw(Stateful):
+    """The laws of six feet.
 
-    Attributes, views: inputs: (6, 4);  answer: (6, 2) of the PID [N];  integral: (6, 2) its [N];
-    deflection, rate: (6,) of the suspension [m, m/s];  load: (6,) smoothed [1].
+    Attributes, (6,) each:
+        pid: the PIDs against slip.
+        answer: of the PIDs, x + i y [N].
+        deflection, rate: of the suspensions [m, m/s].
+        load: of the feet, smoothed, in thirds of the weight [1].
     """
 
+    STATE = ("pid", "answer", "deflection", "rate", "load")
+
     def __init__(self, gains: Gains, *, period: float) -> None:
-        self._step = law_matrix(gains, period=period)
-        self.row, self._next = np.zeros((2, LEGS, COLUMNS))
-        self.inputs, self.answer, self.integral, self.load = (
-            self.row[:, INPUTS],
-            self.row[:, ANSWER],
-            self.row[:, SUM],
-            self.row[:, LOAD],
-        )
-        self.deflection, self.rate = self.row[:, SUSPENSION].T
+        self.pid = SlipPid(gains.slip, period=period)
+        self.a, self.b = discretise(gains.suspension, period=period)
+        self.keep = math.exp(-period / gains.slip.load_time)
+        self.reset()
 
     def reset(self) -> None:
-        """Everything at rest."""
-        self.row[...] = 0.0
+        """All at rest."""
+        self.pid.reset()
+        self.answer: Plane = np.zeros(LEGS, dtype=np.complex128)
+        self.deflection, self.rate, self.load = np.zeros((3, LEGS))
 
-    def step(self) -> None:
-        """One period on, under the inputs as they are."""
-        np.dot(self.row, self._step, out=self._next)
-        self.row[...] = self._next
+    def step(self, push: Plane, excess: Array, load: Array) -> None:
+        """One period on.
 
-
-def law_matrix(gains: Gains, *, period: float) -> Array:
-    """(18, 18) acts on a foot's row from the right. The inputs' columns come out as 0."""
-    matrix = np.zeros((COLUMNS, COLUMNS))
-    pid = slip_pid.system(gains.slip, period=period)  # on e-, e'-, i-, d-, e; gives u, e, e', i, d
-    for axis, force in enumerate((PUSH_X, PUSH_Y)):
-        states = [part.start + axis for part in (LAST, SMOOTH, SUM, SLOPE)]
-        matrix[np.ix_([*states, force], [ANSWER.start + axis, *states])] = pid
-    a, b = suspension.discretise(gains.suspension, period=period)
-    deflection = [SUSPENSION.start, SUSPENSION.start + 1]
-    matrix[np.ix_(deflection, deflection)], matrix[np.ix_([EXCESS], deflection)] = a.T, b
-    keep = math.exp(-period / gains.slip.load_time)
-    matrix[LOAD, LOAD], matrix[SHARE, LOAD] = keep, 1.0 - keep
-    return matrix
+        Args:
+            push: (6,) tangential forces to give way to, x + i y [N] (C25).
+            excess: (6,) normal forces to give way to [N] (C26).
+            load: (6,) measured loads in thirds of the weight [1] (C27).
+        """
+        z, rate, a, b = self.deflection, self.rate, self.a, self.b
+        self.answer = self.pid.step(push)
+        self.deflection = a[0, 0] * z + a[0, 1] * rate + b[0] * excess
+        self.rate = a[1, 0] * z + a[1, 1] * rate + b[1] * excess
+        self.load = self.keep * self.load + (1.0 - self.keep) * load

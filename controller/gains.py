@@ -1,5 +1,6 @@
-"""Gains of the compliant control: what the two laws run with, and what they were designed for.
-Kept in a TOML file.
+"""Gains of the compliant control: what the laws run with, and what they were designed for.
+
+They are kept in a TOML file.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ class GainsError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class SlipGains:
-    """PID from tangential force [N] to the force [N] that a leg's servos are relieved of; the
-    foot's shift is C times it.
+    """PID from tangential force [N] to the force [N] that a leg is relieved of (C25).
 
+    The shift of the foot is C times that force (C28).
     In continuous time: (kp + ki/s + kd s/(derivative_time s + 1)) / (filter_time s + 1).
     """
 
@@ -42,9 +43,7 @@ class SlipGains:
 
 @dataclass(frozen=True, kw_only=True)
 class SuspensionGains:
-    """Virtual m z'' + b z' + k z = f_n - the leg's share of the load; z lifts the foot towards
-    the torso.
-    """
+    """Virtual m z'' + b z' + k z = f_n - the share of the leg; z lifts the foot (C26)."""
 
     mass: float  # kg
     damping: float  # N s/m
@@ -88,17 +87,12 @@ class Requirements:
 
     phase_margin: float = 60.0  # deg    at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
-    bandwidth: float = (
-        5.0  # rad/s    crossover of the tangential loop, at least: quicker than feet creep
-    )
-    slip_rejection: float = (
-        0.6  # 1    steady slip with the tangential law over that without, at most
-    )
+    bandwidth: float = 5.0  # rad/s    crossover of the tangential loop, at least
+    slip_rejection: float = 0.6  # 1    steady slip with the law over that without
     delay_periods: float = 1.0  # 1    computing delay in controller periods
     force_delay: float = 0.010  # s    of the force sensors
     filter_time: float = 0.010  # s    force filter of the tangential loop
-    # s    smoothing of the measured load: the time in which legs really hand over the weight
-    load_time: float = 0.030
+    load_time: float = 0.030  # s    smoothing of the load: the time of real hand-overs
     slip_limit: float = 1.0  # 1    clamp of the tangential answer, in thirds of the weight
     deflection: float = 0.003  # m    of the suspension under a third of the weight beyond the share
     frequency: float = 5.0  # Hz    natural frequency of the suspension, at most
@@ -115,15 +109,12 @@ class Requirements:
     speed_limit: float = 0.02  # m/s
     turn_limit: float = 0.05  # rad/s
     speed_share: float = 0.5  # 1    of the servo's largest speed at which corrections may change
-    # 1    of the servo's largest torque that feed-forward may ask; a tripod must stand within it
-    torque_share: float = 0.9
+    torque_share: float = 0.9  # 1    of the servo's largest torque: a tripod must stand within it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """What a design reached: the worst over stances, loads and eigenvalues of the loop, in
-    discrete time.
-    """
+    """What a design reached: the worst over stances, loads and eigenvalues of the sampled loop."""
 
     slip_crossover: float  # rad/s
     slip_phase_margin: float  # deg
@@ -156,7 +147,11 @@ class Gains:
     def mismatch(self, robot: Robot, *, period: float) -> str | None:
         """Why these gains are not for this robot and period; None when they are."""
         if self.robot_hash != robot.hash:
-            return f"the gains were designed for robot {self.robot!r} ({self.robot_hash[:12]}), not for {robot.name!r} ({robot.hash[:12]})"
+            designed, present = self.robot_hash[:12], robot.hash[:12]
+            return (
+                f"the gains were designed for robot {self.robot!r} ({designed}), "
+                f"not for {robot.name!r} ({present})"
+            )
         if not math.isclose(self.period, period, rel_tol=1e-9):
             return f"the gains were designed for a period of {self.period} s, not {period} s"
         return None
@@ -193,8 +188,9 @@ Record = TypeVar("Record")
 
 
 def save_gains(gains: Gains, path: str | Path) -> Path:
-    """Writes a gains file (TOML, floats to the last bit). Raises GainsError when the file cannot
-    be written.
+    """Writes a gains file (TOML, floats to the last bit).
+
+    Raises GainsError when the file cannot be written.
     """
     head = {
         "format": FORMAT,
@@ -231,8 +227,9 @@ def _toml_lines(table: Mapping[str, Any]) -> list[str]:
 
 
 def load_gains(path: str | Path) -> Gains:
-    """Reads and checks a gains file. Raises GainsError: the file, the key, what was got and
-    expected.
+    """Reads and checks a gains file.
+
+    Raises GainsError: the file, the key, what was got and expected.
     """
     where = str(path)
     try:

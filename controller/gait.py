@@ -1,9 +1,9 @@
-"""Gaits: which leg is in the air when.
+"""Gaits: which leg is in the air when. C: gait.c.
 
-A leg's phase is its offset plus the gait clock, modulo 1; below the duty factor it stands, above it
-swings. The offsets are OpenSHC's multiplier x offset / (stance + swing), given there around the
-robot (front right, mid right, rear right, rear left, mid left, front left) and turned here into the
-order LF LM LR RF RM RR.
+The phase of a leg is its offset plus the gait clock, modulo 1; below the duty factor it stands,
+above it swings (C2). The offsets are OpenSHC's multiplier x offset / (stance + swing), given there
+around the robot (front right, mid right, rear right, rear left, mid left, front left) and turned
+here into the order LF LM LR RF RM RR.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ AROUND_TO_LEGS = (5, 4, 3, 0, 1, 2)  # LF LM LR RF RM RR in the order around the
 
 @dataclass(frozen=True)
 class Pattern:
-    """A gait's timing in whole numbers: stance : swing parts of a cycle, and each leg's offset
-    in parts, around the robot.
+    """The timing of a gait in whole numbers.
+
+    A cycle has stance + swing parts; the offset of a leg around the robot is its multiplier times
+    `offset` parts.
     """
 
     stance: int
@@ -31,7 +33,7 @@ class Pattern:
 
     @property
     def duty(self) -> float:
-        """The natural duty factor: the least one with which the offsets hand over without a gap."""
+        """The least duty factor with which the offsets hand over without a gap."""
         return self.stance / (self.stance + self.swing)
 
     @property
@@ -58,9 +60,7 @@ class Gait:
     duty: float  # 1    share of the cycle on the ground
     offsets: tuple[float, ...]  # 1    (6,) phase of each leg at clock 0
     step_height: float  # m    the foot's lift above the ground
-    touchdown_speed: float = (
-        0.0  # m/s    vertical, at the end of a swing; 0: the foot is set down without speed
-    )
+    touchdown_speed: float = 0.0  # m/s    vertical, at the end of a swing
 
     def __post_init__(self) -> None:
         for name, value, low, high in (
@@ -110,9 +110,9 @@ def make_gait(
 ) -> Gait:
     """A gait by name; what is not given is taken from the robot's own gait.
 
-    Another gait than the robot's gets its pattern's natural duty factor. The default period keeps
-    the time of the robot's swing, so that no duty factor asks more speed of the joints than the
-    robot's own gait does.
+    Another gait than the robot's gets the natural duty factor of its pattern. The default period
+    keeps the time of the robot's swing, so that no duty factor asks more speed of the joints than
+    the robot's own gait does.
 
     Raises HexapodError: unknown name (with the nearest valid one), impossible values.
     """

@@ -1,223 +1,217 @@
-"""What the planned motion asks of servos and ground: inverse dynamics of all legs over many steps
-at once.
+"""What the planned motion demands of servos and ground: inverse dynamics of all legs.
 
-A leg is three masses. Seen in its own plane, which turns with the coxa, a point is U = u + i w
-(outward, up) and Y to the side; from above that plane points along e^(i psi). With the mass points'
-accelerations a, by differences in time, the force each needs is F = m (a + g), and about the joints
-(axes +z, -y, +y)
-
-    tau_1 = sum Im((u + i Y)^* F_h e^-i psi)      tau_2 = sum Im((U - U_femur)^* P)      tau_3 =
-    -sum Im((U - U_knee)^* P)
-
-F_h the horizontal force x + i y, P = Re(F_h e^-i psi) + i F_z the force in the plane, the sums over
-the links that the joint moves. To these come the turning inertia of links and rotors and the
-friction of the gears. A force f of the ground on the foot asks -J^T f of the joints, J of the
-contact point. Left out: what the torso's turning does to the legs' turning, and the links' inertia
-about their long axes.
+C: inverse_dynamics.c. A leg is three point masses. Seen in its own vertical plane, which turns with
+the coxa, a point is U = u + i w (outward, up) and Y to the side; from above that plane points along
+e^(i psi). Accelerations are second differences of three successive planned steps. The joint torques
+are those of (C15); what the ground must give the robot as a whole is (C16). A force f of the ground
+on the foot asks -J^T f of the joints, J of the contact point (C17). Left out: what the turning of
+the torso does to the turning of the legs, and the inertia of the links about their long axes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.kinematics import Array, LegSolver, Plane, Pose
-from hexapod_cosim.controller.posture import turned
+from hexapod_cosim.controller.kinematics import LegSolver, Pose
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, cis
+from hexapod_cosim.controller.posture import Posture
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 
-
-@dataclass(frozen=True)
-class Frames:
-    """How the torso is planned to lie; rows are steps, a period apart."""
-
-    way: Plane  # m    (n, 1) of the walking frame over the ground
-    turn: Plane  # 1    (n, 1) e^(i yaw) of it
-    height: Array  # m    (n, 1) of the torso over the walking frame
-    rotation: Array | None  # 1    (n, 3, 3) R_KT, torso to walking frame; None: level
+Wrench = tuple[Any, ...]  # push, weight, moment, twist of (C16)
 
 
-@dataclass(frozen=True)
-class Demand:
-    """What a planned motion asks for; rows are steps."""
+class Masses(NamedTuple):
+    """Where the point masses are at one step; (6, 3): legs, links."""
 
-    torque: (
-        Array  # N m    (n, 6, 3) of the joints for the legs' own weight and motion, their feet free
-    )
-    # m    (n, 6, 3, 3) J^T: joint torques per force on the contact point along x, y, z of the
-    # walking frame
-    lever: Array
-    push: Plane  # N    (n,) horizontal force the ground must give the robot, x + i y, walking frame
-    weight: Array  # N    (n,) and the vertical one
-    moment: Plane  # N m    (n,) what the sum of p f_n over the feet must be, p = x + i y
-    twist: Array  # N m    (n,) and that of Im(p^* f_h), the moment about the vertical
+    point: Plane  # m    (6, 3) U, from where the coxa axis meets the hip
+    place: Plane  # m    (6, 3) x + i y, walking frame
+    height: Array  # m    (6, 3) z, walking frame
+    ground: Plane  # m    (6, 3) x + i y, ground frame
+    torso_place: complex  # m    x + i y, walking frame
+    torso_height: float  # m    z, walking frame
+    torso_ground: complex  # m    x + i y, ground frame
+    turn: complex  # 1    e^(i yaw) of the walking frame over the ground
 
-    def rows(self, chosen: slice) -> Demand:
-        """Some of the steps."""
-        return Demand(*(getattr(self, item.name)[chosen] for item in fields(self)))
+
+class Demand(NamedTuple):
+    """What a planned motion demands at one step."""
+
+    torque: Array  # N m    (6, 3) for the legs' own weight and motion, their feet free
+    lever: Array  # m    (6, 3, 3) J^T: joint torques per force on the contact point, walking axes
+    push: complex  # N    horizontal force that the ground must give the robot, walking frame
+    weight: float  # N    the vertical force
+    moment: complex  # N m    what the sum of p f_n over the feet must be
+    twist: float  # N m    what the sum of Im(p^* f_h) must be, the moment about the vertical
+
+
+class Neighbours(NamedTuple):
+    """Three successive steps: before, now, after. Without a neighbour there is no acceleration."""
+
+    masses: tuple[Masses | None, Masses, Masses | None]
+    pose: tuple[Pose | None, Pose, Pose | None]
 
 
 class InverseDynamics:
-    """Of one robot. `legs` hold its kinematics; `period` [s] lies between two steps."""
+    """Of one robot. `legs`: its kinematics; `period` [s] lies between two steps."""
 
     def __init__(self, robot: Robot, legs: LegSolver, *, period: float) -> None:
-        self._legs, self._period, self._radius, self._torso = (
-            legs,
-            period,
-            robot.foot.radius,
-            robot.torso,
-        )
-        self._gravity = float(np.linalg.norm(robot.gravity))
-        self._rotor, self._friction = robot.servo.rotor_inertia, robot.servo.coulomb_friction
-        self._stance = legs.forward(robot.stance)
-        self._floor = float(np.mean(self._stance[:, 2])) - robot.foot.radius
-        links = [[leg.links[joint] for leg in robot.legs] for joint in range(3)]
-        com = np.array([[link.com for link in joint] for joint in links])  # (3, 6, 3)
-        offset = np.array([[link.offset_y for link in joint] for joint in links])
-        self._mass = np.array([[link.mass for link in joint] for joint in links])[
-            :, None
-        ]  # (3, 1, 6), and so on
-        self._com = (com[..., 0] + 1j * com[..., 2])[:, None]
-        self._side = (com[..., 1] + np.cumsum(offset, axis=0) - offset)[:, None]  # Y
-        self._yaw_inertia, self._pitch_inertia = (
-            np.array([[link.inertia[k] for link in joint] for joint in links]) for k in (2, 1)
-        )
-        self._femur_zero, self._tibia_zero = (
-            np.exp(-1j * tilt) for tilt in (legs.femur_tilt, legs.tibia_tilt)
-        )
+        self.legs, self.period = legs, period
+        self.gravity = float(np.linalg.norm(robot.gravity))
+        self.rotor, self.friction = robot.servo.rotor_inertia, robot.servo.coulomb_friction
+        self.torso_mass, self.torso_inertia = robot.torso.mass, robot.torso.inertia[2]
+        self.torso_com = complex(robot.torso.com[0], robot.torso.com[1])
+        self.torso_com_z = robot.torso.com[2]
+        self.stance = legs.forward(robot.stance)  # m    (6, 3) feet
+        self.floor = float(np.mean(self.stance[:, 2])) - robot.foot.radius  # m    torso frame
+        links = [leg.links for leg in robot.legs]
+        com = np.array([[link.com for link in leg] for leg in links])  # (6, 3, 3)
+        offset = np.array([[link.offset_y for link in leg] for leg in links])
+        inertia = np.array([[link.inertia[:3] for link in leg] for leg in links])
+        self.mass = np.array([[link.mass for link in leg] for leg in links])  # kg    (6, 3)
+        self.com = com[..., 0] + 1j * com[..., 2]  # m    (6, 3) from the joint, plane of the leg
+        self.side = com[..., 1] + np.cumsum(offset, axis=1) - offset  # m    (6, 3) Y
+        self.yaw_inertia = inertia[..., 2].sum(axis=1)  # kg m2    (6,)
+        self.pitch_inertia = inertia[..., 1]  # kg m2    (6, 3)
 
     def rest(self) -> Demand:
-        """Of one step in the stance."""
-        still = Frames(
-            way=np.zeros((1, 1), dtype=np.complex128),
-            turn=np.ones((1, 1), dtype=np.complex128),
-            height=np.zeros((1, 1)),
-            rotation=None,
-        )
-        x, y, z = self._stance.T[:, None]
-        pose = self._legs.pose(x + 1j * y, z)
-        return self.demand(pose, np.zeros_like(pose.angles), still)
+        """What the robot demands in its stance."""
+        x, y, z = self.stance.T
+        pose = self.legs.pose(x + 1j * y, z)
+        level = Posture.of(np.zeros(3), np.zeros(3))
+        masses = self.place(pose, 0j, 0.0, level)
+        alone = Neighbours((None, masses, None), (None, pose, None))
+        return self.demand(alone, np.zeros_like(pose.angle), level)
 
-    def demand(self, pose: Pose, speed: Array, frames: Frames) -> Demand:
-        """Of legs at successive steps, at least one, whose joints move at speed (n, 6, 3)
-        [rad/s].
+    def place(self, pose: Pose, way: complex, turn: float, posture: Posture) -> Masses:
+        """Where the point masses are.
+
+        Args:
+            pose: the legs, torso frame.
+            way, turn: of the walking frame over the ground [m, rad].
+            posture: of the torso in the walking frame.
         """
-        points, back = self._points(pose), frames.turn.conj()
-        place = self._legs.place + pose.heading * (points.real + 1j * self._side)
-        xy, z = _walking(place, self._legs.hip[2] + points.imag, frames)
-        push, lift = self._forces(frames.way + frames.turn * xy, z, self._mass)
-        push *= back
-        parts = (push, lift, xy * lift - (z - self._floor) * push, (xy.conj() * push).imag)
-        legs, torso = (part.sum(axis=(0, 2)) for part in parts), self._torso_demand(frames)
-        total, weight, moment, twist = (ours + its for ours, its in zip(legs, torso, strict=True))
-        return Demand(
-            torque=self._torques(pose, speed, points, *_torso(push, lift, frames)),
-            lever=self._lever(pose, frames),
-            push=total,
-            weight=weight,
-            moment=moment,
-            twist=twist,
-        )
-
-    def _points(self, pose: Pose) -> Plane:
-        """(3, n, 6) U of the mass points, from where the coxa axis meets the hip."""
-        legs = self._legs
+        legs, turned = self.legs, cis(turn)
         joint = legs.coxa_length + 1j * legs.coxa_height
-        return np.stack(
-            [
-                np.broadcast_to(self._com[0], pose.foot.shape),
-                joint + pose.femur * (self._femur_zero * self._com[1]),
-                joint + legs.femur * pose.femur + pose.tibia * (self._tibia_zero * self._com[2]),
-            ]
+        knee = joint + pose.femur * legs.femur
+        point = np.empty((LEGS, 3), dtype=np.complex128)
+        point[:, 0] = self.com[:, 0]
+        point[:, 1] = joint + pose.femur * (legs.femur_zero * self.com[:, 1])
+        point[:, 2] = knee + pose.tibia * (legs.tibia_zero * self.com[:, 2])
+        aside = point.real + 1j * self.side
+        place, height = posture.turn(
+            legs.place[:, None] + pose.heading[:, None] * aside,
+            legs.hip[2][:, None] + point.imag,
+        )
+        torso_place, torso_height = posture.turn(self.torso_com, self.torso_com_z)
+        return Masses(
+            point=point,
+            place=place,
+            height=height + posture.height,
+            ground=way + turned * place,
+            torso_place=torso_place,
+            torso_height=torso_height + posture.height,
+            torso_ground=way + turned * torso_place,
+            turn=turned,
         )
 
-    def _forces(self, place: Plane, z: Array, mass: Array) -> tuple[Plane, Array]:
-        """m (a + g) of points whose path over the ground runs along the last but one axis:
-        horizontal x + i y, and vertical [N].
+    def _acceleration(self, before: Any, now: Any, after: Any) -> Any:
+        """The second difference of three steps, of numbers and points alike."""
+        return (after - 2.0 * now + before) / (self.period * self.period)
+
+    def _add_force(self, total: Wrench, push: Any, lift: Any, place: Any, height: Any) -> Wrench:
+        """Adds m (a + g) = (push, lift) of points at (place, height), walking frame (C16).
+
+        `total` and the result are push, weight, moment and twist.
         """
-        return mass * self._acceleration(place), mass * (self._acceleration(z) + self._gravity)
+        moment = place * lift - push * (height - self.floor)
+        parts = (push, lift, moment, across(place, push))
+        return tuple(
+            a + (part.sum() if isinstance(part, np.ndarray) else part)
+            for a, part in zip(total, parts, strict=True)
+        )
 
-    def _acceleration(self, values: Any) -> Any:
-        """Second differences along the last but one axis, 0 at its ends: there feet lift off or
-        touch down, which they do without any.
+    def _demand_torso(
+        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None]
+    ) -> Wrench:
+        """Adds what the torso demands to push, weight, moment and twist (C16)."""
+        before, now, after = masses
+        acceleration, up, spin = 0j, 0.0, 0j
+        if before is not None and after is not None:
+            acceleration = self._acceleration(
+                before.torso_ground, now.torso_ground, after.torso_ground
+            )
+            up = self._acceleration(before.torso_height, now.torso_height, after.torso_height)
+            spin = self._acceleration(before.turn, now.turn, after.turn)
+        push = self.torso_mass * acceleration * now.turn.conjugate()
+        lift = self.torso_mass * (up + self.gravity)
+        place, height = now.torso_place, now.torso_height
+        push, weight, moment, twist = self._add_force(total, push, lift, place, height)
+        return push, weight, moment, twist + self.torso_inertia * across(now.turn, spin)
+
+    def _demand_links(
+        self, masses: tuple[Masses | None, Masses, Masses | None]
+    ) -> tuple[Plane, Array]:
+        """m (a + g) of the links: horizontal and vertical, (6, 3) each [N], walking frame."""
+        before, now, after = masses
+        if before is None or after is None:
+            return np.zeros((LEGS, 3), dtype=np.complex128), self.mass * self.gravity
+        acceleration = self._acceleration(before.ground, now.ground, after.ground)
+        up = self._acceleration(before.height, now.height, after.height)
+        push = self.mass * acceleration * now.turn.conjugate()
+        return push, self.mass * (up + self.gravity)
+
+    def _demand_torques(self, motion: Neighbours, push: Plane, lift: Array, speed: Array) -> Array:
+        """The joint torques (C15), (6, 3) [N m].
+
+        push, lift: (6, 3) forces that the links need, torso frame [N]; speed: (6, 3) [rad/s].
         """
-        found = np.zeros_like(values)
-        found[..., 1:-1, :] = (
-            values[..., 2:, :] - 2.0 * values[..., 1:-1, :] + values[..., :-2, :]
-        ) / self._period**2
-        return found
-
-    def _torso_demand(self, frames: Frames) -> tuple[Plane, Array, Plane, Array]:
-        com = self._torso.com
-        xy, z = _walking(
-            np.full_like(frames.way, complex(com[0], com[1])),
-            np.full_like(frames.height, com[2]),
-            frames,
-        )
-        push, lift = self._forces(frames.way + frames.turn * xy, z, np.array(self._torso.mass))
-        push *= frames.turn.conj()
-        spin = self._torso.inertia[2] * (self._acceleration(frames.turn) * frames.turn.conj()).imag
-        return (
-            push[:, 0],
-            lift[:, 0],
-            (xy * lift - (z - self._floor) * push)[:, 0],
-            ((xy.conj() * push).imag + spin)[:, 0],
-        )
-
-    def _torques(self, pose: Pose, speed: Array, points: Plane, push: Plane, lift: Array) -> Array:
-        """(n, 6, 3) from the forces (3, n, 6) that the links need, torso frame."""
-        legs = self._legs
-        along = push * pose.heading.conj()
+        legs, (before, now, after), point = self.legs, motion.pose, motion.masses[1].point
+        turning = np.zeros((LEGS, 3))
+        if before is not None and after is not None:
+            turning = self._acceleration(before.angle, now.angle, after.angle)
+        torque = self.rotor * turning + self.friction * np.tanh(speed / GEAR_SPEED)
+        # tau_1 = sum Im((u + i Y)^* F_h e^(-i psi))
+        along = push * now.heading.conj()[:, None]
+        torque[:, 0] += across(point.real + 1j * self.side, along).sum(axis=1)
+        torque[:, 0] += turning[:, 0] * self.yaw_inertia
+        # tau_2 = sum Im((U - U_femur)^* P)    tau_3 = -Im((U - U_knee)^* P)
         inner = along.real + 1j * lift
-        femur = points[1:] - (legs.coxa_length + 1j * legs.coxa_height)
-        tibia = femur[1] - legs.femur * pose.femur
-        turning = self._acceleration(pose.angles.reshape(len(lift[0]), -1)).reshape(
-            pose.angles.shape
-        )
-        upper, lower = (
-            turning[..., 1] * self._pitch_inertia[1],
-            (turning[..., 1] - turning[..., 2]) * self._pitch_inertia[2],
-        )
-        torque = self._rotor * turning + self._friction * np.tanh(speed / GEAR_SPEED)
-        torque[..., 0] += ((points.real - 1j * self._side) * along).imag.sum(axis=0) + turning[
-            ..., 0
-        ] * self._yaw_inertia.sum(axis=0)
-        torque[..., 1] += (femur.conj() * inner[1:]).imag.sum(axis=0) + upper + lower
-        torque[..., 2] -= (tibia.conj() * inner[2]).imag + lower
+        arm = point[:, 1:] - (legs.coxa_length + 1j * legs.coxa_height)[:, None]
+        tibia = arm[:, 1] - legs.femur * now.femur
+        upper = turning[:, 1] * self.pitch_inertia[:, 1]
+        lower = (turning[:, 1] - turning[:, 2]) * self.pitch_inertia[:, 2]
+        torque[:, 1] += across(arm, inner[:, 1:]).sum(axis=1) + upper + lower
+        torque[:, 2] -= across(tibia, inner[:, 2]) + lower
         return np.asarray(torque)
 
-    def _lever(self, pose: Pose, frames: Frames) -> Array:
-        """(n, 6, 3, 3) J^T of the contact points."""
-        femur = pose.foot - 1j * self._radius
-        tibia = femur - self._legs.femur * pose.femur
-        lever = np.zeros((*pose.foot.shape, 3, 3))
-        lever[..., 0, 0], lever[..., 0, 1] = -pose.point.imag, pose.point.real
-        for row, arm in ((1, femur), (2, -tibia)):
-            lever[..., row, 0], lever[..., row, 1] = (
-                -arm.imag * pose.heading.real,
-                -arm.imag * pose.heading.imag,
-            )
-            lever[..., row, 2] = arm.real
-        return (
-            lever
-            if frames.rotation is None
-            else lever @ frames.rotation.transpose(0, 2, 1)[:, None]
-        )
+    def _lever_of(self, pose: Pose, posture: Posture) -> Array:
+        """J^T of the contact points (C17), (6, 3, 3) [m]: rows joints, columns walking axes."""
+        femur = pose.foot - 1j * self.legs.radius
+        tibia = femur - self.legs.femur * pose.femur
+        row = np.empty((LEGS, 3), dtype=np.complex128)
+        up = np.zeros((LEGS, 3))
+        row[:, 0] = 1j * pose.point
+        row[:, 1], up[:, 1] = -femur.imag * pose.heading, femur.real
+        row[:, 2], up[:, 2] = tibia.imag * pose.heading, -tibia.real
+        row, up = posture.turn(row, up)
+        return np.array((row.real, row.imag, up)).transpose(1, 2, 0)
 
+    def demand(self, motion: Neighbours, speed: Array, posture: Posture) -> Demand:
+        """What the middle one of three steps demands.
 
-def _walking(place: Plane, z: Array, frames: Frames) -> tuple[Plane, Array]:
-    """Points (..., n, m) of the torso frame in the walking frame."""
-    if frames.rotation is not None:
-        place, z = turned(place, z, frames.rotation)
-    return place, z + frames.height
-
-
-def _torso(push: Plane, lift: Array, frames: Frames) -> tuple[Plane, Array]:
-    """Forces (..., n, m) of the walking frame in the torso frame."""
-    return (
-        (push, lift)
-        if frames.rotation is None
-        else turned(push, lift, frames.rotation.transpose(0, 2, 1))
-    )
+        Args:
+            motion: the steps.
+            speed: (6, 3) joint speeds [rad/s].
+            posture: of the torso in the walking frame.
+        """
+        now = motion.masses[1]
+        push, lift = self._demand_links(motion.masses)
+        legs = self._add_force((0j, 0.0, 0j, 0.0), push, lift, now.place, now.height)
+        total, weight, moment, twist = self._demand_torso(legs, motion.masses)
+        push, lift = posture.turn_back(push, lift)
+        torque = self._demand_torques(motion, push, lift, speed)
+        lever = self._lever_of(motion.pose[1], posture)
+        return Demand(torque, lever, complex(total), float(weight), complex(moment), float(twist))

@@ -1,33 +1,20 @@
-"""Closed-form kinematics of six three-joint legs, for many steps at once.
+"""Closed-form kinematics of six three-joint legs in the torso frame. C: kinematics.c.
 
 Geometry (docs/architecture.md): the coxa turns about +z, the femur about -y, the tibia about +y;
-every link's tip is (length, offset_y, offset_z) in its frame. Seen in the coxa frame a leg is then
-a planar two-link arm in the x-z plane, shifted sideways by the sum Y of the y offsets:
-
-    x = l_1  + a cos A + b cos B        A = q_2 + atan2(offset_z, length) of the femur     a =
-    |femur tip| z = oz_1 + a sin A + b sin B        B = q_2 - q_3 + atan2(offset_z, length) of the
-    tibia   b = |tibia tip|
-
-The knee angle gamma = A - B in [0, pi] (knee up) makes the inverse unique. Points of a plane are
-complex numbers, x + i y seen from above and u + i w, outward and up, in the leg's own plane: a turn
-is one product, and only the results need arc functions.
+the tip of a link is (length, offset_y, offset_z) in the link's frame. Seen in the coxa frame, a leg
+is a planar two-link arm in the x-z plane, shifted sideways by the sum Y of the y offsets (C11).
+The knee angle gamma in [0, pi] (knee up) makes the inverse unique (C12).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hexapod_cosim.controller.plane import Array, Mask, Plane, across, along, clamp, square
 from hexapod_cosim.models import LEG_NAMES, ReachError, Robot, RobotError
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Plane = NDArray[np.complex128]  # points or directions x + i y
-
-LEGS = len(LEG_NAMES)
 AXES = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 1.0, 0.0))
 AXIS_TOLERANCE = 1e-9  # 1    on the components of an axis
 FLAG_TOLERANCE = 1e-9  # rad or 1    round-off at the edge of the reach is not "unreachable"
@@ -36,163 +23,204 @@ FOLDED_COSINE = -1.0 + 1e-12  # 1    least cos(gamma): a folded leg of equal lin
 RADIUS_FLOOR = 1e-9  # m2    floor of the squared distance from the coxa axis
 
 
-def _check_axes(robot: Robot) -> None:
-    for leg in robot.legs:
-        for joint, (link, axis) in enumerate(zip(leg.links, AXES, strict=True)):
-            if np.abs(np.subtract(link.axis, axis)).max() > AXIS_TOLERANCE:
-                raise RobotError(
-                    "no closed-form inverse kinematics for this joint axis",
-                    got=tuple(link.axis),
-                    expected=f"{axis}",
-                    fix="turn the link's frame so that coxa, femur and tibia turn about +z, -y and +y",
-                    where=f"leg {leg.name}, joint {joint + 1}",
-                )
+class Feet(NamedTuple):
+    """Centres of the feet and their velocities, (6,) each."""
+
+    plane: Plane  # m    x + i y
+    height: Array  # m    z
+    velocity: Plane  # m/s    of x + i y
+    rise: Array  # m/s    of z
 
 
-@dataclass(frozen=True)
-class Feet:
-    """Feet and how they move, (n, 6) each; rows are steps."""
+class Pose(NamedTuple):
+    """The legs, each in its own vertical plane; torso frame."""
 
-    plane: Plane  # m    centres, x + i y
-    height: Array  # m    and z
-    velocity: Plane  # m/s
-    rise: Array  # m/s
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Legs in their planes, torso frame, (n, 6) each."""
-
-    point: Plane  # m    from the coxa axis to the foot, x + i y
-    heading: Plane  # 1    e^(i psi), the leg's outward direction
-    foot: Plane  # m    from the femur joint to the foot, u + i w
-    femur: Plane  # 1    e^(i A)
-    tibia: Plane  # 1    e^(i B)
-    angles: Array  # rad    (n, 6, 3)
-    lost: Mask  # the foot is out of reach: these are the nearest angles
-
-    def rows(self, chosen: slice) -> Pose:
-        """Some of the steps."""
-        return Pose(*(getattr(self, item.name)[chosen] for item in fields(self)))
+    point: Plane  # m    (6,) from the coxa axis to the foot, x + i y
+    heading: Plane  # 1    (6,) e^(i psi), the outward direction of the leg
+    foot: Plane  # m    (6,) from the femur joint to the foot, u + i w
+    femur: Plane  # 1    (6,) e^(i A)
+    tibia: Plane  # 1    (6,) e^(i B)
+    angle: Array  # rad    (6, 3) without joint limits
+    lost: Mask  # (6,) the foot is out of reach: these are the nearest angles
 
 
-@dataclass(frozen=True)
-class Joints:
-    """What servos can be told, (n, 6, 3) each."""
+class Joints(NamedTuple):
+    """What the servos can be told."""
 
-    angle: Array  # rad
-    speed: Array  # rad/s
-    unreachable: Mask  # (n, 6) legs whose angles do not put the foot on its target
-
-
-def rates(values: Any, period: float) -> Any:
-    """Differences over time of rows a period [s] apart, one-sided at the ends; a single row has
-    none.
-    """
-    return np.gradient(values, period, axis=0) if len(values) > 1 else np.zeros_like(values)
+    angle: Array  # rad    (6, 3)
+    speed: Array  # rad/s    (6, 3)
+    unreachable: Mask  # (6,) legs whose angles do not put the foot on its target
 
 
 class LegSolver:
-    """Forward and inverse kinematics of a robot's legs in the torso frame. Raises RobotError on
-    another axis pattern.
+    """Forward and inverse kinematics of a robot's legs.
+
+    Raises RobotError when the joint axes have another pattern.
     """
 
     def __init__(self, robot: Robot) -> None:
         _check_axes(robot)
-        tip = np.array(
-            [
-                [(link.length, link.offset_y, link.offset_z) for link in leg.links]
-                for leg in robot.legs
-            ]
-        )
-        self.hip = np.ascontiguousarray(
-            np.array([leg.hip_position for leg in robot.legs]).T
-        )  # m    (3, 6) torso frame
-        self.hip_yaw = np.array([leg.hip_yaw for leg in robot.legs])  # rad    (6,)
+        legs = robot.legs
+        tip = np.array([[(k.length, k.offset_y, k.offset_z) for k in leg.links] for leg in legs])
+        self.hip = np.array([leg.hip_position for leg in legs]).T.copy()  # m    (3, 6) torso frame
+        self.place = self.hip[0] + 1j * self.hip[1]  # m    (6,) coxa axes, torso frame
+        self.hip_yaw = np.array([leg.hip_yaw for leg in legs])  # rad    (6,)
+        self.upright = np.exp(-1j * self.hip_yaw)  # 1    (6,)
         self.coxa_length, self.coxa_height = tip[:, 0, 0].copy(), tip[:, 0, 2].copy()  # m    (6,)
-        self.offset_y = tip[:, :, 1].sum(axis=1)  # m    (6,)  Y
-        self.femur, self.tibia = (
-            np.hypot(tip[:, j, 0], tip[:, j, 2]) for j in (1, 2)
-        )  # m    (6,)  a, b
-        self.femur_tilt, self.tibia_tilt = (
-            np.arctan2(tip[:, j, 2], tip[:, j, 0]) for j in (1, 2)
-        )  # rad    (6,)
-        self.angle_min = np.array(
-            [[link.angle_min for link in leg.links] for leg in robot.legs]
-        )  # rad    (6, 3)
-        self.angle_max = np.array(
-            [[link.angle_max for link in leg.links] for leg in robot.legs]
-        )  # rad    (6, 3)
+        self.offset_y = tip[:, :, 1].sum(axis=1)  # m    (6,) Y
+        self.femur = np.hypot(tip[:, 1, 0], tip[:, 1, 2])  # m    (6,) a
+        self.tibia = np.hypot(tip[:, 2, 0], tip[:, 2, 2])  # m    (6,) b
+        self.femur_tilt = np.arctan2(tip[:, 1, 2], tip[:, 1, 0])  # rad    (6,)
+        self.tibia_tilt = np.arctan2(tip[:, 2, 2], tip[:, 2, 0])  # rad    (6,)
+        self.femur_zero = np.exp(-1j * self.femur_tilt)  # 1    (6,)
+        self.tibia_zero = np.exp(-1j * self.tibia_tilt)  # 1    (6,)
+        self.angle_min = np.array([[k.angle_min for k in leg.links] for leg in legs])  # rad
+        self.angle_max = np.array([[k.angle_max for k in leg.links] for leg in legs])  # rad
+        self.stance = robot.stance  # rad    (6, 3)
+        self.stance_pitch = robot.stance[:, 2] - robot.stance[:, 1]  # rad    (6,)
         self.speed_max = robot.servo.speed_max  # rad/s
-        self.radius, self._stance_pitch = (
-            robot.foot.radius,
-            robot.stance[:, 2] - robot.stance[:, 1],
-        )  # m, rad
-        self.place = self.hip[0] + 1j * self.hip[1]  # m    (6,) of the coxa axes, torso frame
-        self._upright, self._femur_zero = (
-            np.exp(-1j * tilt) for tilt in (self.hip_yaw, self.femur_tilt)
-        )
+        self.radius = robot.foot.radius  # m
 
     def forward(self, angle: Array) -> Array:
-        """(..., 6, 3) feet's centres in the torso frame [m] at joint angles (..., 6, 3) [rad]."""
-        x, z = self._plane(angle)[:2]
-        heading = self.hip_yaw + angle[..., 0]
-        c, s = np.cos(heading), np.sin(heading)
-        foot: Array = (
-            np.stack([c * x - s * self.offset_y, s * x + c * self.offset_y, z], axis=-1)
-            + self.hip.T
-        )
-        return foot
+        """The centres of the feet at joint angles (C11).
 
-    def rolling(self, angle: Array) -> Array:
-        """(..., 6) m    how far the round feet have rolled outwards since the stance, R (q_3 -
-        q_2 less that of the stance)
+        Args:
+            angle: (..., 6, 3) joint angles [rad].
+
+        Returns:
+            (..., 6, 3) positions in the torso frame [m].
         """
-        return np.asarray(self.radius * (angle[..., 2] - angle[..., 1] - self._stance_pitch))
-
-    def _plane(self, angle: Array) -> tuple[Array, Array, Array, Array]:
-        """x, z of the foot in the coxa frame [m] and the angles A, B [rad], (..., 6) each."""
         a = angle[..., 1] + self.femur_tilt
         b = angle[..., 1] - angle[..., 2] + self.tibia_tilt
         x = self.coxa_length + self.femur * np.cos(a) + self.tibia * np.cos(b)
         z = self.coxa_height + self.femur * np.sin(a) + self.tibia * np.sin(b)
-        return x, z, a, b
-
-    def jacobian(self, angle: Array) -> Array:
-        """(6, 3, 3) foot velocity in the torso frame per joint speed [m/rad]; row: axis, column:
-        joint.
-        """
-        x, z, _, b = self._plane(angle)
         heading = self.hip_yaw + angle[..., 0]
         c, s = np.cos(heading), np.sin(heading)
-        jacobian = np.zeros((LEGS, 3, 3))
+        forward, aside = c * x - s * self.offset_y, s * x + c * self.offset_y
+        return np.asarray(np.stack([forward, aside, z], axis=-1) + self.hip.T)
+
+    def rolling(self, angle: Array) -> Array:
+        """How far the round feet have rolled outwards since the stance (C9), (6,) [m]."""
+        return np.asarray(self.radius * (angle[..., 2] - angle[..., 1] - self.stance_pitch))
+
+    def pose(self, plane: Plane, height: Array) -> Pose:
+        """Inverse kinematics without joint limits (C12): every target gives a pose.
+
+        Args:
+            plane, height: (6,) centres of the feet, x + i y and z, torso frame [m].
+        """
+        a, b, side = self.femur, self.tibia, self.offset_y
+        point = plane - self.place
+        # rho^2 = x^2 + y^2 - Y^2;  e^(i psi) = (x + i y)/(rho + i Y)
+        distance2 = square(point) - side * side
+        rho = np.sqrt(np.maximum(distance2, RADIUS_FLOOR))
+        heading = point / (rho + 1j * side)
+        foot = rho - self.coxa_length + 1j * (height - self.hip[2] - self.coxa_height)
+        # cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a e^(i gamma))
+        wanted = (square(foot) - a * a - b * b) / (2.0 * a * b)
+        cosine = clamp(wanted, FOLDED_COSINE, 1.0)
+        knee = cosine + 1j * np.sqrt(1.0 - cosine * cosine)
+        tibia = foot / (b + a * knee)
+        femur = tibia * knee
+        angle = np.empty((*cosine.shape, 3))
+        coxa, thigh = heading * self.upright, femur * self.femur_zero
+        angle[..., 0] = np.arctan2(coxa.imag, coxa.real)
+        angle[..., 1] = np.arctan2(thigh.imag, thigh.real)
+        angle[..., 2] = np.arccos(cosine) - self.femur_tilt + self.tibia_tilt
+        lost = ~((distance2 >= RADIUS_FLOOR) & (np.abs(wanted - cosine) <= FLAG_TOLERANCE))
+        return Pose(point, heading, foot, femur, tibia, angle, lost)
+
+    def speeds(self, pose: Pose, velocity: Plane | float, rise: Array | float) -> Array:
+        """Joint speeds of feet that move with given velocities (C13).
+
+        Args:
+            velocity, rise: (6,) velocities of x + i y and of z, torso frame [m/s].
+
+        Returns:
+            (6, 3) joint speeds without limits [rad/s].
+        """
+        v = velocity * pose.heading.conj()
+        turn = v.imag / (pose.foot.real + self.coxa_length)
+        left = v.real + self.offset_y * turn + 1j * rise
+        sine = across(pose.tibia, pose.femur)
+        lever = -self.femur * np.maximum(sine, SINGULAR_SINE)
+        speed = np.empty((*turn.shape, 3))
+        speed[..., 0] = turn
+        speed[..., 1] = along(left, pose.tibia) / lever
+        speed[..., 2] = along(left, pose.foot) / (lever * self.tibia)
+        return speed
+
+    def solve(self, pose: Pose, velocity: Plane, rise: Array) -> Joints:
+        """Angles within the joints' limits and speeds that servos can reach.
+
+        A joint that is held by its angle limit has no speed. Arguments are those of speeds().
+        """
+        angle = clamp(pose.angle, self.angle_min, self.angle_max)
+        held = ~(np.abs(pose.angle - angle) <= FLAG_TOLERANCE)
+        speed = clamp(self.speeds(pose, velocity, rise), -self.speed_max, self.speed_max)
+        return Joints(angle, np.where(held, 0.0, speed), pose.lost | held.any(axis=-1))
+
+    def accelerations(
+        self, neighbour: Pose | None, ahead: float, angle: Array, speed: Array
+    ) -> Array:
+        """Joint accelerations that lead to the angles of a neighbouring step (C14).
+
+        A joint that its limits hold, of angle or of speed, has none, and none has more than
+        reverses the largest speed within that time.
+
+        Args:
+            neighbour: the pose of the neighbouring step; None: no accelerations.
+            ahead: time from this step to the neighbour [s], negative when it lies before.
+            angle, speed: (6, 3) joints at this step [rad, rad/s].
+
+        Returns:
+            (6, 3) accelerations [rad/s2].
+        """
+        if neighbour is None:
+            return np.zeros_like(angle)
+        most = 2.0 * self.speed_max / abs(ahead)
+        held = (angle <= self.angle_min) | (angle >= self.angle_max)
+        held |= np.abs(speed) >= self.speed_max
+        way = clamp(neighbour.angle, self.angle_min, self.angle_max) - angle - ahead * speed
+        return np.where(held, 0.0, clamp(2.0 * way / (ahead * ahead), -most, most))
+
+    # what the design and the static checks use; the running controller does not
+
+    def jacobian(self, angle: Array) -> Array:
+        """(6, 3, 3) velocity of the foot's centre, torso axes, per joint speed [m/rad].
+
+        Rows are axes, columns joints. angle: (6, 3) [rad].
+        """
+        a = angle[..., 1] + self.femur_tilt
+        b = angle[..., 1] - angle[..., 2] + self.tibia_tilt
+        x = self.coxa_length + self.femur * np.cos(a) + self.tibia * np.cos(b)
+        z = self.coxa_height + self.femur * np.sin(a) + self.tibia * np.sin(b)
+        heading = self.hip_yaw + angle[..., 0]
+        c, s = np.cos(heading), np.sin(heading)
+        jacobian = np.zeros((*angle.shape, 3))
         jacobian[:, 0, 0] = -s * x - c * self.offset_y
         jacobian[:, 1, 0] = c * x - s * self.offset_y
         for joint, radial, rise in (
             (1, self.coxa_height - z, x - self.coxa_length),
             (2, self.tibia * np.sin(b), -self.tibia * np.cos(b)),
         ):
-            jacobian[:, 0, joint], jacobian[:, 1, joint], jacobian[:, 2, joint] = (
-                c * radial,
-                s * radial,
-                rise,
-            )
+            jacobian[:, 0, joint], jacobian[:, 1, joint] = c * radial, s * radial
+            jacobian[:, 2, joint] = rise
         return jacobian
 
     def inverse(self, foot: Array) -> Array:
-        """(6, 3) joint angles [rad] of feet (6, 3) [m] in the torso frame. Raises ReachError:
-        leg, target, reach.
+        """(6, 3) joint angles [rad] of feet (6, 3) in the torso frame [m].
+
+        Raises ReachError with leg, target and reach when a foot cannot get there.
         """
         points = np.asarray(foot, dtype=np.float64)
         wrong = ~np.isfinite(points).all(axis=1)
         if not wrong.any():
-            x, y, z = points.T[:, None]
-            joints = self.solve(
-                self.pose(x + 1j * y, z), np.zeros(1, dtype=np.complex128), np.zeros(1)
-            )
-            wrong = joints.unreachable[0]
+            pose = self.pose(points[:, 0] + 1j * points[:, 1], points[:, 2])
+            joints = self.solve(pose, np.zeros_like(pose.point), np.zeros_like(points[:, 2]))
+            wrong = joints.unreachable
             if not wrong.any():
-                return np.asarray(joints.angle[0])
+                return joints.angle
         leg = int(np.argmax(wrong))
         raise ReachError(
             "the foot cannot get there",
@@ -203,102 +231,25 @@ class LegSolver:
         )
 
     def _reach_text(self, leg: int) -> str:
-        near, far = abs(self.femur[leg] - self.tibia[leg]), self.femur[leg] + self.tibia[leg]
-        limits = ", ".join(
-            f"[{low:.3f}, {high:.3f}]"
-            for low, high in zip(self.angle_min[leg], self.angle_max[leg], strict=True)
-        )
+        near = abs(self.femur[leg] - self.tibia[leg])
+        far = self.femur[leg] + self.tibia[leg]
+        ranges = zip(self.angle_min[leg], self.angle_max[leg], strict=True)
+        limits = ", ".join(f"[{low:.3f}, {high:.3f}]" for low, high in ranges)
         hip = tuple(round(float(v), 4) for v in self.hip[:, leg])
         return (
-            f"a point {near:.4f} to {far:.4f} m from the femur joint, which circles the hip {hip} m "
-            f"at {self.coxa_length[leg]:.4f} m, with joints within {limits} rad"
+            f"a point {near:.4f} to {far:.4f} m from the femur joint, which circles the hip {hip} "
+            f"m at {self.coxa_length[leg]:.4f} m, with joints within {limits} rad"
         )
 
-    def pose(self, plane: Plane, height: Array) -> Pose:
-        """Inverse kinematics without joint limits: whatever comes in, something comes out. Feet
-        (n, 6) x + i y and z, torso frame [m].
-        """
-        a, b, side = self.femur, self.tibia, self.offset_y
-        point = plane - self.place
-        # rho^2 = x^2 + y^2 - Y^2: the foot's distance along the coxa's x axis;  e^i psi = (x + i y)
-        # / (rho + i Y)
-        square = point.real**2 + point.imag**2 - side * side
-        rho = np.sqrt(np.maximum(square, RADIUS_FLOOR))
-        heading = point / (rho + 1j * side)
-        foot = rho - self.coxa_length + 1j * (height - self.hip[2] - self.coxa_height)
-        # u + i w = e^i B (b + a e^i gamma), so cos gamma = (u^2 + w^2 - a^2 - b^2) / (2 a b)
-        wanted = (foot.real**2 + foot.imag**2 - a * a - b * b) / (2.0 * a * b)
-        cosine = np.minimum(np.maximum(wanted, FOLDED_COSINE), 1.0)
-        knee = cosine + 1j * np.sqrt(1.0 - cosine * cosine)
-        tibia = foot / (b + a * knee)
-        femur = tibia * knee
-        angles = np.stack(
-            [
-                np.angle(heading * self._upright),
-                np.angle(femur * self._femur_zero),
-                np.arccos(cosine) - self.femur_tilt + self.tibia_tilt,
-            ],
-            axis=-1,
-        )
-        return Pose(
-            point,
-            heading,
-            foot,
-            femur,
-            tibia,
-            angles,
-            ~((square >= RADIUS_FLOOR) & (np.abs(wanted - cosine) <= FLAG_TOLERANCE)),
-        )
 
-    def speeds(self, pose: Pose, velocity: Plane | Array, rise: Array) -> Array:
-        """(n, 6, 3) joint speeds [rad/s] of feet that move so, (n, 6) each or what broadcasts to
-        it, torso frame [m/s].
-        """
-        # velocity in the coxa frame v e^-i psi: dq_1 = v_y / rho; then u + i rise, u = v_x + Y
-        # dq_1, is left for the leg's plane
-        v = velocity * pose.heading.conj()
-        turn = v.imag / (pose.foot.real + self.coxa_length)
-        left = v.real + self.offset_y * turn - 1j * rise
-        # dq_2 = -Re((u + i rise)^* e^i B) / (a sin gamma);  dq_3 = -Re((u + i rise)^* foot) / (a b
-        # sin gamma)
-        lever = -self.femur * np.maximum((pose.femur * pose.tibia.conj()).imag, SINGULAR_SINE)
-        return np.stack(
-            [
-                turn,
-                (left * pose.tibia).real / lever,
-                (left * pose.foot).real / (lever * self.tibia),
-            ],
-            axis=-1,
-        )
-
-    def solve(self, pose: Pose, velocity: Plane, rise: Array) -> Joints:
-        """Angles within the joints' limits, and speeds that servos can reach: a joint held by
-        its limit has none.
-        """
-        angle = np.minimum(np.maximum(pose.angles, self.angle_min), self.angle_max)
-        held = ~(np.abs(pose.angles - angle) <= FLAG_TOLERANCE)
-        speed = self.speeds(pose, velocity, rise)
-        np.minimum(np.maximum(speed, -self.speed_max, out=speed), self.speed_max, out=speed)
-        speed[held] = 0.0
-        return Joints(angle, speed, pose.lost | held.any(axis=-1))
-
-    def accelerations(self, joints: Joints, period: float) -> Array:
-        """(n, 6, 3) [rad/s2] that lead the joints from each row to the angles of the next.
-
-        Rows are a period [s] apart; the last row has those that led there. A joint that its limits
-        hold, of angle or of speed, has none; no joint has more than turns its speed round within a
-        period.
-        """
-        angle, speed, found = joints.angle, joints.speed, np.zeros_like(joints.angle)
-        if len(angle) > 1:
-            found[:-1] = 2.0 * (angle[1:] - angle[:-1] - period * speed[:-1]) / period**2
-            found[-1] = 2.0 * (angle[-2] - angle[-1] + period * speed[-1]) / period**2
-        most = 2.0 * self.speed_max / period
-        np.minimum(np.maximum(found, -most, out=found), most, out=found)
-        held = (
-            (angle <= self.angle_min)
-            | (angle >= self.angle_max)
-            | (np.abs(speed) >= self.speed_max)
-        )
-        found[held] = 0.0
-        return found
+def _check_axes(robot: Robot) -> None:
+    for leg in robot.legs:
+        for joint, (link, axis) in enumerate(zip(leg.links, AXES, strict=True)):
+            if np.abs(np.subtract(link.axis, axis)).max() > AXIS_TOLERANCE:
+                raise RobotError(
+                    "no closed-form inverse kinematics for this joint axis",
+                    got=tuple(link.axis),
+                    expected=f"{axis}",
+                    fix="turn the link's frame so that coxa, femur and tibia turn about +z, -y, +y",
+                    where=f"leg {leg.name}, joint {joint + 1}",
+                )

@@ -1,71 +1,76 @@
-"""How high above the ends of their paths feet meet the ground.
+"""How high above the ends of their paths the feet meet the ground (C35). C: landing.c.
 
 On level ground under a torso that lies as planned that is 0. A torso that sags or leans, or feet
-that sink in, let all feet meet the ground early, step after step; a bump lets one, once. So a foot
-is expected to meet the ground at the least height at which the others have met it of late, or which
-they have reached in their swing without meeting it; or as high as it did itself a step before.
+that sink in, let all feet meet the ground early, step after step; a bump lets one foot meet it
+early, once. So a foot is expected to meet the ground at the least height at which the other feet
+have met it last, or which they have reached in their swing without meeting it; or as high as it did
+itself a step before.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.controller.kinematics import LEGS, Array, Mask
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Mask
 from hexapod_cosim.controller.touchdown import EARLY
 
 
-class Landings:
-    """Of all feet. `met`, `before`: (6,) height of each foot's path over its end when it last came
-    down, and the time before that [m]; inf and 0 until it first has.
+def _least_of_others(values: Array) -> Array:
+    """(6,) the least of the other five values; 0 where that is infinite."""
+    first, second = np.sort(values)[:2]
+    least = np.where(np.arange(LEGS) == values.argmin(), second, first)
+    return np.where(np.isfinite(least), least, 0.0)
+
+
+class Landings(Stateful):
+    """The last landings of all feet.
+
+    Attributes, (6,) each:
+        met: height of the path over its end when the foot last came down [m]; inf until it has.
+        before: the same at the landing before that [m]; 0 until there was one.
+        flew: the foot has been off the ground in a swing since.
     """
+
+    STATE = ("met", "before", "flew")
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """No foot has come down yet."""
-        self.restore((np.full(LEGS, math.inf), np.zeros(LEGS), np.zeros(LEGS, dtype=np.bool_)))
-
-    def save(self) -> tuple[Any, ...]:
-        """Returns the state that restore() takes."""
-        return self.met, self.before, self._flew
-
-    def restore(self, state: tuple[Any, ...]) -> None:
-        """Restores a state returned by save()."""
-        self.met, self.before, self._flew = state
+        self.met, self.before = np.full(LEGS, math.inf), np.zeros(LEGS)
+        self.flew: Mask = np.zeros(LEGS, dtype=np.bool_)
 
     def look(self, touching: Mask, height: Array, swinging: Mask) -> None:
-        """One period on; (6,) each: feet that report a force, paths over their ends [m],
-        swinging legs.
+        """One period on.
+
+        Args:
+            touching: (6,) feet that report a force.
+            height: (6,) of the paths over their ends [m].
+            swinging: (6,) legs planned in the air.
         """
-        landed = touching & self._flew
+        landed = touching & self.flew
         if landed.any():
-            self.before = np.where(landed & (self.met < math.inf), self.met, self.before)
-            self.met = np.where(landed, np.where(swinging, np.maximum(height, 0.0), 0.0), self.met)
-        self._flew = (self._flew | swinging) & ~touching
+            self.before = np.where(landed & np.isfinite(self.met), self.met, self.before)
+            now = np.where(swinging, np.maximum(height, 0.0), 0.0)
+            self.met = np.where(landed, now, self.met)
+        self.flew = (self.flew | swinging) & ~touching
 
     def expected(self, touching: Mask, height: Array, swinging: Mask) -> Array:
-        """(6,) m    where each foot meets the ground without any bump; 0 while nothing tells"""
-        return np.asarray(
-            np.maximum(
-                _least_of_others(np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)),
-                self.before,
-            )
-        )
+        """Where each foot meets the ground without any bump (C35), (6,) [m].
+
+        It is 0 while nothing tells. Arguments are those of look().
+        """
+        told = np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)
+        return np.maximum(_least_of_others(told), self.before)
 
     def early(self, expected: Array, height: Array) -> Mask:
-        """(6,) feet that met the ground well above the height expected and have yet to come down to
-        where feet met it before.
+        """(6,) feet that met the ground early and are still above where feet met it before (C36).
+
+        expected: (6,) from expected() [m]; height: (6,) of the paths over their ends [m].
         """
         settled = np.maximum(_least_of_others(self.met), self.before)
-        return np.asarray((self.met > expected + EARLY) & (height > settled + EARLY))
-
-
-def _least_of_others(values: Array) -> Array:
-    """(6,) the least of the other five; 0 where that is infinite."""
-    first, second = np.sort(values)[:2]
-    least = np.where(np.arange(LEGS) == values.argmin(), second, first)
-    return np.where(least < math.inf, least, 0.0)
+        return (self.met > expected + EARLY) & (height > settled + EARLY)

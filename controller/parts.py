@@ -1,5 +1,6 @@
-"""Which parts of the compliant control are at work: each can be switched off by itself, so that
-its share of the benefit is measured.
+"""Which parts of the compliant control are at work.
+
+Each can be switched off by itself, so that its share of the benefit can be measured.
 """
 
 from __future__ import annotations

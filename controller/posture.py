@@ -1,52 +1,74 @@
-"""Height, roll and pitch of the torso over its feet: from the walking frame K to the torso frame T.
+"""Height, roll and pitch of the torso over its feet (C10). C: posture.c.
 
-p_T = R_TK (p_K - height e_z)        v_T = R_TK (v_K - rate e_z) - w_T x p_T
+The walking frame K is the torso frame of a robot at its nominal height and level posture; the torso
+frame T lies in it at a height and is turned by R_KT, roll about x first and then pitch about y.
 """
 
 from __future__ import annotations
 
+import math
+from typing import Any, NamedTuple
+
 import numpy as np
 
-from hexapod_cosim.controller.kinematics import Array, Feet, Plane
+from hexapod_cosim.controller.kinematics import Feet
+from hexapod_cosim.controller.plane import Array
 
 
-def in_torso_frame(feet: Feet, value: Array, rate: Array) -> Feet:
-    """Feet of the walking frame under a torso at (n, 3) height [m], roll, pitch [rad], with
-    their rates per second.
-    """
-    back = rotations(value[:, 1], value[:, 2]).transpose(0, 2, 1)
-    plane, height = turned(feet.plane, feet.height - value[:, :1], back)
-    velocity, rise = turned(feet.velocity, feet.rise - rate[:, :1], back)
-    x, y, z = _spins(value[:, 1], rate[:, 1], rate[:, 2])[..., None]
-    # w x p
-    return Feet(
-        plane,
-        height,
-        velocity - (y - 1j * x) * height - 1j * z * plane,
-        rise - (x * plane.imag - y * plane.real),
-    )
+class Posture(NamedTuple):
+    """The torso in the walking frame."""
+
+    level: bool  # height, roll, pitch and their rates are all 0: nothing to turn
+    height: float  # m
+    rotation: Array  # 1    (3, 3) R_KT
+    rate: float  # m/s    of the height
+    spin: tuple[float, float, float]  # rad/s    w_KT, torso axes
+
+    @classmethod
+    def of(cls, value: Array, rate: Array) -> Posture:
+        """The posture of height, roll and pitch (3,) [m, rad, rad] and their rates per second."""
+        if not (value.any() or rate.any()):
+            return LEVEL
+        height, roll, pitch = value.tolist()
+        height_rate, roll_rate, pitch_rate = rate.tolist()
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+        rotation = np.array(
+            [[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]],
+        )
+        spin = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
+        return cls(False, height, rotation, height_rate, spin)
+
+    def turn(self, plane: Any, z: Any) -> tuple[Any, Any]:
+        """R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
+        return (plane, z) if self.level else _product(self.rotation, plane, z)
+
+    def turn_back(self, plane: Any, z: Any) -> tuple[Any, Any]:
+        """R_TK p of vectors p = (x + i y, z) of any shape: walking axes to torso axes."""
+        return (plane, z) if self.level else _product(self.rotation.T, plane, z)
+
+    def see_place(self, plane: Any, height: Any) -> tuple[Any, Any]:
+        """Points of the walking frame (x + i y, z) [m] in the torso frame."""
+        # p_T = R_TK (p_K - height e_z)
+        return self.turn_back(plane, height - self.height)
+
+    def see(self, feet: Feet) -> Feet:
+        """Feet of the walking frame, places and velocities, in the torso frame."""
+        if self.level:
+            return feet
+        x, y, z = self.spin
+        plane, height = self.see_place(feet.plane, feet.height)
+        # v_T = R_TK (v_K - rate e_z) - w_T x p_T
+        velocity, rise = self.turn_back(feet.velocity, feet.rise - self.rate)
+        velocity = velocity - ((y - 1j * x) * height + 1j * z * plane)
+        rise = rise - (x * plane.imag - y * plane.real)
+        return Feet(plane, height, velocity, rise)
 
 
-def rotations(roll: Array, pitch: Array) -> Array:
-    """(n, 3, 3) R_KT, roll about x first, then pitch about y; both (n,) [rad]."""
-    cr, sr, cp, sp, zero = (
-        np.cos(roll),
-        np.sin(roll),
-        np.cos(pitch),
-        np.sin(pitch),
-        np.zeros_like(roll),
-    )
-    return np.array([[cp, sp * sr, sp * cr], [zero, cr, -sr], [-sp, cp * sr, cp * cr]]).transpose(
-        2, 0, 1
-    )
+LEVEL = Posture(True, 0.0, np.eye(3), 0.0, (0.0, 0.0, 0.0))
 
 
-def turned(plane: Plane, z: Array, rotation: Array) -> tuple[Plane, Array]:
-    """Vectors (..., n, m), x + i y and z, turned by (n, 3, 3); or (m,) by (3, 3)."""
-    vectors = np.stack([plane.real, plane.imag, z], axis=-1) @ rotation.swapaxes(-1, -2)
-    return vectors[..., 0] + 1j * vectors[..., 1], vectors[..., 2]
-
-
-def _spins(roll: Array, roll_rate: Array, pitch_rate: Array) -> Array:
-    """(3, n) the torso's angular velocity in its own axes [rad/s]."""
-    return np.stack([roll_rate, pitch_rate * np.cos(roll), -pitch_rate * np.sin(roll)])
+def _product(rotation: Array, plane: Any, z: Any) -> tuple[Any, Any]:
+    x, y = plane.real, plane.imag
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    turned = (xx * x + xy * y + xz * z) + 1j * (yx * x + yy * y + yz * z)
+    return turned, zx * x + zy * y + zz * z

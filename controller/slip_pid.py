@@ -1,24 +1,11 @@
-"""The law against slip: one discrete PID per foot and direction, from tangential force to the force
-the leg's servos are relieved of.
+"""The law against slip: from tangential forces on the feet to forces that the servos give way to.
 
-A foot that the ground pushes by f while the leg holds it is being squeezed against its neighbours
-or dragged. Giving way takes the load off the contact, and with it the creep f/(mu f_n k_t). Forces
-that move the body are left alone: of the tangential forces d_i beyond the plan, (n_i/N) (D + i w
-(p_i - c)) are those of a body that is pushed and turned, n_i the normal forces, N their sum, p = x
-+ i y,
-
-    D = sum d_i      c = sum n_i p_i / N      w = sum Im((p_i - c)^* d_i) / sum (n_i/N) |p_i - c|^2
-
-so that what is left has neither a sum nor a moment about the vertical: e_i = d_i - (n_i/N)
-(D + i w (p_i - c)) is legs squeezing against each other. How the answer reaches the joints is said
-in compliance.py.
-
-Discretised by Tustin's rule at the controller's period h:
-
-    e' = (h (e + e-) + (2 T_f - h) e'-) / (2 T_f + h)          force filter
-    i  = i- + k_i h/2 (e' + e'-)                               integral
-    d  = (2 k_d (e' - e'-) + (2 T_d - h) d-) / (2 T_d + h)     filtered derivative
-    u  = k_p e' + i + d
+C: slip_pid.c. A foot that the ground pushes by f while the leg holds it is being squeezed against
+its neighbours, or dragged. Giving way takes the load off the contact, and with it the creep
+f/(mu f_n k_t). Forces that move the body are left alone: of the tangential forces beyond the plan
+only the squeeze (C24) is answered, which has neither a sum nor a moment about the vertical. The
+answer is that of a PID, the same for every foot and direction (C25), discretised by Tustin's rule.
+How it reaches the joints is (C28).
 """
 
 from __future__ import annotations
@@ -26,15 +13,23 @@ from __future__ import annotations
 import numpy as np
 
 from hexapod_cosim.controller.gains import SlipGains
-from hexapod_cosim.controller.kinematics import Array, Plane
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Plane
 
 LOAD_FLOOR = 1e-6  # N    below it no foot carries anything
 LEAST_SPREAD = 1e-4  # m2    of the feet about their centre: less takes no moment about the vertical
 
 
 def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """(n,) e [N] of tangential forces x + i y on feet that carry normal forces [N] at places
-    [m].
+    """Tangential forces less what pushes and turns the body as one, shared by load (C24).
+
+    Args:
+        push: (n,) tangential forces x + i y beyond the planned ones [N].
+        normal: (n,) normal forces on the feet [N].
+        feet: (n,) places of the feet, x + i y [m].
+
+    Returns:
+        (n,) e [N].
     """
     total = normal.sum()
     if total <= LOAD_FLOOR:
@@ -47,11 +42,37 @@ def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
     return np.asarray(push - (push.sum() * share + 1j * turn * carried))
 
 
-def system(gains: SlipGains, *, period: float) -> Array:
-    """(5, 5) from the row e-, e'-, i-, d-, e to the row u, e, e', i, d: acts from the right."""
-    h, tf, td = period, gains.filter_time, gains.derivative_time
-    last, old, integral, slope, force = np.eye(5)
-    smooth = (h * (force + last) + (2.0 * tf - h) * old) / (2.0 * tf + h)
-    integral = integral + 0.5 * h * gains.ki * (smooth + old)
-    slope = (2.0 * gains.kd * (smooth - old) + (2.0 * td - h) * slope) / (2.0 * td + h)
-    return np.column_stack([gains.kp * smooth + integral + slope, force, smooth, integral, slope])
+class SlipPid(Stateful):
+    """The PIDs of all feet, at rest at first.
+
+    Forces are complex numbers x + i y: the gains are real, so that both directions are answered
+    alike and do not mix.
+    """
+
+    STATE = ("force", "smooth", "integral", "slope")
+
+    def __init__(self, gains: SlipGains, *, period: float) -> None:
+        self.gains, self.period = gains, period
+        self.reset()
+
+    def reset(self) -> None:
+        """All at rest."""
+        self.force: Plane = np.zeros(LEGS, dtype=np.complex128)  # N    e of the last period
+        self.smooth = self.force  # N    e', filtered
+        self.integral = self.force  # N    i
+        self.slope = self.force  # N    d, filtered derivative
+
+    def step(self, force: Plane) -> Plane:
+        """The answers u of this period to forces e (C25), (6,) x + i y each [N]."""
+        h, gains, old = self.period, self.gains, self.smooth
+        tf, td = gains.filter_time, gains.derivative_time
+        # e' = (h (e + e-) + (2 T_f - h) e'-)/(2 T_f + h)
+        self.smooth = (h * (force + self.force) + (2.0 * tf - h) * old) / (2.0 * tf + h)
+        # i = i- + k_i h/2 (e' + e'-)
+        self.integral = self.integral + 0.5 * h * gains.ki * (self.smooth + old)
+        # d = (2 k_d (e' - e'-) + (2 T_d - h) d-)/(2 T_d + h)
+        change = 2.0 * gains.kd * (self.smooth - old)
+        self.slope = (change + (2.0 * td - h) * self.slope) / (2.0 * td + h)
+        self.force = force
+        # u = k_p e' + i + d
+        return gains.kp * self.smooth + self.integral + self.slope

@@ -1,24 +1,41 @@
-"""The virtual suspension: m z'' + b z' + k z = f per foot, f the normal force beyond the leg's
-share, z up towards the torso.
+"""The virtual suspension m z'' + b z' + k z = f of a foot (C26). C: suspension.c.
 
-The force is held over a period, so the discretisation by the matrix exponential is exact: x = (z,
-z'), x(k+1) = A x(k) + B f(k).
+f is the normal force beyond the share of the leg, z lifts the foot towards the torso. The force is
+held over a period, so that the discretisation by the matrix exponential is exact.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from hexapod_cosim.controller.gains import SuspensionGains
-from hexapod_cosim.controller.kinematics import Array
+from hexapod_cosim.controller.plane import Array
 
 
 def discretise(gains: SuspensionGains, *, period: float) -> tuple[Array, Array]:
-    """A (2, 2) and B (2,) of the suspension under a force held for a period [s]."""
-    from scipy.linalg import expm  # noqa: PLC0415  slow to import
+    """A (2, 2) and B (2,) of x(k+1) = A x(k) + B f(k), x = (z, z'), for a period [s] (C26).
 
-    system = np.zeros((3, 3))
-    system[0, 1] = 1.0
-    system[1] = np.array([-gains.stiffness, -gains.damping, 1.0]) / gains.mass
-    step = expm(system * period)
-    return step[:2, :2].copy(), step[:2, 2].copy()
+    The matrix exponential has a closed form. With sigma = b/2m, omega^2 = k/m and
+    mu^2 = sigma^2 - omega^2 it is
+
+        z(t)  = e^(-sigma t) ((cosh mu t + sigma sinh(mu t)/mu) z + sinh(mu t)/mu z')
+        z'(t) = e^(-sigma t) (-omega^2 sinh(mu t)/mu z + (cosh mu t - sigma sinh(mu t)/mu) z')
+    """
+    sigma, omega2 = 0.5 * gains.damping / gains.mass, gains.stiffness / gains.mass
+    mu2 = sigma * sigma - omega2
+    mu, decay = math.sqrt(abs(mu2)), math.exp(-sigma * period)
+    x = mu * period
+    # even = e^(-sigma t) cosh mu t    odd = e^(-sigma t) sinh(mu t)/mu
+    if mu2 < 0.0:
+        even, odd = decay * math.cos(x), decay * math.sin(x) / mu
+    elif x < 1.0:
+        even, odd = decay * math.cosh(x), decay * (math.sinh(x) / mu if x > 0.0 else period)
+    else:  # a strong damper: neither exponential may overflow
+        slow, fast = math.exp(-omega2 / (sigma + mu) * period), math.exp(-(mu + sigma) * period)
+        even, odd = 0.5 * (slow + fast), 0.5 * (slow - fast) / mu
+    a = np.array([[even + sigma * odd, odd], [-omega2 * odd, even - sigma * odd]])
+    # from rest, z approaches f/k as the deflection of a released spring leaves it
+    b = np.array([(1.0 - a[0, 0]) / gains.stiffness, odd / gains.mass])
+    return a, b

@@ -1,82 +1,70 @@
-"""Ground that is met too early or too late.
+"""Ground that is met too early or too late (C36). C: touchdown.c.
 
 A foot that meets the ground before its path ends is not pressed into it: it keeps the height at
-which it touched, through its stance. One that finds no ground where its path ends reaches down for
-it, at a fixed speed and not without limit. What either added to the path goes again in the next
+which it touched, through its stance. A foot that finds no ground where its path ends reaches down
+for it, at a fixed speed and down to a limit. What either has added to the path vanishes in the next
 swing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
-from hexapod_cosim.controller.kinematics import LEGS
+import numpy as np
 
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.plane import LEGS, Array, Mask
+
+EARLY = 0.002  # m    a foot that meets the ground with more of its way down to go has met it early
 REACH_SPEED = 0.08  # m/s    downwards
 REACH_LIMIT = 0.020  # m
 HOLD_LIMIT = 0.030  # m    upwards: as high as a swing of the robots goes
-GRACE = (
-    0.040  # s    after the planned touch-down, in which a foot may be late without anyone minding
-)
-RETURN_TIME = 0.060  # s    in which an offset goes in the swing
-EARLY = 0.002  # m    a foot that meets the ground with more of its way down to go has met it early
+GRACE = 0.040  # s    after the planned touch-down, in which a foot may be late
+RETURN_TIME = 0.060  # s    time constant with which an offset vanishes in the swing
 NEGLIGIBLE = 1e-5  # m    an offset less than this is none
 
 
-class Touchdown:
-    """Offsets of all feet. `offset`: of each leg [m], up; `busy`: there is something to look
-    after.
+class Touchdown(Stateful):
+    """Offsets of all feet.
+
+    Attributes, (6,) each:
+        offset: by which the paths are raised [m].
+        late: for how long the ground has been missed [s].
     """
 
+    STATE = ("offset", "late")
+
     def __init__(self, *, period: float) -> None:
-        self._period, self._fade = period, math.exp(-period / RETURN_TIME)
-        self.offset: list[float]
+        self.period = period
         self.reset()
 
     def reset(self) -> None:
         """No offsets."""
-        self.restore(([0.0] * LEGS, [0.0] * LEGS))
+        self.offset, self.late = np.zeros((2, LEGS))
 
-    def save(self) -> tuple[Any, ...]:
-        """Returns the state that restore() takes."""
-        return self.offset, self._late
+    def busy(self) -> bool:
+        """Whether some foot has an offset or misses the ground."""
+        return bool(self.offset.any() or self.late.any())
 
-    def restore(self, state: tuple[Any, ...]) -> None:
-        """Restores a state returned by save()."""
-        self.offset, self._late = state
-        self.busy = any(self.offset) or any(self._late)
+    def _moved(self, touching: Mask, falling: Array, swinging: Mask) -> Array:
+        """(6,) the next offsets [m]. Arguments are those of step()."""
+        reached = np.maximum(self.offset - REACH_SPEED * self.period, -REACH_LIMIT)
+        held = np.minimum(self.offset + falling, HOLD_LIMIT)
+        faded = self.offset * math.exp(-self.period / RETURN_TIME)
+        faded = np.where(np.abs(self.offset) > NEGLIGIBLE, faded, 0.0)
+        in_swing = np.where(touching, np.where(falling > 0.0, held, self.offset), faded)
+        moved = np.where(swinging, in_swing, self.offset)
+        return np.where(self.late > GRACE, reached, moved)
 
-    def step(
-        self,
-        touching: Sequence[bool],
-        falling: Sequence[float],
-        swinging: Sequence[bool],
-        loaded: Sequence[bool],
-    ) -> list[float]:
-        """One period.
+    def step(self, touching: Mask, falling: Array, swinging: Mask, loaded: Mask) -> None:
+        """One period on (C36).
 
         Args:
-            touching: feet that report a force; falling: how far each path, well above its end,
-                comes down in this period [m];
-            swinging, loaded: planned in the air, planned to carry their whole share.
+            touching: (6,) feet that report a force.
+            falling: (6,) how far the path of a foot that met the ground early comes down in this
+                period [m], 0 of the others.
+            swinging: (6,) legs planned in the air.
+            loaded: (6,) legs planned to carry their whole share.
         """
-        misses = [loads and not touches for loads, touches in zip(loaded, touching, strict=True)]
-        late = [
-            waited + self._period if missing else 0.0
-            for waited, missing in zip(self._late, misses, strict=True)
-        ]
-        legs = zip(self.offset, late, touching, falling, swinging, strict=True)
-        self.restore(([self._move(*leg) for leg in legs], late))
-        return self.offset
-
-    def _move(self, offset: float, late: float, touches: bool, fall: float, swings: bool) -> float:
-        """One foot's next offset."""
-        if late > GRACE:
-            return max(offset - REACH_SPEED * self._period, -REACH_LIMIT)
-        if swings and touches and fall > 0.0:
-            return min(offset + fall, HOLD_LIMIT)
-        if swings and not touches:
-            return offset * self._fade if abs(offset) > NEGLIGIBLE else 0.0
-        return offset
+        self.late = np.where(loaded & ~touching, self.late + self.period, 0.0)
+        self.offset = self._moved(touching, falling, swinging)

@@ -91,7 +91,7 @@ def _period(plan: Scenario) -> float:
 
 def _walk(plans: Sequence[Scenario], workers: int | None, tell: Tell | None) -> list[Summary]:
     done: list[Summary] = []
-    with closing(run_batch(plans, workers=workers)) as runs:
+    with closing(run_batch(plans, workers=workers, compiled=True)) as runs:
         for run in runs:
             done.append(run)
             if tell is not None:

@@ -13,8 +13,7 @@ import numpy as np
 
 from hexapod_cosim.controller.design.loci import Response, response
 from hexapod_cosim.controller.gains import Requirements, SlipGains, SuspensionGains
-from hexapod_cosim.controller.kinematics import Array
-from hexapod_cosim.controller.suspension import discretise
+from hexapod_cosim.controller.plane import Array
 
 ROUNDING = 1e-9  # 1    of a period
 
@@ -46,10 +45,17 @@ def slip_response(gains: SlipGains, omega: Array, *, period: float) -> Response:
 
 
 def sampled_suspension(gains: SuspensionGains, *, period: float) -> control.StateSpace:
-    """The suspension as it runs, force to deflection: x+ = A x + B f and the new z is used at
-    once.
+    """The suspension as it runs, force to deflection: x+ = A x + B f and the new z is used at once.
+
+    The matrix exponential is scipy's, independently of suspension.discretise() and equal to it.
     """
-    a, b = discretise(gains, period=period)
+    from scipy.linalg import expm  # noqa: PLC0415  slow to import
+
+    system = np.zeros((3, 3))
+    system[0, 1] = 1.0
+    system[1] = np.array([-gains.stiffness, -gains.damping, 1.0]) / gains.mass
+    step = expm(system * period)
+    a, b = step[:2, :2].copy(), step[:2, 2].copy()
     return control.ss(a, b.reshape(2, 1), a[:1], b[:1].reshape(1, 1), period)
 
 

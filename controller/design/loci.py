@@ -26,7 +26,7 @@ from hexapod_cosim.controller.design.standing import (
     relieved,
     squeeze_matrix,
 )
-from hexapod_cosim.controller.kinematics import Array
+from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import Robot
 
 Response = NDArray[np.complex128]

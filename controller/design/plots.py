@@ -25,7 +25,7 @@ from hexapod_cosim.controller.design.loci import (
 from hexapod_cosim.controller.design.standing import StandingPlant, answers, relieved, weight_share
 from hexapod_cosim.controller.figure_style import DPI, PALETTE, SETTINGS, UNDATED, WIDTH
 from hexapod_cosim.controller.gains import Gains, GainsError
-from hexapod_cosim.controller.kinematics import Array
+from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.models import Robot
 
 DRAWN = 200  # frequencies

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.controller.compliance import LARGEST_LOAD
 from hexapod_cosim.controller.gains import TRIPOD_LEGS
-from hexapod_cosim.controller.kinematics import LEGS, Array, LegSolver, Mask
+from hexapod_cosim.controller.kinematics import LegSolver
+from hexapod_cosim.controller.plane import LEGS, Array, Mask
 from hexapod_cosim.controller.slip_pid import squeeze
 from hexapod_cosim.models import Robot
 

@@ -2,24 +2,21 @@
 
 #include <string.h>
 
-static const double load_floor = 1e-6; /* N  below it no foot carries anything */
-static const double sliding_drag = 0.55; /* 1  common tangential over normal force beyond the plan:
-                                            only a robot that slides has it */
+/* 1  common tangential over normal force beyond the plan: only a robot that slides has it */
+static const double sliding_drag = 0.55;
 static const double calm_cycles = 0.5; /* 1  gait cycles without it until feet are trusted again */
 static const double sliding_time = 0.04; /* s  longer than a foot skids when it touches down */
-static const double settled_share =
-    0.5; /* 1  of the weight: feet that carry less together have only just met the ground */
-static const double
-    joints_follow = 0.35,
-    joints_do_not = 0.45; /* 1  share of the time in which paths ask more speed than a servo has */
+/* 1  of the weight: feet that carry less together have only just met the ground */
+static const double settled_share = 0.5;
+/* 1  share of the time in which joints are asked for more speed than a servo has */
+static const double joints_follow = 0.35, joints_do_not = 0.45;
 static const double gripped = 0.99; /* 1  of its share: a leg with more carries it */
-static const double largest_load =
-    2.0; /* 1  in thirds of the weight: the design's margins hold up to it */
-static const double least_scale = 0.5,
-                    largest_scale =
-                        3.0; /* 1  measured over modelled weight that the support believes */
-static const double high_share =
-    0.25; /* 1  of the step height: a foot planned higher is certainly in the air */
+/* 1  in thirds of the weight: the design's margins hold up to it */
+static const double largest_load = 2.0;
+/* 1  measured over modelled weight that the support believes */
+static const double least_scale = 0.5, largest_scale = 3.0;
+/* 1  of the step height: a foot planned higher is certainly in the air */
+static const double high_share = 0.25;
 
 enum {
   HX_TRIPOD_LEGS = 3
@@ -42,7 +39,7 @@ void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianc
   model->weight = total_weight(definition);
   model->share = model->weight / HX_TRIPOD_LEGS;
   model->settled = settled_share * model->weight;
-  hx_watch_compile(model->weight, cycle, period, &model->watch);
+  hx_sensor_watch_compile(model->weight, cycle, period, &model->watch);
   hx_burden_compile(definition, &model->burden);
   model->softness = 1.0 / definition->servo.kp;
   model->high = high_share * definition->gait.step_height;
@@ -89,10 +86,9 @@ void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
   }
 }
 
-/* ----------------------------------------------------------------------------------------------
- * sensors */
+/* ----------------------------------------------------------------------------------- contacts */
 
-/* Feet whose sensors are not believed feel what is planned; all do once a tripod's are not. */
+/* feet whose sensors are not believed feel what is planned */
 static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     if (!laws->doubted[leg]) continue;
@@ -103,18 +99,17 @@ static void replace_forces(const hxPlan *plan, double force[HX_LEGS][3], hxCompl
   }
 }
 
-/* met: height at which feet meet the ground without any bump [m] */
-static void doubt(const hxComplianceModel *model, const hxPlan *plan, const double met[HX_LEGS],
-                  double force[HX_LEGS][3], hxCompliance *laws) {
-  hxExpected expected;
+/* Which sensors are believed (C34); all feet's are not once those of a tripod are not.
+ * met: heights at which the feet meet the ground without any bump [m]. */
+static void judge_sensors(const hxComplianceModel *model, const hxPlan *plan,
+                          const double met[HX_LEGS], double force[HX_LEGS][3], hxCompliance *laws) {
+  int high[HX_LEGS], doubted = 0;
   double total = 0.0;
-  int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    expected.standing[leg] = plan->standing[leg];
-    expected.high[leg] = plan->height[leg] > model->high + met[leg];
+    high[leg] = plan->height[leg] > model->high + met[leg];
     total += laws->touching[leg] ? force[leg][2] : 0.0;
   }
-  hx_watch_look(&model->watch, laws->touching, total, &expected, &laws->watch);
+  hx_sensor_watch_look(&model->watch, laws->touching, total, plan->standing, high, &laws->watch);
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted += laws->watch.left[leg] > 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->doubted[leg] = doubted >= HX_TRIPOD_LEGS || laws->watch.left[leg] > 0.0;
@@ -123,49 +118,46 @@ static void doubt(const hxComplianceModel *model, const hxPlan *plan, const doub
   if (doubted) replace_forces(plan, force, laws);
 }
 
+/* answers ground that is met early or late (C36) */
 static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
                         const double met[HX_LEGS], hxCompliance *laws) {
-  hxMeeting meeting[HX_LEGS];
+  double falling[HX_LEGS];
   int early[HX_LEGS];
   laws->slack = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const double falling = early[leg] ? plan->falling[leg] : 0.0;
-    meeting[leg] =
-        (hxMeeting){laws->touching[leg], falling, plan->swinging[leg], plan->standing[leg]};
-  }
-  hx_touchdown_step(model->period, meeting, &laws->touchdown);
+  for (int leg = 0; leg < HX_LEGS; ++leg) falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
+  hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
+                    &laws->touchdown);
 }
 
-/* Feet that touch and should not, or the other way round: ground met early or late, or a sensor
- * that is wrong. */
-static void wonder(const hxComplianceModel *model, const hxPlan *plan, double force[HX_LEGS][3],
-                   hxCompliance *laws) {
+/* decides between a wrong sensor and ground that is met early or late */
+static void examine_contacts(const hxComplianceModel *model, const hxPlan *plan,
+                             double force[HX_LEGS][3], hxCompliance *laws) {
   double met[HX_LEGS];
   hx_landings_expected(&laws->landings, laws->touching, plan->height, plan->swinging, met);
-  if (model->parts.fallback) doubt(model, plan, met, force, laws);
+  if (model->parts.fallback) judge_sensors(model, plan, met, force, laws);
   if (laws->trust < 1.0)
     memset(&laws->touchdown, 0, sizeof laws->touchdown);
   else if (model->parts.touchdown)
     meet_ground(model, plan, met, laws);
 }
 
-static int surprised(const hxPlan *plan, const hxCompliance *laws) {
-  int found = hx_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
+/* whether contacts contradict the plan, or did so and the answer to it is under way */
+static int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
+  int found = hx_sensor_watch_busy(&laws->watch) || hx_touchdown_busy(&laws->touchdown);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     found |=
         laws->touching[leg] != plan->standing[leg] && (plan->standing[leg] || plan->well_up[leg]);
   return found;
 }
 
-/* ----------------------------------------------------------------------------------------------
- * laws */
+/* -------------------------------------------------------------------------- inputs and weight */
 
-/* A robot whose feet slide, or whose joints cannot follow, has no use for the plan of who carries
- * what: kinematic control for it. drag: of the feet's common tangential force beyond the plan, the
- * share of the normal one. */
-static void judge(const hxComplianceModel *model, const hxPlan *plan, double drag,
-                  hxCompliance *laws) {
+/* Gives the plan of the load up while it does not hold (C33): for a robot that slides, whose joints
+ * cannot follow or that is far too heavy. drag: the common tangential force of the feet beyond the
+ * plan over the normal one. */
+static void update_trust(const hxComplianceModel *model, const hxPlan *plan, double drag,
+                         hxCompliance *laws) {
   laws->asked += model->follow_cycle * ((double)plan->hurried - laws->asked);
   laws->outrun = laws->asked > (laws->outrun ? joints_follow : joints_do_not);
   laws->dragged = drag > sliding_drag ? laws->dragged + 1 : 0;
@@ -180,36 +172,34 @@ static void judge(const hxComplianceModel *model, const hxPlan *plan, double dra
   for (int leg = 0; leg < HX_LEGS; ++leg) laws->fallback[leg] = laws->doubted[leg] || goal == 0.0;
 }
 
-/* Inputs of the laws from the forces felt, tangential ones beyond the plan's: the squeeze of these,
- * f_n, load. Returns sum f_n [N]. */
-static double mix(const hxComplianceModel *model, const hxPlan *plan,
-                  const double force[HX_LEGS][3], hxFootInput input[HX_LEGS], hxCompliance *laws) {
-  hxPlane felt[HX_LEGS], common = {0.0, 0.0};
-  double normal[HX_LEGS], total = 0.0;
+/* The squeeze and normal forces felt (C24); returns the sum of the latter [N]. */
+static double law_inputs(const hxComplianceModel *model, const hxPlan *plan,
+                         const double force[HX_LEGS][3], hxPlane push[HX_LEGS],
+                         double normal[HX_LEGS], hxCompliance *laws) {
+  hxPlane common = {0.0, 0.0};
+  double total = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double touching = laws->touching[leg] ? 1.0 : 0.0;
-    felt[leg].x = (force[leg][0] - laws->scale * plan->shares.push[leg].x) * touching;
-    felt[leg].y = (force[leg][1] - laws->scale * plan->shares.push[leg].y) * touching;
+    push[leg].x = (force[leg][0] - laws->scale * plan->shares.push[leg].x) * touching;
+    push[leg].y = (force[leg][1] - laws->scale * plan->shares.push[leg].y) * touching;
     normal[leg] = force[leg][2] * touching;
-    common = hx_add(common, felt[leg]);
+    common = hx_plane_add(common, push[leg]);
     total += normal[leg];
   }
-  const double share = total > load_floor ? 1.0 / total : 0.0;
+  const double share = total > hx_load_floor ? 1.0 / total : 0.0;
   if (model->parts.fallback)
-    judge(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0, laws);
-  hx_slip_squeeze(normal, plan->feet, felt);
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    input[leg].push = model->parts.slip_pid ? felt[leg] : hx_plane(0.0, 0.0);
-    input[leg].excess = normal[leg];
-    input[leg].load = normal[leg] * (1.0 / model->share);
-  }
+    update_trust(model, plan, total > model->settled ? hypot(common.x, common.y) * share : 0.0,
+                 laws);
+  hx_squeeze(normal, plan->feet, push);
+  for (int leg = 0; leg < HX_LEGS && !model->parts.slip_pid; ++leg) push[leg] = hx_plane(0.0, 0.0);
   return total;
 }
 
-/* measured over planned weight, and what the suspensions are to give way to */
-static void weigh(const hxComplianceModel *model, const hxPlan *plan, double total,
-                  hxFootInput input[HX_LEGS], hxCompliance *laws) {
-  const double ratio = total / fmax(plan->weight, load_floor),
+/* Follows the measured over the planned weight (C30), and what the servos carry of it.
+ * total: the sum of the normal forces felt [N]. */
+static void update_weight(const hxComplianceModel *model, const hxPlan *plan, double total,
+                          hxCompliance *laws) {
+  const double ratio = total / fmax(plan->weight, hx_load_floor),
                scale = hx_clamp(ratio, least_scale, largest_scale);
   int doubted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) doubted |= laws->doubted[leg];
@@ -218,13 +208,18 @@ static void weigh(const hxComplianceModel *model, const hxPlan *plan, double tot
     hx_burden_weigh(&model->burden, ratio, &laws->burden);
   }
   hx_burden_step(&model->burden, plan->needed, laws->scale, &laws->burden);
-  for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int live = model->parts.suspension && plan->shares.activation[leg] > 0.0;
-    input[leg].excess = live ? input[leg].excess - laws->scale * plan->shares.normal[leg] : 0.0;
-  }
 }
 
-/* The PID's answers no larger than allowed, their direction kept; integrals give way. */
+/* normal force of a foot beyond its share [N], 0 of feet that have none (C26) */
+static double excess(const hxComplianceModel *model, const hxPlan *plan, int leg, double normal,
+                     const hxCompliance *laws) {
+  const int live = model->parts.suspension && plan->shares.activation[leg] > 0.0;
+  return live ? normal - laws->scale * plan->shares.normal[leg] : 0.0;
+}
+
+/* --------------------------------------------------------------------------------------- laws */
+
+/* limits the answers of the PID, their direction kept; the integrals give way (C27) */
 static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
@@ -236,7 +231,7 @@ static void limit_answers(const hxComplianceModel *model, hxCompliance *laws) {
   }
 }
 
-/* At its stop a suspension stands still. */
+/* at its stop a suspension stands still */
 static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     hxFootLaw *law = &laws->law[leg];
@@ -245,15 +240,17 @@ static void limit_deflections(const hxComplianceModel *model, hxCompliance *laws
   }
 }
 
-/* The laws one period on, limited, and the forces that come of them. */
-static void answer_forces(const hxComplianceModel *model, const hxPlan *plan,
-                          const hxFootInput input[HX_LEGS], double answer[HX_LEGS][3],
-                          hxCompliance *laws) {
+/* The laws one period on, limited, and the forces that they answer by (C25 to C27). */
+static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
+                      const hxPlane push[HX_LEGS], const double normal[HX_LEGS],
+                      double answer[HX_LEGS][3], hxCompliance *laws) {
   const double freedom = model->parts.support ? laws->burden.freedom : 1.0,
                kept = 1.0 - (1.0 - freedom) * model->follow_load;
   double answers = 0.0, deflections = 0.0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    hx_foot_law_step(&model->law, &input[leg], &laws->law[leg]);
+    const double beyond = excess(model, plan, leg, normal[leg], laws);
+    hx_foot_law_step(&model->law, push[leg], beyond, normal[leg] * (1.0 / model->share),
+                     &laws->law[leg]);
     answers += hx_square(laws->law[leg].answer);
     deflections += laws->law[leg].deflection * laws->law[leg].deflection;
   }
@@ -269,16 +266,18 @@ static void answer_forces(const hxComplianceModel *model, const hxPlan *plan,
     answer[leg][0] = given.x;
     answer[leg][1] = given.y;
     answer[leg][2] = law->deflection / (model->softness * vertical); /* z/C_zz, C = J kp^-1 J^T */
-    /* a foot in the air forgets, within the time in which a leg gives up its load; and all do what
-     * they may not take away */
+    /* a foot in the air forgets, within the time in which a leg gives up its load; and all
+     * forget what they may not take away */
     const double left = plan->swinging[leg] && !laws->touching[leg] ? kept * model->memory : kept;
     law->x.integral *= left;
     law->y.integral *= left;
   }
 }
 
-/* A leg that stands in the plan and not on the ground is given its share back as it loads. */
-static void take_up(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
+/* ------------------------------------------------------------------------------------- joints */
+
+/* gives a leg that stands only in the plan its share back as it loads (C29) */
+static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
   laws->slack = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->grip[leg] += model->follow_load * (1.0 - laws->grip[leg]);
@@ -288,7 +287,7 @@ static void take_up(const hxComplianceModel *model, const hxPlan *plan, hxCompli
   }
 }
 
-/* one joint's bend towards the wanted one, and torque, within what commands never exceed */
+/* leads the bend of a joint to the wanted one and limits its torque (C28, C29) */
 static void limit_joint(const hxComplianceModel *model, double wanted, double *bend,
                         double *torque) {
   if (!model->parts.limits) {
@@ -299,14 +298,15 @@ static void limit_joint(const hxComplianceModel *model, double wanted, double *b
   *torque = hx_clamp(*torque, -model->most, model->most);
 }
 
-/* bend = J^T f/kp, limited in rate; torque = own + strength x scale x carry, limited */
+/* Turns the forces of the laws and the planned load into angles and torques: bend = J^T f/kp (C28);
+ * torque = trust (own + grip strength scale carry) (C29). */
 static void actuate(const hxComplianceModel *model, const hxPlan *plan,
                     const double answer[HX_LEGS][3], hxCompliance *laws) {
   const double strength = model->parts.limits ? laws->burden.strength : 1.0;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
-  if (laws->slack) take_up(model, plan, laws);
+  if (laws->slack) restore_grip(model, plan, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double *f = answer[leg];
     double *shift = laws->shift[leg];
@@ -323,14 +323,14 @@ static void actuate(const hxComplianceModel *model, const hxPlan *plan,
 
 void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
                         double force[HX_LEGS][3], hxCompliance *laws) {
-  hxFootInput input[HX_LEGS];
-  double normal[HX_LEGS], answer[HX_LEGS][3];
+  hxPlane push[HX_LEGS];
+  double normal[HX_LEGS], felt[HX_LEGS], answer[HX_LEGS][3];
   for (int leg = 0; leg < HX_LEGS; ++leg) normal[leg] = force[leg][2];
-  hx_contact_detect(model->weight, normal, laws->touching);
+  hx_contact_detector_step(model->weight, normal, laws->touching);
   hx_landings_look(laws->touching, plan->height, plan->swinging, &laws->landings);
-  if (surprised(plan, laws)) wonder(model, plan, force, laws);
-  const double total = mix(model, plan, (const double (*)[3])force, input, laws);
-  weigh(model, plan, total, input, laws);
-  answer_forces(model, plan, input, answer, laws);
+  if (contacts_differ(plan, laws)) examine_contacts(model, plan, force, laws);
+  const double total = law_inputs(model, plan, (const double (*)[3])force, push, felt, laws);
+  update_weight(model, plan, total, laws);
+  step_laws(model, plan, push, felt, answer, laws);
   actuate(model, plan, (const double (*)[3])answer, laws);
 }

@@ -1,5 +1,5 @@
-/* compliance.h - the force laws of all feet: what the planned load and the measured foot forces ask
- * of the joints. Python: controller/compliance.py. */
+/* compliance.h - the force laws of compliant control: from planned load and measured foot forces to
+ * the joints. Python: controller/compliance.py. */
 #ifndef HX_COMPLIANCE_H
 #define HX_COMPLIANCE_H
 
@@ -16,15 +16,15 @@ HX_HIDDEN_BEGIN
 typedef struct hxComplianceModel {
   hxParts parts;
   hxFootLawModel law;
-  hxWatchModel watch;
+  hxSensorWatchModel watch;
   hxBurdenModel burden;
   double period; /* s */
-  double weight, share, settled; /* N       of the robot; a third of it; what feet that have met the
-                                    ground carry together */
+  /* N  of the robot; a third of it; what feet that have met the ground carry together */
+  double weight, share, settled;
   double softness; /* rad/N m of the servos */
   double high; /* m       a foot planned higher is certainly in the air */
-  double tracking, memory, follow_load, follow_cycle,
-      follow_weight; /* 1  of the smoothings, over a period */
+  /* 1  of the smoothings, over a period */
+  double tracking, memory, follow_load, follow_cycle, follow_weight;
   int64_t calm; /* steps   without sliding until feet are trusted again */
   double largest, deepest; /* N, m    limits of the laws' answers */
   double most, fastest; /* N m, rad  limits of torque and of the bend's change in a period */
@@ -49,7 +49,7 @@ typedef struct hxPlan {
 
 typedef struct hxCompliance {
   hxFootLaw law[HX_LEGS];
-  hxWatch watch;
+  hxSensorWatch watch;
   hxTouchdown touchdown;
   hxLandings landings;
   hxBurden burden;
@@ -58,8 +58,8 @@ typedef struct hxCompliance {
   double torque[HX_LEGS][HX_JOINTS]; /* N m  for the servos */
   double shift[HX_LEGS][3]; /* m    of the feet that comes of bend */
   int doubted[HX_LEGS]; /* its sensor is not believed */
-  int fallback[HX_LEGS]; /* walks without feedback: doubted, or the robot slides or outruns its
-                            joints */
+  /* walks without feedback: doubted, or the robot slides or outruns its joints */
+  int fallback[HX_LEGS];
   double grip[HX_LEGS]; /* 1    of its share that a leg is given back as it loads */
   int slack; /* some leg is */
   double scale; /* 1    measured over planned weight */
@@ -76,8 +76,8 @@ void hx_compliance_reset(hxCompliance *laws);
 void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
                         const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan);
 
-/* One period on. force: ground on foot in the walking frame [N]; changed where a sensor is not
- * believed. */
+/* One period on. force: of the ground on the feet, walking frame [N]; replaced by the planned
+ * one where a sensor is not believed. */
 void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
                         double force[HX_LEGS][3], hxCompliance *laws);
 

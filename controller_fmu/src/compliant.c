@@ -2,10 +2,10 @@
 
 #include <string.h>
 
-static const double steering_time =
-    0.1; /* s  in which a change of the added velocity is led over */
+/* s  in which a change of the added velocity is led over */
+static const double steering_time = 0.1;
 
-void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS],
+void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
                           hxCompliantModel *model) {
   const double still[HX_LEGS][HX_JOINTS] = {{0.0}}, zero[3] = {0.0};
   hxPose pose[HX_LEGS];
@@ -15,15 +15,15 @@ void hx_compliant_compile(const hxControllerDefinition *definition, const hxLegM
   double foot[3];
   model->per_second = 1.0 / definition->period;
   model->leading = steering_time / definition->period;
-  hx_dynamics_compile(definition, leg, &model->dynamics);
+  hx_inverse_dynamics_compile(definition, leg, &model->dynamics);
   for (int k = 0; k < HX_LEGS; ++k) {
-    hx_leg_forward(&leg[k], leg[k].stance, foot);
-    hx_leg_pose(&leg[k], hx_plane(foot[0], foot[1]), foot[2], &pose[k]);
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
+    hx_leg_solver_pose(&leg[k], hx_plane(foot[0], foot[1]), foot[2], &pose[k]);
   }
-  hx_posture_set(&level, zero, zero);
-  hx_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
-  const hxMotion motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
-  hx_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
+  hx_posture_of(&level, zero, zero);
+  hx_inverse_dynamics_place(&model->dynamics, leg, pose, hx_plane(0.0, 0.0), 0.0, &level, &masses);
+  const hxNeighbours motion = {{NULL, &masses, NULL}, {NULL, pose, NULL}};
+  hx_inverse_dynamics_demand(&model->dynamics, leg, &motion, still, &level, &rest);
   hx_support_compile(definition, &rest, &model->support);
   hx_compliance_compile(definition, &model->laws);
   hx_hold_compile(definition, &model->hold);
@@ -34,16 +34,15 @@ void hx_compliant_reset(hxCompliant *compliant) {
   hx_compliance_reset(&compliant->laws);
 }
 
-/* ----------------------------------------------------------------------------------------------
- * steering */
+/* ----------------------------------------------------------------------------------- steering */
 
 hxTwist hx_compliant_addition(const hxCompliantModel *model, const hxCompliant *compliant,
                               int64_t steps) {
   const hxSteering *s = &compliant->steering;
   const double part = fmin((double)(s->past + steps) / model->leading, 1.0);
-  return (hxTwist){
-      hx_add(s->begin.velocity, hx_scaled(hx_sub(s->goal.velocity, s->begin.velocity), part)),
-      s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
+  return (hxTwist){hx_plane_add(s->begin.velocity,
+                                hx_scaled(hx_plane_sub(s->goal.velocity, s->begin.velocity), part)),
+                   s->begin.yaw_rate + (s->goal.yaw_rate - s->begin.yaw_rate) * part};
 }
 
 void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves, int afresh,
@@ -60,10 +59,9 @@ void hx_compliant_steer(const hxCompliantModel *model, int64_t steps, int moves,
   s->past = 0;
 }
 
-/* ----------------------------------------------------------------------------------------------
- * sensors */
+/* ------------------------------------------------------------------------------------ sensors */
 
-/* foot forces in the walking frame K: f_K = R_KT R_TW f_W */
+/* the foot forces in the walking frame (C22): f_K = R_KT R_TW f_W */
 static void sense(const hxControllerInput *input, const hxPosture *posture,
                   double force[HX_LEGS][3]) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
@@ -87,7 +85,7 @@ static void sense(const hxControllerInput *input, const hxPosture *posture,
 }
 
 /* shows the slow loops where the standing feet are */
-static void look(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS],
+static void look(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                  const hxStance *stance, const hxControllerInput *input, hxCompliant *compliant) {
   const double w = input->quaternion[0], x = input->quaternion[1], y = input->quaternion[2],
                z = input->quaternion[3];
@@ -95,13 +93,13 @@ static void look(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS],
   double foot[3];
   for (int k = 0; k < HX_LEGS; ++k) {
     const double *angle = input->angle[k];
-    hx_leg_forward(&leg[k], angle, foot);
+    hx_leg_solver_forward(&leg[k], angle, foot);
     seen.plane[k] = hx_plane(foot[0], foot[1]);
     seen.height[k] = foot[2];
     hx_posture_turn(stance->posture, &seen.plane[k], &seen.height[k]);
     const hxPlane rolled =
-        hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), hx_leg_rolling(&leg[k], angle));
-    seen.plane[k] = hx_sub(seen.plane[k], rolled);
+        hx_scaled(hx_cis(leg[k].hip_yaw + angle[0]), hx_leg_solver_rolling(&leg[k], angle));
+    seen.plane[k] = hx_plane_sub(seen.plane[k], rolled);
     seen.height[k] += stance->value[3];
     seen.planned[k] = stance->plane[k];
     seen.planned_height[k] = stance->height[k];
@@ -115,18 +113,17 @@ static void look(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS],
   hx_hold_look(&model->hold, &seen, &compliant->hold);
 }
 
-/* ----------------------------------------------------------------------------------------------
- * step */
+/* --------------------------------------------------------------------------------------- step */
 
-/* adds to a leg's command what raises its foot by so much, and the laws' bend */
-static void correct(const hxLegModel *leg, const double climb[HX_JOINTS],
+/* the joint angles of a leg, bent by the laws and with the foot raised (C41) */
+static void correct(const hxLegSolver *leg, const double climb[HX_JOINTS],
                     const double bend[HX_JOINTS], double raised, double angle[HX_JOINTS]) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     angle[joint] = hx_clamp(angle[joint] + bend[joint] + climb[joint] * raised,
                             leg->angle_min[joint], leg->angle_max[joint]);
 }
 
-void hx_compliant_step(const hxCompliantModel *model, const hxLegModel leg[HX_LEGS],
+void hx_compliant_step(const hxCompliantModel *model, const hxLegSolver leg[HX_LEGS],
                        const hxStance *stance, const hxControllerInput *input,
                        hxCompliant *compliant, hxControllerOutput *output) {
   hxCompliance *laws = &compliant->laws;

@@ -1,5 +1,5 @@
-/* contact_detection.h - what the foot force sensors say, and whether they can be believed. Python:
- * controller/contact_detection.py. */
+/* contact_detection.h - what the foot force sensors say, and whether they can be believed.
+ * Python: controller/contact_detection.py. */
 #ifndef HX_CONTACT_DETECTION_H
 #define HX_CONTACT_DETECTION_H
 
@@ -8,35 +8,32 @@
 
 HX_HIDDEN_BEGIN
 
-/* Touch-down and lift-off with hysteresis, all feet. weight [N] of the robot. */
-void hx_contact_detect(double weight, const double normal[HX_LEGS], int touching[HX_LEGS]);
+/* Touch-down and lift-off with hysteresis (C23) under normal forces [N]; weight: of the robot
+ * [N]. */
+void hx_contact_detector_step(double weight, const double normal[HX_LEGS], int touching[HX_LEGS]);
 
-/* Which foot sensors contradict the plan for too long. */
-typedef struct hxWatchModel {
-  double period;   /* s */
-  double missing;  /* N  less than this from all feet, and some force is not being reported */
-  double memory;   /* s  without contradiction until a sensor is believed again */
-} hxWatchModel;
+/* Which foot sensors contradict the plan for too long (C34). */
+typedef struct hxSensorWatchModel {
+  double period; /* s */
+  double missing; /* N  less than this from all feet, and some force is not being reported */
+  double memory; /* s  without contradiction until a sensor is believed again */
+} hxSensorWatchModel;
 
-typedef struct hxWatch {
-  double contradicted[HX_LEGS];  /* s  for how long */
-  double left[HX_LEGS];          /* s  until it is believed again */
-} hxWatch;
+typedef struct hxSensorWatch {
+  double contradicted[HX_LEGS]; /* s  for how long */
+  double left[HX_LEGS]; /* s  until it is believed again */
+} hxSensorWatch;
 
-/* The plan that the sensors are held against, of each leg. */
-typedef struct hxExpected {
-  int standing[HX_LEGS]; /* carries its whole share */
-  int high[HX_LEGS];     /* well above the ground */
-} hxExpected;
+void hx_sensor_watch_compile(double weight, double cycle, double period, hxSensorWatchModel *model);
 
-void hx_watch_compile(double weight, double cycle, double period, hxWatchModel *model);
+/* Whether some sensor contradicts the plan or is not believed. */
+int hx_sensor_watch_busy(const hxSensorWatch *watch);
 
-/* Whether there is something to look after. */
-int hx_watch_busy(const hxWatch *watch);
-
-/* After another period: touching and the sum of all forces [N] are what is reported. */
-void hx_watch_look(const hxWatchModel *model, const int touching[HX_LEGS], double total,
-                   const hxExpected *expected, hxWatch *watch);
+/* One period on. touching, total: feet that report a force and the sum of all normal forces [N];
+ * standing: planned to carry their whole share; high: planned well above the ground. */
+void hx_sensor_watch_look(const hxSensorWatchModel *model, const int touching[HX_LEGS],
+                          double total, const int standing[HX_LEGS], const int high[HX_LEGS],
+                          hxSensorWatch *watch);
 
 HX_HIDDEN_END
 

@@ -1,7 +1,8 @@
 #include "gait.h"
 
-/* A gait's timing in whole numbers, OpenSHC's: stance : swing parts of a cycle, and each leg's
- * offset in parts, around the robot from the front right leg to the front left one. */
+/* The timing of a gait in whole numbers, as in OpenSHC: stance + swing parts of a cycle; the
+ * offset of a leg, around the robot from the front right to the front left one, is its
+ * multiplier times `offset`. */
 typedef struct {
   int stance, swing, offset, multiplier[HX_LEGS];
 } hxTiming;

@@ -1,4 +1,4 @@
-/* gait.h - which leg is in the air when. Python: controller/gait.py. */
+/* gait.h - which leg is in the air when (C2). Python: controller/gait.py. */
 #ifndef HX_GAIT_H
 #define HX_GAIT_H
 

@@ -1,29 +1,13 @@
 #include "hold.h"
 
 static const double look_time = 0.04;          /* s   between two looks, at least a period */
-static const double loaded =
-    0.3;              /* 1   thirds of the weight on a foot that certainly does not slip along */
+/* 1  thirds of the weight on a foot that certainly does not slip along */
+static const double loaded = 0.3;
 static const double determinant_floor = 1e-6;  /* m4  feet on one line tell no tilt */
 static const double turn = 6.283185307179586;  /* rad */
 
-void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *model) {
-  const double every = nearbyint(look_time / definition->period);
-  model->every = every < 1.0 ? 1 : (int64_t)every;
-  model->time = (double)model->every * definition->period;
-  model->posture = definition->parts.posture;
-  model->path = definition->parts.path;
-  model->attitude_step = definition->gains.hold.attitude_rate * model->time;
-  model->height_step = definition->gains.hold.height_rate * model->time;
-  model->smooth = fmin(model->time / definition->gains.hold.ground_time, 1.0);
-  model->angle_limit = definition->gains.hold.angle_limit;
-  model->height_limit = definition->gains.hold.height_limit;
-  model->path_rate = definition->gains.hold.path_rate;
-  model->speed_limit = definition->gains.hold.speed_limit;
-  model->turn_limit = definition->gains.hold.turn_limit;
-}
-
-/* c, s_x, s_y of the weighted least squares height = c + s_x x + s_y y; returns whether the feet
- * span a plane */
+/* The plane height = c + s_x x + s_y y of least weighted squares (C37): fit = c, s_x, s_y. Returns
+ * whether the feet span a plane. */
 static int fit_plane(const hxSight *seen, double fit[3]) {
   double total = 0.0, x0 = 0.0, y0 = 0.0, z0 = 0.0, xx = 0.0, yy = 0.0, xy = 0.0, xz = 0.0,
          yz = 0.0;
@@ -60,11 +44,27 @@ static int fit_plane(const hxSight *seen, double fit[3]) {
   return 1;
 }
 
+void hx_hold_compile(const hxControllerDefinition *definition, hxHoldModel *model) {
+  const double every = nearbyint(look_time / definition->period);
+  model->every = every < 1.0 ? 1 : (int64_t)every;
+  model->time = (double)model->every * definition->period;
+  model->posture = definition->parts.posture;
+  model->path = definition->parts.path;
+  model->attitude_step = definition->gains.hold.attitude_rate * model->time;
+  model->height_step = definition->gains.hold.height_rate * model->time;
+  model->smooth = fmin(model->time / definition->gains.hold.ground_time, 1.0);
+  model->angle_limit = definition->gains.hold.angle_limit;
+  model->height_limit = definition->gains.hold.height_limit;
+  model->path_rate = definition->gains.hold.path_rate;
+  model->speed_limit = definition->gains.hold.speed_limit;
+  model->turn_limit = definition->gains.hold.turn_limit;
+}
+
+/* integrates height and tilt against the ground (C38) */
 static void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   double fit[3];
   if (!fit_plane(seen, fit)) return;
-  /* against the planned feet the torso is pitched by s_x and rolled by -s_y: with the sensor's
-   * tilt, the ground's inclination */
+  /* against the planned feet the torso is pitched by s_x and rolled by -s_y */
   const double leaning[2] = {seen->tilt[0] + fit[2], seen->tilt[1] - fit[1]};
   for (int i = 0; i < 2; ++i) {
     const double ground = hold->ground_known ? hold->ground[i] : leaning[i];
@@ -81,8 +81,7 @@ static void hold_posture(const hxHoldModel *model, const hxSight *seen, hxHold *
                       seen->planned[leg].y * hold->angle[0] - hold->height;
 }
 
-/* from look to look the way over the ground is -d(e^(i yaw) p) of the feet that stood all the time
- */
+/* Adds what was lost since the last look (C39). foot: turned by the yaw [m]. */
 static void add_lost_way(const hxHoldModel *model, const hxSight *seen, const hxPlane foot[HX_LEGS],
                          hxHold *hold) {
   const hxPlane ahead = hx_cis(hold->yaw + hold->heading + 0.5 * seen->yaw_rate * model->time);
@@ -93,13 +92,14 @@ static void add_lost_way(const hxHoldModel *model, const hxSight *seen, const hx
     const double least = fmin(hold->load[leg], seen->load[leg]),
                  both = least > loaded ? least : 0.0;
     total += both;
-    walked = hx_add(walked, hx_scaled(hx_sub(foot[leg], hold->foot[leg]), both));
+    walked = hx_plane_add(walked, hx_scaled(hx_plane_sub(foot[leg], hold->foot[leg]), both));
   }
   walked = total > 0.0 ? hx_scaled(walked, -1.0 / total) : commanded;
-  hold->way = hx_add(hold->way, hx_sub(commanded, walked));
+  hold->way = hx_plane_add(hold->way, hx_plane_sub(commanded, walked));
   hold->heading += seen->yaw_rate * model->time - remainder(seen->yaw - hold->yaw, turn);
 }
 
+/* leads the robot back to its way (C39, C40) */
 static void hold_path(const hxHoldModel *model, const hxSight *seen, hxHold *hold) {
   const hxPlane turned = hx_cis(seen->yaw);
   hxPlane foot[HX_LEGS];

@@ -2,11 +2,11 @@
 
 #include <string.h>
 
-static const double gear_speed =
-    0.05; /* rad/s  where the gear's dry friction saturates, as in the plant */
+/* rad/s  where the gear's dry friction saturates, as in the plant */
+static const double gear_speed = 0.05;
 
-void hx_dynamics_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS],
-                         hxDynamicsModel *model) {
+void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
+                                 const hxLegSolver leg[HX_LEGS], hxInverseDynamics *model) {
   const double *g = definition->gravity;
   double foot[3], sum = 0.0;
   model->period = definition->period;
@@ -19,7 +19,7 @@ void hx_dynamics_compile(const hxControllerDefinition *definition, const hxLegMo
   model->torso_com_z = definition->torso.com[2];
   for (int k = 0; k < HX_LEGS; ++k) {
     double offset = 0.0;
-    hx_leg_forward(&leg[k], leg[k].stance, foot);
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
     sum += foot[2];
     model->yaw_inertia[k] = 0.0;
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
@@ -35,43 +35,43 @@ void hx_dynamics_compile(const hxControllerDefinition *definition, const hxLegMo
   model->floor = sum / HX_LEGS - definition->foot_radius;
 }
 
-/* ----------------------------------------------------------------------------------------------
- * places */
+/* ------------------------------------------------------------------------------------- places */
 
-void hx_dynamics_place(const hxDynamicsModel *model, const hxLegModel leg[HX_LEGS],
-                       const hxPose pose[HX_LEGS], hxPlane way, double turn,
-                       const hxPosture *posture, hxMasses *masses) {
+void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
+                               const hxPose pose[HX_LEGS], hxPlane way, double turn,
+                               const hxPosture *posture, hxMasses *masses) {
   masses->turn = hx_cis(turn);
   for (int k = 0; k < HX_LEGS; ++k) {
     const hxPose *p = &pose[k];
     const hxPlane joint = hx_plane(leg[k].coxa_length, leg[k].coxa_height),
                   hip = hx_plane(leg[k].hip[0], leg[k].hip[1]);
-    const hxPlane knee = hx_add(joint, hx_scaled(p->femur, leg[k].femur));
+    const hxPlane knee = hx_plane_add(joint, hx_scaled(p->femur, leg[k].femur));
     hxPlane *point = masses->point[k];
     point[0] = model->com[k][0];
-    point[1] = hx_add(joint, hx_times(p->femur, hx_times(leg[k].femur_zero, model->com[k][1])));
-    point[2] = hx_add(knee, hx_times(p->tibia, hx_times(leg[k].tibia_zero, model->com[k][2])));
+    point[1] =
+        hx_plane_add(joint, hx_times(p->femur, hx_times(leg[k].femur_zero, model->com[k][1])));
+    point[2] =
+        hx_plane_add(knee, hx_times(p->tibia, hx_times(leg[k].tibia_zero, model->com[k][2])));
     for (int link = 0; link < HX_JOINTS; ++link) {
       hxPlane place =
-          hx_add(hip, hx_times(p->heading, hx_plane(point[link].x, model->side[k][link])));
+          hx_plane_add(hip, hx_times(p->heading, hx_plane(point[link].x, model->side[k][link])));
       double height = leg[k].hip[2] + point[link].y;
       hx_posture_turn(posture, &place, &height);
       masses->place[k][link] = place;
       masses->height[k][link] = height + posture->height;
-      masses->ground[k][link] = hx_add(way, hx_times(masses->turn, place));
+      masses->ground[k][link] = hx_plane_add(way, hx_times(masses->turn, place));
     }
   }
   masses->torso_place = model->torso_com;
   masses->torso_height = model->torso_com_z;
   hx_posture_turn(posture, &masses->torso_place, &masses->torso_height);
   masses->torso_height += posture->height;
-  masses->torso_ground = hx_add(way, hx_times(masses->turn, masses->torso_place));
+  masses->torso_ground = hx_plane_add(way, hx_times(masses->turn, masses->torso_place));
 }
 
-/* ----------------------------------------------------------------------------------------------
- * forces */
+/* ------------------------------------------------------------------------------------- forces */
 
-/* second difference; 0 at the ends: there feet lift off or touch down, which they do without any */
+/* the second difference of three steps */
 static double acceleration(double before, double now, double after, double period) {
   return (after - 2.0 * now + before) / (period * period);
 }
@@ -81,17 +81,18 @@ static hxPlane plane_acceleration(hxPlane before, hxPlane now, hxPlane after, do
                   acceleration(before.y, now.y, after.y, period));
 }
 
-/* adds m (a + g) of a point, walking frame, to what the ground must give */
+/* adds m (a + g) of a point, walking frame, to what the ground must give (C16) */
 static void add_force(hxPlane push, double lift, hxPlane place, double height, double floor,
                       hxDemand *demand) {
-  demand->push = hx_add(demand->push, push);
+  demand->push = hx_plane_add(demand->push, push);
   demand->weight += lift;
-  demand->moment =
-      hx_add(demand->moment, hx_sub(hx_scaled(place, lift), hx_scaled(push, height - floor)));
+  demand->moment = hx_plane_add(
+      demand->moment, hx_plane_sub(hx_scaled(place, lift), hx_scaled(push, height - floor)));
   demand->twist += hx_across(place, push);
 }
 
-static void demand_torso(const hxDynamicsModel *model, const hxMotion *motion, hxDemand *demand) {
+static void demand_torso(const hxInverseDynamics *model, const hxNeighbours *motion,
+                         hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
   hxPlane a = {0.0, 0.0}, spin = {0.0, 0.0};
   double up = 0.0;
@@ -107,8 +108,8 @@ static void demand_torso(const hxDynamicsModel *model, const hxMotion *motion, h
   demand->twist += model->torso_inertia * hx_across(now->turn, spin);
 }
 
-/* m (a + g) of a leg's links: told to the demand, and returned in the torso frame */
-static void demand_links(const hxDynamicsModel *model, const hxMotion *motion, int leg,
+/* m (a + g) of the links of a leg: added to the demand (C16), and returned in the torso frame */
+static void demand_links(const hxInverseDynamics *model, const hxNeighbours *motion, int leg,
                          const hxPosture *posture, hxPlane push[HX_JOINTS], double lift[HX_JOINTS],
                          hxDemand *demand) {
   const hxMasses *now = motion->masses[1], *before = motion->masses[0], *after = motion->masses[2];
@@ -130,9 +131,9 @@ static void demand_links(const hxDynamicsModel *model, const hxMotion *motion, i
   }
 }
 
-/* of a leg's joints, from the forces that its links need, torso frame */
-static void demand_torques(const hxDynamicsModel *model, const hxLegModel *leg,
-                           const hxMotion *motion, int k, const hxPlane push[HX_JOINTS],
+/* the joint torques of a leg (C15) from the forces that its links need, torso frame */
+static void demand_torques(const hxInverseDynamics *model, const hxLegSolver *leg,
+                           const hxNeighbours *motion, int k, const hxPlane push[HX_JOINTS],
                            const double lift[HX_JOINTS], const double speed[HX_JOINTS],
                            double torque[HX_JOINTS]) {
   const hxPose *now = &motion->pose[1][k];
@@ -156,17 +157,17 @@ static void demand_torques(const hxDynamicsModel *model, const hxLegModel *leg,
   /* tau_2 = sum Im((U - U_femur)^* P)  tau_3 = -Im((U - U_knee)^* P) */
   const double upper = turning[1] * model->pitch_inertia[k][1],
                lower = (turning[1] - turning[2]) * model->pitch_inertia[k][2];
-  const hxPlane femur = hx_sub(point[1], joint), whole = hx_sub(point[2], joint);
-  const hxPlane tibia = hx_sub(whole, hx_scaled(now->femur, leg->femur));
+  const hxPlane femur = hx_plane_sub(point[1], joint), whole = hx_plane_sub(point[2], joint);
+  const hxPlane tibia = hx_plane_sub(whole, hx_scaled(now->femur, leg->femur));
   torque[1] += hx_across(femur, inner[1]) + hx_across(whole, inner[2]) + upper + lower;
   torque[2] -= hx_across(tibia, inner[2]) + lower;
 }
 
-/* J^T of the contact point, a row for each joint */
-static void lever_of(const hxLegModel *leg, const hxPose *pose, const hxPosture *posture,
+/* J^T of the contact point (C17), a row for each joint */
+static void lever_of(const hxLegSolver *leg, const hxPose *pose, const hxPosture *posture,
                      double lever[HX_JOINTS][3]) {
-  const hxPlane femur = hx_sub(pose->foot, hx_plane(0.0, leg->radius));
-  const hxPlane tibia = hx_sub(femur, hx_scaled(pose->femur, leg->femur)),
+  const hxPlane femur = hx_plane_sub(pose->foot, hx_plane(0.0, leg->radius));
+  const hxPlane tibia = hx_plane_sub(femur, hx_scaled(pose->femur, leg->femur)),
                 arm[HX_JOINTS] = {{0.0, 0.0}, femur, {-tibia.x, -tibia.y}};
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     hxPlane row = joint == 0 ? hx_plane(-pose->point.y, pose->point.x)
@@ -179,9 +180,9 @@ static void lever_of(const hxLegModel *leg, const hxPose *pose, const hxPosture 
   }
 }
 
-void hx_dynamics_demand(const hxDynamicsModel *model, const hxLegModel leg[HX_LEGS],
-                        const hxMotion *motion, const double speed[HX_LEGS][HX_JOINTS],
-                        const hxPosture *posture, hxDemand *demand) {
+void hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
+                                const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],
+                                const hxPosture *posture, hxDemand *demand) {
   hxPlane push[HX_JOINTS];
   double lift[HX_JOINTS];
   memset(demand, 0, sizeof *demand);

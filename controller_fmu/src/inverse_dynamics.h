@@ -1,5 +1,5 @@
-/* inverse_dynamics.h - what the planned motion asks of servos and ground. Python:
- * controller/inverse_dynamics.py. */
+/* inverse_dynamics.h - what the planned motion demands of servos and ground.
+ * Python: controller/inverse_dynamics.py. */
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
@@ -9,10 +9,10 @@
 
 HX_HIDDEN_BEGIN
 
-typedef struct hxDynamicsModel {
-  double period, gravity;       /* s, m/s2 */
-  double rotor, friction;       /* kg m2, N m  of servo and gear */
-  double floor;                 /* m   the ground under the stance, torso frame */
+typedef struct hxInverseDynamics {
+  double period, gravity; /* s, m/s2 */
+  double rotor, friction; /* kg m2, N m  of servo and gear */
+  double floor; /* m   the ground under the stance, torso frame */
   double torso_mass, torso_inertia;
   hxPlane torso_com;
   double torso_com_z;
@@ -22,7 +22,7 @@ typedef struct hxDynamicsModel {
   double side[HX_LEGS][HX_JOINTS]; /* m   Y of the mass points */
   double yaw_inertia[HX_LEGS]; /* kg m2  of all links about the vertical */
   double pitch_inertia[HX_LEGS][HX_JOINTS];
-} hxDynamicsModel;
+} hxInverseDynamics;
 
 /* Where the mass points are at one step. */
 typedef struct hxMasses {
@@ -35,7 +35,7 @@ typedef struct hxMasses {
   hxPlane turn; /* 1   e^(i yaw) of the walking frame */
 } hxMasses;
 
-/* What a planned motion asks for at one step. */
+/* What a planned motion demands at one step. */
 typedef struct hxDemand {
   double torque[HX_LEGS][HX_JOINTS]; /* N m  of the joints for the legs' own weight and motion,
                                         their feet free */
@@ -48,21 +48,21 @@ typedef struct hxDemand {
 } hxDemand;
 
 /* Three successive steps; without one on either side the present one has no acceleration. */
-typedef struct hxMotion {
+typedef struct hxNeighbours {
   const hxMasses *masses[3]; /* before, now, after */
   const hxPose *pose[3]; /* of all legs */
-} hxMotion;
+} hxNeighbours;
 
-void hx_dynamics_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS],
-                         hxDynamicsModel *model);
+void hx_inverse_dynamics_compile(const hxControllerDefinition *definition,
+                                 const hxLegSolver leg[HX_LEGS], hxInverseDynamics *model);
 
-void hx_dynamics_place(const hxDynamicsModel *model, const hxLegModel leg[HX_LEGS],
-                       const hxPose pose[HX_LEGS], hxPlane way, double turn,
-                       const hxPosture *posture, hxMasses *masses);
+void hx_inverse_dynamics_place(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
+                               const hxPose pose[HX_LEGS], hxPlane way, double turn,
+                               const hxPosture *posture, hxMasses *masses);
 
-void hx_dynamics_demand(const hxDynamicsModel *model, const hxLegModel leg[HX_LEGS],
-                        const hxMotion *motion, const double speed[HX_LEGS][HX_JOINTS],
-                        const hxPosture *posture, hxDemand *demand);
+void hx_inverse_dynamics_demand(const hxInverseDynamics *model, const hxLegSolver leg[HX_LEGS],
+                                const hxNeighbours *motion, const double speed[HX_LEGS][HX_JOINTS],
+                                const hxPosture *posture, hxDemand *demand);
 
 HX_HIDDEN_END
 

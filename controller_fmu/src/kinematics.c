@@ -1,14 +1,14 @@
 #include "kinematics.h"
 
-static const double flag_tolerance =
-    1e-9;            /* rad or 1  round-off at the edge of the reach is not "unreachable" */
-static const double singular_sine =
-    0.02;             /* 1   floor of sin(gamma): a straight leg has no finite joint speed */
-static const double folded_cosine =
-    -1.0 + 1e-12;     /* 1   least cos(gamma): a folded leg of equal links has no direction */
+/* rad or 1  round-off at the edge of the reach is not "unreachable" */
+static const double flag_tolerance = 1e-9;
+/* 1  floor of sin(gamma): a straight leg has no finite joint speed */
+static const double singular_sine = 0.02;
+/* 1  least cos(gamma): a folded leg of equal links has no direction */
+static const double folded_cosine = -1.0 + 1e-12;
 static const double radius_floor = 1e-9; /* m2  floor of the squared distance from the coxa axis */
 
-void hx_leg_compile(const hxControllerDefinition *definition, int leg, hxLegModel *model) {
+void hx_leg_solver_compile(const hxControllerDefinition *definition, int leg, hxLegSolver *model) {
   const hxKnownLeg *known = &definition->leg[leg];
   const hxKnownLink *coxa = &known->link[0], *femur = &known->link[1], *tibia = &known->link[2];
   for (int i = 0; i < 3; ++i) model->hip[i] = known->hip_position[i];
@@ -33,7 +33,8 @@ void hx_leg_compile(const hxControllerDefinition *definition, int leg, hxLegMode
   model->radius = definition->foot_radius;
 }
 
-void hx_leg_forward(const hxLegModel *model, const double angle[HX_JOINTS], double foot[3]) {
+void hx_leg_solver_forward(const hxLegSolver *model, const double angle[HX_JOINTS],
+                           double foot[3]) {
   const double a = angle[1] + model->femur_tilt, b = angle[1] - angle[2] + model->tibia_tilt;
   const double x = model->coxa_length + model->femur * cos(a) + model->tibia * cos(b);
   const double z = model->coxa_height + model->femur * sin(a) + model->tibia * sin(b);
@@ -43,21 +44,20 @@ void hx_leg_forward(const hxLegModel *model, const double angle[HX_JOINTS], doub
   foot[2] = z + model->hip[2];
 }
 
-double hx_leg_rolling(const hxLegModel *model, const double angle[HX_JOINTS]) {
+double hx_leg_solver_rolling(const hxLegSolver *model, const double angle[HX_JOINTS]) {
   return model->radius * (angle[2] - angle[1] - model->stance_pitch);
 }
 
-void hx_leg_pose(const hxLegModel *model, hxPlane plane, double height, hxPose *pose) {
+void hx_leg_solver_pose(const hxLegSolver *model, hxPlane plane, double height, hxPose *pose) {
   const double a = model->femur, b = model->tibia, side = model->offset_y;
-  const hxPlane point = hx_sub(plane, hx_plane(model->hip[0], model->hip[1]));
-  /* rho^2 = x^2 + y^2 - Y^2, the foot's distance along the coxa's x axis;  e^i psi = (x + i y)/(rho
-   * + i Y) */
+  const hxPlane point = hx_plane_sub(plane, hx_plane(model->hip[0], model->hip[1]));
+  /* rho^2 = x^2 + y^2 - Y^2;  e^(i psi) = (x + i y)/(rho + i Y) */
   const double square = point.x * point.x + point.y * point.y - side * side;
   const double rho = sqrt(square < radius_floor ? radius_floor : square);
   pose->point = point;
   pose->heading = hx_over(point, hx_plane(rho, side));
   pose->foot = hx_plane(rho - model->coxa_length, height - model->hip[2] - model->coxa_height);
-  /* u + i w = e^i B (b + a e^i gamma), so cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b) */
+  /* cos gamma = (u^2 + w^2 - a^2 - b^2)/(2 a b);  e^(i B) = (u + i w)/(b + a e^(i gamma)) */
   const double wanted = (hx_square(pose->foot) - a * a - b * b) / (2.0 * a * b);
   const double cosine = hx_clamp(wanted, folded_cosine, 1.0);
   const hxPlane knee = hx_plane(cosine, sqrt(1.0 - cosine * cosine));
@@ -71,15 +71,11 @@ void hx_leg_pose(const hxLegModel *model, hxPlane plane, double height, hxPose *
   pose->lost = !(square >= radius_floor && fabs(wanted - cosine) <= flag_tolerance);
 }
 
-void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise,
-                   double speed[HX_JOINTS]) {
-  /* velocity in the coxa frame v e^-i psi: dq_1 = v_y / rho; then u + i rise, u = v_x + Y dq_1, is
-   * left for the leg's plane */
+void hx_leg_solver_speeds(const hxLegSolver *model, const hxPose *pose, hxPlane velocity,
+                          double rise, double speed[HX_JOINTS]) {
   const hxPlane v = hx_times(velocity, hx_conj(pose->heading));
   const double turn = v.y / (pose->foot.x + model->coxa_length);
   const hxPlane left = hx_plane(v.x + model->offset_y * turn, rise);
-  /* dq_2 = -Re((u + i rise)^* e^i B)/(a sin gamma);  dq_3 = -Re((u + i rise)^* foot)/(a b sin
-   * gamma) */
   const double sine = hx_across(pose->tibia, pose->femur);
   const double lever = -model->femur * (sine < singular_sine ? singular_sine : sine);
   speed[0] = turn;
@@ -87,10 +83,10 @@ void hx_leg_speeds(const hxLegModel *model, const hxPose *pose, hxPlane velocity
   speed[2] = hx_along(left, pose->foot) / (lever * model->tibia);
 }
 
-int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, double rise,
-                 double angle[HX_JOINTS], double speed[HX_JOINTS]) {
+int hx_leg_solver_solve(const hxLegSolver *model, const hxPose *pose, hxPlane velocity, double rise,
+                        double angle[HX_JOINTS], double speed[HX_JOINTS]) {
   int missed = pose->lost;
-  hx_leg_speeds(model, pose, velocity, rise, speed);
+  hx_leg_solver_speeds(model, pose, velocity, rise, speed);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     angle[joint] = hx_clamp(pose->angle[joint], model->angle_min[joint], model->angle_max[joint]);
     /* a joint held by its limit has no speed */
@@ -101,9 +97,9 @@ int hx_leg_solve(const hxLegModel *model, const hxPose *pose, hxPlane velocity, 
   return missed;
 }
 
-void hx_leg_accelerations(const hxLegModel *model, const hxPose *neighbour, double ahead,
-                          const double angle[HX_JOINTS], const double speed[HX_JOINTS],
-                          double acceleration[HX_JOINTS]) {
+void hx_leg_solver_accelerations(const hxLegSolver *model, const hxPose *neighbour, double ahead,
+                                 const double angle[HX_JOINTS], const double speed[HX_JOINTS],
+                                 double acceleration[HX_JOINTS]) {
   const double most = 2.0 * model->speed_max / fabs(ahead);
   for (int joint = 0; joint < HX_JOINTS; ++joint) {
     const double low = model->angle_min[joint], high = model->angle_max[joint];

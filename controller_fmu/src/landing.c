@@ -4,6 +4,14 @@
 
 #include "touchdown.h"
 
+/* the least of the other five; 0 when that is infinite */
+static double least_of_others(const double values[HX_LEGS], int leg) {
+  double least = INFINITY;
+  for (int other = 0; other < HX_LEGS; ++other)
+    if (other != leg) least = fmin(least, values[other]);
+  return isfinite(least) ? least : 0.0;
+}
+
 void hx_landings_reset(hxLandings *landings) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     landings->met[leg] = INFINITY;
@@ -21,14 +29,6 @@ void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
     }
     landings->flew[leg] = (landings->flew[leg] || swinging[leg]) && !touching[leg];
   }
-}
-
-/* the least of the other five; 0 when that is infinite */
-static double least_of_others(const double values[HX_LEGS], int leg) {
-  double least = INFINITY;
-  for (int other = 0; other < HX_LEGS; ++other)
-    if (other != leg) least = fmin(least, values[other]);
-  return isfinite(least) ? least : 0.0;
 }
 
 void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],

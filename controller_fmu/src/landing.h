@@ -1,5 +1,5 @@
-/* landing.h - how high above the ends of their paths feet meet the ground. Python:
- * controller/landing.py. */
+/* landing.h - how high above the ends of their paths feet meet the ground.
+ * Python: controller/landing.py. */
 #ifndef HX_LANDING_H
 #define HX_LANDING_H
 
@@ -9,10 +9,11 @@
 HX_HIDDEN_BEGIN
 
 typedef struct hxLandings {
-  double met[HX_LEGS]; /* m  height of each foot's path over its end when it last came down;
-                          infinite until it first has */
+  /* m  height of each foot's path over its end when it last came down; infinite until it first
+   * has */
+  double met[HX_LEGS];
   double before[HX_LEGS]; /* m  and the time before that; 0 until then */
-  int flew[HX_LEGS];   /* it has been off the ground in a swing since */
+  int flew[HX_LEGS]; /* it has been off the ground in a swing since */
 } hxLandings;
 
 void hx_landings_reset(hxLandings *landings);
@@ -21,13 +22,12 @@ void hx_landings_reset(hxLandings *landings);
 void hx_landings_look(const int touching[HX_LEGS], const double height[HX_LEGS],
                       const int swinging[HX_LEGS], hxLandings *landings);
 
-/* m  the height at which each foot meets the ground without any bump; 0 while nothing tells */
+/* Where each foot meets the ground without any bump (C35) [m]; 0 while nothing tells. */
 void hx_landings_expected(const hxLandings *landings, const int touching[HX_LEGS],
                           const double height[HX_LEGS], const int swinging[HX_LEGS],
                           double expected[HX_LEGS]);
 
-/* Feet that met the ground well above the height expected, and have still some way to go to where
- * feet met it before. */
+/* Feet that met the ground early and are still above where feet met it before (C36). */
 void hx_landings_early(const hxLandings *landings, const double expected[HX_LEGS],
                        const double height[HX_LEGS], int early[HX_LEGS]);
 

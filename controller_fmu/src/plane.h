@@ -11,8 +11,8 @@ typedef struct hxPlane {
 } hxPlane;
 
 static inline hxPlane hx_plane(double x, double y) { return (hxPlane){x, y}; }
-static inline hxPlane hx_add(hxPlane a, hxPlane b) { return (hxPlane){a.x + b.x, a.y + b.y}; }
-static inline hxPlane hx_sub(hxPlane a, hxPlane b) { return (hxPlane){a.x - b.x, a.y - b.y}; }
+static inline hxPlane hx_plane_add(hxPlane a, hxPlane b) { return (hxPlane){a.x + b.x, a.y + b.y}; }
+static inline hxPlane hx_plane_sub(hxPlane a, hxPlane b) { return (hxPlane){a.x - b.x, a.y - b.y}; }
 static inline hxPlane hx_scaled(hxPlane a, double k) { return (hxPlane){a.x * k, a.y * k}; }
 static inline hxPlane hx_conj(hxPlane a) { return (hxPlane){a.x, -a.y}; }
 static inline hxPlane hx_times(hxPlane a, hxPlane b) {
@@ -20,7 +20,7 @@ static inline hxPlane hx_times(hxPlane a, hxPlane b) {
 }
 static inline double hx_square(hxPlane a) { return a.x * a.x + a.y * a.y; }
 
-/* Re(a^* b) and Im(a^* b): the dot and the cross product of two arrows */
+/* Re(a^* b) and Im(a^* b): the dot and the cross product of two vectors */
 static inline double hx_along(hxPlane a, hxPlane b) { return a.x * b.x + a.y * b.y; }
 static inline double hx_across(hxPlane a, hxPlane b) { return a.x * b.y - a.y * b.x; }
 

@@ -1,6 +1,6 @@
 #include "posture.h"
 
-void hx_posture_set(hxPosture *posture, const double value[3], const double rate[3]) {
+void hx_posture_of(hxPosture *posture, const double value[3], const double rate[3]) {
   const double cr = cos(value[1]), sr = sin(value[1]), cp = cos(value[2]), sp = sin(value[2]);
   const double rotation[3][3] = {{cp, sp * sr, sp * cr}, {0.0, cr, -sr}, {-sp, cp * sr, cp * cr}};
   for (int i = 0; i < 3; ++i)

@@ -1,5 +1,5 @@
-/* posture.h - height, roll and pitch of the torso over its feet: from the walking frame K to the
- * torso frame T. Python: controller/posture.py. */
+/* posture.h - height, roll and pitch of the torso over its feet (C10): from the walking frame K
+ * to the torso frame T. Python: controller/posture.py. */
 #ifndef HX_POSTURE_H
 #define HX_POSTURE_H
 
@@ -10,15 +10,15 @@ HX_HIDDEN_BEGIN
 
 /* The torso in the walking frame. */
 typedef struct hxPosture {
-  int level;              /* height, roll, pitch and their rates are all 0: nothing to turn */
-  double height;          /* m */
-  double rotation[3][3];  /* 1      R_KT */
-  double rate;            /* m/s    of the height */
-  double spin[3];         /* rad/s  w_KT, torso axes */
+  int level; /* height, roll, pitch and their rates are all 0: nothing to turn */
+  double height; /* m */
+  double rotation[3][3]; /* 1      R_KT */
+  double rate; /* m/s    of the height */
+  double spin[3]; /* rad/s  w_KT, torso axes */
 } hxPosture;
 
 /* Roll about x first, then pitch about y [m, rad, per second]. */
-void hx_posture_set(hxPosture *posture, const double value[3], const double rate[3]);
+void hx_posture_of(hxPosture *posture, const double value[3], const double rate[3]);
 
 /* R_KT p and R_TK p of p = (plane, z), in place. */
 void hx_posture_turn(const hxPosture *posture, hxPlane *plane, double *z);

@@ -1,12 +1,13 @@
-/* schedule.c - a controller in its users' hands: ticks at their times, saved states, refusals. */
+/* schedule.c - the public functions of a controller: ticks at their times, saved states,
+ * refusals. */
 #include <float.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "check.h"
-#include "controller.h"
+#include "state.h"
+#include "validation.h"
 
 /* A saved state: model and state behind what it takes to recognise them. */
 typedef struct {
@@ -17,8 +18,8 @@ typedef struct {
 
 static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
 static const uint64_t saved_version = 2;
-static const double clock_tolerance =
-    0.01; /* 1  of a period: a tick this much after the present time is due */
+/* 1  of a period: a tick this much after the present time is due */
+static const double clock_tolerance = 0.01;
 
 static uint64_t checksum(const hxSaved *saved) {
   return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model));
@@ -71,7 +72,7 @@ static int is_finite(const hxControllerOutput *output) {
   return sum == 0.0;
 }
 
-/* whether the next tick under this input has been done; inputs are doubles through and through */
+/* whether the next tick under this input has been computed; inputs consist of doubles alone */
 static int is_ahead(const hxController *controller, const hxControllerInput *input) {
   return controller->ahead.known && memcmp(&controller->ahead.input, input, sizeof *input) == 0;
 }

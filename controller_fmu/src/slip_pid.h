@@ -1,5 +1,5 @@
-/* slip_pid.h - the law against slip: one discrete PID per foot and direction. Python:
- * controller/slip_pid.py. */
+/* slip_pid.h - the law against slip: one discrete PID per foot and direction.
+ * Python: controller/slip_pid.py. */
 #ifndef HX_SLIP_PID_H
 #define HX_SLIP_PID_H
 
@@ -9,28 +9,28 @@
 
 HX_HIDDEN_BEGIN
 
-typedef struct hxSlipPid {
-  double h;                    /* s */
+typedef struct hxSlipPidModel {
+  double h; /* s */
   double kp, ki, kd;
-  double filter, derivative;   /* s  T_f, T_d */
-} hxSlipPid;
+  double filter, derivative; /* s  T_f, T_d */
+} hxSlipPidModel;
 
 /* What one PID remembers, of the last period. */
-typedef struct hxSlipState {
-  double force;     /* N   e */
-  double smooth;    /* N   e', filtered */
-  double integral;  /* N */
-  double slope;     /* N   filtered derivative */
-} hxSlipState;
+typedef struct hxSlipPid {
+  double force; /* N   e */
+  double smooth; /* N   e', filtered */
+  double integral; /* N */
+  double slope; /* N   filtered derivative */
+} hxSlipPid;
 
-/* Tangential forces d on feet that carry normal forces [N] at these places [m], less what pushes
- * and turns the body as one, shared by load: e = d - (n / sum n) (D + i w (p - c)), with neither a
- * sum nor a moment about the vertical. */
-void hx_slip_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
-                     hxPlane push[HX_LEGS]);
+extern const double hx_load_floor; /* N  below it no foot carries anything */
 
-/* One period on under a force [N]; returns the answer [N]. */
-double hx_slip_pid_step(const hxSlipPid *pid, double force, hxSlipState *state);
+/* Tangential forces on feet [N] less what pushes and turns the body as one, shared by load
+ * (C24), in place; normal: forces on the feet [N]; feet: their places [m]. */
+void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
+
+/* The answer of this period to a force [N] (C25). */
+double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state);
 
 HX_HIDDEN_END
 

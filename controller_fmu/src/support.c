@@ -1,45 +1,23 @@
 #include "support.h"
 
-static const double ridge_share =
-    1e-9;    /* 1   of the mean square arm: feet on one line share no moment about it */
-static const double least_arm =
-    1e-12;     /* m2  keeps the equations of no standing foot at all solvable */
-static const double least_spread =
-    1e-4;   /* m2  of the feet about their centre: less takes no moment about the vertical */
+/* 1  of the mean square arm: feet on one line share no moment about it */
+static const double ridge_share = 1e-9;
+/* m2  keeps the equations of no standing foot at all solvable */
+static const double least_arm = 1e-12;
+/* m2  of the feet about their centre: less takes no moment about the vertical */
+static const double least_spread = 1e-4;
 static const double least_load = 1e-6;     /* N   less is no load to share by */
 
+/* depth [m] to which the ground gives way under a load [N] (C21) */
 static double indentation(double load, double stiffness) {
   const double root = cbrt(load / stiffness);
   return root * root;
-}
-
-void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest,
-                        hxSupportModel *model) {
-  const hxGait *gait = &definition->gait;
-  const double handover = definition->gains.support.handover_time / gait->period;
-  model->duty = gait->duty;
-  model->handover = fmin(handover, fmin(gait->duty, 1.0 - gait->duty));
-  model->stiffness = definition->contact_stiffness;
-  model->rest_weight = rest->weight;
-  model->rest_moment = rest->moment;
-  model->rest_depth = indentation(rest->weight / HX_LEGS, model->stiffness);
 }
 
 /* from 0 to 1 over [0, 1] without a jump in rate or acceleration */
 static double smooth(double x) {
   const double y = hx_clamp(x, 0.0, 1.0);
   return y * y * y * (10.0 + y * (6.0 * y - 15.0));
-}
-
-double hx_support_activation(const hxSupportModel *model, double phase, int stayed, int stays,
-                             int walking) {
-  /* a leg that stayed where it was has neither given up its load nor takes it up again */
-  if (!walking || (stayed && phase >= model->duty)) return 1.0;
-  const double half = 0.5 * model->handover,
-               since = fmod(phase + half, 1.0); /* cycles since the activation began to rise */
-  const double rising = stayed ? 1.0 : smooth(since / model->handover);
-  const double falling = stays ? 1.0 : smooth((model->duty + 2.0 * half - since) / model->handover);
-  return fmin(rising, falling);
 }
 
 /* x of S x = b, S symmetric and positive definite: x = L^-T D^-1 L^-1 b */
@@ -53,7 +31,30 @@ static void solve(const double S[6], const double b[3], double x[3]) { /* S: 00 
   x[0] = b[0] / d0 - l10 * x[1] - l20 * x[2];
 }
 
-/* f_n = a (alpha + beta x + gamma y), sum f_n = weight, sum p f_n = moment; never negative */
+void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest,
+                        hxSupport *model) {
+  const hxGait *gait = &definition->gait;
+  const double handover = definition->gains.support.handover_time / gait->period;
+  model->duty = gait->duty;
+  model->handover = fmin(handover, fmin(gait->duty, 1.0 - gait->duty));
+  model->stiffness = definition->contact_stiffness;
+  model->rest_weight = rest->weight;
+  model->rest_moment = rest->moment;
+  model->rest_depth = indentation(rest->weight / HX_LEGS, model->stiffness);
+}
+
+double hx_support_activation(const hxSupport *model, double phase, int stayed, int stays,
+                             int walking) {
+  /* a leg that stayed where it was has neither given up its load nor takes it up again */
+  if (!walking || (stayed && phase >= model->duty)) return 1.0;
+  const double half = 0.5 * model->handover,
+               since = fmod(phase + half, 1.0); /* cycles since the activation began to rise */
+  const double rising = stayed ? 1.0 : smooth(since / model->handover);
+  const double falling = stays ? 1.0 : smooth((model->duty + 2.0 * half - since) / model->handover);
+  return fmin(rising, falling);
+}
+
+/* the vertical shares (C19): sums of f_n and of p f_n are weight and moment; never negative */
 static void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX_LEGS],
                          double weight, hxPlane moment, double normal[HX_LEGS]) {
   const double needed[3] = {weight, moment.x, moment.y};
@@ -78,7 +79,7 @@ static void share_normal(const hxPlane feet[HX_LEGS], const double activation[HX
   }
 }
 
-void hx_support_lowering(const hxSupportModel *model, const hxPlane feet[HX_LEGS],
+void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],
                          const double activation[HX_LEGS], double lowering[HX_LEGS]) {
   double normal[HX_LEGS];
   share_normal(feet, activation, model->rest_weight, model->rest_moment, normal);
@@ -93,16 +94,16 @@ void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxSh
   for (int k = 0; k < HX_LEGS; ++k) total += shares->normal[k];
   for (int k = 0; k < HX_LEGS; ++k) {
     part[k] = shares->normal[k] / (total < least_load ? least_load : total);
-    centre = hx_add(centre, hx_scaled(feet[k], part[k]));
+    centre = hx_plane_add(centre, hx_scaled(feet[k], part[k]));
   }
   for (int k = 0; k < HX_LEGS; ++k) {
-    arm[k] = hx_sub(feet[k], centre);
+    arm[k] = hx_plane_sub(feet[k], centre);
     spread += part[k] * hx_square(arm[k]);
   }
-  /* f_h = (f_n / sum f_n) (F_h + i w (p - c)), w such that sum Im(p^* f_h) = twist */
+  /* f_h = (f_n/sum f_n) (F_h + i w (p - c)) (C20) */
   const double w =
       spread < least_spread ? 0.0 : (demand->twist - hx_across(centre, demand->push)) / spread;
   for (int k = 0; k < HX_LEGS; ++k)
     shares->push[k] =
-        hx_scaled(hx_add(demand->push, hx_plane(-w * arm[k].y, w * arm[k].x)), part[k]);
+        hx_scaled(hx_plane_add(demand->push, hx_plane(-w * arm[k].y, w * arm[k].x)), part[k]);
 }

@@ -2,9 +2,10 @@
 
 #include <math.h>
 
-/* The matrix exponential in closed form. With sigma = b/2m, omega^2 = k/m, mu^2 = sigma^2 -
- * omega^2: z(t)  = e^(-sigma t) ((cosh mu t + sigma sinh(mu t)/mu) z + sinh(mu t)/mu z') z'(t) =
- * e^(-sigma t) (-omega^2 sinh(mu t)/mu z + (cosh mu t - sigma sinh(mu t)/mu) z')
+/* The matrix exponential in closed form. With sigma = b/2m, omega^2 = k/m and
+ * mu^2 = sigma^2 - omega^2:
+ *   z(t)  = e^(-sigma t) ((cosh mu t + sigma sinh(mu t)/mu) z + sinh(mu t)/mu z')
+ *   z'(t) = e^(-sigma t) (-omega^2 sinh(mu t)/mu z + (cosh mu t - sigma sinh(mu t)/mu) z')
  */
 void hx_suspension_discretise(double mass, double damping, double stiffness, double period,
                               hxSuspension *suspension) {
@@ -27,8 +28,7 @@ void hx_suspension_discretise(double mass, double damping, double stiffness, dou
   suspension->a[0][1] = odd;
   suspension->a[1][0] = -omega2 * odd;
   suspension->a[1][1] = even - sigma * odd;
-  /* from rest, z approaches f/k as the deflection of a released spring leaves it; z' = dz/dt of
-   * that */
+  /* from rest, z approaches f/k as the deflection of a released spring leaves it */
   suspension->b[0] = (1.0 - suspension->a[0][0]) / stiffness;
   suspension->b[1] = odd / mass;
 }

@@ -1,5 +1,5 @@
-/* suspension.h - the virtual suspension m z'' + b z' + k z = f per foot. Python:
- * controller/suspension.py. */
+/* suspension.h - the virtual suspension m z'' + b z' + k z = f of a foot (C26).
+ * Python: controller/suspension.py. */
 #ifndef HX_SUSPENSION_H
 #define HX_SUSPENSION_H
 

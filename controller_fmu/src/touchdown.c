@@ -7,8 +7,8 @@ const double hx_early = 0.002;
 static const double reach_speed = 0.08;  /* m/s  downwards */
 static const double reach_limit = 0.020; /* m */
 static const double hold_limit = 0.030;  /* m    upwards: as high as a swing of the robots goes */
-static const double grace = 0.040; /* s    after the planned touch-down, in which a foot may be late
-                                      without anyone minding */
+/* s  after the planned touch-down, in which a foot may be late */
+static const double grace = 0.040;
 static const double return_time = 0.060; /* s    in which an offset goes in the swing */
 static const double negligible = 1e-5; /* m    an offset less than this is none */
 
@@ -19,20 +19,23 @@ int hx_touchdown_busy(const hxTouchdown *touchdown) {
   return busy;
 }
 
-static double moved(double offset, double late, double period, const hxMeeting *foot) {
+/* the next offset of a foot that has missed the ground so long [s] */
+static double moved(double offset, double late, double period, int touching, double falling,
+                    int swinging) {
   if (late > grace) return fmax(offset - reach_speed * period, -reach_limit);
-  if (foot->swinging && foot->touching && foot->falling > 0.0)
-    return fmin(offset + foot->falling, hold_limit);
-  if (foot->swinging && !foot->touching)
+  if (swinging && touching && falling > 0.0) return fmin(offset + falling, hold_limit);
+  if (swinging && !touching)
     return fabs(offset) > negligible ? offset * exp(-period / return_time) : 0.0;
   return offset;
 }
 
-void hx_touchdown_step(double period, const hxMeeting meeting[HX_LEGS], hxTouchdown *touchdown) {
+void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
+                       const int swinging[HX_LEGS], const int loaded[HX_LEGS],
+                       hxTouchdown *touchdown) {
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    const int misses = meeting[leg].loaded && !meeting[leg].touching;
+    const int misses = loaded[leg] && !touching[leg];
     touchdown->late[leg] = misses ? touchdown->late[leg] + period : 0.0;
-    touchdown->offset[leg] =
-        moved(touchdown->offset[leg], touchdown->late[leg], period, &meeting[leg]);
+    touchdown->offset[leg] = moved(touchdown->offset[leg], touchdown->late[leg], period,
+                                   touching[leg], falling[leg], swinging[leg]);
   }
 }

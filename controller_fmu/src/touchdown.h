@@ -1,4 +1,4 @@
-/* touchdown.h - ground that is met too early or too late. Python: controller/touchdown.py. */
+/* touchdown.h - ground that is met too early or too late (C36). Python: controller/touchdown.py. */
 #ifndef HX_TOUCHDOWN_H
 #define HX_TOUCHDOWN_H
 
@@ -15,19 +15,15 @@ typedef struct hxTouchdown {
   double late[HX_LEGS]; /* s  for how long the ground has been missed */
 } hxTouchdown;
 
-/* What is planned and felt of a foot. */
-typedef struct hxMeeting {
-  int touching; /* it reports a force */
-  double falling; /* m  how far its path, well above its end, comes down in this period */
-  int swinging; /* planned in the air */
-  int loaded; /* planned to carry its whole share */
-} hxMeeting;
-
-/* Whether there is something to look after. */
+/* Whether some foot has an offset or misses the ground. */
 int hx_touchdown_busy(const hxTouchdown *touchdown);
 
-/* One period [s]. */
-void hx_touchdown_step(double period, const hxMeeting meeting[HX_LEGS], hxTouchdown *touchdown);
+/* One period [s] on (C36). touching: feet that report a force; falling: how far the path of a
+ * foot that met the ground early comes down in this period [m], 0 of the others; swinging: legs
+ * planned in the air; loaded: legs planned to carry their whole share. */
+void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
+                       const int swinging[HX_LEGS], const int loaded[HX_LEGS],
+                       hxTouchdown *touchdown);
 
 HX_HIDDEN_END
 

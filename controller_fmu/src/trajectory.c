@@ -5,44 +5,44 @@
 #include <string.h>
 
 static const double dwell = 0.1; /* 1   share of the swing at each end with vertical motion only */
-static const double freeze =
-    0.75; /* 1   part of the swing after which the landing point stays fixed to the ground */
-static const double home_tolerance =
-    1e-9; /* m   a foot this close to its stance position need not step any more */
-static const double clock_epsilon =
-    1e-9; /* cycles  the clock starts this much before the first lift-off */
+/* 1  part of the swing after which the landing point stays fixed to the ground */
+static const double freeze = 0.75;
+/* m  a foot this close to its stance position need not step any more */
+static const double home_tolerance = 1e-9;
+/* cycles  the clock starts this much before the first lift-off */
+static const double clock_epsilon = 1e-9;
 static const double nearly_done = 1e-12; /* 1   floor of 1 - s */
 static const double small_angle = 1e-12; /* rad below it sin(a)/a is 1 */
 
-/* ----------------------------------------------------------------------------------------------
- * command */
+/* ------------------------------------------------------------------------------------ command */
 
-void hx_ramp_compile(double duration, double period, hxRampModel *model) {
+void hx_command_ramp_compile(double duration, double period, hxCommandRampModel *model) {
   model->duration = duration;
   model->period = period;
   model->end = (int64_t)(duration / period);
   while ((double)model->end * period < duration) ++model->end;
 }
 
-void hx_ramp_reset(const hxRampModel *model, hxRamp *ramp) {
+void hx_command_ramp_reset(const hxCommandRampModel *model, hxCommandRamp *ramp) {
   memset(ramp, 0, sizeof *ramp);
   ramp->steps = model->end;
 }
 
-int hx_ramp_settled(const hxRampModel *model, const hxRamp *ramp) {
+int hx_command_ramp_settled(const hxCommandRampModel *model, const hxCommandRamp *ramp) {
   return ramp->steps >= model->end;
 }
 
-int hx_ramp_moves(const hxRamp *ramp) {
+int hx_command_ramp_moves(const hxCommandRamp *ramp) {
   return ramp->target[0] != 0.0 || ramp->target[1] != 0.0 || ramp->target[2] != 0.0;
 }
 
-int hx_ramp_aim(const hxRampModel *model, const double target[HX_COMMANDS], hxRamp *ramp) {
+int hx_command_ramp_aim(const hxCommandRampModel *model, const double target[HX_COMMANDS],
+                        hxCommandRamp *ramp) {
   double value[HX_COMMANDS], rate[HX_COMMANDS];
   int same = 1;
   for (int i = 0; i < HX_COMMANDS; ++i) same &= target[i] == ramp->target[i];
   if (same) return 0;
-  hx_ramp_ahead(model, ramp, 0, value, rate);
+  hx_command_ramp_ahead(model, ramp, 0, value, rate);
   for (int i = 0; i < HX_COMMANDS; ++i) {
     const double gap = target[i] - value[i], slope = rate[i] * model->duration;
     ramp->cubic[0][i] = value[i];
@@ -55,8 +55,8 @@ int hx_ramp_aim(const hxRampModel *model, const double target[HX_COMMANDS], hxRa
   return 1;
 }
 
-void hx_ramp_ahead(const hxRampModel *model, const hxRamp *ramp, int64_t steps,
-                   double value[HX_COMMANDS], double rate[HX_COMMANDS]) {
+void hx_command_ramp_ahead(const hxCommandRampModel *model, const hxCommandRamp *ramp,
+                           int64_t steps, double value[HX_COMMANDS], double rate[HX_COMMANDS]) {
   const int64_t number = ramp->steps + steps;
   const double x = (double)number * model->period / model->duration;
   const int under_way = number < model->end;
@@ -68,10 +68,9 @@ void hx_ramp_ahead(const hxRampModel *model, const hxRamp *ramp, int64_t steps,
   }
 }
 
-/* ----------------------------------------------------------------------------------------------
- * shapes */
+/* ------------------------------------------------------------------------------------- shapes */
 
-/* s in [0, 1] and ds/dtau: s = 1/2 + 45/64 y - 9/32 y^5 + 5/64 y^9 between the dwells */
+/* the horizontal progress s in [0, 1] at the part tau of a swing, and ds/dtau (C6) */
 static void blend(double tau, double *s, double *slope) {
   const double y = hx_clamp((2.0 * tau - 1.0) / (1.0 - 2.0 * dwell), -1.0, 1.0);
   const double y4 = y * y * y * y, flat = 1.0 - y4;
@@ -79,26 +78,25 @@ static void blend(double tau, double *s, double *slope) {
   *slope = 45.0 / 32.0 * flat * flat / (1.0 - 2.0 * dwell);
 }
 
-/* z and dz/dtau [m]: 64 top (tau (1 - tau))^3 + down tau^3 (1 - tau), down the touch-down speed
- * times the swing's time */
+/* The lift z of the foot at the part tau of a swing, and dz/dtau [m] (C7). top: the step height;
+ * down: the touch-down speed times the duration of the swing [m]. */
 static void hop(double tau, double top, double down, double *lift, double *climb) {
   const double arch = tau * (1.0 - tau), bow = 64.0 * top * arch * arch, fall = down * tau * tau;
   *lift = (bow + fall) * arch;
   *climb = 3.0 * bow * (1.0 - 2.0 * tau) + fall * (3.0 - 4.0 * tau);
 }
 
-/* the way under a constant twist: v (e^(i w t) - 1)/(i w) */
+/* the way [m] under a constant twist for a time [s]: v (e^(i w t) - 1)/(i w) (C3) */
 static hxPlane travel(hxTwist twist, double time) {
   const double half = 0.5 * twist.yaw_rate * time;
   const double chord = fabs(half) > small_angle ? sin(half) / half : 1.0;
   return hx_times(hx_scaled(twist.velocity, time * chord), hx_cis(half));
 }
 
-/* ----------------------------------------------------------------------------------------------
- * paths */
+/* -------------------------------------------------------------------------------------- paths */
 
-void hx_paths_compile(const hxControllerDefinition *definition, const hxLegModel leg[HX_LEGS],
-                      hxPathModel *model) {
+void hx_foot_paths_compile(const hxControllerDefinition *definition, const hxLegSolver leg[HX_LEGS],
+                           hxFootPathsModel *model) {
   const hxGait *gait = &definition->gait;
   double offset[HX_LEGS], foot[3];
   hx_gait_offsets(gait, offset);
@@ -114,38 +112,39 @@ void hx_paths_compile(const hxControllerDefinition *definition, const hxLegModel
                  first = begin + clock_epsilon;
     model->offset[k] = begin - clock_epsilon;
     model->late[k] = first - floor(first) >= gait->duty;
-    hx_leg_forward(&leg[k], leg[k].stance, foot);
+    hx_leg_solver_forward(&leg[k], leg[k].stance, foot);
     model->home[k] = hx_plane(foot[0], foot[1]);
     model->home_height[k] = foot[2];
   }
 }
 
-static double phase_after(const hxPathModel *model, int leg, int64_t number) {
+/* the phase of a leg so many periods after the begin of the walk (C2) */
+static double phase_after(const hxFootPathsModel *model, int leg, int64_t number) {
   const double clock = model->offset[leg] + (double)number * model->period / model->gait_period;
   return clock - floor(clock);
 }
 
-/* standing still, with the clock rewound */
-static void rest(const hxPathModel *model, const hxPlane plane[HX_LEGS], hxPaths *paths,
-                 hxSteps *steps) {
+/* standing still with the feet at `plane`, the gait clock rewound */
+static void rest(const hxFootPathsModel *model, const hxPlane plane[HX_LEGS], hxFootPaths *paths,
+                 hxPlannedFeet *feet) {
   hxPlane place[HX_LEGS];
-  memcpy(place, plane, sizeof place); /* plane may lie in steps */
+  memcpy(place, plane, sizeof place); /* plane may lie in feet */
   memset(paths, 0, sizeof *paths);
-  memset(steps, 0, sizeof *steps);
+  memset(feet, 0, sizeof *feet);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    steps->plane[leg] = steps->goal[leg] = place[leg];
-    steps->height[leg] = model->home_height[leg];
-    steps->phase[leg] = phase_after(model, leg, 0);
+    feet->plane[leg] = feet->goal[leg] = place[leg];
+    feet->height[leg] = model->home_height[leg];
+    feet->phase[leg] = phase_after(model, leg, 0);
     paths->stayed[leg] = model->late[leg];
   }
 }
 
-void hx_paths_reset(const hxPathModel *model, hxPaths *paths, hxSteps *steps) {
-  rest(model, model->home, paths, steps);
+void hx_foot_paths_reset(const hxFootPathsModel *model, hxFootPaths *paths, hxPlannedFeet *feet) {
+  rest(model, model->home, paths, feet);
 }
 
-/* Which legs are in the air in the coming steps, by the clock; returns whether any is. */
-static int lift_off(const hxPathModel *model, const hxPaths *old, hxPaths *paths) {
+/* Which legs are in the air in the coming section, by the gait clock; returns whether any is. */
+static int lift_off(const hxFootPathsModel *model, const hxFootPaths *old, hxFootPaths *paths) {
   int any = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const int stood = phase_after(model, leg, paths->before) < model->duty;
@@ -159,16 +158,17 @@ static int lift_off(const hxPathModel *model, const hxPaths *old, hxPaths *paths
   return any;
 }
 
-/* Feet that are home stay there. Returns whether all do; feet: where they are, the ones just landed
- * at their goals. */
-static int come_home(const hxPathModel *model, const hxPaths *old, const hxSteps *now,
-                     int any_swinging, hxPaths *paths, hxPlane feet[HX_LEGS]) {
+/* Keeps the feet that are home there. Returns whether all are home and on the ground; place: where
+ * they are, those that have just landed at their goals. */
+static int come_home(const hxFootPathsModel *model, const hxFootPaths *old,
+                     const hxPlannedFeet *now, int any_swinging, hxFootPaths *paths,
+                     hxPlane place[HX_LEGS]) {
   int all_home = 1, any_lifted = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    feet[leg] = now->plane[leg];
+    place[leg] = now->plane[leg];
     if (old->swinging[leg] && paths->standing[leg])
-      feet[leg] = hx_times(hx_cis(-now->turn), hx_sub(now->goal[leg], now->way));
-    const int home = sqrt(hx_square(hx_sub(feet[leg], model->home[leg]))) < home_tolerance;
+      place[leg] = hx_times(hx_cis(-now->turn), hx_plane_sub(now->goal[leg], now->way));
+    const int home = sqrt(hx_square(hx_plane_sub(place[leg], model->home[leg]))) < home_tolerance;
     paths->lifted[leg] &= !home;
     paths->stays[leg] = home && !paths->swinging[leg];
     all_home &= home;
@@ -177,36 +177,38 @@ static int come_home(const hxPathModel *model, const hxPaths *old, const hxSteps
   return all_home && !any_swinging && !any_lifted;
 }
 
-/* foot, velocity and height of one leg at a step whose goal, pull, way and turn are known; carried:
- * on the ground, where it was */
-static void place_foot(const hxPathModel *model, const hxPaths *paths, int leg, hxPlane back,
-                       hxPlane carried, double slope, double tau, hxSteps *steps) {
-  const hxPlane ground =
-      hx_sub(steps->goal[leg], hx_scaled(steps->pull[leg], 1.0 - steps->blend[leg]));
-  const hxPlane was = hx_times(back, hx_sub(carried, steps->way)), v = steps->twist.velocity;
-  double lift, climb;
-  steps->plane[leg] = hx_times(back, hx_sub(ground, steps->way));
-  /* a foot on the ground: dp/dt = -(v + i w p) */
-  const hxPlane pulled = hx_scaled(hx_times(back, steps->pull[leg]), slope / model->swing_time);
-  const double w = steps->twist.yaw_rate;
-  steps->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));
-  hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);
-  steps->height[leg] = model->home_height[leg] + (paths->swinging[leg] ? lift : 0.0);
-  steps->rise[leg] = paths->swinging[leg] ? climb / model->swing_time : 0.0;
-}
-
-static hxPlane ground_of(const hxSteps *steps, int leg) {
-  return hx_sub(steps->goal[leg], hx_scaled(steps->pull[leg], 1.0 - steps->blend[leg]));
-}
-
-static double progress(const hxPathModel *model, double phase) {
+/* the part tau of its swing that a leg at this phase has done */
+static double progress(const hxFootPathsModel *model, double phase) {
   return (phase - model->duty) / (1.0 - model->duty);
 }
 
-/* the present step anew, with the legs in the air that will be so */
-static void set_out(const hxPathModel *model, const hxPaths *paths, const hxSteps *now,
-                    hxTwist twist, hxSteps *first) {
-  const hxSteps present = *now;
+/* where a foot is on the ground (C5) */
+static hxPlane ground_of(const hxPlannedFeet *feet, int leg) {
+  return hx_plane_sub(feet->goal[leg], hx_scaled(feet->pull[leg], 1.0 - feet->blend[leg]));
+}
+
+/* Place and velocity of a foot whose phase, goal, pull and frame are known (C5 to C8); carried:
+ * where it was on the ground at the step before, back: e^(-i turn). */
+static void place_foot(const hxFootPathsModel *model, const hxFootPaths *paths, int leg,
+                       hxPlane back, hxPlane carried, hxPlannedFeet *feet) {
+  const double tau = progress(model, feet->phase[leg]), w = feet->twist.yaw_rate;
+  double s, slope, lift, climb;
+  blend(tau, &s, &slope);
+  feet->blend[leg] = paths->swinging[leg] ? s : 0.0;
+  const hxPlane was = hx_times(back, hx_plane_sub(carried, feet->way)), v = feet->twist.velocity;
+  feet->plane[leg] = hx_times(back, hx_plane_sub(ground_of(feet, leg), feet->way));
+  /* a foot on the ground: dp/dt = -(v + i w p) */
+  const hxPlane pulled = hx_scaled(hx_times(back, feet->pull[leg]), slope / model->swing_time);
+  feet->velocity[leg] = hx_plane(pulled.x - (v.x - w * was.y), pulled.y - (v.y + w * was.x));
+  hop(tau, model->step_height, model->touchdown_speed * model->swing_time, &lift, &climb);
+  feet->height[leg] = model->home_height[leg] + (paths->swinging[leg] ? lift : 0.0);
+  feet->rise[leg] = paths->swinging[leg] ? climb / model->swing_time : 0.0;
+}
+
+/* the present step once more, with the legs in the air that will be in the section */
+static void set_out(const hxFootPathsModel *model, const hxFootPaths *paths,
+                    const hxPlannedFeet *now, hxTwist twist, hxPlannedFeet *first) {
+  const hxPlannedFeet present = *now;
   memset(first, 0, sizeof *first);
   first->way = present.way;
   first->turn = present.turn;
@@ -215,27 +217,26 @@ static void set_out(const hxPathModel *model, const hxPaths *paths, const hxStep
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     double s, slope;
     first->phase[leg] = phase_after(model, leg, paths->before);
-    const double tau = progress(model, first->phase[leg]);
-    blend(tau, &s, &slope);
+    blend(progress(model, first->phase[leg]), &s, &slope);
     first->blend[leg] = paths->swinging[leg] ? s : 0.0;
     first->goal[leg] = present.goal[leg];
     first->pull[leg] = paths->swinging[leg] ? present.pull[leg] : hx_plane(0.0, 0.0);
-    place_foot(model, paths, leg, back, ground_of(first, leg), slope, tau, first);
+    place_foot(model, paths, leg, back, ground_of(first, leg), first);
   }
 }
 
-void hx_paths_plan(const hxPathModel *model, const hxSteps *now, int64_t number, int going,
-                   hxTwist twist, hxPaths *paths, hxSteps *first) {
-  const hxPaths old = *paths;
-  hxPlane feet[HX_LEGS];
+void hx_foot_paths_plan(const hxFootPathsModel *model, const hxPlannedFeet *now, int64_t number,
+                        int going, hxTwist twist, hxFootPaths *paths, hxPlannedFeet *first) {
+  const hxFootPaths old = *paths;
+  hxPlane place[HX_LEGS];
   if (!old.walking && !going) {
     rest(model, now->plane, paths, first);
     return;
   }
   paths->before = old.walking ? old.before + number : 0;
   const int any = lift_off(model, &old, paths);
-  if (!going && come_home(model, &old, now, any, paths, feet)) {
-    rest(model, feet, paths, first);
+  if (!going && come_home(model, &old, now, any, paths, place)) {
+    rest(model, place, paths, first);
     return;
   }
   for (int leg = 0; leg < HX_LEGS; ++leg) {
@@ -246,7 +247,7 @@ void hx_paths_plan(const hxPathModel *model, const hxSteps *now, int64_t number,
   set_out(model, paths, now, twist, first);
 }
 
-int hx_paths_reach(const hxPathModel *model, const hxPaths *paths, int64_t number) {
+int hx_foot_paths_reach(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number) {
   if (!paths->walking || number == 1) return 1;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if ((phase_after(model, leg, paths->before + number) < model->duty) != paths->standing[leg])
@@ -254,45 +255,45 @@ int hx_paths_reach(const hxPathModel *model, const hxPaths *paths, int64_t numbe
   return 1;
 }
 
-/* where the ground under the stance position, half a stance after touch-down, is now */
-static hxPlane landing(const hxPathModel *model, int leg, double tau, hxTwist twist) {
+/* the landing point (C4), ground frame relative to the present place */
+static hxPlane landing(const hxFootPathsModel *model, int leg, double tau, hxTwist twist) {
   const double ahead = model->landing_lead - tau * model->swing_time;
-  return hx_add(hx_times(hx_cis(twist.yaw_rate * ahead), model->home[leg]), travel(twist, ahead));
+  return hx_plane_add(hx_times(hx_cis(twist.yaw_rate * ahead), model->home[leg]),
+                      travel(twist, ahead));
 }
 
-/* way and turn of the walking frame since the walk's begin */
-static void odometry(double period, const hxSteps *before, hxTwist twist, hxSteps *steps) {
+/* way and turn of the walking frame since the begin of the walk (C3) */
+static void odometry(double period, const hxPlannedFeet *before, hxTwist twist,
+                     hxPlannedFeet *feet) {
   const hxTwist *last = &before->twist;
-  const hxTwist mean = {hx_scaled(hx_add(twist.velocity, last->velocity), 0.5),
+  const hxTwist mean = {hx_scaled(hx_plane_add(twist.velocity, last->velocity), 0.5),
                         0.5 * (twist.yaw_rate + last->yaw_rate)};
-  steps->turn = before->turn + mean.yaw_rate * period;
-  steps->way = hx_add(before->way, hx_times(hx_cis(before->turn), travel(mean, period)));
-  steps->twist = twist;
+  feet->turn = before->turn + mean.yaw_rate * period;
+  feet->way = hx_plane_add(before->way, hx_times(hx_cis(before->turn), travel(mean, period)));
+  feet->twist = twist;
 }
 
-void hx_paths_walk(const hxPathModel *model, const hxPaths *paths, int64_t number, hxTwist twist,
-                   const hxSteps *before, hxSteps *steps) {
+void hx_foot_paths_walk(const hxFootPathsModel *model, const hxFootPaths *paths, int64_t number,
+                        hxTwist twist, const hxPlannedFeet *before, hxPlannedFeet *feet) {
   if (!paths->walking) {
-    *steps = *before;
+    *feet = *before;
     return;
   }
-  odometry(model->period, before, twist, steps);
-  const hxPlane turn = hx_cis(steps->turn), back = hx_conj(turn);
+  odometry(model->period, before, twist, feet);
+  const hxPlane turn = hx_cis(feet->turn), back = hx_conj(turn);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
-    double s, slope;
-    steps->phase[leg] = phase_after(model, leg, paths->before + number);
-    const double tau = progress(model, steps->phase[leg]);
-    blend(tau, &s, &slope);
-    steps->blend[leg] = paths->swinging[leg] ? s : 0.0;
+    feet->phase[leg] = phase_after(model, leg, paths->before + number);
+    const double tau = progress(model, feet->phase[leg]);
+    /* every foot is aimed once */
     const int free = paths->swinging[leg] && (tau < freeze || (number == 1 && paths->lifted[leg]));
-    steps->goal[leg] = free ? hx_add(steps->way, hx_times(turn, landing(model, leg, tau, twist)))
-                            : before->goal[leg];
-    /* the way to the landing point shrinks as 1 - s: with pull = (goal - foot)/(1 - s), pull' =
-     * pull + (goal' - goal)/(1 - s) */
+    feet->goal[leg] = free
+                          ? hx_plane_add(feet->way, hx_times(turn, landing(model, leg, tau, twist)))
+                          : before->goal[leg];
+    /* the way to the landing point shrinks as 1 - s (C5) */
     const double left = 1.0 - before->blend[leg];
-    const hxPlane moved = hx_scaled(hx_sub(steps->goal[leg], before->goal[leg]),
+    const hxPlane moved = hx_scaled(hx_plane_sub(feet->goal[leg], before->goal[leg]),
                                     1.0 / (left < nearly_done ? nearly_done : left));
-    steps->pull[leg] = hx_add(before->pull[leg], moved);
-    place_foot(model, paths, leg, back, ground_of(before, leg), slope, tau, steps);
+    feet->pull[leg] = hx_plane_add(before->pull[leg], moved);
+    place_foot(model, paths, leg, back, ground_of(before, leg), feet);
   }
 }

@@ -36,9 +36,10 @@ def check_accuracy(
     fmu: Path | None,
     used: Gains | None,
     given: Gains | None,
+    engine: str,
 ) -> Accuracy:
-    """Of the runs that these plans came to, all of one control, whose results are in a folder
-    already.
+    """Of the runs that these plans came to on an engine, all of one control, whose results are in a
+    folder already.
 
     used: the gains of the runs. given: those that the user gave, which half the macro-step keeps;
     else it has gains of its own.
@@ -46,8 +47,10 @@ def check_accuracy(
     fine, half = [finer(plan) for plan in plans], [halved(plan) for plan in plans]
     try:
         with counting_bar("accuracy", len(fine) + len(half)) as tell:
-            references = list(_run(fine, fmu=fmu, gains=used, tell=tell, done=0))
-            halves = list(_run(half, fmu=fmu, gains=given, tell=tell, done=len(fine)))
+            references = list(_run(fine, fmu=fmu, gains=used, engine=engine, tell=tell, done=0))
+            halves = list(
+                _run(half, fmu=fmu, gains=given, engine=engine, tell=tell, done=len(fine))
+            )
     except KeyboardInterrupt:
         warn(
             f"the results in {folder} are whole, their accuracy was not checked; `hexapod report {folder}` draws their figures"
@@ -60,9 +63,15 @@ def check_accuracy(
 
 
 def _run(
-    plans: Sequence[Scenario], *, fmu: Path | None, gains: Gains | None, tell: Count, done: int
+    plans: Sequence[Scenario],
+    *,
+    fmu: Path | None,
+    gains: Gains | None,
+    engine: str,
+    tell: Count,
+    done: int,
 ) -> Iterator[Summary]:
-    with closing(run_batch(plans, fmu=fmu, gains=gains)) as batch:
+    with closing(run_batch(plans, fmu=fmu, gains=gains, compiled=engine == "compiled")) as batch:
         tell(done)
         for count, summary in enumerate(batch, start=done + 1):
             tell(count)

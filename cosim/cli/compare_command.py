@@ -14,11 +14,13 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    Engine,
     FmuFile,
     FolderName,
     GainsFile,
     Name,
     Settings,
+    checked_engine,
     command_line,
     default_folder,
     drawing,
@@ -91,24 +93,36 @@ def compare(
     fmu: FmuFile = None,
     gains: GainsFile = None,
     accuracy: CheckAccuracy = False,
+    engine: Engine = None,
     json: Json = False,
 ) -> int:
     """Run a walk under kinematic and under compliant control; report."""
     plan = _plan(scenario, settings or [], seeds)
     if accuracy:
         halved(plan)  # refused before anything is run
-    given = given_gains(gains)
+    given, walks = given_gains(gains), checked_engine(engine, runs=seeds)
     ready = chosen_gains(replace(plan, control="compliant"), given)
     command = command_line(
-        "compare", scenario, seeds=seeds, settings=settings, fmu=fmu, gains=gains, accuracy=accuracy
+        "compare",
+        scenario,
+        seeds=seeds,
+        settings=settings,
+        engine=engine,
+        fmu=fmu,
+        gains=gains,
+        accuracy=accuracy,
     )
     with results_folder(output or default_folder(scenario)) as folder:
-        results, files = _first_seed(plan, folder, command, fmu=fmu, gains=ready)
-        comparison = _all_seeds(plan, results, seeds, folder.path, fmu=fmu, gains=ready)
+        results, files = _first_seed(plan, folder, command, fmu=fmu, gains=ready, engine=walks)
+        comparison = _all_seeds(
+            plan, results, seeds, folder.path, fmu=fmu, gains=ready, engine=walks
+        )
         files += _store(plan, comparison, folder.path, command)
         checked: dict[str, Accuracy] = {}
         if accuracy:
-            checked = _accuracies(plan, comparison, folder.path, fmu=fmu, used=ready, given=given)
+            checked = _accuracies(
+                plan, comparison, folder.path, fmu=fmu, used=ready, given=given, engine=walks
+            )
             write_json(folder.path / METRICS_FILE, _table(comparison, checked))
         with drawing(folder.path):
             runs = {control: stored(result) for control, result in results.items()}
@@ -149,15 +163,22 @@ def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
 
 
 def _first_seed(
-    plan: Scenario, folder: Folder, command: str, *, fmu: Path | None, gains: Gains | None
+    plan: Scenario,
+    folder: Folder,
+    command: str,
+    *,
+    fmu: Path | None,
+    gains: Gains | None,
+    engine: str,
 ) -> tuple[dict[str, Result], list[Path]]:
     """The runs whose recordings are kept."""
     results: dict[str, Result] = {}
     files: list[Path] = []
     for control in CONTROLS:
         with results_folder(folder.path / control) as part:
+            walk = replace(plan, control=control)
             results[control], written = run_into(
-                replace(plan, control=control), [folder, part], command, fmu=fmu, gains=gains
+                walk, [folder, part], command, fmu=fmu, gains=gains, engine=engine
             )
         files += written
     return results, files
@@ -171,6 +192,7 @@ def _all_seeds(
     *,
     fmu: Path | None,
     gains: Gains | None,
+    engine: str,
 ) -> Comparison:
     """Runs the other seeds too; an interrupt keeps what came to its end, under another name."""
     scenarios = [
@@ -180,10 +202,8 @@ def _all_seeds(
     ]
     done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
     try:
-        with (
-            counting_bar("seeds", 2 * seeds) as tell,
-            closing(run_batch(scenarios, fmu=fmu, gains=gains)) as runs,
-        ):
+        batch = run_batch(scenarios, fmu=fmu, gains=gains, compiled=engine == "compiled")
+        with counting_bar("seeds", 2 * seeds) as tell, closing(batch) as runs:
             tell(len(done))
             for run in runs:
                 done.append(run)
@@ -210,12 +230,15 @@ def _accuracies(
     fmu: Path | None,
     used: Gains | None,
     given: Gains | None,
+    engine: str,
 ) -> dict[str, Accuracy]:
     """By control, of the means over the seeds that are compared."""
     found = {}
     for control, runs in zip(CONTROLS, comparison.judged, strict=True):
         plans = [replace(plan, control=control, seed=run.seed) for run in runs]
-        found[control] = check_accuracy(plans, runs, folder, fmu=fmu, used=used, given=given)
+        found[control] = check_accuracy(
+            plans, runs, folder, fmu=fmu, used=used, given=given, engine=engine
+        )
     return found
 
 

@@ -11,11 +11,13 @@ from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
 from hexapod_cosim.cosim.cli.failures import FELL, SUCCESS
 from hexapod_cosim.cosim.cli.running import (
+    Engine,
     FmuFile,
     FolderName,
     GainsFile,
     Name,
     Settings,
+    checked_engine,
     command_line,
     default_folder,
     drawing,
@@ -69,6 +71,7 @@ def simulate(
     fmu: FmuFile = None,
     gains: GainsFile = None,
     accuracy: CheckAccuracy = False,
+    engine: Engine = None,
     json: Json = False,
 ) -> int:
     """Run one co-simulation: results, metrics, plots."""
@@ -76,7 +79,7 @@ def simulate(
         scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])]
     )
     plan = titled(plan, settings or [])
-    given = given_gains(gains)
+    given, walks = given_gains(gains), checked_engine(engine, runs=1)
     if accuracy:
         halved(plan)  # refused before anything is run
     ready = chosen_gains(plan, given) if accuracy else given
@@ -86,15 +89,22 @@ def simulate(
             scenario,
             control=control,
             settings=settings,
+            engine=engine,
             fmu=fmu,
             gains=gains,
             accuracy=accuracy,
         )
-        result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready)
+        result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready, engine=walks)
         checked: dict[str, Accuracy] = {}
         if accuracy:
             checked[plan.control] = check_accuracy(
-                [plan], [summarise(result)], folder.path, fmu=fmu, used=ready, given=given
+                [plan],
+                [summarise(result)],
+                folder.path,
+                fmu=fmu,
+                used=ready,
+                given=given,
+                engine=walks,
             )
             write_accuracy(folder.path, result.metrics, checked[plan.control].as_table())
         if plan.outputs.plots:

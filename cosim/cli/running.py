@@ -21,8 +21,10 @@ from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.results import Folder, write_result
 from hexapod_cosim.cosim.run.run import simulate as run_scenario
+from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import HexapodError
+from hexapod_cosim.cosim.study.execute.engines import ENGINES
+from hexapod_cosim.models import HexapodError, unknown_name
 
 Name = Annotated[
     str,
@@ -59,6 +61,15 @@ GainsFile = Annotated[
 ]
 
 
+Engine = Annotated[
+    str | None,
+    typer.Option(
+        "--engine",
+        metavar="|".join(ENGINES),
+        help="The controller and the loop that walk; default python for one run, compiled for many.",
+    ),
+]
+
 UNTITLED = ("control=", "seed=", "outputs.", "duration=")  # settings that make no other walk
 
 
@@ -86,6 +97,17 @@ def command_line(
     )
 
 
+def checked_engine(name: str | None, *, runs: int) -> str:
+    """One of ENGINES; where none is given, Python for one run and compiled for many. Raises
+    HexapodError.
+    """
+    if name is None:
+        return "python" if runs == 1 else "compiled"
+    if name not in ENGINES:
+        raise unknown_name("engine", name, ENGINES, where="--engine")
+    return name
+
+
 def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
     """The scenario with a title that tells what was set, so that no report of another walk bears
     the plain one's name.
@@ -103,9 +125,11 @@ def run_into(
     *,
     fmu: Path | None,
     gains: Gains | None,
+    engine: str,
 ) -> tuple[Result, list[Path]]:
-    """Runs, and writes into the last folder, clearing all of them once the run begins; an interrupt
-    waits for what is being written.
+    """Runs on one of ENGINES, and writes into the last folder.
+
+    All folders are cleared once the run begins; an interrupt waits for what is being written.
 
     Raises RunError, or KeyboardInterrupt, with what was recorded on disk when the run does not
     complete.
@@ -118,7 +142,11 @@ def run_into(
                 folder.begin()
 
         with progress_bar(plan.control, plan.duration) as progress:
-            result = run_scenario(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
+            if engine == "compiled":
+                walker = whole.enter_context(Walker(everything=True))
+                result = walker.simulate(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
+            else:
+                result = run_scenario(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
         result = replace(result, facts={**result.facts, "command": command})
         files = write_result(result, folders[-1].path)
     for warning in result.facts["warnings"]:

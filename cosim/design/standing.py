@@ -12,7 +12,7 @@ import numpy as np
 
 from hexapod_cosim.controller import LegSolver
 from hexapod_cosim.controller.design.standing import weight_share
-from hexapod_cosim.controller.kinematics import Mask
+from hexapod_cosim.controller.plane import Mask
 from hexapod_cosim.controller.size import size_of
 from hexapod_cosim.cosim.design.linearise import ANGLES, LATEST, POSES, STATES, Bench, Motion
 from hexapod_cosim.cosim.interface.names import JOINTS, LEGS

@@ -4,6 +4,7 @@ designs are made once, the loop is C.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +22,7 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
+from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
 from hexapod_cosim.cosim.results.metrics import judged_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
@@ -80,9 +82,12 @@ class Walker:
         fmu: Path | None = None,
         gains: Gains | None = None,
         progress: Progress | None = None,
+        begin: Callable[[], None] | None = None,
     ) -> Result:
-        """A scenario's run and what came of it, on the plant `fmu` if given. Raises HexapodError
-        for what keeps it from starting.
+        """A scenario's run and what came of it, on the plant `fmu` if given. Arguments are those of
+        run.simulate().
+
+        Raises HexapodError for what keeps the run from starting.
         """
         plan = make_plan(scenario, gains=self._gains(scenario, gains))
         controller = self._told_controller(plan)
@@ -92,14 +97,22 @@ class Walker:
         parameters = initialise_plant(plant, plan)
         controller.initialise(scenario.start, scenario.start + scenario.duration)
         sensor = sensor_settings(scenario, plan.schedule)
-        begin = thread_time()
+        if self._everything:
+            chosen_columns(
+                ("time", *master.columns, *COMMAND_COLUMNS),
+                scenario.outputs.csv,
+                where=f"{scenario.where}: outputs.csv",
+            )
+        if begin is not None:
+            begin()
+        started = thread_time()
         every = (
             scenario.every if self._everything else 1
         )  # what is judged is needed of every macro-step
         outcome = master.run(
             plan.schedule, h=scenario.macro_step, every=every, sensor=sensor, progress=progress
         )
-        self.loop_time = thread_time() - begin
+        self.loop_time = thread_time() - started
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
         return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.warnings})
 

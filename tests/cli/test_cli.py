@@ -272,6 +272,62 @@ def test_a_folder_of_an_earlier_run_is_written_anew(call: Call, tmp_path: Path) 
     assert {path.name for path in folder.iterdir()} == RUN
 
 
+def test_both_engines_walk_the_same_walk_and_leave_the_same_files(
+    call: Call, tmp_path: Path
+) -> None:
+    """To the last digits of their controllers; each as its command says, the Python one by
+    default.
+    """
+    found = {}
+    for engine, words in (("python", []), ("compiled", ["--engine", "compiled"])):
+        folder = tmp_path / engine
+        code, out, _ = call(
+            "simulate",
+            "walk_flat",
+            "--control",
+            "compliant",
+            *words,
+            "-o",
+            folder,
+            "--json",
+            *CYCLES,
+        )
+        assert code == 0
+        assert (
+            " --engine compiled" in json.loads((folder / "run.json").read_text())["command"]
+        ) == bool(words)
+        recorded = read_csv(folder / "results.csv")
+        found[engine] = (
+            json.loads(out)["metrics"],
+            list(recorded.names),
+            recorded.data,
+            {path.name for path in folder.iterdir()},
+        )
+    (metrics, names, rows, files), (other, other_names, other_rows, other_files) = (
+        found["python"],
+        found["compiled"],
+    )
+    assert files == other_files
+    assert sorted(names) == sorted(other_names)
+    order = [other_names.index(name) for name in names]
+    np.testing.assert_allclose(other_rows[:, order], rows, rtol=1e-6, atol=1e-6)
+    for name in set(METRICS) - TWINS - {"realtime_factor"}:
+        assert other[name] == pytest.approx(metrics[name], rel=1e-6, abs=1e-9), name
+
+
+@pytest.mark.parametrize("command", ["simulate", "compare"])
+def test_an_unknown_engine_is_refused_with_the_valid_names(
+    call: Call, tmp_path: Path, command: str
+) -> None:
+    code, _, err = call(command, "walk_flat", "-o", tmp_path / "none", "--engine", "compile")
+    assert code != 0
+    assert (
+        "--engine: unknown engine: got 'compile', expected one of compiled, python; did you mean 'compiled'?"
+        in " ".join(err.split())
+    )
+    assert not (tmp_path / "none").exists()
+
+
 @pytest.mark.parametrize("what", ["robots", "scenarios", "gaits", "terrains", "laws"])
 def test_list_names_what_there_is(call: Call, what: str) -> None:
     code, out, _ = call("list", what, "--json")

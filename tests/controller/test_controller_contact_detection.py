@@ -11,15 +11,15 @@ from hexapod_cosim.controller.contact_detection import ContactDetector, SensorWa
 
 WEIGHT, CYCLE, PERIOD = 50.0, 1.0, 0.005  # N, s, s
 TOUCHES, LIFTS = 1.0, 0.25  # N    2 and 0.5 % of the weight
-NONE, ALL = [False] * 6, [True] * 6
+NONE, ALL = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)
 
 
-def only(*legs: int) -> list[bool]:
-    return [leg in legs for leg in range(6)]
+def only(*legs: int) -> np.ndarray:
+    return np.isin(np.arange(6), legs)
 
 
-def but(*legs: int) -> list[bool]:
-    return [leg not in legs for leg in range(6)]
+def but(*legs: int) -> np.ndarray:
+    return ~only(*legs)
 
 
 def test_a_foot_touches_down_above_2_percent_of_the_weight_and_lifts_off_below_half_a_percent() -> (
@@ -51,10 +51,10 @@ def test_feet_are_told_apart_and_what_was_found_before_is_left_alone() -> None:
     np.testing.assert_array_equal(detector.touching, first)
 
 
-def until_doubted(watch: SensorWatch, leg: int, **seen: list[bool] | float) -> int:
+def until_doubted(watch: SensorWatch, leg: int, **seen: np.ndarray | float) -> int:
     """Looks until the sensor is doubted, none of the others ever."""
     for count in range(1, 1000):
-        doubted = watch.look(**seen, time=PERIOD)  # type: ignore[arg-type]
+        doubted = watch.look(**seen)  # type: ignore[arg-type]
         assert not any(doubted[other] for other in range(6) if other != leg)
         if doubted[leg]:
             return count
@@ -62,79 +62,73 @@ def until_doubted(watch: SensorWatch, leg: int, **seen: list[bool] | float) -> i
 
 
 def test_a_dead_sensor_of_a_foot_that_carries_is_doubted_after_a_tenth_of_a_second() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     count = until_doubted(watch, 2, touching=but(2), total=40.0, standing=ALL, high=NONE)
     assert count in {20, 21}  # times are sums
 
 
 def test_a_stuck_sensor_of_a_foot_in_mid_swing_is_doubted_after_60_milliseconds() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     count = until_doubted(watch, 2, touching=ALL, total=WEIGHT, standing=but(2), high=only(2))
     assert count in {12, 13}
 
 
 def test_a_missing_foothold_whose_weight_the_others_carry_is_not_a_dead_sensor() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     for _ in range(1000):
-        assert not any(
-            watch.look(but(2), 46.1, ALL, NONE, time=PERIOD)
-        )  # N    92 % of the weight are 46
-    assert not watch.busy
+        assert not any(watch.look(but(2), 46.1, ALL, NONE))  # N    92 % of the weight are 46
+    assert not watch.busy()
     assert until_doubted(watch, 2, touching=but(2), total=45.9, standing=ALL, high=NONE)
 
 
 def test_contradictions_shorter_than_that_never_add_up() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     for _ in range(50):
         for _ in range(18):
-            assert not any(watch.look(but(2), 0.5 * WEIGHT, ALL, NONE, time=PERIOD))
-        assert not any(watch.look(ALL, WEIGHT, ALL, NONE, time=PERIOD))
+            assert not watch.look(but(2), 0.5 * WEIGHT, ALL, NONE).any()
+        assert not watch.look(ALL, WEIGHT, ALL, NONE).any()
 
 
 def test_a_foot_that_need_not_carry_or_is_not_high_contradicts_nothing() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     for _ in range(200):
-        assert not any(watch.look(NONE, 0.0, NONE, ALL, time=PERIOD))
-        assert not any(watch.look(ALL, WEIGHT, NONE, NONE, time=PERIOD))
-    assert not watch.busy
+        assert not watch.look(NONE, 0.0, NONE, ALL).any()
+        assert not watch.look(ALL, WEIGHT, NONE, NONE).any()
+    assert not watch.busy()
 
 
 def test_a_sensor_is_believed_again_when_it_has_contradicted_nothing_for_one_and_a_half_cycles() -> (
     None
 ):
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     count = 0
-    while watch.look(ALL, WEIGHT, ALL, NONE, time=PERIOD)[2]:
-        assert watch.busy
+    while watch.look(ALL, WEIGHT, ALL, NONE)[2]:
+        assert watch.busy()
         count += 1
     assert abs(count - 300) <= 2
-    assert not watch.busy
+    assert not watch.busy()
 
 
 def test_a_sensor_that_stays_dead_stays_doubted() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     for k in range(1000):
         stands = k // 100 % 2 == 0  # walking: dead in the stance only
         assert watch.look(
-            but(2),
-            0.5 * WEIGHT,
-            ALL if stands else but(2),
-            NONE if stands else only(2),
-            time=PERIOD,
+            but(2), 0.5 * WEIGHT, ALL if stands else but(2), NONE if stands else only(2)
         )[2]
 
 
 def test_what_is_saved_does_not_change() -> None:
-    watch = SensorWatch(WEIGHT, cycle=CYCLE)
+    watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     for _ in range(10):
-        watch.look(but(2), 0.5 * WEIGHT, ALL, NONE, time=PERIOD)
+        watch.look(but(2), 0.5 * WEIGHT, ALL, NONE)
     state = watch.save()
     left = until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     watch.restore(state)
-    assert not any(watch.doubted)
-    assert watch.busy
+    assert not watch.doubted.any()
+    assert watch.busy()
     assert (
         until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
         == left

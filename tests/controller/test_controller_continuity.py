@@ -45,7 +45,7 @@ def torques(name: str, gait: str, period: float) -> np.ndarray:
             k * period, BodyCommand(vx=0.04, yaw_rate=0.05) if walks else BodyCommand(), measurement
         )
         found.append(out.torque_ref.copy())
-        measurement.foot_force[:] = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
+        measurement.foot_force[:] = compliant.stance.plan.shares.forces()
         measurement.angle[:] = out.angle_ref - compliant.laws.bend
     assert not controller.paths.walking
     return np.array(found)

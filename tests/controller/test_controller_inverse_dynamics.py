@@ -11,9 +11,8 @@ from states import changed, with_links
 from twin_motion import HIGH, Motion, Z, twin_needs, velocities
 
 from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.inverse_dynamics import Demand, Frames, InverseDynamics
-from hexapod_cosim.controller.kinematics import Feet
-from hexapod_cosim.controller.posture import in_torso_frame, rotations
+from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics, Neighbours
+from hexapod_cosim.controller.posture import Posture
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 from hexapod_cosim.models.dynamics import masses
@@ -57,15 +56,24 @@ def moving(robot: Robot, *, turning: float, leaning: float, start: float) -> tup
     ground = home[:, 0] + 1j * home[:, 1] + SWINGING * wave(0.02, 8.0, 0.5)(t)[:, None]
     height = home[:, 2] + SWINGING * (0.02 + wave(0.015, 9.0, 0.1)(t)[:, None])
     plane = np.exp(-1j * yaw[:, None]) * (ground - way[:, None])
-    feet = Feet(plane, height, velocity=np.zeros_like(plane), rise=np.zeros_like(height))
-    seen = in_torso_frame(feet, posture, np.zeros_like(posture))
-    pose = legs.pose(seen.plane, seen.height)
-    speed = np.gradient(pose.angles, PERIOD, axis=0)
-    rotation = rotations(posture[:, 1], posture[:, 2]) if leaning else None
-    frames = Frames(way[:, None], np.exp(1j * yaw[:, None]), posture[:, :1], rotation)
-    return Motion(PERIOD, way, yaw, posture, pose.angles, speed), InverseDynamics(
-        robot, legs, period=PERIOD
-    ).demand(pose, speed, frames)
+    dynamics, torsos = (
+        InverseDynamics(robot, legs, period=PERIOD),
+        [Posture.of(row, np.zeros(3)) for row in posture],
+    )
+    before, now, after = (
+        legs.pose(*torso.see_place(*foot))
+        for torso, foot in zip(torsos, zip(plane, height, strict=True), strict=True)
+    )
+    masses = [
+        dynamics.place(*step)
+        for step in zip((before, now, after), way.tolist(), yaw.tolist(), torsos, strict=True)
+    ]
+    angle = np.array([before.angle, now.angle, after.angle])
+    speed = np.gradient(angle, PERIOD, axis=0)
+    demand = dynamics.demand(
+        Neighbours((masses[0], masses[1], masses[2]), (before, now, after)), speed[1], torsos[1]
+    )
+    return Motion(PERIOD, way, yaw, posture, angle, speed), demand
 
 
 def differences(robot: Robot, motion: Motion, demand: Demand) -> dict[str, float]:
@@ -81,11 +89,11 @@ def differences(robot: Robot, motion: Motion, demand: Demand) -> dict[str, float
         motion.speed[1] / GEAR_SPEED
     )
     return {
-        "push": abs(demand.push[1] - back * complex(needed[0], needed[1])),
-        "weight": abs(demand.weight[1] - needed[2]),
-        "moment": abs(demand.moment[1] - back * complex(-moment[1], moment[0])),
-        "twist": abs(demand.twist[1] - moment[2]),
-        "torque": float(np.abs(demand.torque[1] - torque).max()),
+        "push": abs(demand.push - back * complex(needed[0], needed[1])),
+        "weight": abs(demand.weight - needed[2]),
+        "moment": abs(demand.moment - back * complex(-moment[1], moment[0])),
+        "twist": abs(demand.twist - moment[2]),
+        "torque": float(np.abs(demand.torque - torque).max()),
     }
 
 
@@ -161,7 +169,7 @@ def test_the_lever_is_the_twins_virtual_work_of_a_force_on_the_contact_point(nam
         v, w = np.split(reach[3 * leg + 3, :, 6 + 3 * leg : 9 + 3 * leg], 2)
         arm = centre - robot.foot.radius * Z - body[3 * leg + 3, :3]
         np.testing.assert_allclose(
-            demand.lever[1, leg], (v + np.cross(w.T, arm).T).T @ axes.T, atol=1e-12
+            demand.lever[leg], (v + np.cross(w.T, arm).T).T @ axes.T, atol=1e-12
         )
 
 
@@ -169,8 +177,8 @@ def test_the_lever_is_the_twins_virtual_work_of_a_force_on_the_contact_point(nam
 def test_standing_needs_the_weight_its_moment_and_nothing_else(name: str) -> None:
     robot = load_robot(name)
     demand = InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
-    assert demand.weight[0] == pytest.approx(weight(robot), rel=1e-14)
-    assert demand.push[0] == 0.0
+    assert demand.weight == pytest.approx(weight(robot), rel=1e-14)
+    assert demand.push == 0.0
     body = body_states(
         robot,
         np.array(robot.torso.com),
@@ -181,4 +189,4 @@ def test_standing_needs_the_weight_its_moment_and_nothing_else(name: str) -> Non
         np.zeros((6, 3)),
     )
     centre = masses(robot) @ body[:, :2] @ [1.0, 1.0j]
-    assert demand.moment[0] == pytest.approx(9.81 * centre, abs=1e-12)
+    assert demand.moment == pytest.approx(9.81 * centre, abs=1e-12)

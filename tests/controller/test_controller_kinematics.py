@@ -90,14 +90,14 @@ def test_the_jacobian_is_the_slope_of_forward_kinematics(robot: Robot) -> None:
             np.testing.assert_allclose(jacobian[:, :, joint], slope, atol=DIFFERENCE_ERROR)
 
 
-def test_many_steps_at_once_are_the_same_as_each_by_itself(robot: Robot) -> None:
+def test_many_poses_at_once_are_the_same_as_each_by_itself(robot: Robot) -> None:
     solver, poses = LegSolver(robot), reachable_poses(robot, 20)
     foot = solver.forward(poses)
     together = solver.pose(plane(foot), foot[..., 2])
     for k, angle in enumerate(poses):
         np.testing.assert_array_equal(foot[k], solver.forward(angle))
         np.testing.assert_array_equal(
-            together.angles[k], solver.pose(plane(foot[k : k + 1]), foot[k : k + 1, :, 2]).angles[0]
+            together.angle[k], solver.pose(plane(foot[k]), foot[k, :, 2]).angle
         )
     assert not together.lost.any()
 

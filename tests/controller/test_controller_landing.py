@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 from gains import PERIOD
-from standing import WEIGHT, make_laws, plan, squeezing
+from standing import WEIGHT, Laws, make_laws, plan, squeezing
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.compliance import Compliance
 from hexapod_cosim.controller.landing import Landings
 
 LOW = np.zeros(6)
@@ -77,7 +76,7 @@ def test_what_is_saved_does_not_change() -> None:
     np.testing.assert_array_equal(other.met, np.where(FIRST, 0.01, np.inf))
 
 
-def walk(laws: Compliance, ground: np.ndarray, steps: int) -> list[np.ndarray]:
+def walk(laws: Laws, ground: np.ndarray, steps: int) -> list[np.ndarray]:
     """Two tripods in turn, feet that come down from 25 mm at 0.25 m/s onto ground so high [m]
     (6,). Offsets at the end of each step.
     """
@@ -89,9 +88,9 @@ def walk(laws: Compliance, ground: np.ndarray, steps: int) -> list[np.ndarray]:
             force = squeezing(0.0)
             force[swinging & (height > ground), 2] = 0.0
             force[swinging & (height <= ground), 2] = 0.05 * WEIGHT
-            plan(laws, 1, standing=standing, height=height, rise=-0.25)
-            laws.step(force)
-        found.append(laws.offset.copy())
+            plan(laws, standing=standing, height=height, rise=-0.25)
+            laws.feel(force)
+        found.append(laws.touchdown.offset)
     return found
 
 

@@ -5,6 +5,7 @@ make the planned motion.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from gains import PERIOD, make_gains, weight
 from states import changed, with_links
 from twin_motion import Motion, Z, twin_needs
 
-from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, make_gait
+from hexapod_cosim.controller import BodyCommand, Controller, Gait, Measurement, Parts, make_gait
+from hexapod_cosim.controller.compliance import Plan
 from hexapod_cosim.models import Robot, load_robot
 from hexapod_cosim.models.actuator import GEAR_SPEED
 from hexapod_cosim.models.dynamics import mass_matrix
@@ -40,44 +42,74 @@ LINK_TURNS = 0.01  # N m    5e-4 kg m2 x 20 rad/s2: what is left out of a joint'
 INERTIAS = {"points": SWEPT, "real": LINK_TURNS}
 
 
-def planned(robot: Robot, command: BodyCommand, gait: Gait | None = None) -> Controller:
-    """A controller in its walk, at the begin of a plan."""
-    gait = make_gait(robot, step_height=0.02) if gait is None else gait
-    controller = Controller(robot, period=PERIOD, gait=gait, gains=make_gains(robot))
-    steps = 0
-    while steps < BEGUN or controller._at != 0:
+class Step(NamedTuple):
+    """A step of a walk: what it asks of the laws, and the planned motion of which it is the
+    middle.
+    """
+
+    plan: Plan
+    motion: Motion
+
+
+def walker(robot: Robot, gait: Gait) -> Controller:
+    """A controller whose joint speeds are the planned ones."""
+    return Controller(
+        robot, period=PERIOD, gait=gait, gains=make_gains(robot), parts=Parts(touchdown=False)
+    )
+
+
+def present(controller: Controller) -> Step | None:
+    """The present step; None where a section of the walk begins or ends."""
+    before, now, after = controller._before, controller._now, controller._after
+    if before is None or after is None:
+        return None
+    compliant, steps = controller.compliant, (before, now, after)
+    assert compliant is not None
+    way, yaw = (
+        np.array([step.feet.way for step in steps]),
+        np.array([step.feet.turn for step in steps]),
+    )
+    posture, angle = (
+        np.array([step.value[3:] for step in steps]),
+        np.array([step.pose.angle for step in steps]),
+    )
+    speed = np.array([np.full((6, 3), np.nan), controller._out.speed_ref, np.full((6, 3), np.nan)])
+    return Step(compliant.stance.plan, Motion(PERIOD, way, yaw, posture, angle, speed))
+
+
+def planned(robot: Robot, command: BodyCommand, gait: Gait | None = None) -> list[Step]:
+    """The inner steps of a section of a walk, from a lift-off or touch-down to the next."""
+    controller, steps, found = (
+        walker(robot, make_gait(robot, step_height=0.02) if gait is None else gait),
+        0,
+        list[Step](),
+    )
+    while steps < BEGUN or not found or controller._after is not None:
         controller.step(steps * PERIOD, command, Measurement())
         steps += 1
-    return controller
+        if steps < BEGUN:
+            continue
+        step = present(controller)
+        if step is not None and (found or controller._at == 2):
+            found.append(step)
+    return found
 
 
-def given_and_needed(
-    robot: Robot, controller: Controller, at: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def given_and_needed(robot: Robot, step: Step) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(24,) what the plan gives the twin, (24,) what its motion needs, and the mass matrix (24,
     24) of torso and joints.
     """
-    compliant, steps = controller.compliant, controller.paths.steps
-    assert compliant is not None
-    plan, posture = compliant.laws._plan, np.array(compliant._command)[:, 3:]
-    motion = Motion(
-        PERIOD,
-        steps.way[1:, 0],
-        steps.turn[1:, 0],
-        posture,
-        controller._plan.angle,
-        controller._plan.speed,
-    )
+    plan, motion, at = step.plan, step.motion, 1
     needed, body, reach = twin_needs(robot, motion, at)
     c, s = np.cos(motion.yaw[at]), np.sin(motion.yaw[at])
-    force = plan.shares.forces(at)[:, :3] @ np.array([[c, s, 0.0], [-s, c, 0.0], Z])
+    force = plan.shares.forces() @ np.array([[c, s, 0.0], [-s, c, 0.0], Z])
     given, moves = np.zeros(24), reach.reshape(19, 6, 24)
     for leg, (f, centre) in enumerate(zip(force, foot_centres(robot, body), strict=True)):
         tibia = 3 * leg + 3
         arm = centre - robot.foot.radius * Z - body[tibia, :3]
         given += moves[tibia, :3].T @ f + moves[tibia, 3:].T @ np.cross(arm, f)
     gear = robot.servo.coulomb_friction * np.tanh(motion.speed[at] / GEAR_SPEED)
-    given[6:] += (plan.own[at] + plan.carry[at] - gear).ravel()
+    given[6:] += (plan.own + plan.carry - gear).ravel()
     return given, needed, reach.T @ mass_matrix(robot, body) @ reach
 
 
@@ -92,9 +124,9 @@ def test_planned_torques_and_forces_move_the_twin_as_planned(
         robot = changed(robot, torso={"inertia": POINT})
         for joint in range(3):
             robot = with_links(robot, joint, inertia=POINT)
-    controller = planned(robot, COMMANDS[command])
-    for at in np.linspace(1, len(controller._plan.angle) - 2, 3, dtype=int).tolist():
-        given, needed, inertia = given_and_needed(robot, controller, at)
+    steps = planned(robot, COMMANDS[command])
+    for at in np.linspace(0, len(steps) - 1, 3, dtype=int).tolist():
+        given, needed, inertia = given_and_needed(robot, steps[at])
         error = given - needed
         assert np.abs(error[:3]).max() < CARRIED
         assert np.abs(error[3:5]).max() < weight(robot) * ROLLED + (
@@ -115,10 +147,12 @@ def test_planned_torques_and_forces_move_the_twin_as_planned(
 @pytest.mark.parametrize("name", ROBOTS)
 def test_standing_still_is_planned_to_round_off(name: str) -> None:
     robot = load_robot(name)
-    controller = Controller(robot, period=PERIOD, gait=make_gait(robot), gains=make_gains(robot))
+    controller = walker(robot, make_gait(robot))
     for k in range(3):
         controller.step(k * PERIOD, BodyCommand(), Measurement())
-    given, needed, _ = given_and_needed(robot, controller, 2)
+    step = present(controller)
+    assert step is not None
+    given, needed, _ = given_and_needed(robot, step)
     # N m    two hundredths of a millimetre of lowering shift the mass of the legs, and the shares
     # stand on the stance
     indented = 5e-6
@@ -132,10 +166,9 @@ def test_a_mirrored_plan_is_the_plan_in_a_mirror(command: str) -> None:
     left = planned(robot, straight, gait)
     other = replace(straight, vy=-straight.vy, yaw_rate=-straight.yaw_rate, roll=-straight.roll)
     right = planned(robot, other, replace(gait, offsets=tuple(np.array(gait.offsets)[mirror])))
-    assert left.compliant is not None
-    assert right.compliant is not None
-    mine, seen = left.compliant.laws._plan, right.compliant.laws._plan
-    for wanted, found in ((mine.own, seen.own), (mine.carry, seen.carry)):
-        np.testing.assert_allclose(found, wanted[:, mirror] * [-1.0, 1.0, 1.0], atol=1e-9)
-    np.testing.assert_allclose(seen.shares.normal, mine.shares.normal[:, mirror], atol=1e-9)
-    np.testing.assert_allclose(seen.shares.push, mine.shares.push[:, mirror].conj(), atol=1e-9)
+    assert len(left) == len(right) > 20
+    for mine, seen in ((one.plan, two.plan) for one, two in zip(left, right, strict=True)):
+        for wanted, found in ((mine.own, seen.own), (mine.carry, seen.carry)):
+            np.testing.assert_allclose(found, wanted[mirror] * [-1.0, 1.0, 1.0], atol=1e-9)
+        np.testing.assert_allclose(seen.shares.normal, mine.shares.normal[mirror], atol=1e-9)
+        np.testing.assert_allclose(seen.shares.push, mine.shares.push[mirror].conj(), atol=1e-9)

@@ -10,10 +10,9 @@ import pytest
 from gains import PERIOD, SLIP
 
 from hexapod_cosim.controller import SlipGains
-from hexapod_cosim.controller.slip_pid import squeeze, system
+from hexapod_cosim.controller.slip_pid import SlipPid, squeeze
 
-FORCE = 4  # of the row that goes in, behind the states
-ANSWER, STATES = 0, slice(1, 5)  # of the row that comes out
+STATES = ("force", "smooth", "integral", "slope")
 FREQUENCIES = np.geomspace(0.1, 0.99 * np.pi / PERIOD, 50)  # rad/s
 RELATIVE = 1e-9  # of the response: round-off of python-control's polynomials of order 3
 WITH_SLOPE = replace(SLIP, kd=0.003, derivative_time=0.007)
@@ -34,10 +33,17 @@ def continuous(gains: SlipGains) -> control.TransferFunction:
 
 
 def running(gains: SlipGains, *, period: float = PERIOD) -> control.StateSpace:
-    """The law that runs, as python-control sees it: rows that act from the right, transposed."""
-    matrix = system(gains, period=period).T
-    a, b = matrix[STATES, :FORCE], matrix[STATES, FORCE:]
-    return control.ss(a, b, matrix[ANSWER : ANSWER + 1, :FORCE], matrix[ANSWER, FORCE], period)
+    """The law that runs, as python-control sees it: what a step makes of each state, and of a
+    force, alone.
+    """
+    columns = []
+    for cause in (*STATES, "input"):
+        pid = SlipPid(gains, period=period)
+        pid.restore({name: np.full(6, complex(name == cause)) for name in STATES})
+        answer = pid.step(np.full(6, complex(cause == "input")))
+        columns.append([answer[0].real, *(getattr(pid, name)[0].real for name in STATES)])
+    matrix = np.array(columns).T
+    return control.ss(matrix[1:, :4], matrix[1:, 4:], matrix[:1, :4], matrix[0, 4], period)
 
 
 def response(law: control.LTI, at: np.ndarray) -> np.ndarray:
@@ -68,13 +74,13 @@ def test_a_steady_force_is_answered_by_kp_and_an_integral_that_lacks_the_filters
     """u = kp f + ki f (t - T_f) once the filter has settled: the trapezoid loses nothing of the
     area.
     """
-    matrix, row, force, count = system(SLIP, period=PERIOD), np.zeros(5), 3.0, 400
+    pid, force, count = SlipPid(SLIP, period=PERIOD), 3.0, 400
     for _ in range(count):
-        row = np.append(row[STATES], force) @ matrix
+        answer = pid.step(np.full(6, force + 0j))
     lasted = (
         count - 0.5
     ) * PERIOD  # a force first seen at a step counts from half a period before it
-    assert row[ANSWER] == pytest.approx(
+    assert answer[0] == pytest.approx(
         force * (SLIP.kp + SLIP.ki * (lasted - SLIP.filter_time)), rel=1e-9
     )
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from gains import make_gains, weight
@@ -11,7 +9,7 @@ from gains import make_gains, weight
 from hexapod_cosim.controller import LegSolver, make_gait
 from hexapod_cosim.controller.gains import SupportGains
 from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
-from hexapod_cosim.controller.support import Shares, Support, torques
+from hexapod_cosim.controller.support import Support
 from hexapod_cosim.models import GAITS, Robot, load_robot
 
 ROBOT = load_robot("athena")
@@ -44,19 +42,17 @@ def demand(
     *, push: complex = 0j, moment: complex = 0j, twist: float = 0.0, load: float = WEIGHT
 ) -> Demand:
     """Of one step that asks no torques."""
-    none = np.zeros((1, 6, 3))
-    return Demand(
-        none,
-        np.zeros((1, 6, 3, 3)),
-        np.array([push]),
-        np.array([load]),
-        np.array([moment]),
-        np.array([twist]),
-    )
+    return Demand(np.zeros((6, 3)), np.zeros((6, 3, 3)), push, load, moment, twist)
+
+
+def normal_shares(
+    support: Support, feet: np.ndarray, active: np.ndarray, asked: Demand
+) -> np.ndarray:
+    return support.share_normal(feet, active, asked.weight, asked.moment)
 
 
 def legs(standing: str) -> np.ndarray:
-    return np.array([[float(flag) for flag in standing]])
+    return np.array([float(flag) for flag in standing])
 
 
 def phases(gait: str) -> np.ndarray:
@@ -126,38 +122,34 @@ def test_who_stands_still_or_has_nowhere_to_step_is_active() -> None:
 @pytest.mark.parametrize("standing", BALANCED)
 def test_shares_balance_force_and_moment(standing: str) -> None:
     asked = demand(push=3.0 - 2.0j, moment=WEIGHT * (0.02 - 0.01j), twist=0.4)
-    shares = make().shares(HOME[None], legs(standing), asked)
+    shares = make().shares(HOME, legs(standing), asked)
     assert shares.normal.sum() == pytest.approx(WEIGHT, abs=RIDGED)
-    assert shares.normal[0] @ HOME == pytest.approx(asked.moment[0], abs=RIDGED)
+    assert shares.normal @ HOME == pytest.approx(asked.moment, abs=RIDGED)
     assert shares.push.sum() == pytest.approx(3.0 - 2.0j, abs=1e-9)
-    assert (HOME.conj() * shares.push[0]).imag.sum() == pytest.approx(0.4, abs=1e-9)
+    assert (HOME.conj() * shares.push).imag.sum() == pytest.approx(0.4, abs=1e-9)
     # per load the pushes are those of a body that moves and turns: none squeezes another
-    carries = shares.normal[0] > 0.0
-    per, arm = (
-        shares.push[0, carries] / shares.normal[0, carries],
-        HOME[carries] - HOME[carries].mean(),
-    )
+    carries = shares.normal > 0.0
+    per, arm = shares.push[carries] / shares.normal[carries], HOME[carries] - HOME[carries].mean()
     spin = (arm.conj() * per).imag.sum() / (abs(arm) ** 2).sum()
     np.testing.assert_allclose(per, per.mean() + 1j * spin * arm, rtol=1e-6, atol=1e-9)
     assert not shares.normal[legs(standing) == 0.0].any()
     np.testing.assert_array_equal(
-        shares.forces(0),
-        np.column_stack([shares.push[0].real, shares.push[0].imag, shares.normal[0], np.zeros(6)]),
+        shares.forces(), np.column_stack([shares.push.real, shares.push.imag, shares.normal])
     )
 
 
 def test_of_all_shares_that_balance_the_sum_of_squares_is_least() -> None:
     """Any change that keeps force and moment makes sum f^2/a greater, by second order."""
-    active = np.array([[1.0, 0.4, 1.0, 0.7, 1.0, 0.2]])
-    normal = make().normal(HOME[None], active, demand(moment=WEIGHT * 0.01))[0]
+    active = np.array([1.0, 0.4, 1.0, 0.7, 1.0, 0.2])
+    normal = normal_shares(make(), HOME, active, demand(moment=WEIGHT * 0.01))
     balance = np.array([np.ones(6), HOME.real, HOME.imag])
     free = np.linalg.svd(balance)[2][3:]
-    np.testing.assert_allclose(free @ (normal / active[0]), 0.0, atol=1e-6)
+    np.testing.assert_allclose(free @ (normal / active), 0.0, atol=1e-6)
 
 
 def test_shares_follow_activation_without_a_jump_to_nothing() -> None:
     shares = [
-        make().normal(HOME[None], np.array([[a, 1.0, 1.0, 1.0, 1.0, 1.0]]), demand())[0, 0]
+        normal_shares(make(), HOME, np.array([a, 1.0, 1.0, 1.0, 1.0, 1.0]), demand())[0]
         for a in (1.0, 0.5, 0.1, 0.01, 0.0)
     ]
     assert (np.diff(shares) < 0.0).all()
@@ -171,9 +163,9 @@ def test_shares_follow_activation_without_a_jump_to_nothing() -> None:
 def test_two_feet_or_one_carry_what_they_can_without_their_moment(
     standing: str, least: float
 ) -> None:
-    normal = make().normal(HOME[None], legs(standing), demand())[0]
+    normal = normal_shares(make(), HOME, legs(standing), demand())
     assert least * WEIGHT < normal.sum() < 1.001 * WEIGHT
-    assert not normal[legs(standing)[0] == 0.0].any()
+    assert not normal[legs(standing) == 0.0].any()
     assert normal.min() >= 0.0
 
 
@@ -183,9 +175,11 @@ def test_the_ridge_takes_a_billionth_of_the_weight_from_feet_on_a_line_and_hardl
     """S = sum a (1, y^2), ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force W S_00/(S_00 +
     ridge).
     """
-    feet, y = np.array([[0.1j, -0.1j, 0j, 0j, 0j, 0j]]), 0.1
+    feet, y = np.array([0.1j, -0.1j, 0j, 0j, 0j, 0j]), 0.1
     for active, lost in ((1.0, 1e-9 * (1.0 + y * y)), (1e-6, 0.5e-6 + 1e-9 * (1.0 + y * y))):
-        normal = make().normal(feet, np.array([[active, active, 0.0, 0.0, 0.0, 0.0]]), demand())
+        normal = normal_shares(
+            make(), feet, np.array([active, active, 0.0, 0.0, 0.0, 0.0]), demand()
+        )
         assert 1.0 - normal.sum() / WEIGHT == pytest.approx(lost, rel=1e-3)
 
 
@@ -193,32 +187,23 @@ def test_feet_within_a_centimetre_take_no_moment_about_the_vertical_and_a_millio
     None
 ):
     for reach, turns in ((0.0099, False), (0.0101, True)):
-        feet = np.array([[reach * 1j, -reach * 1j, 0j, 0j, 0j, 0j]])
+        feet = np.array([reach * 1j, -reach * 1j, 0j, 0j, 0j, 0j])
         shares = make().shares(feet, legs("110000"), demand(twist=0.4))
         assert bool(shares.push.any()) is turns
     for load, part in ((0.5e-6, 0.5), (1.0e-6, 1.0), (3e-6, 1.0)):
-        shares = make().shares(HOME[None], legs("111111"), demand(push=2.0 + 0j, load=load))
+        shares = make().shares(HOME, legs("111111"), demand(push=2.0 + 0j, load=load))
         assert shares.push.sum().real == pytest.approx(2.0 * part, rel=0.01)
 
 
 def test_no_foot_at_all_is_asked_for_nothing() -> None:
-    shares = make().shares(HOME[None], legs("000000"), demand(push=1.0 + 0j))
+    shares = make().shares(HOME, legs("000000"), demand(push=1.0 + 0j))
     assert not shares.normal.any()
     assert np.isfinite(shares.push).all()
 
 
 def test_no_foot_is_asked_to_pull() -> None:
-    normal = make().normal(HOME[None], legs("111111"), demand(moment=WEIGHT * 0.5))
+    normal = normal_shares(make(), HOME, legs("111111"), demand(moment=WEIGHT * 0.5))
     assert normal.min() == 0.0
-
-
-def test_rows_are_steps() -> None:
-    support, active = make(), np.vstack([legs(standing) for standing in BALANCED])
-    together = support.normal(np.tile(HOME, (len(active), 1)), active, demand())
-    for row, one in zip(together, active, strict=True):
-        np.testing.assert_allclose(
-            row, support.normal(HOME[None], one[None], demand())[0], rtol=1e-12
-        )
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])
@@ -229,36 +214,13 @@ def test_feet_are_lowered_by_what_they_press_in_beyond_the_stance(name: str) -> 
         LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j]),
     )
     rest = (weight(robot) / 6.0 / robot.contact.stiffness) ** (2.0 / 3.0)
-    three = support.lowering(home[None], legs("101010"))[0]
-    load = support.normal(
-        home[None], legs("101010"), InverseDynamics(robot, LegSolver(robot), period=0.005).rest()
-    )[0]
+    three = support.lowering(home, legs("101010"))
+    load = normal_shares(
+        support, home, legs("101010"), InverseDynamics(robot, LegSolver(robot), period=0.005).rest()
+    )
     np.testing.assert_allclose(
         three, (load / robot.contact.stiffness) ** (2.0 / 3.0) - rest, atol=1e-12
     )
     assert (three[[0, 2, 4]] > 0.0).all()
     np.testing.assert_allclose(three[[1, 3, 5]], -rest, atol=1e-12)
-    np.testing.assert_allclose(
-        support.lowering(home[None], legs("111111")).mean(), 0.0, atol=0.02 * rest
-    )
-
-
-def test_torques_are_the_levers_against_the_shares() -> None:
-    generator = np.random.default_rng(4)
-    lever = generator.normal(size=(5, 6, 3, 3))
-    shares = Shares(
-        np.ones((5, 6)),
-        generator.normal(size=(5, 6)),
-        generator.normal(size=(5, 6)) + 1j * generator.normal(size=(5, 6)),
-    )
-    found = torques(lever, shares)
-    force = shares.forces(2)[4, :3]
-    np.testing.assert_allclose(found[2, 4], -lever[2, 4] @ force, atol=1e-12)
-
-
-def test_some_of_the_steps_are_a_slice_of_all() -> None:
-    whole = make().shares(np.tile(HOME, (4, 1)), np.vstack([legs("111111")] * 4), demand())
-    part = whole.rows(slice(1, 3))
-    np.testing.assert_array_equal(part.normal, whole.normal[1:3])
-    np.testing.assert_array_equal(part.push, whole.push[1:3])
-    assert len(replace(part).activation) == 2
+    np.testing.assert_allclose(support.lowering(home, legs("111111")).mean(), 0.0, atol=0.02 * rest)

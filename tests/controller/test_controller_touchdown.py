@@ -6,19 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from standing import ROBOT, WEIGHT, make_laws, plan, squeezing
+from standing import ROBOT, WEIGHT, Laws, make_laws, plan, squeezing
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.compliance import Compliance
 from hexapod_cosim.controller.touchdown import Touchdown
 
 PERIOD = 0.005  # s
-YES, NO, STILL = [True] * 6, [False] * 6, [0.0] * 6
+YES, NO, STILL = np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)
 ONLY_TOUCHDOWN = Parts(slip_pid=False, suspension=False, support=False, fallback=False)
 
 
-def only(leg: int) -> list[bool]:
-    return [other == leg for other in range(6)]
+def only(leg: int) -> np.ndarray:
+    return np.asarray(np.arange(6) == leg)
 
 
 def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched() -> None:
@@ -27,7 +26,7 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
     for _ in range(15):
         fall = 0.001
         height -= fall
-        down.step(only(2), [fall] * 6, YES, NO)
+        down.step(only(2), np.full(6, fall), YES, NO)
         total += fall
         heights.append(height + down.offset[2])
     np.testing.assert_allclose(heights, 0.02, atol=1e-12)
@@ -37,14 +36,14 @@ def test_a_foot_that_meets_the_ground_early_keeps_the_height_at_which_it_touched
 
 def test_only_a_foot_that_swings_is_held_up() -> None:
     down = Touchdown(period=PERIOD)
-    down.step(YES, [0.002] * 6, NO, NO)
-    assert not any(down.offset)
+    down.step(YES, np.full(6, 0.002), NO, NO)
+    assert not down.offset.any()
 
 
 def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(5):
-        down.step(only(2), [0.002] * 6, YES, NO)
+        down.step(only(2), np.full(6, 0.002), YES, NO)
     for _ in range(100):
         down.step(YES, STILL, NO, YES)
     assert down.offset[2] == pytest.approx(0.01)
@@ -54,20 +53,20 @@ def test_it_keeps_it_through_its_stance_and_gives_it_up_in_the_next_swing() -> N
     for _ in range(60):
         down.step(NO, STILL, YES, NO)
     assert down.offset[2] == 0.0
-    assert not down.busy
+    assert not down.busy()
 
 
 def test_a_foot_is_held_no_higher_than_it_may() -> None:
     down = Touchdown(period=PERIOD)
     for _ in range(30):
-        down.step(only(2), [0.002] * 6, YES, NO)
+        down.step(only(2), np.full(6, 0.002), YES, NO)
     assert down.offset[2] == 0.03
 
 
 def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_with_the_speed_and_to_the_limit() -> (
     None
 ):
-    down, missing = Touchdown(period=PERIOD), [leg != 2 for leg in range(6)]
+    down, missing = Touchdown(period=PERIOD), ~only(2)
     offsets = []
     for _ in range(100):
         down.step(missing, STILL, NO, YES)
@@ -79,7 +78,7 @@ def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_with_the_speed
 
 
 def test_it_stops_where_it_finds_the_ground() -> None:
-    down, missing = Touchdown(period=PERIOD), [leg != 2 for leg in range(6)]
+    down, missing = Touchdown(period=PERIOD), ~only(2)
     for _ in range(20):
         down.step(missing, STILL, NO, YES)
     found = down.offset[2]
@@ -98,32 +97,32 @@ def test_on_flat_ground_nothing_happens() -> None:
         swings = k // 100 % 2 == 0
         down.step(
             NO if swings else YES,
-            [0.001] * 6 if swings else STILL,
+            np.full(6, 0.001) if swings else STILL,
             YES if swings else NO,
             NO if swings else YES,
         )
-        assert not down.busy
-        assert not any(down.offset)
+        assert not down.busy()
+        assert not down.offset.any()
 
 
 def test_what_is_negligible_goes_at_once() -> None:
     down = Touchdown(period=PERIOD)
-    down.restore(([0.99e-5] * 6, STILL))
-    assert not any(down.step(NO, STILL, YES, NO))
-    down.restore(([1.01e-5] * 6, STILL))
-    assert all(down.step(NO, STILL, YES, NO))
+    for size, goes in ((0.99e-5, True), (1.01e-5, False)):
+        down.restore({"offset": np.full(6, size), "late": STILL})
+        down.step(NO, STILL, YES, NO)
+        assert (down.offset == 0.0).all() == goes
 
 
 def test_a_saved_state_does_not_change() -> None:
     down = Touchdown(period=PERIOD)
-    down.step(only(2), [0.002] * 6, YES, NO)
+    down.step(only(2), np.full(6, 0.002), YES, NO)
     state = down.save()
-    down.step(only(2), [0.002] * 6, YES, NO)
+    down.step(only(2), np.full(6, 0.002), YES, NO)
     down.restore(state)
     assert down.offset[2] == 0.002
 
 
-def descend(laws: Compliance, touching: bool) -> list[float]:
+def descend(laws: Laws, touching: bool) -> list[float]:
     """Offsets of foot 1 while it comes down from 20 mm at 0.05 m/s, with a force on it from 8 mm
     on or not.
     """
@@ -131,10 +130,10 @@ def descend(laws: Compliance, touching: bool) -> list[float]:
     while height > 0.0:
         force = squeezing(0.0)
         force[1, 2] = 0.05 * WEIGHT if touching and height < 0.008 else 0.0
-        plan(laws, 1, standing="101111", height=height, rise=rise)
-        laws.step(force)
+        plan(laws, standing="101111", height=height, rise=rise)
+        laws.feel(force)
         height += rise * PERIOD
-        offsets.append(float(laws.offset[1]))
+        offsets.append(float(laws.touchdown.offset[1]))
     return offsets
 
 
@@ -150,9 +149,9 @@ def test_the_laws_reach_for_ground_that_is_missing_while_the_others_carry_the_we
     laws, force = make_laws(), squeezing(0.0)
     force[:, 2] *= 6.0 / 5.0
     force[1] = 0.0
-    plan(laws, 100)
+    plan(laws)
     for _ in range(100):
-        laws.step(force)
-    assert laws.offset[1] == -0.02
+        laws.feel(force)
+    assert laws.touchdown.offset[1] == -0.02
     assert not laws.doubted.any()
     assert ROBOT.gait.step_height > 0.02

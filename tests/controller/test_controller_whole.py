@@ -17,7 +17,7 @@ from hexapod_cosim.controller import (
     Parts,
     make_gait,
 )
-from hexapod_cosim.controller.kinematics import Joints, LegSolver
+from hexapod_cosim.controller.kinematics import LegSolver
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
 
@@ -139,23 +139,25 @@ def test_a_joint_that_its_limits_hold_has_no_acceleration_and_none_has_more_than
     None
 ):
     legs = LegSolver(load_robot("athena"))
-    angle, speed = np.zeros((3, 6, 3)), np.zeros((3, 6, 3))
-    angle[1] = 0.1
-    speed[0, 0, 0], angle[0, 1, 1], angle[0, 2, 2] = (
+    angle, speed = np.zeros((6, 3)), np.zeros((6, 3))
+    speed[0, 0], angle[1, 1], angle[2, 2] = (
         legs.speed_max,
         legs.angle_max[1, 1],
         legs.angle_min[2, 2],
     )
-    joints = Joints(angle, speed, np.zeros((3, 6), dtype=np.bool_))
-    found = legs.accelerations(joints, 0.01)
-    assert found[0, 0, 0] == found[0, 1, 1] == found[0, 2, 2] == 0.0
-    assert found[0, 3, 0] == pytest.approx(
+    pose = legs.pose(np.zeros(6, dtype=np.complex128), np.zeros(6))._replace(
+        angle=np.full((6, 3), 0.1)
+    )
+    found = legs.accelerations(pose, 0.01, angle, speed)
+    assert found[0, 0] == found[1, 1] == found[2, 2] == 0.0
+    assert found[3, 0] == pytest.approx(
         2.0 * legs.speed_max / 0.01
     )  # 2 (0.1 rad)/(10 ms)^2 = 2000 rad/s2 would be more
-    assert legs.accelerations(Joints(angle, speed, joints.unreachable), 0.1)[
-        0, 3, 0
-    ] == pytest.approx(20.0)
-    assert not legs.accelerations(Joints(angle[:1], speed[:1], joints.unreachable[:1]), 0.01).any()
+    assert legs.accelerations(pose, 0.1, angle, speed)[3, 0] == pytest.approx(20.0)
+    assert legs.accelerations(pose, -0.1, angle, speed)[3, 0] == pytest.approx(
+        20.0
+    )  # a neighbour that lies before
+    assert not legs.accelerations(None, 0.01, angle, speed).any()
 
 
 @pytest.mark.parametrize("compliant", [False, True])
@@ -260,26 +262,6 @@ def test_a_restored_controller_goes_on_bit_for_bit_amid_doubts_and_missing_groun
         run(controller, command, 400, first=283, measurement=measurement), first
     )
     assert before.any()
-
-
-@pytest.mark.parametrize("compliant", [False, True])
-def test_commands_do_not_depend_on_how_many_steps_are_planned_at_once(
-    compliant: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    walks = []
-    for planned in (1, 11, 1000):
-        monkeypatch.setattr("hexapod_cosim.controller.controller.PLANNED", planned)
-        controller, parts, first = make(compliant=compliant), [], 0
-        for command, steps in (
-            (BodyCommand(vx=0.08), 233),
-            (BodyCommand(0.03, 0.01, 0.2, roll=0.1), 150),
-            (BodyCommand(), 450),
-        ):
-            parts.append(run(controller, command, steps, first=first, measurement=squeezed()))
-            first += steps
-        walks.append(np.concatenate(parts))
-    np.testing.assert_array_equal(walks[1], walks[0])
-    np.testing.assert_array_equal(walks[2], walks[0])
 
 
 def test_kinematic_control_does_not_look_at_the_forces() -> None:
@@ -399,9 +381,8 @@ def test_what_leads_back_to_the_way_is_led_over_in_a_tenth_of_a_second() -> None
     compliant = make(compliant=True).compliant
     assert compliant is not None
     compliant.hold.velocity, compliant.hold.yaw_rate = 0.01 - 0.004j, 0.02
-    v, yaw_rate = compliant.steer(
-        np.zeros(31, dtype=np.complex128), np.zeros(31), moves=True, afresh=True
-    )
+    compliant.steer(0, moves=True, afresh=True)
+    v, yaw_rate = np.array([compliant.addition(k) for k in range(31)]).T
     part = np.minimum(np.arange(31) / 20.0, 1.0)  # periods of 5 ms
     np.testing.assert_allclose(v, part * (0.01 - 0.004j), atol=1e-12)
     np.testing.assert_allclose(yaw_rate, part * 0.02, atol=1e-12)

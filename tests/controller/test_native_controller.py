@@ -84,7 +84,7 @@ class Ground:
         compliant, draw = controller.compliant, self.generator.normal
         if compliant is None:
             return
-        planned = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
+        planned = compliant.stance.plan.shares.forces()
         measurement.foot_force[:] = planned * (
             1.0 + self.noise * draw(size=(6, 1))
         ) + 3.0 * self.noise * draw(size=(6, 3)) * (planned > 0.0)
@@ -119,7 +119,9 @@ def differences(
                 f"{flag} at step {k}"
             )
         np.testing.assert_allclose(
-            np.ctypeslib.as_array(out.shift), shown.shift.view(np.float64).reshape(6, 2), atol=1e-12
+            np.ctypeslib.as_array(out.shift),
+            np.column_stack([shown.shift.real, shown.shift.imag]),
+            atol=1e-12,
         )
         np.testing.assert_allclose(np.ctypeslib.as_array(out.lift), shown.lift, atol=1e-12)
         np.testing.assert_allclose(np.ctypeslib.as_array(out.planned), shown.planned, atol=1e-12)
@@ -233,7 +235,7 @@ def test_ground_that_is_met_early_is_answered_at_the_same_step(
             np.where(np.arange(6) == 2, bump, 0.012 if parts is ALL_PARTS else 0.0),
         )
         assert compliant is not None
-        height = compliant.laws._plan.height[compliant._at]
+        height = compliant.stance.plan.height
         if step < 1400:
             measurement.foot_force[(height > 0.0) & (height < met), 2] = 4.0
 
@@ -562,7 +564,7 @@ def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(
     rest = InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
     support, none = (
         Support(robot, make_gait(robot), make_gains(robot).support, rest=rest),
-        np.zeros((1, 6, 3)),
+        np.zeros((6, 3)),
     )
     for active in (np.ones(6), generator.uniform(0.0, 1.0, 6), np.full(6, 1e-6)):
         feet, asked, found = (
@@ -572,10 +574,9 @@ def test_shares_are_the_same_down_to_no_load_or_feet_that_stand_together(
         )
         controller_core.hx_probe_shares(*pointers(feet, active, asked, found))
         demand = Demand(
-            none, np.zeros((1, 6, 3, 3)), push=np.array([0.3 - 0.2j]), weight=np.array([load]),
-            moment=np.zeros(1, dtype=np.complex128), twist=np.array([0.4]),
+            none, np.zeros((6, 3, 3)), push=0.3 - 0.2j, weight=load, moment=0j, twist=0.4,
         )  # fmt: skip
-        expected = support.shares((feet @ [1.0, 1.0j])[None], active[None], demand).forces(0)[:, :3]
+        expected = support.shares(feet @ [1.0, 1.0j], active, demand).forces()
         scale = np.abs(expected).max(axis=0)  # of pushes and of loads
         np.testing.assert_allclose(
             found / scale, expected / scale, atol=1e-9

@@ -20,7 +20,7 @@ void hx_probe_suspension(double mass, double damping, double stiffness, double p
 
 void hx_probe_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS],
                       hxPlane push[HX_LEGS]) {
-  hx_slip_squeeze(normal, feet, push);
+  hx_squeeze(normal, feet, push);
 }
 
 /* asked: push x y, weight, moment x y, twist */

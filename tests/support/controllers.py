@@ -67,6 +67,6 @@ def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray
         out = controller.step(k * PERIOD, command, measurement)
         found.append(np.stack([out.angle_ref, out.speed_ref, out.torque_ref]))
         if compliant is not None:
-            measurement.foot_force[:] = compliant.laws._plan.shares.forces(compliant._at)[:, :3]
+            measurement.foot_force[:] = compliant.stance.plan.shares.forces()
             measurement.angle[:] = out.angle_ref - compliant.laws.bend
     return np.array(found)

@@ -8,7 +8,7 @@ import numpy as np
 from gains import PERIOD, make_gains, weight
 
 from hexapod_cosim.controller import Gains, LegSolver, Parts, make_gait
-from hexapod_cosim.controller.compliance import Compliance
+from hexapod_cosim.controller.compliance import Compliance, Plan
 from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.controller.support import Support
 from hexapod_cosim.models import Robot, load_robot
@@ -26,12 +26,32 @@ def rest(robot: Robot) -> Demand:
     return InverseDynamics(robot, LegSolver(robot), period=PERIOD).rest()
 
 
+class Laws(Compliance):
+    """The laws together with what the present step asks of them."""
+
+    planned: Plan
+
+    def feel(self, force: np.ndarray) -> None:
+        """One period under forces (6, 3) on the feet."""
+        self.step(self.planned, force)
+
+    @property
+    def answer(self) -> np.ndarray:
+        """(6, 2) of the slip PID [N]."""
+        return np.column_stack([self.law.answer.real, self.law.answer.imag])
+
+    @property
+    def integral(self) -> np.ndarray:
+        """(6, 2) of the slip PID [N]."""
+        return np.column_stack([self.law.pid.integral.real, self.law.pid.integral.imag])
+
+
 def make_laws(
     robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None
-) -> Compliance:
+) -> Laws:
     """The laws at rest, with no plan yet."""
     gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
-    return Compliance(
+    return Laws(
         gains,
         Parts() if parts is None else parts,
         weight=weight(robot),
@@ -43,55 +63,48 @@ def make_laws(
 
 
 def plan(
-    laws: Compliance,
-    steps: int,
+    laws: Laws,
     *,
     robot: Robot = ROBOT,
     standing: str = ALL,
     height: float = RAISED,
     rise: float = 0.0,
+    hurried: bool = False,
 ) -> None:
-    """Lays out steps in which these legs stand and the others are in the air, so high [m] and
+    """Plans a step in which these legs stand and the others are in the air, so high [m] and
     rising so fast [m/s].
     """
     still = rest(robot)
-    demand = Demand(
-        *(
-            np.repeat(getattr(still, name), steps, axis=0)
-            for name in ("torque", "lever", "push", "weight", "moment", "twist")
-        )
-    )
     stands = np.array([flag == "1" for flag in standing])
     home = LegSolver(robot).forward(robot.stance)[:, :2] @ np.array([1.0, 1.0j])
     support = Support(robot, make_gait(robot), make_gains(robot).support, rest=still)
-    rows = np.tile(stands.astype(float), (steps, 1))
-    shares = support.shares(np.tile(home, (steps, 1)), rows, demand)
-    air = 1.0 - rows
-    laws.plan(
-        demand,
+    shares, air = support.shares(home, stands.astype(float), still), 1.0 - stands
+    laws.planned = laws.plan(
+        still,
         shares,
-        feet=np.tile(home, (steps, 1)),
+        feet=home,
         height=height * air,
         rise=rise * air,
         swinging=~stands,
+        hurried=hurried,
     )
 
 
-def shared(laws: Compliance) -> np.ndarray:
-    """(6, 4) the planned forces."""
-    return np.asarray(laws._plan.shares.forces(0))
+def shared(laws: Laws) -> np.ndarray:
+    """(6, 3) the planned forces."""
+    return laws.planned.shares.forces()
 
 
 def squeezing(size: float = 2.0) -> np.ndarray:
-    """(6, 4) all feet carry alike, the middle ones are pushed apart."""
-    force = np.zeros((6, 4))
+    """(6, 3) all feet carry alike, the middle ones are pushed apart."""
+    force = np.zeros((6, 3))
     force[:, 2] = WEIGHT / 6.0
     force[1, 1], force[4, 1] = size, -size
     return force
 
 
 def run(
-    laws: Compliance,
+    laws: Laws,
     force: np.ndarray,
     steps: int,
     *,
@@ -99,7 +112,7 @@ def run(
     standing: str = ALL,
     height: float = RAISED,
 ) -> None:
-    """Plans and takes so many steps under the same forces."""
-    plan(laws, steps, robot=robot, standing=standing, height=height)
+    """Takes so many steps under the same plan and forces."""
+    plan(laws, robot=robot, standing=standing, height=height)
     for _ in range(steps):
-        laws.step(force)
+        laws.feel(force)

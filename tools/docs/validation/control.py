@@ -11,7 +11,7 @@ from test_conditions import WORLDS
 from test_controller_continuity import LARGEST, steepest
 
 from hexapod_cosim.controller import compliance
-from hexapod_cosim.controller.kinematics import Array, Plane
+from hexapod_cosim.controller.plane import Array, Plane
 from hexapod_cosim.controller.slip_pid import LOAD_FLOOR
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.result import Result

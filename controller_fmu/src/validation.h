@@ -1,6 +1,6 @@
-/* check.h - what a controller may be told. */
-#ifndef HX_CONTROLLER_CHECK_H
-#define HX_CONTROLLER_CHECK_H
+/* validation.h - what a controller may be told. */
+#ifndef HX_CONTROLLER_VALIDATION_H
+#define HX_CONTROLLER_VALIDATION_H
 
 #include "hexapod/controller.h"
 #include "hexapod/inside.h"
