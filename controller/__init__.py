@@ -17,10 +17,10 @@ from hexapod_cosim.controller.gains import (
     load_gains,
     save_gains,
 )
-from hexapod_cosim.controller.gait import PATTERNS, Gait, Pattern, make_gait
-from hexapod_cosim.controller.kinematics import LegSolver
 from hexapod_cosim.controller.parts import Parts
-from hexapod_cosim.controller.trajectory import BodyCommand, CommandRamp, FootPaths
+from hexapod_cosim.controller.walk.gait import PATTERNS, Gait, Pattern, make_gait
+from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.controller.walk.trajectory import BodyCommand, CommandRamp, FootPaths
 
 __all__ = [
     "PATTERNS",

@@ -20,16 +20,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hexapod_cosim.controller.compliant import Compliant, Stance
+from hexapod_cosim.controller.comply.compliant import Compliant, Stance
+from hexapod_cosim.controller.comply.posture import Posture
 from hexapod_cosim.controller.gains import Gains
-from hexapod_cosim.controller.gait import Gait
-from hexapod_cosim.controller.inverse_dynamics import Masses, Neighbours
-from hexapod_cosim.controller.kinematics import Feet, LegSolver, Pose
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, rows_of
-from hexapod_cosim.controller.posture import Posture
-from hexapod_cosim.controller.trajectory import (
+from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.inverse_dynamics import Masses, Neighbours
+from hexapod_cosim.controller.walk.kinematics import Feet, LegSolver, Pose
+from hexapod_cosim.controller.walk.trajectory import (
     BodyCommand,
     CommandRamp,
     FootPaths,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hexapod_cosim.controller.gains import TRIPOD_LEGS, Requirements
-from hexapod_cosim.controller.kinematics import LegSolver
+from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
 SHORTEST, LONGEST = 0.22, 0.44  # m    coxa, femur and tibia of legs that the figures suit

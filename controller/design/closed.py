@@ -16,8 +16,8 @@ from hexapod_cosim.controller.design.standing import (
     relieved,
     squeeze_matrix,
 )
-from hexapod_cosim.controller.kinematics import LegSolver
 from hexapod_cosim.controller.plane import Array
+from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
 RISE = 0.05  # s

@@ -14,11 +14,11 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from hexapod_cosim.controller.compliance import LARGEST_LOAD
+from hexapod_cosim.controller.comply.compliance import LARGEST_LOAD
+from hexapod_cosim.controller.comply.slip_pid import squeeze
 from hexapod_cosim.controller.gains import TRIPOD_LEGS
-from hexapod_cosim.controller.kinematics import LegSolver
 from hexapod_cosim.controller.plane import LEGS, Array, Mask
-from hexapod_cosim.controller.slip_pid import squeeze
+from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
 Places = NDArray[np.int_]

@@ -504,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{031d7daa-a786-4184-a4d7-2aa39157cd86}";
+const char hx_default_guid[] = "{4a42936c-c540-41a5-bab6-a83d153dc809}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

@@ -11,7 +11,7 @@
 #ifndef HX_CONTROLLER_STATE_H
 #define HX_CONTROLLER_STATE_H
 
-#include "compliant.h"
+#include "comply/compliant.h"
 #include "hexapod/inside.h"
 
 HX_HIDDEN_BEGIN

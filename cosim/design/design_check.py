@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexapod_cosim.controller import Gains, LegSolver
-from hexapod_cosim.controller.compliance import LARGEST_LOAD
+from hexapod_cosim.controller.comply.compliance import LARGEST_LOAD
+from hexapod_cosim.controller.comply.slip_pid import squeeze
 from hexapod_cosim.controller.design.closed import closed_loop, disturbed, rising, splay
 from hexapod_cosim.controller.design.laws import Laws, delay_steps
 from hexapod_cosim.controller.design.standing import Places, weight_share
 from hexapod_cosim.controller.size import size_of
-from hexapod_cosim.controller.slip_pid import squeeze
 from hexapod_cosim.cosim.design.design import STANCES, level_fmu
 from hexapod_cosim.cosim.design.linearise import ANGLES, Bench, Motion, linearise
 from hexapod_cosim.cosim.design.standing import StanceError, rest

@@ -88,7 +88,7 @@ def assume_stances(legs: Mapping[str, Table]) -> list[str]:
 
 
 class _Plane:
-    """A leg of the controller's pattern in its own plane (controller/kinematics.py has the
+    """A leg of the controller's pattern in its own plane (controller/walk/kinematics.py has the
     equations).
     """
 

@@ -13,7 +13,7 @@ from gains import PERIOD
 from standing import GAINS, ROBOT, make_laws, plan, rest, shared, squeezing
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.burden import Burden
+from hexapod_cosim.controller.sense.burden import Burden
 
 MOST, CYCLE = 5.0, 1.0  # N m, s
 WEIGHT_TIME = 0.5  # s    a fifth of which smooths the measured weight

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexapod_cosim.controller.contact_detection import ContactDetector, SensorWatch
+from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
 
 WEIGHT, CYCLE, PERIOD = 50.0, 1.0, 0.005  # N, s, s
 TOUCHES, LIFTS = 1.0, 0.25  # N    2 and 0.5 % of the weight

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from gains import PERIOD, SLIP, make_gains
 
-from hexapod_cosim.controller.foot_law import FootLaw
-from hexapod_cosim.controller.slip_pid import SlipPid
-from hexapod_cosim.controller.suspension import discretise
+from hexapod_cosim.controller.comply.foot_law import FootLaw
+from hexapod_cosim.controller.comply.slip_pid import SlipPid
+from hexapod_cosim.controller.comply.suspension import discretise
 from hexapod_cosim.models import load_robot
 
 GAINS = replace(make_gains(load_robot("athena")), slip=replace(SLIP, kd=0.002))

@@ -13,7 +13,7 @@ from gains import HOLD, PERIOD
 from standing import HOME
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.hold import Hold, Sight, fit_plane
+from hexapod_cosim.controller.walk.hold import Hold, Sight, fit_plane
 
 LEVEL = np.full(6, -0.12)  # m    planned heights of the feet
 LOADS = np.full(6, 0.5)  # of a third of the weight

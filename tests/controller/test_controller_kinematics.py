@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import LegSolver
-from hexapod_cosim.controller.kinematics import Joints
+from hexapod_cosim.controller.walk.kinematics import Joints
 from hexapod_cosim.models import ReachError, Robot, RobotError, foot_positions, load_robot
 
 ROUND_OFF = 1e-12  # m, rad    of a dozen operations on numbers of order 1

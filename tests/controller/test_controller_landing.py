@@ -9,7 +9,7 @@ from gains import PERIOD
 from standing import WEIGHT, Laws, make_laws, plan, squeezing
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.landing import Landings
+from hexapod_cosim.controller.sense.landing import Landings
 
 LOW = np.zeros(6)
 ALL, NONE = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexapod_cosim.controller.kinematics import Feet
-from hexapod_cosim.controller.posture import Posture
+from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.walk.kinematics import Feet
 from hexapod_cosim.models.kinematics import axis_rotation
 
 ROUND_OFF = 1e-14  # m

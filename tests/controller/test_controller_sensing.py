@@ -10,8 +10,8 @@ from controllers import make, obey, run, squeezed
 from gains import PERIOD
 
 from hexapod_cosim.controller import BodyCommand, Measurement, Parts
-from hexapod_cosim.controller.compliant import STEERING_TIME
-from hexapod_cosim.controller.hold import Sight
+from hexapod_cosim.controller.comply.compliant import STEERING_TIME
+from hexapod_cosim.controller.walk.hold import Sight
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product
 
 

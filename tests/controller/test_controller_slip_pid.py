@@ -10,7 +10,7 @@ import pytest
 from gains import PERIOD, SLIP
 
 from hexapod_cosim.controller import SlipGains
-from hexapod_cosim.controller.slip_pid import SlipPid, squeeze
+from hexapod_cosim.controller.comply.slip_pid import SlipPid, squeeze
 
 STATES = ("force", "smooth", "integral", "slope")
 FREQUENCIES = np.geomspace(0.1, 0.99 * np.pi / PERIOD, 50)  # rad/s

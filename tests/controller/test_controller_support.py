@@ -7,9 +7,9 @@ import pytest
 from gains import make_gains, weight
 
 from hexapod_cosim.controller import LegSolver, make_gait
+from hexapod_cosim.controller.comply.support import Support
 from hexapod_cosim.controller.gains import SupportGains
-from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
-from hexapod_cosim.controller.support import Support
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import GAITS, Robot, load_robot
 
 ROBOT = load_robot("athena")

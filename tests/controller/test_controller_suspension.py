@@ -11,7 +11,7 @@ from gains import PERIOD, suspension
 from scipy.integrate import solve_ivp
 
 from hexapod_cosim.controller import SuspensionGains
-from hexapod_cosim.controller.suspension import discretise
+from hexapod_cosim.controller.comply.suspension import discretise
 from hexapod_cosim.models import load_robot
 
 GAINS = suspension(load_robot("athena"))

@@ -9,7 +9,7 @@ import pytest
 from standing import ROBOT, WEIGHT, Laws, make_laws, plan, squeezing
 
 from hexapod_cosim.controller import Parts
-from hexapod_cosim.controller.touchdown import Touchdown
+from hexapod_cosim.controller.sense.touchdown import Touchdown
 
 PERIOD = 0.005  # s
 YES, NO, STILL = np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import BodyCommand, CommandRamp, FootPaths, LegSolver, make_gait
-from hexapod_cosim.controller.trajectory import PlannedFeet, Twist
+from hexapod_cosim.controller.walk.trajectory import PlannedFeet, Twist
 from hexapod_cosim.models import GAITS, HexapodError, load_robot
 
 PERIOD = 1e-3  # s

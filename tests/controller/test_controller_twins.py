@@ -12,10 +12,19 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON, C = ROOT / "controller", ROOT / "controller_fmu/src"
-PAIRS = sorted(path.stem for path in C.glob("*.c") if (PYTHON / f"{path.stem}.py").exists())
+
+
+def files_below(folder: Path, suffix: str) -> set[str]:
+    """The files of a folder and the folders in it, without their suffix."""
+    return {
+        path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob(f"*{suffix}")
+    }
+
+
+PAIRS = sorted(files_below(C, ".c") & files_below(PYTHON, ".py"))
 # tick times, saved states and refusals around the controller; in Python the constructor's and
 # `step`'s own
-ONLY_C = {"schedule", "validation"}
+ONLY_C = {"walk/schedule", "validation"}
 # state.h declares what controller.c defines, and all types of the state
 HEADERS = {"plane", "state"}
 # numpy does for all legs what C does for one, or a loop or a sum does
@@ -60,21 +69,24 @@ def is_in_order(few: list[str], many: list[str]) -> bool:
 
 
 def test_every_file_has_its_twin() -> None:
-    assert {path.stem for path in C.glob("*.c")} - ONLY_C == set(PAIRS)
-    assert {path.stem for path in C.glob("*.h")} == set(PAIRS) - {"controller"} | {
-        "validation"
-    } | HEADERS
-    assert {"plane", *PAIRS, "memory", "gains", "parts", "size", "figure_style", "__init__"} == {
-        path.stem for path in PYTHON.glob("*.py")
+    assert files_below(C, ".c") - ONLY_C == set(PAIRS)
+    headers = {name for name in PAIRS if name != "controller"} | {"validation"} | HEADERS
+    assert files_below(C, ".h") == headers
+    own = {"plane", "memory", "gains", "parts", "size", "figure_style"}  # of Python alone
+    python = {
+        name
+        for name in files_below(PYTHON, ".py")
+        if not name.startswith("design/") and not name.endswith("__init__")
     }
+    assert python == own | set(PAIRS)
 
 
 @pytest.mark.parametrize("stem", PAIRS)
 def test_each_function_in_c_has_its_twin_in_python_in_the_same_order(stem: str) -> None:
     ours, theirs = c_functions(stem), python_functions(stem)
     if stem in {
-        "contact_detection",
-        "slip_pid",
+        "sense/contact_detection",
+        "comply/slip_pid",
         "controller",
     }:  # C compiles no model of the detector and the PID; reset and step are last
         assert sorted(set(ours) - {"compile"}) == sorted(set(ours) & set(theirs) - {"compile"})
@@ -136,9 +148,9 @@ def test_each_citation_exists_in_the_page_and_each_equation_is_cited_by_both() -
         {
             path: cited(path.read_text(encoding="utf-8"))
             for folder, kind in places
-            for path in folder.glob(kind)
+            for path in folder.rglob(kind)
         }
-        for places in ([(PYTHON, "*.py"), (PYTHON / "design", "*.py")], [(C, "*.c"), (C, "*.h")])
+        for places in ([(PYTHON, "*.py")], [(C, "*.c"), (C, "*.h")])
     )
     for files in (python, c):
         for path, numbers in files.items():

@@ -17,7 +17,7 @@ from hexapod_cosim.controller import (
     Parts,
     make_gait,
 )
-from hexapod_cosim.controller.kinematics import LegSolver
+from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import GAITS, foot_positions, load_robot
 from hexapod_cosim.models.kinematics import quaternion_product
 

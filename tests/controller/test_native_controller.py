@@ -23,9 +23,9 @@ from hexapod_cosim.controller import (
     Parts,
     make_gait,
 )
-from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
-from hexapod_cosim.controller.slip_pid import squeeze
-from hexapod_cosim.controller.support import Support
+from hexapod_cosim.controller.comply.slip_pid import squeeze
+from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.models import load_robot
 

@@ -2,9 +2,9 @@
  * library shows. */
 #include <string.h>
 
-#include "slip_pid.h"
-#include "support.h"
-#include "suspension.h"
+#include "comply/slip_pid.h"
+#include "comply/support.h"
+#include "comply/suspension.h"
 
 HX_API void hx_probe_suspension(double mass, double damping, double stiffness, double period,
                                 hxSuspension *suspension);

@@ -8,9 +8,9 @@ import numpy as np
 from gains import PERIOD, make_gains, weight
 
 from hexapod_cosim.controller import Gains, LegSolver, Parts, make_gait
-from hexapod_cosim.controller.compliance import Compliance, Plan
-from hexapod_cosim.controller.inverse_dynamics import Demand, InverseDynamics
-from hexapod_cosim.controller.support import Support
+from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand, InverseDynamics
 from hexapod_cosim.models import Robot, load_robot
 
 ROBOT = load_robot("athena")

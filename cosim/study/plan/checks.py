@@ -143,9 +143,8 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
         )
     part, _, name = factor.name.removeprefix(GAINS).partition(".")
     above = name in POSITIVE[part]
-    bad = next(
-        (value for value in samples(factor) if not (value > 0.0 if above else value >= 0.0)), None
-    )  # type: ignore[operator]
+    numbers = [float(value) for value in samples(factor)]
+    bad = next((value for value in numbers if not (value > 0.0 if above else value >= 0.0)), None)
     if bad is not None:
         raise StudyError(
             "not a gain's value",

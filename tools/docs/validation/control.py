@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from test_conditions import WORLDS
 from test_controller_continuity import LARGEST, steepest
 
-from hexapod_cosim.controller import compliance
+from hexapod_cosim.controller.comply import compliance
+from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR
 from hexapod_cosim.controller.plane import Array, Plane
-from hexapod_cosim.controller.slip_pid import LOAD_FLOOR
 from hexapod_cosim.cosim.master.signals import COMMANDED
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.run.run import simulate
@@ -106,7 +106,7 @@ def _twisted(*settings: str) -> Result:
 
 
 def _with_twist(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """In the place of controller/slip_pid.py's `squeeze`."""
+    """In the place of controller/comply/slip_pid.py's `squeeze`."""
     total = normal.sum()
     return push if total <= LOAD_FLOOR else np.asarray(push - push.sum() * normal / total)
 

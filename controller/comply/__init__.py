@@ -1,0 +1,1 @@
+"""The compliant control: slip PID, virtual suspension, feed-forward support and posture."""

@@ -1,0 +1,365 @@
+"""The force laws of compliant control: from planned load and measured foot forces to the joints.
+
+C: compliance.c. In a period these steps follow each other:
+
+1. Contacts. The detector says which feet touch the ground (C23). Where that contradicts the plan,
+   a sensor may be wrong (C34) or the ground may lie higher or lower than planned (C35, C36).
+2. Inputs. Of the forces beyond the planned ones the squeeze is what the slip PID answers (C24), the
+   normal force beyond the planned share what the virtual suspension answers (C26).
+3. Weight. The plan is scaled by the weight that the feet measure (C30): a payload is carried too.
+4. Laws. PID and suspension answer by forces (C25 to C27).
+5. Joints. The angles are corrected by what the servos yield under these forces (C28); the torques
+   are those of the planned load (C29).
+
+When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` takes all of
+this away and kinematic control is left (C33).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hexapod_cosim.controller.comply.foot_law import FootLaw
+from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR, squeeze
+from hexapod_cosim.controller.comply.support import Shares
+from hexapod_cosim.controller.gains import TRIPOD_LEGS, Gains
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.plane import LEGS, Array, Mask, Plane, clamp, rows_of, square
+from hexapod_cosim.controller.sense.burden import Burden
+from hexapod_cosim.controller.sense.contact_detection import ContactDetector, SensorWatch
+from hexapod_cosim.controller.sense.landing import Landings
+from hexapod_cosim.controller.sense.touchdown import EARLY, Touchdown
+from hexapod_cosim.controller.walk.inverse_dynamics import Demand
+
+SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
+# slides has it, or one on a slope of 29 degrees
+CALM_CYCLES = 0.5  # 1    gait cycles without it until the feet are trusted again
+SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
+SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
+JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
+GRIPPED = 0.99  # 1    of its share: a leg with more carries it
+LARGEST_LOAD = 2.0  # 1    in thirds of the weight: the margins of the design hold up to it
+LEAST_SCALE, LARGEST_SCALE = 0.5, 3.0  # 1    measured over modelled weight that is believed
+HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly in the air
+
+
+class Plan(NamedTuple):
+    """What a step asks of the laws; (6,) and walking frame unless said otherwise."""
+
+    own: Array  # N m    (6, 3) torques for the legs' own weight and motion
+    carry: Array  # N m    (6, 3) torques for the planned load
+    lever: Array  # m    (6, 3, 3) J^T of the contact points
+    shares: Shares
+    feet: Plane  # m    contact points, x + i y
+    weight: float  # N    scalar: of all shares
+    standing: Mask  # the leg carries its whole share
+    well_up: Mask  # well above the ground: in the air even if the ground is met early
+    height: Array  # m    of the paths over their ends
+    needed: float  # N m    scalar: the largest of `carry`
+    swinging: Mask  # planned in the air
+    falling: Array  # m    by which feet well above the ground come down in a period
+    hurried: bool  # scalar: some joint is asked for more speed than its servo has
+
+
+class Compliance(Stateful):
+    """The laws of all feet.
+
+    Attributes, (6,) unless said otherwise:
+        law, detector, watch, touchdown, landings, burden: the parts that laws and decisions are
+            made of.
+        bend: (6, 3) corrections of the joint angles [rad].
+        torque: (6, 3) for the servos [N m].
+        shift: (6, 3) of the feet that comes of `bend`, walking frame [m].
+        doubted: sensors that are not believed.
+        fallback: legs that walk without feedback.
+        grip: part of its share that a leg is given back as it loads [1].
+        slack: some leg is given its share back (scalar).
+        scale: measured over planned weight (scalar) [1].
+        trust: 1, or less while the plan of the load is not to be relied on (scalar) [1].
+        outrun: the joints cannot follow (scalar).
+        asked: share of the time in which joints are asked for too much speed (scalar) [1].
+        dragged, sliding: periods for which the robot has slid, and until it is trusted again.
+    """
+
+    STATE = (
+        "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
+        "doubted", "fallback", "grip", "slack", "scale", "trust", "outrun", "asked", "dragged",
+        "sliding",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        gains: Gains,
+        parts: Parts,
+        *,
+        weight: float,
+        cycle: float,
+        kp: float,
+        step_height: float,
+        period: float,
+    ) -> None:
+        """weight: of the robot [N]; cycle, step_height: of its gait [s, m]; kp: of its servos."""
+        self.parts, self.period = parts, period
+        self.share = weight / TRIPOD_LEGS  # N
+        self.settled = SETTLED_SHARE * weight  # N
+        self.softness = 1.0 / kp  # rad/N m
+        self.high = HIGH_SHARE * step_height  # m
+        self.law, self.landings = FootLaw(gains, period=period), Landings()
+        self.detector = ContactDetector(weight)
+        self.watch = SensorWatch(weight, cycle=cycle, period=period)
+        self.touchdown = Touchdown(period=period)
+        time = gains.support.weight_time
+        self.burden = Burden(most=gains.limits.torque, cycle=cycle, period=period, weight_time=time)
+        self.tracking = min(period / gains.slip.tracking_time, 1.0)
+        self.memory = math.exp(-period / gains.slip.load_time)
+        self.follow_load = 1.0 - self.memory
+        self.follow_cycle = 1.0 - math.exp(-period / cycle)
+        self.follow_weight = 1.0 - math.exp(-period / gains.support.weight_time)
+        self.calm = round(CALM_CYCLES * cycle / period)  # periods
+        self.largest, self.deepest = gains.slip.limit * self.share, gains.suspension.limit  # N, m
+        self.most, self.fastest = gains.limits.torque, gains.limits.speed * period  # N m, rad
+        self.reset()
+
+    def reset(self) -> None:
+        """All laws at rest."""
+        for part in (self.law, self.detector, self.watch, self.touchdown, self.landings):
+            part.reset()
+        self.burden.reset()
+        self.bend, self.torque, self.shift = np.zeros((3, LEGS, 3))
+        self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
+        self.grip, self.slack = np.ones(LEGS), False
+        self.scale, self.trust = 0.0, 1.0
+        self.outrun, self.asked, self.dragged, self.sliding = False, 0.0, 0, 0
+
+    @property
+    def touching(self) -> Mask:
+        """(6,) feet on the ground, as far as the sensors are believed."""
+        return self.detector.touching
+
+    def plan(
+        self,
+        demand: Demand,
+        shares: Shares,
+        *,
+        feet: Plane,
+        height: Array,
+        rise: Array,
+        swinging: Mask,
+        hurried: bool = False,
+    ) -> Plan:
+        """What a step asks of the laws.
+
+        Args:
+            feet: (6,) contact points x + i y, walking frame [m].
+            height, rise: (6,) of the paths over the stance [m, m/s].
+            swinging: (6,) legs planned in the air.
+            hurried: some joint is asked for more speed than its servo has.
+        """
+        supports = 1.0 if self.parts.support else 0.0
+        well_up = height > EARLY
+        carry = -supports * (demand.lever @ shares.forces()[:, :, None])[:, :, 0]
+        return Plan(
+            own=supports * demand.torque,
+            carry=carry,
+            lever=demand.lever,
+            shares=shares,
+            feet=feet,
+            weight=float(shares.normal.sum()),
+            standing=shares.activation >= 1.0,
+            well_up=well_up,
+            height=height,
+            needed=float(np.abs(carry).max()),
+            swinging=swinging,
+            falling=np.where(well_up, np.maximum(-self.period * rise, 0.0), 0.0),
+            hurried=hurried,
+        )
+
+    # ------------------------------------------------------------------------------ contacts
+
+    def _replace_forces(self, plan: Plan, force: Array) -> Array:
+        """The forces, where a sensor is not believed those of the plan, (6, 3) [N]."""
+        planned = plan.shares.activation > 0.5
+        self.detector.touching = np.where(self.doubted, planned, self.touching)
+        return np.where(self.doubted[:, None], self.scale * plan.shares.forces(), force)
+
+    def _judge_sensors(self, plan: Plan, met: Array, force: Array) -> Array:
+        """Which sensors are believed (C34); all feet's are not once those of a tripod are not.
+
+        met: (6,) heights at which the feet meet the ground without any bump [m]. Returns the forces
+        (6, 3) to go by [N].
+        """
+        total = float(force[self.touching, 2].sum())
+        high = plan.height > self.high + met
+        doubted = self.watch.look(self.touching, total, plan.standing, high)
+        self.doubted = doubted | (np.count_nonzero(doubted) >= TRIPOD_LEGS)
+        self.fallback = self.doubted | (self.trust < 1.0)
+        return self._replace_forces(plan, force) if doubted.any() else force
+
+    def _meet_ground(self, plan: Plan, met: Array) -> None:
+        """Answers ground that is met early or late (C36). met: as in _judge_sensors()."""
+        self.slack = True
+        early = self.landings.early(met, plan.height)
+        falling = np.where(early, plan.falling, 0.0)
+        self.touchdown.step(self.touching, falling, plan.swinging, plan.standing)
+
+    def _examine_contacts(self, plan: Plan, force: Array) -> Array:
+        """Decides between a wrong sensor and ground that is met early or late.
+
+        Returns the forces (6, 3) to go by [N].
+        """
+        met = self.landings.expected(self.touching, plan.height, plan.swinging)
+        if self.parts.fallback:
+            force = self._judge_sensors(plan, met, force)
+        if self.trust < 1.0:
+            self.touchdown.reset()
+        elif self.parts.touchdown:
+            self._meet_ground(plan, met)
+        return force
+
+    def _contacts_differ(self, plan: Plan) -> bool:
+        """Whether contacts contradict the plan, or did so and the answer to it is under way."""
+        certain = plan.standing | plan.well_up
+        differs = ((self.touching != plan.standing) & certain).any()
+        return bool(differs) or self.watch.busy() or self.touchdown.busy()
+
+    # ------------------------------------------------------------------------ inputs and weight
+
+    def _update_trust(self, plan: Plan, drag: float) -> None:
+        """Gives the plan of the load up while it does not hold (C33).
+
+        It does not hold for a robot that slides, whose joints cannot follow or that is far too
+        heavy. drag: the common tangential force of the feet beyond the plan over the normal one.
+        """
+        self.asked += self.follow_cycle * (float(plan.hurried) - self.asked)
+        self.outrun = self.asked > (JOINTS_FOLLOW if self.outrun else JOINTS_DO_NOT)
+        self.dragged = self.dragged + 1 if drag > SLIDING_DRAG else 0
+        if self.dragged * self.period > SLIDING_TIME:
+            self.sliding = self.calm
+        elif self.sliding:
+            self.sliding -= 1
+        goal = 0.0 if self.sliding or self.outrun or self.burden.overburdened else 1.0
+        if self.trust == goal:
+            return
+        self.trust += self.follow_load * (goal - self.trust)
+        if abs(goal - self.trust) < 1.0 - GRIPPED:
+            self.trust = goal
+        self.fallback = self.doubted | (goal == 0.0)
+
+    def _law_inputs(self, plan: Plan, force: Array) -> tuple[Plane, Array, float]:
+        """The squeeze (6,) and normal forces (6,) felt, and the sum of the latter [N] (C24)."""
+        horizontal = force[:, 0] + 1j * force[:, 1]
+        felt = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
+        normal = np.where(self.touching, force[:, 2], 0.0)
+        total = float(normal.sum())
+        if self.parts.fallback:
+            drag = abs(felt.sum()) / total if total > max(self.settled, LOAD_FLOOR) else 0.0
+            self._update_trust(plan, drag)
+        if not self.parts.slip_pid:
+            return np.zeros(LEGS, dtype=np.complex128), normal, total
+        return squeeze(felt, normal, plan.feet), normal, total
+
+    def _update_weight(self, plan: Plan, total: float) -> None:
+        """Follows the measured over the planned weight (C30), and what the servos carry of it.
+
+        total: the sum of the normal forces felt [N].
+        """
+        if not self.doubted.any():
+            ratio = total / max(plan.weight, LOAD_FLOOR)
+            scale = min(max(ratio, LEAST_SCALE), LARGEST_SCALE)
+            self.scale += self.follow_weight * (scale - self.scale)
+            self.burden.weigh(ratio)
+        self.burden.step(plan.needed, self.scale)
+
+    def _excess(self, plan: Plan, normal: Array) -> Array:
+        """(6,) normal forces beyond the shares [N], 0 of feet that have none (C26)."""
+        live = self.parts.suspension & (plan.shares.activation > 0.0)
+        return np.where(live, normal - self.scale * plan.shares.normal, 0.0)
+
+    # ------------------------------------------------------------------------------------ laws
+
+    def _limit_answers(self) -> None:
+        """Limits the answers of the PID, their direction kept; the integrals give way (C27)."""
+        law = self.law
+        wanted = law.answer
+        law.answer = wanted * (self.largest / np.maximum(np.abs(wanted), self.largest))
+        law.pid.integral = law.pid.integral + self.tracking * (law.answer - wanted)
+
+    def _limit_deflections(self) -> None:
+        """At its stop a suspension stands still."""
+        law = self.law
+        law.rate = np.where(np.abs(law.deflection) > self.deepest, 0.0, law.rate)
+        law.deflection = clamp(law.deflection, -self.deepest, self.deepest)
+
+    def _step_laws(self, plan: Plan, push: Plane, normal: Array, excess: Array) -> Array:
+        """The laws one period on, limited, and the forces that they answer by (C25 to C27).
+
+        push, normal, excess: (6,) [N]. Returns (6, 3) [N].
+        """
+        law = self.law
+        law.step(push, excess, normal * (1.0 / self.share))
+        # no single one is beyond its limit when all together are not
+        if square(law.answer).sum() > self.largest**2:
+            self._limit_answers()
+        if (law.deflection * law.deflection).sum() > self.deepest**2:
+            self._limit_deflections()
+        freedom = self.burden.freedom if self.parts.support else 1.0
+        given = law.answer * (freedom * np.minimum(law.load, LARGEST_LOAD))
+        vertical = (plan.lever[:, :, 2] ** 2).sum(axis=1)
+        lift = law.deflection / (self.softness * vertical)  # z/C_zz, C = J kp^-1 J^T
+        # a foot in the air forgets, within the time in which a leg gives up its load; and all
+        # forget what they may not take away
+        kept = 1.0 - (1.0 - freedom) * self.follow_load
+        forgets = plan.swinging & ~self.touching
+        law.pid.integral = law.pid.integral * np.where(forgets, kept * self.memory, kept)
+        return rows_of(given.real, given.imag, lift)
+
+    # ---------------------------------------------------------------------------------- joints
+
+    def _restore_grip(self, plan: Plan, torque: Array) -> Array:
+        """Gives a leg that stands only in the plan its share back as it loads (C29).
+
+        torque: (6, 3) for the planned load [N m]. Returns what is left of it.
+        """
+        grip = self.grip + self.follow_load * (1.0 - self.grip)
+        self.grip = np.where(plan.standing & ~self.touching, 0.0, grip)
+        self.slack = bool((self.grip < GRIPPED).any())
+        return torque * self.grip[:, None]
+
+    def _limit_joints(self, wanted: Array, torque: Array) -> None:
+        """Leads the bends to the wanted ones and sets the torques, both limited (C28, C29)."""
+        if not self.parts.limits:
+            self.bend, self.torque = wanted, torque
+            return
+        self.bend = self.bend + clamp(wanted - self.bend, -self.fastest, self.fastest)
+        self.torque = clamp(torque, -self.most, self.most)
+
+    def _actuate(self, plan: Plan, answer: Array) -> None:
+        """Turns the forces of the laws (6, 3) [N] and the planned load into angles and torques.
+
+        bend = J^T f/kp (C28); torque = trust (own + grip strength scale carry) (C29).
+        """
+        strength = self.burden.strength if self.parts.limits else 1.0
+        torque = plan.carry * (strength * self.scale)
+        if self.slack:
+            torque = self._restore_grip(plan, torque)
+        bend = self.softness * (plan.lever @ answer[:, :, None])[:, :, 0]
+        self.shift = (bend[:, None, :] @ plan.lever)[:, 0, :]  # J bend
+        self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
+
+    def step(self, plan: Plan, force: Array) -> None:
+        """One period on.
+
+        force: (6, 3) of the ground on the feet, walking frame [N].
+        """
+        self.detector.step(force[:, 2])
+        self.landings.look(self.touching, plan.height, plan.swinging)
+        if self._contacts_differ(plan):
+            force = self._examine_contacts(plan, force)
+        push, normal, total = self._law_inputs(plan, force)
+        self._update_weight(plan, total)
+        answer = self._step_laws(plan, push, normal, self._excess(plan, normal))
+        self._actuate(plan, answer)

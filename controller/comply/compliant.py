@@ -1,0 +1,215 @@
+"""Compliant control around its laws: from the sensors to the corrected feet. C: compliant.c.
+
+Every period the controller has a plan of the step at hand (controller.py): joint angles, the forces
+that the feet should feel, and the torques that carry them. Compliant control corrects that plan by
+what the robot senses:
+
+    foot forces -- sense (C22) --> force laws (compliance.py, C23 to C36) --> bend, torque, offset
+    joint angles, attitude -- look, every 40 ms --> slow loops (hold.py, C37 to C40) --> lift, v, w
+    planned angles + bend + climb (offset + lift) ---> angle_ref (C41)
+
+The force laws answer at once, by the joint angles and torques of this period. The slow loops answer
+in part at once, by lifting the feet (posture), and in part by an addition to the commanded velocity
+(path), which the next steps are planned with.
+"""
+
+from __future__ import annotations
+
+from math import asin, atan2
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hexapod_cosim.controller.comply.compliance import Compliance, Plan
+from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.comply.support import Support
+from hexapod_cosim.controller.gains import Gains
+from hexapod_cosim.controller.memory import Stateful
+from hexapod_cosim.controller.parts import Parts
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
+from hexapod_cosim.controller.walk.gait import Gait
+from hexapod_cosim.controller.walk.hold import Hold, Sight
+from hexapod_cosim.controller.walk.inverse_dynamics import InverseDynamics
+from hexapod_cosim.controller.walk.kinematics import LegSolver
+from hexapod_cosim.controller.walk.trajectory import Twist
+from hexapod_cosim.models import Robot
+
+if TYPE_CHECKING:
+    from hexapod_cosim.controller.controller import JointCommand, Measurement
+
+STEERING_TIME = 0.1  # s    in which a change of the added velocity is led over
+
+
+class Stance(NamedTuple):
+    """What a step asks, and where it is."""
+
+    plan: Plan  # of the laws
+    climb: Array  # rad/m    (6, 3) motion of the joints as a foot rises
+    value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
+    posture: Posture  # of the torso
+    plane: Plane  # m    (6,) planned feet, walking frame
+    height: Array  # m    (6,) to which they are lowered, walking frame
+
+
+class Steering(NamedTuple):
+    """What the lost way adds to the commanded velocity, led over from one value to the next."""
+
+    begin: Twist
+    goal: Twist
+    past: int  # periods since the begin, at the first step planned
+
+
+NO_STEERING = Steering(Twist(0j, 0.0), Twist(0j, 0.0), 0)
+
+
+class Compliant(Stateful):
+    """Compliant control of one robot in one gait.
+
+    Attributes:
+        laws: the force laws.
+        hold: the slow loops.
+        steering: of the path.
+        count: periods done.
+        offset: (6,) of early and late touch-downs at the last period [m].
+        moving: the offsets have just changed.
+        stance: what the last step asked; not part of the state.
+    """
+
+    STATE = ("laws", "hold", "steering", "count", "offset", "moving")
+
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        gains: Gains,
+        parts: Parts,
+        *,
+        legs: LegSolver,
+        period: float,
+    ) -> None:
+        self.legs, self.per_second, self.leading = legs, 1.0 / period, STEERING_TIME / period
+        self.dynamics = InverseDynamics(robot, legs, period=period)
+        self.support = Support(robot, gait, gains.support, rest=self.dynamics.rest())
+        self.laws = Compliance(
+            gains,
+            parts,
+            weight=robot.weight,
+            cycle=gait.period,
+            kp=robot.servo.kp,
+            step_height=gait.step_height,
+            period=period,
+        )
+        self.hold = Hold(gains.hold, parts, period=period)
+        self.stance: Stance
+        self.reset()
+
+    def reset(self) -> None:
+        """All laws at rest, nothing seen."""
+        self.laws.reset()
+        self.hold.reset()
+        self.steering, self.count = NO_STEERING, 0
+        self.offset, self.moving = np.zeros(LEGS), False
+
+    # ------------------------------------------------------------------------------- steering
+
+    def addition(self, steps: int) -> Twist:
+        """What is added to the commanded velocity so many periods after the first planned (C40)."""
+        begin, goal, past = self.steering
+        part = min((past + steps) / self.leading, 1.0)
+        return Twist(
+            begin.velocity + (goal.velocity - begin.velocity) * part,
+            begin.yaw_rate + (goal.yaw_rate - begin.yaw_rate) * part,
+        )
+
+    def steer(self, steps: int, *, moves: bool, afresh: bool) -> None:
+        """Before new steps are planned: takes over what the slow loops ask for (C40).
+
+        That happens when a leg lifts off or touches down, and at a stop.
+
+        Args:
+            steps: periods since the last planning.
+            moves: the body is commanded to move; otherwise nothing is added.
+            afresh: a leg lifts off or touches down now.
+        """
+        self.steering = self.steering._replace(past=self.steering.past + steps)
+        goal = self.steering.goal
+        added = goal.velocity != 0.0 or goal.yaw_rate != 0.0
+        if not afresh and (moves or not added):
+            return
+        lost = Twist(self.hold.velocity, self.hold.yaw_rate)
+        self.steering = Steering(self.addition(0), lost if moves else Twist(0j, 0.0), 0)
+
+    # -------------------------------------------------------------------------------- sensors
+
+    def _sense(self, measurement: Measurement, posture: Posture) -> Array:
+        """The foot forces in the walking frame (C22), (6, 3) [N]: f_K = R_KT R_TW f_W."""
+        w, x, y, z = measurement.quaternion.tolist()
+        xx, yy, zz = x * x, y * y, z * z
+        rotation = np.array(
+            [
+                [1.0 - 2.0 * (yy + zz), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+                [2.0 * (x * y + w * z), 1.0 - 2.0 * (xx + zz), 2.0 * (y * z - w * x)],
+                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (xx + yy)],
+            ]
+        )  # R_WT
+        force = measurement.foot_force @ rotation
+        return force if posture.level else np.asarray(force @ posture.rotation.T)
+
+    def _look(self, measurement: Measurement, stance: Stance) -> None:
+        """Shows the slow loops where the standing feet are."""
+        legs, angle = self.legs, measurement.angle
+        w, x, y, z = measurement.quaternion.tolist()
+        foot = legs.forward(angle)
+        plane, height = stance.posture.turn(foot[:, 0] + 1j * foot[:, 1], foot[:, 2])
+        rolled = cis(legs.hip_yaw + angle[:, 0]) * legs.rolling(angle)
+        vx, vy, yaw_rate, commanded_height, roll, pitch = stance.value.tolist()
+        roll_seen = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        pitch_seen = asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        self.hold.look(
+            Sight(
+                plane=plane - rolled,
+                height=height + commanded_height,
+                planned=stance.plane,
+                planned_height=stance.height,
+                load=self.laws.law.load,
+                tilt=np.array([roll_seen - roll, pitch_seen - pitch]),
+                yaw=atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+                velocity=complex(vx, vy),
+                yaw_rate=yaw_rate,
+            )
+        )
+
+    # ----------------------------------------------------------------------------------- step
+
+    def _correct(self, angle: Array, climb: Array, raised: Array) -> Array:
+        """The joint angles (6, 3) [rad], bent by the laws and with the feet raised (C41).
+
+        climb: (6, 3) motion of the joints as a foot rises [rad/m]; raised: (6,) [m].
+        """
+        corrected = angle + self.laws.bend + climb * raised[:, None]
+        return np.asarray(clamp(corrected, self.legs.angle_min, self.legs.angle_max))
+
+    def step(self, stance: Stance, measurement: Measurement, output: JointCommand) -> Array:
+        """One period on: corrects the joint commands of this step in place (C41).
+
+        Returns the shift of the feet by all corrections, walking frame (6, 3) [m].
+        """
+        laws, self.stance = self.laws, stance
+        laws.step(stance.plan, self._sense(measurement, stance.posture))
+        if self.count % self.hold.every == 0:
+            if laws.trust == 1.0:
+                self._look(measurement, stance)
+            else:
+                self.hold.reset()
+        self.count += 1
+        offset, climb, busy = laws.touchdown.offset, stance.climb, laws.touchdown.busy()
+        raised = offset + self.hold.lift
+        output.angle_ref[...] = self._correct(output.angle_ref, climb, raised)
+        output.torque_ref[...] = laws.torque
+        if busy or self.moving:
+            rise = (offset - self.offset) * self.per_second
+            output.speed_ref[...] += climb * rise[:, None]
+            self.offset, self.moving = offset, busy
+        shift = laws.shift.copy()
+        shift[:, 2] += raised
+        return shift

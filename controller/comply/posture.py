@@ -1,0 +1,74 @@
+"""Height, roll and pitch of the torso over its feet (C10). C: posture.c.
+
+The walking frame K is the torso frame of a robot at its nominal height and level posture; the torso
+frame T lies in it at a height and is turned by R_KT, roll about x first and then pitch about y.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hexapod_cosim.controller.plane import Array
+from hexapod_cosim.controller.walk.kinematics import Feet
+
+
+class Posture(NamedTuple):
+    """The torso in the walking frame."""
+
+    level: bool  # height, roll, pitch and their rates are all 0: nothing to turn
+    height: float  # m
+    rotation: Array  # 1    (3, 3) R_KT
+    rate: float  # m/s    of the height
+    spin: tuple[float, float, float]  # rad/s    w_KT, torso axes
+
+    @classmethod
+    def of(cls, value: Array, rate: Array) -> Posture:
+        """The posture of height, roll and pitch (3,) [m, rad, rad] and their rates per second."""
+        if not (value.any() or rate.any()):
+            return LEVEL
+        height, roll, pitch = value.tolist()
+        height_rate, roll_rate, pitch_rate = rate.tolist()
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+        rotation = np.array(
+            [[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]],
+        )
+        spin = (roll_rate, pitch_rate * cr, -pitch_rate * sr)
+        return cls(False, height, rotation, height_rate, spin)
+
+    def turn(self, plane: Any, z: Any) -> tuple[Any, Any]:
+        """R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
+        return (plane, z) if self.level else _product(self.rotation, plane, z)
+
+    def turn_back(self, plane: Any, z: Any) -> tuple[Any, Any]:
+        """R_TK p of vectors p = (x + i y, z) of any shape: walking axes to torso axes."""
+        return (plane, z) if self.level else _product(self.rotation.T, plane, z)
+
+    def see_place(self, plane: Any, height: Any) -> tuple[Any, Any]:
+        """Points of the walking frame (x + i y, z) [m] in the torso frame."""
+        # p_T = R_TK (p_K - height e_z)
+        return self.turn_back(plane, height - self.height)
+
+    def see(self, feet: Feet) -> Feet:
+        """Feet of the walking frame, places and velocities, in the torso frame."""
+        if self.level:
+            return feet
+        x, y, z = self.spin
+        plane, height = self.see_place(feet.plane, feet.height)
+        # v_T = R_TK (v_K - rate e_z) - w_T x p_T
+        velocity, rise = self.turn_back(feet.velocity, feet.rise - self.rate)
+        velocity = velocity - ((y - 1j * x) * height + 1j * z * plane)
+        rise = rise - (x * plane.imag - y * plane.real)
+        return Feet(plane, height, velocity, rise)
+
+
+LEVEL = Posture(True, 0.0, np.eye(3), 0.0, (0.0, 0.0, 0.0))
+
+
+def _product(rotation: Array, plane: Any, z: Any) -> tuple[Any, Any]:
+    x, y = plane.real, plane.imag
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    turned = (xx * x + xy * y + xz * z) + 1j * (yx * x + yy * y + yz * z)
+    return turned, zx * x + zy * y + zz * z

@@ -1,0 +1,1 @@
+"""What the controller concludes from measured forces: contacts, touch-downs, landings, burden."""

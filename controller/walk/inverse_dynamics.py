@@ -1,0 +1,217 @@
+"""What the planned motion demands of servos and ground: inverse dynamics of all legs.
+
+C: inverse_dynamics.c. A leg is three point masses. Seen in its own vertical plane, which turns with
+the coxa, a point is U = u + i w (outward, up) and Y to the side; from above that plane points along
+e^(i psi). Accelerations are second differences of three successive planned steps. The joint torques
+are those of (C15); what the ground must give the robot as a whole is (C16). A force f of the ground
+on the foot asks -J^T f of the joints, J of the contact point (C17). Left out: what the turning of
+the torso does to the turning of the legs, and the inertia of the links about their long axes.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hexapod_cosim.controller.comply.posture import Posture
+from hexapod_cosim.controller.plane import LEGS, Array, Plane, across, cis
+from hexapod_cosim.controller.walk.kinematics import LegSolver, Pose
+from hexapod_cosim.models import Robot
+from hexapod_cosim.models.actuator import GEAR_SPEED
+
+Wrench = tuple[Any, ...]  # push, weight, moment, twist of (C16)
+
+
+class Masses(NamedTuple):
+    """Where the point masses are at one step; (6, 3): legs, links."""
+
+    point: Plane  # m    (6, 3) U, from where the coxa axis meets the hip
+    place: Plane  # m    (6, 3) x + i y, walking frame
+    height: Array  # m    (6, 3) z, walking frame
+    ground: Plane  # m    (6, 3) x + i y, ground frame
+    torso_place: complex  # m    x + i y, walking frame
+    torso_height: float  # m    z, walking frame
+    torso_ground: complex  # m    x + i y, ground frame
+    turn: complex  # 1    e^(i yaw) of the walking frame over the ground
+
+
+class Demand(NamedTuple):
+    """What a planned motion demands at one step."""
+
+    torque: Array  # N m    (6, 3) for the legs' own weight and motion, their feet free
+    lever: Array  # m    (6, 3, 3) J^T: joint torques per force on the contact point, walking axes
+    push: complex  # N    horizontal force that the ground must give the robot, walking frame
+    weight: float  # N    the vertical force
+    moment: complex  # N m    what the sum of p f_n over the feet must be
+    twist: float  # N m    what the sum of Im(p^* f_h) must be, the moment about the vertical
+
+
+class Neighbours(NamedTuple):
+    """Three successive steps: before, now, after. Without a neighbour there is no acceleration."""
+
+    masses: tuple[Masses | None, Masses, Masses | None]
+    pose: tuple[Pose | None, Pose, Pose | None]
+
+
+class InverseDynamics:
+    """Of one robot. `legs`: its kinematics; `period` [s] lies between two steps."""
+
+    def __init__(self, robot: Robot, legs: LegSolver, *, period: float) -> None:
+        self.legs, self.period = legs, period
+        self.gravity = float(np.linalg.norm(robot.gravity))
+        self.rotor, self.friction = robot.servo.rotor_inertia, robot.servo.coulomb_friction
+        self.torso_mass, self.torso_inertia = robot.torso.mass, robot.torso.inertia[2]
+        self.torso_com = complex(robot.torso.com[0], robot.torso.com[1])
+        self.torso_com_z = robot.torso.com[2]
+        self.stance = legs.forward(robot.stance)  # m    (6, 3) feet
+        self.floor = float(np.mean(self.stance[:, 2])) - robot.foot.radius  # m    torso frame
+        links = [leg.links for leg in robot.legs]
+        com = np.array([[link.com for link in leg] for leg in links])  # (6, 3, 3)
+        offset = np.array([[link.offset_y for link in leg] for leg in links])
+        inertia = np.array([[link.inertia[:3] for link in leg] for leg in links])
+        self.mass = np.array([[link.mass for link in leg] for leg in links])  # kg    (6, 3)
+        self.com = com[..., 0] + 1j * com[..., 2]  # m    (6, 3) from the joint, plane of the leg
+        self.side = com[..., 1] + np.cumsum(offset, axis=1) - offset  # m    (6, 3) Y
+        self.yaw_inertia = inertia[..., 2].sum(axis=1)  # kg m2    (6,)
+        self.pitch_inertia = inertia[..., 1]  # kg m2    (6, 3)
+
+    def rest(self) -> Demand:
+        """What the robot demands in its stance."""
+        x, y, z = self.stance.T
+        pose = self.legs.pose(x + 1j * y, z)
+        level = Posture.of(np.zeros(3), np.zeros(3))
+        masses = self.place(pose, 0j, 0.0, level)
+        alone = Neighbours((None, masses, None), (None, pose, None))
+        return self.demand(alone, np.zeros_like(pose.angle), level)
+
+    def place(self, pose: Pose, way: complex, turn: float, posture: Posture) -> Masses:
+        """Where the point masses are.
+
+        Args:
+            pose: the legs, torso frame.
+            way, turn: of the walking frame over the ground [m, rad].
+            posture: of the torso in the walking frame.
+        """
+        legs, turned = self.legs, cis(turn)
+        joint = legs.coxa_length + 1j * legs.coxa_height
+        knee = joint + pose.femur * legs.femur
+        point = np.empty((LEGS, 3), dtype=np.complex128)
+        point[:, 0] = self.com[:, 0]
+        point[:, 1] = joint + pose.femur * (legs.femur_zero * self.com[:, 1])
+        point[:, 2] = knee + pose.tibia * (legs.tibia_zero * self.com[:, 2])
+        aside = point.real + 1j * self.side
+        place, height = posture.turn(
+            legs.place[:, None] + pose.heading[:, None] * aside,
+            legs.hip[2][:, None] + point.imag,
+        )
+        torso_place, torso_height = posture.turn(self.torso_com, self.torso_com_z)
+        return Masses(
+            point=point,
+            place=place,
+            height=height + posture.height,
+            ground=way + turned * place,
+            torso_place=torso_place,
+            torso_height=torso_height + posture.height,
+            torso_ground=way + turned * torso_place,
+            turn=turned,
+        )
+
+    def _acceleration(self, before: Any, now: Any, after: Any) -> Any:
+        """The second difference of three steps, of numbers and points alike."""
+        return (after - 2.0 * now + before) / (self.period * self.period)
+
+    def _add_force(self, total: Wrench, push: Any, lift: Any, place: Any, height: Any) -> Wrench:
+        """Adds m (a + g) = (push, lift) of points at (place, height), walking frame (C16).
+
+        `total` and the result are push, weight, moment and twist.
+        """
+        moment = place * lift - push * (height - self.floor)
+        parts = (push, lift, moment, across(place, push))
+        return tuple(
+            a + (part.sum() if isinstance(part, np.ndarray) else part)
+            for a, part in zip(total, parts, strict=True)
+        )
+
+    def _demand_torso(
+        self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None]
+    ) -> Wrench:
+        """Adds what the torso demands to push, weight, moment and twist (C16)."""
+        before, now, after = masses
+        acceleration, up, spin = 0j, 0.0, 0j
+        if before is not None and after is not None:
+            acceleration = self._acceleration(
+                before.torso_ground, now.torso_ground, after.torso_ground
+            )
+            up = self._acceleration(before.torso_height, now.torso_height, after.torso_height)
+            spin = self._acceleration(before.turn, now.turn, after.turn)
+        push = self.torso_mass * acceleration * now.turn.conjugate()
+        lift = self.torso_mass * (up + self.gravity)
+        place, height = now.torso_place, now.torso_height
+        push, weight, moment, twist = self._add_force(total, push, lift, place, height)
+        return push, weight, moment, twist + self.torso_inertia * across(now.turn, spin)
+
+    def _demand_links(
+        self, masses: tuple[Masses | None, Masses, Masses | None]
+    ) -> tuple[Plane, Array]:
+        """m (a + g) of the links: horizontal and vertical, (6, 3) each [N], walking frame."""
+        before, now, after = masses
+        if before is None or after is None:
+            return np.zeros((LEGS, 3), dtype=np.complex128), self.mass * self.gravity
+        acceleration = self._acceleration(before.ground, now.ground, after.ground)
+        up = self._acceleration(before.height, now.height, after.height)
+        push = self.mass * acceleration * now.turn.conjugate()
+        return push, self.mass * (up + self.gravity)
+
+    def _demand_torques(self, motion: Neighbours, push: Plane, lift: Array, speed: Array) -> Array:
+        """The joint torques (C15), (6, 3) [N m].
+
+        push, lift: (6, 3) forces that the links need, torso frame [N]; speed: (6, 3) [rad/s].
+        """
+        legs, (before, now, after), point = self.legs, motion.pose, motion.masses[1].point
+        turning = np.zeros((LEGS, 3))
+        if before is not None and after is not None:
+            turning = self._acceleration(before.angle, now.angle, after.angle)
+        torque = self.rotor * turning + self.friction * np.tanh(speed / GEAR_SPEED)
+        # tau_1 = sum Im((u + i Y)^* F_h e^(-i psi))
+        along = push * now.heading.conj()[:, None]
+        torque[:, 0] += across(point.real + 1j * self.side, along).sum(axis=1)
+        torque[:, 0] += turning[:, 0] * self.yaw_inertia
+        # tau_2 = sum Im((U - U_femur)^* P)    tau_3 = -Im((U - U_knee)^* P)
+        inner = along.real + 1j * lift
+        arm = point[:, 1:] - (legs.coxa_length + 1j * legs.coxa_height)[:, None]
+        tibia = arm[:, 1] - legs.femur * now.femur
+        upper = turning[:, 1] * self.pitch_inertia[:, 1]
+        lower = (turning[:, 1] - turning[:, 2]) * self.pitch_inertia[:, 2]
+        torque[:, 1] += across(arm, inner[:, 1:]).sum(axis=1) + upper + lower
+        torque[:, 2] -= across(tibia, inner[:, 2]) + lower
+        return np.asarray(torque)
+
+    def _lever_of(self, pose: Pose, posture: Posture) -> Array:
+        """J^T of the contact points (C17), (6, 3, 3) [m]: rows joints, columns walking axes."""
+        femur = pose.foot - 1j * self.legs.radius
+        tibia = femur - self.legs.femur * pose.femur
+        row = np.empty((LEGS, 3), dtype=np.complex128)
+        up = np.zeros((LEGS, 3))
+        row[:, 0] = 1j * pose.point
+        row[:, 1], up[:, 1] = -femur.imag * pose.heading, femur.real
+        row[:, 2], up[:, 2] = tibia.imag * pose.heading, -tibia.real
+        row, up = posture.turn(row, up)
+        return np.array((row.real, row.imag, up)).transpose(1, 2, 0)
+
+    def demand(self, motion: Neighbours, speed: Array, posture: Posture) -> Demand:
+        """What the middle one of three steps demands.
+
+        Args:
+            motion: the steps.
+            speed: (6, 3) joint speeds [rad/s].
+            posture: of the torso in the walking frame.
+        """
+        now = motion.masses[1]
+        push, lift = self._demand_links(motion.masses)
+        legs = self._add_force((0j, 0.0, 0j, 0.0), push, lift, now.place, now.height)
+        total, weight, moment, twist = self._demand_torso(legs, motion.masses)
+        push, lift = posture.turn_back(push, lift)
+        torque = self._demand_torques(motion, push, lift, speed)
+        lever = self._lever_of(motion.pose[1], posture)
+        return Demand(torque, lever, complex(total), float(weight), complex(moment), float(twist))

@@ -1,0 +1,86 @@
+/* compliance.h - the force laws of compliant control: from planned load and measured foot forces to
+ * the joints. Python: controller/comply/compliance.py. */
+#ifndef HX_COMPLIANCE_H
+#define HX_COMPLIANCE_H
+
+#include "../sense/burden.h"
+#include "../sense/contact_detection.h"
+#include "foot_law.h"
+#include "hexapod/inside.h"
+#include "../sense/landing.h"
+#include "support.h"
+#include "../sense/touchdown.h"
+
+HX_HIDDEN_BEGIN
+
+typedef struct hxComplianceModel {
+  hxParts parts;
+  hxFootLawModel law;
+  hxSensorWatchModel watch;
+  hxBurdenModel burden;
+  double period; /* s */
+  /* N  of the robot; a third of it; what feet that have met the ground carry together */
+  double weight, share, settled;
+  double softness; /* rad/N m of the servos */
+  double high; /* m       a foot planned higher is certainly in the air */
+  /* 1  of the smoothings, over a period */
+  double tracking, memory, follow_load, follow_cycle, follow_weight;
+  int64_t calm; /* steps   without sliding until feet are trusted again */
+  double largest, deepest; /* N, m    limits of the laws' answers */
+  double most, fastest; /* N m, rad  limits of torque and of the bend's change in a period */
+} hxComplianceModel;
+
+/* What a step asks. */
+typedef struct hxPlan {
+  double own[HX_LEGS][HX_JOINTS]; /* N m  torques for the legs' own weight and motion */
+  double carry[HX_LEGS][HX_JOINTS]; /* N m  and for the planned load */
+  double lever[HX_LEGS][HX_JOINTS][3]; /* m    J^T of the contact points */
+  hxShares shares;
+  hxPlane feet[HX_LEGS]; /* m    contact points */
+  double weight; /* N    of all shares */
+  int standing[HX_LEGS]; /* carries its whole share */
+  int well_up[HX_LEGS]; /* well above the ground: in the air even if it is met early */
+  double height[HX_LEGS]; /* m    of the paths over their ends */
+  double needed; /* N m  largest of carry */
+  int swinging[HX_LEGS];
+  double falling[HX_LEGS]; /* m    by which feet well above the ground come down in a period */
+  int hurried; /* some joint is asked for more speed than its servo has */
+} hxPlan;
+
+typedef struct hxCompliance {
+  hxFootLaw law[HX_LEGS];
+  hxSensorWatch watch;
+  hxTouchdown touchdown;
+  hxLandings landings;
+  hxBurden burden;
+  int touching[HX_LEGS];
+  double bend[HX_LEGS][HX_JOINTS]; /* rad  corrections of the joints' angles */
+  double torque[HX_LEGS][HX_JOINTS]; /* N m  for the servos */
+  double shift[HX_LEGS][3]; /* m    of the feet that comes of bend */
+  int doubted[HX_LEGS]; /* its sensor is not believed */
+  /* walks without feedback: doubted, or the robot slides or outruns its joints */
+  int fallback[HX_LEGS];
+  double grip[HX_LEGS]; /* 1    of its share that a leg is given back as it loads */
+  int slack; /* some leg is */
+  double scale; /* 1    measured over planned weight */
+  double trust; /* 1    less while the robot slides or its joints cannot follow */
+  int outrun;
+  double asked; /* 1    share of the time in which paths ask more speed than a servo has */
+  int64_t dragged, sliding; /* steps  for how long; until feet are trusted again */
+} hxCompliance;
+
+void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianceModel *model);
+void hx_compliance_reset(hxCompliance *laws);
+
+/* What a step asks of the laws; height, rise: of the feet's paths over the stance [m, m/s]. */
+void hx_compliance_plan(const hxComplianceModel *model, const hxDemand *demand,
+                        const double height[HX_LEGS], const double rise[HX_LEGS], hxPlan *plan);
+
+/* One period on. force: of the ground on the feet, walking frame [N]; replaced by the planned
+ * one where a sensor is not believed. */
+void hx_compliance_step(const hxComplianceModel *model, const hxPlan *plan,
+                        double force[HX_LEGS][3], hxCompliance *laws);
+
+HX_HIDDEN_END
+
+#endif

@@ -1,0 +1,37 @@
+/* slip_pid.h - the law against slip: one discrete PID per foot and direction.
+ * Python: controller/comply/slip_pid.py. */
+#ifndef HX_SLIP_PID_H
+#define HX_SLIP_PID_H
+
+#include "hexapod/controller.h"
+#include "hexapod/inside.h"
+#include "../plane.h"
+
+HX_HIDDEN_BEGIN
+
+typedef struct hxSlipPidModel {
+  double h; /* s */
+  double kp, ki, kd;
+  double filter, derivative; /* s  T_f, T_d */
+} hxSlipPidModel;
+
+/* What one PID remembers, of the last period. */
+typedef struct hxSlipPid {
+  double force; /* N   e */
+  double smooth; /* N   e', filtered */
+  double integral; /* N */
+  double slope; /* N   filtered derivative */
+} hxSlipPid;
+
+extern const double hx_load_floor; /* N  below it no foot carries anything */
+
+/* Tangential forces on feet [N] less what pushes and turns the body as one, shared by load
+ * (C24), in place; normal: forces on the feet [N]; feet: their places [m]. */
+void hx_squeeze(const double normal[HX_LEGS], const hxPlane feet[HX_LEGS], hxPlane push[HX_LEGS]);
+
+/* The answer of this period to a force [N] (C25). */
+double hx_slip_pid_step(const hxSlipPidModel *pid, double force, hxSlipPid *state);
+
+HX_HIDDEN_END
+
+#endif

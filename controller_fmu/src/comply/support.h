@@ -1,0 +1,44 @@
+/* support.h - which foot carries what: the planned weight and acceleration of the robot, shared
+ * by the standing feet. Python: controller/comply/support.py. */
+#ifndef HX_SUPPORT_H
+#define HX_SUPPORT_H
+
+#include "hexapod/inside.h"
+#include "../walk/inverse_dynamics.h"
+
+HX_HIDDEN_BEGIN
+
+typedef struct hxSupport {
+  double duty, handover; /* cycles  a leg's hand-overs never overlap, whatever the gait */
+  double stiffness; /* N/m^1.5 */
+  double rest_weight; /* N       what the robot asks for in its stance */
+  hxPlane rest_moment; /* N m */
+  double rest_depth; /* m       a foot presses in by in the stance */
+} hxSupport;
+
+/* Planned forces of the ground on the feet at one step, walking frame. */
+typedef struct hxShares {
+  double activation[HX_LEGS]; /* 1  in [0, 1] */
+  double normal[HX_LEGS]; /* N */
+  hxPlane push[HX_LEGS]; /* N */
+} hxShares;
+
+void hx_support_compile(const hxControllerDefinition *definition, const hxDemand *rest,
+                        hxSupport *model);
+
+/* The activation of a leg at a gait phase (C18), in [0, 1]. stayed, stays: it had nowhere to
+ * step at its last lift-off, or will have nowhere to step at its next one. */
+double hx_support_activation(const hxSupport *model, double phase, int stayed, int stays,
+                             int walking);
+
+/* How much lower than planned the feet must be for the torso to keep its height over ground that
+ * gives way (C21) [m]. */
+void hx_support_lowering(const hxSupport *model, const hxPlane feet[HX_LEGS],
+                         const double activation[HX_LEGS], double lowering[HX_LEGS]);
+
+/* The shares of feet in the walking frame (C19, C20); activations are given. */
+void hx_support_shares(const hxPlane feet[HX_LEGS], const hxDemand *demand, hxShares *shares);
+
+HX_HIDDEN_END
+
+#endif

@@ -1,0 +1,21 @@
+/* suspension.h - the virtual suspension m z'' + b z' + k z = f of a foot (C26).
+ * Python: controller/comply/suspension.py. */
+#ifndef HX_SUSPENSION_H
+#define HX_SUSPENSION_H
+
+#include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
+
+/* x(k+1) = a x(k) + b f(k) of x = (z, z'), exact under a force held over a period. */
+typedef struct hxSuspension {
+  double a[2][2], b[2];
+} hxSuspension;
+
+void hx_suspension_discretise(double mass, double damping, double stiffness, double period,
+                              hxSuspension *suspension);
+
+HX_HIDDEN_END
+
+#endif

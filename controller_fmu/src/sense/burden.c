@@ -1,0 +1,37 @@
+#include "burden.h"
+
+#include "../plane.h"
+
+/* 1  of the time in which the support follows the weight: the arch must not go first */
+static const double quick = 0.2;
+/* 1  part of the torque needed that servos may give */
+static const double no_support = 0.54, full_support = 0.84;
+/* 1  part of the weight that servos carry */
+static const double arch_stays = 0.8, arch_goes = 0.95;
+/* 1  of the torque allowed, to carry the measured weight */
+static const double support_helps = 1.35, support_fails = 1.5;
+/* 1  measured over modelled weight: less or more is no weight */
+static const double lightest = 0.5, heaviest = 4.0;
+
+void hx_burden_compile(const hxControllerDefinition *definition, hxBurdenModel *model) {
+  model->most = definition->gains.limits.torque;
+  model->fade = exp(-definition->period / definition->gait.period);
+  model->follow = 1.0 - exp(-definition->period / (quick * definition->gains.support.weight_time));
+}
+
+void hx_burden_reset(hxBurden *burden) { *burden = (hxBurden){1.0, 0.0, 1.0, 1.0, 0}; }
+
+void hx_burden_weigh(const hxBurdenModel *model, double ratio, hxBurden *burden) {
+  burden->heft += model->follow * (hx_clamp(ratio, lightest, heaviest) - burden->heft);
+}
+
+void hx_burden_step(const hxBurdenModel *model, double needed, double scale, hxBurden *burden) {
+  burden->peak = fmax(needed, model->fade * burden->peak);
+  burden->overburdened = burden->heft * burden->peak >
+                         model->most * (burden->overburdened ? support_helps : support_fails);
+  const double allowed = model->most / fmax(scale * burden->peak, model->most);
+  const double carried = model->most / fmax(burden->heft * burden->peak, model->most);
+  burden->strength =
+      fmin(allowed, fmax(full_support * (allowed - no_support) / (full_support - no_support), 0.0));
+  burden->freedom = hx_clamp((carried - arch_stays) / (arch_goes - arch_stays), 0.0, 1.0);
+}

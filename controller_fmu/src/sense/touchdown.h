@@ -1,0 +1,30 @@
+/* touchdown.h - ground that is met too early or too late (C36). Python: controller/sense/touchdown.py. */
+#ifndef HX_TOUCHDOWN_H
+#define HX_TOUCHDOWN_H
+
+#include "hexapod/controller.h"
+#include "hexapod/inside.h"
+
+HX_HIDDEN_BEGIN
+
+extern const double
+    hx_early; /* m  a foot that meets the ground with more of its way down to go has met it early */
+
+typedef struct hxTouchdown {
+  double offset[HX_LEGS]; /* m  by which paths are raised */
+  double late[HX_LEGS]; /* s  for how long the ground has been missed */
+} hxTouchdown;
+
+/* Whether some foot has an offset or misses the ground. */
+int hx_touchdown_busy(const hxTouchdown *touchdown);
+
+/* One period [s] on (C36). touching: feet that report a force; falling: how far the path of a
+ * foot that met the ground early comes down in this period [m], 0 of the others; swinging: legs
+ * planned in the air; loaded: legs planned to carry their whole share. */
+void hx_touchdown_step(double period, const int touching[HX_LEGS], const double falling[HX_LEGS],
+                       const int swinging[HX_LEGS], const int loaded[HX_LEGS],
+                       hxTouchdown *touchdown);
+
+HX_HIDDEN_END
+
+#endif

@@ -1,0 +1,169 @@
+/* schedule.c - the public functions of a controller: ticks at their times, saved states,
+ * refusals. */
+#include <float.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "../state.h"
+#include "../validation.h"
+
+/* A saved state: model and state behind what it takes to recognise them. */
+typedef struct {
+  uint64_t magic, version, size, checksum;
+  hxControllerModel model;
+  hxControllerState state;
+} hxSaved;
+
+static const uint64_t magic = 0x72746e6f43507868u; /* "hxPContr" */
+static const uint64_t saved_version = 2;
+/* 1  of a period: a tick this much after the present time is due */
+static const double clock_tolerance = 0.01;
+
+static uint64_t checksum(const hxSaved *saved) {
+  return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSaved, model));
+}
+
+static hxStatus refuse(hxController *controller, hxStatus status, const char *text) {
+  snprintf(controller->message, HX_MESSAGE_SIZE, "%s", text);
+  return status;
+}
+
+const char *hx_controller_message(const hxController *controller) { return controller->message; }
+double hx_controller_time(const hxController *controller) { return controller->state.time; }
+
+hxController *hx_controller_create(void) {
+  hxController *controller = calloc(1, sizeof *controller);
+  hxControllerDefinition definition;
+  if (!controller) return NULL;
+  hx_controller_definition_default(&definition);
+  hx_controller_reset(controller, &definition, 0.0);
+  return controller;
+}
+
+void hx_controller_destroy(hxController *controller) { free(controller); }
+
+hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinition *definition,
+                             double t) {
+  char message[HX_MESSAGE_SIZE];
+  if (!isfinite(t))
+    return refuse(controller, HX_INVALID_ARGUMENT,
+                  "start time: got a number that is not finite, expected seconds");
+  const hxStatus status = hx_controller_definition_check(definition, message);
+  if (status != HX_OK) return refuse(controller, status, message);
+  hx_controller_compile(definition, &controller->model);
+  hx_controller_begin(&controller->model, t, &controller->state);
+  controller->ahead.known = 0;
+  controller->message[0] = '\0';
+  return HX_OK;
+}
+
+static double next_tick(const hxController *controller) {
+  return controller->state.start + (double)controller->state.tick * controller->model.period;
+}
+
+static int is_finite(const hxControllerOutput *output) {
+  double sum = 0.0; /* anything that is not finite makes it so */
+  for (int leg = 0; leg < HX_LEGS; ++leg)
+    for (int joint = 0; joint < HX_JOINTS; ++joint)
+      sum += 0.0 * output->angle_ref[leg][joint] + 0.0 * output->speed_ref[leg][joint] +
+             0.0 * output->torque_ref[leg][joint] + 0.0 * output->acceleration_ref[leg][joint];
+  return sum == 0.0;
+}
+
+/* whether the next tick under this input has been computed; inputs consist of doubles alone */
+static int is_ahead(const hxController *controller, const hxControllerInput *input) {
+  return controller->ahead.known && memcmp(&controller->ahead.input, input, sizeof *input) == 0;
+}
+
+void hx_controller_output(hxController *controller, const hxControllerInput *input,
+                          hxControllerOutput *output) {
+  hxAhead *ahead = &controller->ahead;
+  if (next_tick(controller) - controller->state.time > clock_tolerance * controller->model.period) {
+    *output = controller->state.output;
+    return;
+  }
+  if (!is_ahead(controller, input)) {
+    ahead->known = 1;
+    ahead->input = *input;
+    ahead->state = controller->state;
+    hx_controller_tick(&controller->model, input, &ahead->state);
+  }
+  *output = ahead->state.output;
+}
+
+static void tick(hxController *controller, const hxControllerInput *input) {
+  if (is_ahead(controller, input))
+    controller->state = controller->ahead.state;
+  else
+    hx_controller_tick(&controller->model, input, &controller->state);
+  controller->ahead.known = 0;
+}
+
+/* The input a while after it was given, changing at a rate. */
+static void ramp_input(const hxControllerInput *input, const hxControllerInput *rate, double time,
+                       hxControllerInput *now) {
+  double value[sizeof *now / sizeof(double)], slope[sizeof *now / sizeof(double)];
+  memcpy(value, input, sizeof value);
+  memcpy(slope, rate, sizeof slope);
+  for (size_t i = 0; i < sizeof value / sizeof value[0]; ++i) value[i] += slope[i] * time;
+  memcpy(now, value, sizeof value);
+}
+
+hxStatus hx_controller_step(hxController *controller, const hxControllerInput *input,
+                            const hxControllerInput *rate, double t_end) {
+  const hxControllerState before = controller->state;
+  hxControllerInput now = *input;
+  if (!(t_end >= before.time && t_end <= DBL_MAX)) {
+    snprintf(controller->message, HX_MESSAGE_SIZE,
+             "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
+             before.time);
+    return HX_INVALID_ARGUMENT;
+  }
+  const hxStatus status = hx_controller_input_check(input, controller->message);
+  if (status != HX_OK) return status;
+  while (t_end - next_tick(controller) > clock_tolerance * controller->model.period) {
+    if (rate) ramp_input(input, rate, fmax(next_tick(controller) - before.time, 0.0), &now);
+    tick(controller, &now);
+    if (is_finite(&controller->state.output)) continue;
+    controller->state = before;
+    return refuse(
+        controller, HX_NOT_FINITE,
+        "joint commands: got numbers that are not finite, expected a command that legs can follow");
+  }
+  controller->state.time = t_end;
+  return HX_OK;
+}
+
+size_t hx_controller_state_size(void) { return sizeof(hxSaved); }
+
+void hx_controller_get_state(const hxController *controller, void *bytes) {
+  hxSaved saved;
+  memset(&saved, 0, sizeof saved);
+  saved.magic = magic;
+  saved.version = saved_version;
+  saved.size = sizeof saved;
+  memcpy(&saved.model, &controller->model, sizeof saved.model);
+  memcpy(&saved.state, &controller->state, sizeof saved.state);
+  saved.checksum = checksum(&saved);
+  memcpy(bytes, &saved, sizeof saved);
+}
+
+hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size) {
+  hxSaved saved;
+  if (size != sizeof saved)
+    return refuse(controller, HX_BAD_STATE,
+                  "saved state: its size is not that of this version's states; save it again");
+  memcpy(&saved, bytes, sizeof saved);
+  if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
+    return refuse(controller, HX_BAD_STATE,
+                  "saved state: not one of this version; save it again with this version");
+  if (saved.checksum != checksum(&saved))
+    return refuse(controller, HX_BAD_STATE,
+                  "saved state: damaged, its checksum does not match; save it again");
+  memcpy(&controller->model, &saved.model, sizeof saved.model);
+  memcpy(&controller->state, &saved.state, sizeof saved.state);
+  controller->ahead.known = 0;
+  return HX_OK;
+}
