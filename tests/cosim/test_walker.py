@@ -73,7 +73,7 @@ def gains_of(scenario: Scenario) -> Gains | None:
 def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
     """A scenario on the plant FMU under the controller FMU as the Python master runs it."""
     plan = make_plan(scenario, gains=gains_of(scenario))
-    controller = walker._told_controller(plan)
+    controller = walker._controller_for(plan)
     controller.initialise(scenario.start, scenario.start + scenario.duration)
     with open_plant(scenario) as plant:
         parameters = initialise_plant(plant, plan)
@@ -251,7 +251,7 @@ def test_fmus_that_are_missing_or_something_else_are_refused(
         assert summary.status == REFUSED
         assert said in summary.reason
     with Fmu(athena_fmu) as plant, Walker() as walker:
-        swapped = walker._told_controller(make_plan(WALKS[1])), plant
+        swapped = walker._controller_for(make_plan(WALKS[1])), plant
         with pytest.raises(FmuError, match="not a hexapod plant"):
             NativeMaster(*swapped)
 
