@@ -36,7 +36,7 @@ def quiet(_total: int, _done: int) -> Any:
 def run_quietly(study: Study, folder: Path, **options: Any) -> list[dict[str, Any]]:
     """The rows of the results."""
     run_study(
-        study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), begun=quiet
+        study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), start=quiet
     )
     return rows(folder)
 

@@ -21,8 +21,8 @@ from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
 
 from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.study.execute import cluster
-from hexapod_cosim.cosim.study.execute.cluster_worker import work_here
-from hexapod_cosim.cosim.study.execute.crew import Chunk
+from hexapod_cosim.cosim.study.execute.chunk import Chunk
+from hexapod_cosim.cosim.study.execute.cluster_worker import run_chunk
 from hexapod_cosim.cosim.study.execute.job import make_job
 from hexapod_cosim.cosim.study.execute.study import Options, run_study
 from hexapod_cosim.cosim.study.plan.points import Sweep
@@ -54,8 +54,8 @@ def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., 
 
     def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
         said: list[str] = []
-        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=address, say=said.append)
-        run_study(study_of(TABLE), tmp_path / "out", options=options, begun=once(after_the_first))
+        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=address, events=said.append)
+        run_study(study_of(TABLE), tmp_path / "out", options=options, start=once(after_the_first))
         return said
 
     return run
@@ -88,10 +88,10 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
-        monkeypatch.setattr(cluster, "PATIENCE", PATIENCE)
+        monkeypatch.setattr(cluster, "NO_WORKER_TIMEOUT", PATIENCE)
 
         def kill_all() -> None:
-            monkeypatch.setattr(cluster, "PATIENCE", SHORT)
+            monkeypatch.setattr(cluster, "NO_WORKER_TIMEOUT", SHORT)
             for worker in workers:
                 kill(worker)
 
@@ -159,7 +159,7 @@ def test_ctrl_c_is_heard_while_workers_are_waited_for(
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE)
     assert "no workers" in told
-    assert "stopped; what was run is in" in err
+    assert "stopped; the runs so far are in" in err
     assert process.returncode == 130
 
 
@@ -198,7 +198,7 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
             left = client.run_on_scheduler(
                 lambda dask_scheduler: list(dask_scheduler.worker_plugins)
             )
-        assert not [name for name in left if name.startswith(cluster.OURS)]
+        assert not [name for name in left if name.startswith(cluster.JOB_PREFIX)]
     run_quietly(study, tmp_path / "alone", **options)
     assert digest(folder) == digest(tmp_path / "alone")
 
@@ -214,7 +214,7 @@ def test_studies_that_share_a_cluster_do_not_disturb_each_other(
 
     def run(k: int) -> None:
         options = Options(engine=SLOW, fmu=athena_fmu, scheduler=scheduler)
-        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, begun=quiet)
+        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, start=quiet)
 
     with mortal_workers(scheduler, 2, tmp_path), ThreadPoolExecutor(len(tables)) as together:
         list(together.map(run, range(len(tables))))
@@ -228,6 +228,6 @@ def test_the_job_does_not_travel_with_chunks(athena_fmu: Path) -> None:
     study = study_of(TABLE)
     job = make_job(study, engine=SLOW, fmu=athena_fmu)
     orders = tuple(Sweep(study).orders(iter(range(120))))
-    per_run = len(pickle.dumps((work_here, job.name, Chunk(orders)))) / len(orders)
+    per_run = len(pickle.dumps((run_chunk, job.name, Chunk(orders)))) / len(orders)
     assert per_run < 200.0  # bytes: its number, point, case, values, seed and control
     assert len(pickle.dumps(job)) > athena_fmu.stat().st_size

@@ -74,11 +74,11 @@ def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(
         tmp_path, KINEMATIC + GRIP + '[factors]\nscenario = ["walk_flat", "ripple"]\n'
     )
     code, _, err = call(*words[:3], tmp_path / "short", *words[4:])
-    told = "All 2 kinematic walks of ripple are too short for figures"
+    note = "All 2 kinematic walks of ripple are too short for figures"
     assert code == 0
-    assert err.startswith(f"warning: {told}")
-    assert told in (tmp_path / "short" / "report.html").read_text()
-    assert told in call("report", tmp_path / "short")[2]
+    assert err.startswith(f"warning: {note}")
+    assert note in (tmp_path / "short" / "report.html").read_text()
+    assert note in call("report", tmp_path / "short")[2]
     file = study_file(tmp_path, KINEMATIC + 'scenario = "ripple"\n' + GRIP)
     assert call(*words[:3], tmp_path / "none", *words[4:])[2].startswith(
         "warning: The walks are too short for figures"
@@ -173,7 +173,7 @@ def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
     small_disk("50m")
     code, _, err = call(*fake_study(tmp_path, athena_fmu, out))
     assert code == 0
-    assert "goes on: " in err
+    assert "resumed: " in err
     assert "walked to its end" not in err
     run_quietly(load_study(str(tmp_path / "study.toml")), tmp_path / "roomy", fmu=athena_fmu)
     assert digest(out) == digest(tmp_path / "roomy")
@@ -189,5 +189,5 @@ def test_a_disk_that_takes_no_more_stops_the_command_and_what_it_took_stays(
     assert 1024 <= kept < 3000
     code, _, err = call(*words)
     assert code == 0
-    assert f"goes on: {kept} of 3000 runs" in err
+    assert f"resumed: {kept} of 3000 runs" in err
     assert stored_runs(out) == 3000

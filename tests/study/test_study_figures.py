@@ -215,7 +215,7 @@ def test_figures_of_all_designs_are_drawn_without_a_warning(
         item.draw().draw_without_rendering()
 
 
-def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pairs_where_there_are_two_controls(
+def test_a_page_has_the_files_name_without_a_title_and_pairs_only_with_two_controls(
     folder: Any,
 ) -> None:
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})
@@ -237,7 +237,7 @@ def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder:
         r"([+-]\d+%) \.\. \1 by point", page
     )  # the fake engine changes all figures by one share
     assert "95 %" not in page
-    assert "no interval of how sure" in page
+    assert "which is no confidence interval" in page
 
 
 def test_the_headline_of_one_point_has_its_interval(folder: Any) -> None:

@@ -243,7 +243,7 @@ def test_memory_does_not_grow_with_the_runs_nor_with_the_kinds_of_failures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A point of very many seeds, half of them failing, each for a reason of its own."""
-    monkeypatch.setattr("hexapod_cosim.cosim.study.store.table.MOST_KINDS", 100)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.store.table.MAX_KINDS", 100)
 
     def peak(count: int) -> int:
         tally = Tally(TWO)

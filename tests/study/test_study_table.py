@@ -118,7 +118,8 @@ def test_the_command_runs_a_study_and_its_report_holds_everything(
 ) -> None:
     file, gains, out = tmp_path / "mine.toml", tmp_path / "gains.toml", tmp_path / "out"
     file.write_text(
-        'title = "Mine <&>"\nseeds = 2\n[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n'
+        'title = "Mine <&>"\nseeds = 2\n'
+        "[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n"
     )
     save_gains(make_gains(load_robot("athena")), gains)
     code, told, err = call(

@@ -24,11 +24,11 @@ from study_engines import DEATHS_FILE, Counting
 from hexapod_cosim.cosim.master.loop import FAILED
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.execute.conduct import DEAD
-from hexapod_cosim.cosim.study.execute.crew import DEATHS
+from hexapod_cosim.cosim.study.execute.chunk import MAX_DEATHS
+from hexapod_cosim.cosim.study.execute.dispatch import DIED
 from hexapod_cosim.cosim.study.execute.engines import ENGINES
 from hexapod_cosim.cosim.study.execute.job import make_job
-from hexapod_cosim.cosim.study.execute.scratch import JOB, LOCK, PREFIX, scratch
+from hexapod_cosim.cosim.study.execute.scratch import JOB, LOCK, PREFIX, scratch_folder
 from hexapod_cosim.cosim.study.execute.study import Options, run_study
 from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.cosim.study.store.columns import FIGURES
@@ -108,7 +108,7 @@ def test_a_study_goes_from_this_machine_to_a_cluster_and_back(
                 study,
                 tmp_path / "moved",
                 options=Options(engine=SLOW, fmu=athena_fmu, **place),
-                begun=_stop_after(20),
+                start=_stop_after(20),
             )
     run_quietly(study, tmp_path / "moved", engine=SLOW, fmu=athena_fmu)
     run_quietly(study, tmp_path / "stayed", engine=SLOW, fmu=athena_fmu)
@@ -134,16 +134,16 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
     place = {"scheduler": request.getfixturevalue("scheduler")} if cluster else {"workers": 1}
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.3, 0.5, 0.13, 0.6]}, "seeds": 2})
     found = run_quietly(study, tmp_path / "out", fmu=athena_fmu, **place)
-    died = [row for row in found if row["status"] == DEAD]
+    died = [row for row in found if row["status"] == DIED]
     assert [(row["friction.mu"], row["seed"]) for row in died] == [(0.13, 0), (0.13, 1)]
-    assert all(f"{DEATHS} times" in row["reason"] for row in died)
+    assert all(f"{MAX_DEATHS} times" in row["reason"] for row in died)
     assert sum(row["walked"] for row in found) == len(found) - 2
     assert [row["run"] for row in found] == list(range(8))
     counted = Counter(deaths.read_text().splitlines())
     assert set(counted) == {"kinematic 0", "kinematic 1"}
     # by itself; before that among others, or unnoticed: a worker that ends right after a run may
     # take that one's result with it
-    assert all(DEATHS <= number <= 2 * DEATHS for number in counted.values())
+    assert all(MAX_DEATHS <= number <= 2 * MAX_DEATHS for number in counted.values())
 
 
 def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
         study,
         tmp_path / "out",
         options=Options(engine=SLOW, fmu=athena_fmu, workers=2),
-        begun=lambda _total, _done: tell,
+        start=lambda _total, _done: tell,
     )
     assert len(killed) == 2
     assert all(row["walked"] for row in rows(tmp_path / "out"))
@@ -207,7 +207,7 @@ def test_nothing_is_left_of_what_workers_unpacked(
     for folder in (dead, young):
         folder.mkdir()
     (dead / LOCK).touch()
-    with scratch(make_job(study_of(KINEMATIC), engine=FAKE, fmu=athena_fmu)) as alive:
+    with scratch_folder(make_job(study_of(KINEMATIC), engine=FAKE, fmu=athena_fmu)) as alive:
         assert not dead.exists()
         run_quietly(study_of(KINEMATIC), tmp_path / "out", fmu=athena_fmu, workers=1)
         assert alive.exists()
@@ -259,9 +259,9 @@ def _children() -> set[int]:
 def test_workers_that_cannot_work_at_all_end_the_study(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.conduct.USELESS", 1)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.dispatch.MAX_DEATHS_IN_A_ROW", 1)
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
-    with pytest.raises(StudyError, match="no worker lives to finish a run"):
+    with pytest.raises(StudyError, match="every worker dies before it has finished a run"):
         run_quietly(study, tmp_path / "out", fmu=athena_fmu, workers=2)
     assert not list((tmp_path / "out" / "runs").iterdir())
 
@@ -269,13 +269,13 @@ def test_workers_that_cannot_work_at_all_end_the_study(
 def test_a_scheduler_that_is_not_there_is_named(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.cluster.CONNECT", "1s")
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.cluster.CONNECT_TIMEOUT", "1s")
     with pytest.raises(StudyError, match=r"--scheduler: no scheduler answers.*tcp://127.0.0.1:9"):
         run_study(
             study_of({**SMALL, **KINEMATIC}),
             tmp_path,
             options=Options(fmu=athena_fmu, scheduler="tcp://127.0.0.1:9"),
-            begun=quiet,
+            start=quiet,
         )
 
 
@@ -286,7 +286,7 @@ def test_a_worker_with_other_versions_is_refused(
         "hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9"
     )  # here, not in the worker
     with pytest.raises(
-        StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"
+        StudyError, match=r"differs from the machine that sends.*hexapod-cosim 9.9, here"
     ):
         run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu, workers=2)
 
@@ -301,7 +301,7 @@ def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(
         0.23: "MemoryError: no more",
         0.24: "SourError: nobody can send <object object at 0x...>",
         0.25: "SystemExit: enough",
-        0.26: "BadTextError: it cannot say what",
+        0.26: "BadTextError: its text cannot be read",
         0.27: "TypeError: the engine gave str, expected a Summary",
     }
     study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *mistakes, 0.5]}})
@@ -332,7 +332,7 @@ def test_a_run_that_was_made_before_is_not_made_again(
         "compliant": 3 * 2 * 2,
     }
     Counting.asked.clear()
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.worker.MOST_KNOWN", 0)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.worker.MAX_KNOWN", 0)
     assert run_quietly(study_of(table), tmp_path / "made", **options) == kept
     assert len(Counting.asked) == 24
     assert digest(tmp_path / "kept") == digest(tmp_path / "made")
