@@ -1,4 +1,4 @@
-"""`hexapod study` as it is typed."""
+"""The command `hexapod study`: its output, messages and exit codes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def study_file(folder: Path, text: str) -> Path:
     return file
 
 
-def test_it_says_when_no_run_walked_at_all(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_warning_says_that_no_run_walked(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
     file = study_file(tmp_path, KINEMATIC + "seeds = 4\n[factors]\nfriction.mu = [0.17]\n")
     code, out, err = call(
         "study",
@@ -51,7 +51,7 @@ def test_it_says_when_no_run_walked_at_all(call: Call, athena_fmu: Path, tmp_pat
     )
 
 
-def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(
+def test_a_warning_and_the_report_name_walks_too_short_for_figures(
     call: Call, athena_fmu: Path, tmp_path: Path
 ) -> None:
     mixed = '[factors]\ngait.name = ["tripod", "ripple"]\nscenario = ["walk_flat", "turn"]\n'
@@ -95,16 +95,14 @@ def test_one_fmu_for_several_robots_is_refused(
     )
 
 
-def test_a_number_of_workers_that_is_none_is_refused(call: Call, tmp_path: Path) -> None:
+def test_a_negative_number_of_workers_is_refused(call: Call, tmp_path: Path) -> None:
     outcome = call("study", "friction_speed", "-o", tmp_path / "out", "--workers", "-1")
     assert_refused(outcome, "--workers", "not a number of workers", "0 to 4096")
 
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
-    """A file system of its own, whose size can be changed: mounted by root where that is
-    allowed.
-    """
+    """A function that mounts a file system of a size, or changes its size, if it is allowed to."""
     place = tmp_path / "disk"
     place.mkdir()
 
@@ -163,7 +161,7 @@ def run_in(words: list[str]) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
+def test_a_full_disk_stops_the_command_and_with_room_it_is_resumed(
     athena_fmu: Path, tmp_path: Path, small_disk: Callable[[str], Path], call: Call
 ) -> None:
     out = small_disk("150k") / "out"
@@ -179,7 +177,7 @@ def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
     assert digest(out) == digest(tmp_path / "roomy")
 
 
-def test_a_disk_that_takes_no_more_stops_the_command_and_what_it_took_stays(
+def test_a_disk_that_fills_up_stops_the_command_and_stored_runs_are_kept(
     athena_fmu: Path, tmp_path: Path, call: Call
 ) -> None:
     out = tmp_path / "out"

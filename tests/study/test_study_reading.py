@@ -1,4 +1,4 @@
-"""Study files: what they may say, and what is said of what they may not."""
+"""Study files: what is read from them, and the messages for mistakes."""
 
 from __future__ import annotations
 
@@ -279,7 +279,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ),
     ],
 )
-def test_a_mistake_is_named_with_its_place_and_a_way_out(
+def test_a_mistake_is_named_with_its_place_and_a_fix(
     table: dict[str, Any], parts: list[str]
 ) -> None:
     with pytest.raises(HexapodError) as refused:
@@ -344,12 +344,10 @@ name = "tripod"
         ('[parameters]\n"torso.mass" = 2.6\n', {}),
     ],
 )
-def test_a_held_out_scenario_is_told_from_training_by_its_walk_not_by_its_name(
+def test_a_held_out_scenario_is_compared_with_training_by_its_walk_not_its_name(
     tmp_path: Path, more: str, changes: dict[str, Any]
 ) -> None:
-    """A file that names the robot by a path, seconds by a unit, and settings that the study puts
-    the same in either walk.
-    """
+    """The file differs from the training scenario in its name, units and irrelevant settings."""
     (tmp_path / "own.toml").write_text(
         (Path(load_robot.__code__.co_filename).parent / "athena.toml").read_text()
     )

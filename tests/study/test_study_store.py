@@ -1,6 +1,4 @@
-"""What a study keeps: nothing is lost and nothing is torn, whatever happens, and the result is
-the same bytes.
-"""
+"""The store of a study: no run is lost or damaged by kills, and results have the same bytes."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ from hexapod_cosim.cosim.study.store.results import read_results
 from hexapod_cosim.cosim.study.store.store import MERGE_COUNT, Store, write_durably, write_whole
 
 ROOT = Path(__file__).resolve().parents[2]
-PATIENCE = 180.0  # s    for what takes a few on an idle machine
+TIMEOUT = 180.0  # s    for what takes some seconds on an idle machine
 MANY_RUNS: dict[str, Any] = {
     **KINEMATIC,
     "seeds": 10,
@@ -42,7 +40,7 @@ MANY_RUNS: dict[str, Any] = {
 
 @pytest.fixture
 def small(athena_fmu: Path, tmp_path: Path) -> Callable[..., list[dict[str, Any]]]:
-    """Runs a study of few kinematic walks into a folder of the test's."""
+    """A function that runs a small study under kinematic control into a folder of the test."""
 
     def run(
         name: str = "out", table: dict[str, Any] = SMALL, **options: Any
@@ -148,7 +146,7 @@ def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupte
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     for least in (1, random.randint(100, 500)):
         process = command(killed, athena_fmu, study=file)
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while (
             stored_runs(killed) < least and time.monotonic() < deadline and process.poll() is None
         ):
@@ -161,7 +159,7 @@ def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupte
     (killed / RUNS / ".part-99999999.parquet.12345678.new").write_bytes(b"half a part")
     (killed / ".results.parquet.12345678.new").write_bytes(b"half a file")
     process = command(killed, athena_fmu, study=file)
-    _, err = process.communicate(timeout=PATIENCE)
+    _, err = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0, err
     run_quietly(load_study(str(file)), whole, fmu=athena_fmu, engine="compiled")
     assert digest(killed) == digest(whole)
@@ -171,7 +169,7 @@ def test_real_walks_killed_twice_at_any_point_and_completed_are_the_uninterrupte
     assert all(row["status"] == "completed" for row in rows(whole))
 
 
-def test_a_study_does_not_go_on_with_other_code(
+def test_a_study_is_not_resumed_with_other_code(
     small: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small("out", SMALL)
@@ -182,7 +180,7 @@ def test_a_study_does_not_go_on_with_other_code(
         small("out", SMALL)
 
 
-def test_a_full_disk_is_told_and_what_is_stored_stays_and_is_gone_on_from(
+def test_a_full_disk_is_reported_and_the_study_is_resumed_from_the_stored_runs(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     room = [3]
@@ -247,7 +245,7 @@ def test_a_damaged_part_is_set_aside_and_its_runs_are_run_again(
     small: Callable[..., Any], tmp_path: Path, damage: Callable[[bytes], bytes]
 ) -> None:
     small()
-    first, said = digest(tmp_path / "out"), list[str]()
+    first, events = digest(tmp_path / "out"), list[str]()
     (part,) = (tmp_path / "out" / RUNS).glob("*.parquet")
     content = damage(part.read_bytes())
     part.write_bytes(content)
@@ -261,12 +259,12 @@ def test_a_damaged_part_is_set_aside_and_its_runs_are_run_again(
         0,
         [part.name],
     )
-    small(events=said.append)
+    small(events=events.append)
     assert digest(tmp_path / "out") == first
     assert part.with_name(part.name + ".damaged").read_bytes() == content
-    assert [f"{part.name}: a damaged part" in text for text in said] == [True]
-    small(events=said.append)
-    assert len(said) == 1
+    assert [f"{part.name}: a damaged part" in text for text in events] == [True]
+    small(events=events.append)
+    assert len(events) == 1
 
 
 def test_a_part_of_another_study_is_set_aside(small: Callable[..., Any], tmp_path: Path) -> None:
@@ -276,11 +274,11 @@ def test_a_part_of_another_study_is_set_aside(small: Callable[..., Any], tmp_pat
     small("more", {**SMALL, "seeds": 9})
     for other in ("columns", "more"):
         (part,) = (tmp_path / other / RUNS).glob("*.parquet")
-        said: list[str] = []
+        events: list[str] = []
         (tmp_path / "out" / RUNS / part.name).write_bytes(part.read_bytes())
-        small(events=said.append)
+        small(events=events.append)
         assert digest(tmp_path / "out") == first
-        assert len(said) == 1
+        assert len(events) == 1
 
 
 def test_what_is_not_a_part_is_left_alone(small: Callable[..., Any], tmp_path: Path) -> None:

@@ -1,6 +1,4 @@
-"""Sums of runs: those of the textbook, whichever runs are missing and however they are cut, in
-memory that does not grow with them.
-"""
+"""Sums of runs equal the textbook formulas for any missing runs and any cuts, in bounded memory."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ BOTH = TWO.run_controls
 
 
 def made_rows(study: Study, points: Sequence[int], *, seed: int = 0) -> list[dict[str, Any]]:
-    """All runs of some points: one in five falls, one figure in ten is missing."""
+    """Returns all runs of points; one run in five falls, and one metric in ten is missing."""
     drawn = np.random.default_rng([seed, *points])
     found = []
     for point in points:
@@ -57,7 +55,7 @@ def made_rows(study: Study, points: Sequence[int], *, seed: int = 0) -> list[dic
 
 
 def some_of(rows: Sequence[dict[str, Any]], *, share: float, seed: int) -> list[dict[str, Any]]:
-    """As of a study that is not done: runs are missing anywhere."""
+    """Returns a random share of the rows, as of a study that is not finished."""
     kept = np.random.default_rng(seed).random(len(rows)) < share
     return [row for row, keep in zip(rows, kept, strict=True) if keep]
 
@@ -83,7 +81,7 @@ def summed(
 
 
 def by_hand(rows: Sequence[dict[str, Any]], name: str) -> Change:
-    """Seed by seed and point by point, where both walked."""
+    """Returns the change over the pairs of which both runs walked, computed by pairs."""
     found = {
         (row["point"], row["case"], row["seed"], row["control"]): row[name]
         for row in rows
@@ -242,7 +240,7 @@ def test_a_columns_table_says_what_its_points_say() -> None:
 def test_memory_does_not_grow_with_the_runs_nor_with_the_kinds_of_failures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A point of very many seeds, half of them failing, each for a reason of its own."""
+    """A point has very many seeds, half of which fail, each for another reason."""
     monkeypatch.setattr("hexapod_cosim.cosim.study.store.table.MAX_KINDS", 100)
 
     def peak(count: int) -> int:

@@ -1,4 +1,4 @@
-"""Who runs a study does not show in it: this process' workers, a cluster's, those that die."""
+"""Results do not depend on the workers of a study: local ones, a cluster's, or ones that die."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from threading import Event, Thread
 from typing import Any
 
 import pytest
-from dask_cluster import lasting_workers, scheduling
+from dask_cluster import dask_scheduler, restarting_workers
 from gains import make_gains
 from studies import FAKE, KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
 from study_engines import DEATHS_FILE, Counting
@@ -39,7 +39,7 @@ WALK: dict[str, Any] = {
     "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]},
 }
 
-WAIT = 120.0  # s    a busy machine may take
+TIMEOUT = 120.0  # s    for what takes some seconds on an idle machine
 LONG = """
 controls = ["kinematic"]
 seeds = 2000
@@ -48,7 +48,7 @@ seeds = 2000
 
 @pytest.fixture(scope="module")
 def deaths(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where engines say that they end their process."""
+    """The file to which engines write before they end their process."""
     file = tmp_path_factory.mktemp("deaths") / "deaths.txt"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(DEATHS_FILE, str(file))
@@ -57,11 +57,9 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory, deaths: Path) -> Iterator[str]:
-    """The address of a Dask scheduler with two worker processes on loopback, which are begun
-    anew when they die.
-    """
+    """Starts a scheduler with two workers that restart when they die; yields its address."""
     folder = tmp_path_factory.mktemp("dask")
-    with scheduling(folder) as (address, _), lasting_workers(address, 2, folder):
+    with dask_scheduler(folder) as (address, _), restarting_workers(address, 2, folder):
         yield address
 
 
@@ -98,7 +96,7 @@ def test_a_run_of_a_study_is_the_run_by_itself(athena_fmu: Path, tmp_path: Path)
     assert {name: row[name] for name in FIGURES} == figures
 
 
-def test_a_study_goes_from_this_machine_to_a_cluster_and_back(
+def test_a_study_is_resumed_on_a_cluster_and_on_this_machine_again(
     athena_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
     study = study_of({**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5, 0.7]}})
@@ -141,8 +139,8 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
     assert [row["run"] for row in found] == list(range(8))
     counted = Counter(deaths.read_text().splitlines())
     assert set(counted) == {"kinematic 0", "kinematic 1"}
-    # by itself; before that among others, or unnoticed: a worker that ends right after a run may
-    # take that one's result with it
+    # more than MAX_DEATHS: a run may also end its worker among others, or together with the result
+    # of the run before it
     assert all(MAX_DEATHS <= number <= 2 * MAX_DEATHS for number in counted.values())
 
 
@@ -167,7 +165,7 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
     assert len(rows(tmp_path / "out")) == 200
 
 
-def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(
+def test_workers_killed_as_soon_as_they_start_cost_no_run_and_do_not_block(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     study = study_of({**KINEMATIC, "seeds": 10, "factors": {"friction.mu": [0.3, 0.5]}})
@@ -190,7 +188,7 @@ def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(
     )
     killer.start()
     runner.start()
-    runner.join(timeout=WAIT)
+    runner.join(timeout=TIMEOUT)
     end.set()
     assert not runner.is_alive()
     assert len(killed) == 2
@@ -218,7 +216,7 @@ def test_nothing_is_left_of_what_workers_unpacked(
     assert [path.name for path in place.iterdir()] == [young.name]
 
 
-def test_a_workers_folder_goes_with_it_when_its_program_is_killed(
+def test_workers_remove_their_folder_when_their_program_is_killed(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     place, file = tmp_path / "temporary", tmp_path / "study.toml"
@@ -246,7 +244,7 @@ def test_a_workers_folder_goes_with_it_when_its_program_is_killed(
 
 
 def _wait_until(holds: Callable[[], bool]) -> None:
-    end = time.monotonic() + WAIT
+    end = time.monotonic() + TIMEOUT
     while not holds():
         assert time.monotonic() < end
         time.sleep(0.02)
@@ -256,7 +254,7 @@ def _children() -> set[int]:
     return {child.pid for child in multiprocessing.active_children() if child.pid is not None}
 
 
-def test_workers_that_cannot_work_at_all_end_the_study(
+def test_workers_that_only_die_end_the_study(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("hexapod_cosim.cosim.study.execute.dispatch.MAX_DEATHS_IN_A_ROW", 1)
@@ -292,10 +290,10 @@ def test_a_worker_with_other_versions_is_refused(
 
 
 @pytest.mark.parametrize("workers", [0, 1])
-def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(
+def test_errors_in_an_engine_are_results_and_the_study_continues(
     athena_fmu: Path, tmp_path: Path, workers: int
 ) -> None:
-    mistakes = {
+    errors = {
         0.21: "LinAlgError: Singular matrix",
         0.22: "ValueError: operands could not be broadcast",
         0.23: "MemoryError: no more",
@@ -304,20 +302,20 @@ def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(
         0.26: "BadTextError: its text cannot be read",
         0.27: "TypeError: the engine gave str, expected a Summary",
     }
-    study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *mistakes, 0.5]}})
+    study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *errors, 0.5]}})
     first, *bad, last = run_quietly(
         study, tmp_path / "out", engine="study_engines:Buggy", fmu=athena_fmu, workers=workers
     )
     assert first["walked"]
     assert last["walked"]
-    for row, expected in zip(bad, mistakes.values(), strict=True):
+    for row, expected in zip(bad, errors.values(), strict=True):
         assert row["status"] == FAILED
         assert row["reason"].startswith(expected)
         assert row["slip_per_metre"] is None
     assert "(study_engines.py, line" in bad[2]["reason"]
 
 
-def test_a_run_that_was_made_before_is_not_made_again(
+def test_a_run_with_equal_settings_is_not_repeated(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table = {"seeds": 2, "factors": {"gains.slip.kp": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]}}
