@@ -208,11 +208,8 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
 def test_studies_that_share_a_cluster_do_not_disturb_each_other(
     athena_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
-    tables = [
-        TABLE,
-        {**TABLE, "seeds": {"first": 500, "count": 20}},
-        TABLE,
-    ]  # with the same FMU, scenario and factors
+    # all of them with the same FMU, scenario and factors
+    tables = [TABLE, {**TABLE, "seeds": {"first": 500, "count": 20}}, TABLE]
 
     def run(k: int) -> None:
         options = Options(engine=SLOW, fmu=athena_fmu, scheduler=scheduler)

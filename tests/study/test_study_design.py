@@ -50,10 +50,8 @@ def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
 
 
 def test_a_list_takes_the_factors_side_by_side() -> None:
-    factors = {
-        "friction.mu": [0.3, 0.6, 0.3],
-        "gait.name": ["tripod", "wave", "wave"],
-    }  # in a list a value may come again
+    # in a list values may be repeated
+    factors = {"friction.mu": [0.3, 0.6, 0.3], "gait.name": ["tripod", "wave", "wave"]}
     design = Design(study_of({"design": "list", "factors": factors}))
     assert [design.point(index) for index in range(design.count)] == [
         (0.3, "tripod"),

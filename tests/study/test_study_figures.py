@@ -121,11 +121,12 @@ def test_only_grids_have_a_heat_map() -> None:
 def test_the_mark_of_a_cell_without_a_value_shows_the_reason() -> None:
     study = study_of(GRID)
     nothing = {"kinematic": math.nan, "compliant": math.nan}
+    # the fourth cell has no run
     points = [
         point(0, {"friction.mu": 0.3, "command.vx": 0.05}, {"kinematic": 0.4, "compliant": 0.1}),
         point(1, {"friction.mu": 0.3, "command.vx": 0.08}, nothing, walked=0, pairs=0),  # fell
         point(2, {"friction.mu": 0.5, "command.vx": 0.05}, nothing),  # too short
-    ]  # and a cell of which nothing is run
+    ]
     figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
     for axes in figure.axes[:3]:
         marks = {
@@ -234,9 +235,8 @@ def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
 
 def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder: Any) -> None:
     page = folder({"seeds": 3, **GRID}).partition("<h2>")[0]
-    assert re.search(
-        r"([+-]\d+%) \.\. \1 by point", page
-    )  # the fake engine changes all figures by one share
+    # the fake engine changes all metrics by the same share
+    assert re.search(r"([+-]\d+%) \.\. \1 by point", page)
     assert "95 %" not in page
     assert "which is no confidence interval" in page
 

@@ -150,9 +150,8 @@ def test_means_and_counts_are_of_all_walks_with_a_pair_or_without(share: float) 
 
 
 def test_the_control_of_the_first_run_does_not_turn_a_change_round() -> None:
-    rows = [{**row, "walked": True} for row in made_rows(TWO, [0])][
-        1:
-    ]  # the first run, a kinematic one, is missing
+    rows = [{**row, "walked": True} for row in made_rows(TWO, [0])]
+    del rows[0]  # a kinematic run
     (point,), overall = summed(rows)
     assert (
         point.changes["peak_force"].before
@@ -210,9 +209,10 @@ def test_sums_of_numbers_far_from_zero_keep_their_spread() -> None:
                 if row["point"] == point.number and row["control"] == BOTH[0]
             ]
         )
+        # the values of 1e8 are doubles, of 16 digits
         assert point.means[BOTH[0]]["peak_force"].half_width == pytest.approx(
             half_width_of(values), rel=1e-6
-        )  # of 1e8 in doubles
+        )
 
 
 def test_a_columns_table_says_what_its_points_say() -> None:
@@ -270,7 +270,6 @@ def test_memory_does_not_grow_with_the_runs_nor_with_the_kinds_of_failures(
         assert len(tally.overall().failures) <= 30
         return used
 
-    peak(2)  # what is imported on the way
-    assert peak(80) < 1.1 * peak(
-        20
-    )  # 20 tables bring more kinds than are told apart; reasons are longer by some bytes
+    peak(2)  # imports modules
+    # 20 tables have more than MAX_KINDS kinds of failures; the reasons of 80 are some bytes longer
+    assert peak(80) < 1.1 * peak(20)

@@ -257,9 +257,8 @@ def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(
     assert {row["case"] for row in held} == {"ripple", "turn"}
     assert {row["case"] for row in training} == {"walk_flat", "push"}
     assert {row["point"] for row in held} == {12, best["trial"]}
-    assert {row["friction.mu"] for row in found if row["point"] == 12} == {
-        None
-    }  # before: nothing is set
+    # point 12 is before the optimisation: no variable is set
+    assert {row["friction.mu"] for row in found if row["point"] == 12} == {None}
 
 
 def test_what_the_best_trial_gains_is_paired_and_by_hand(athena_fmu: Path, tmp_path: Path) -> None:

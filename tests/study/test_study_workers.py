@@ -280,9 +280,8 @@ def test_a_scheduler_that_is_not_there_is_named(
 def test_a_worker_with_other_versions_is_refused(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9"
-    )  # here, not in the worker
+    # in this process, not in the worker
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9")
     with pytest.raises(
         StudyError, match=r"differs from the machine that sends.*hexapod-cosim 9.9, here"
     ):

@@ -61,35 +61,8 @@ MAX_TRIALS, MAX_SEEDS = 100_000, 10_000
 
 def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]:
     """Returns the optimisation and its variables. Raises StudyError."""
-    if not isinstance(table, Mapping):
-        raise StudyError(
-            "wrong type", got=table, expected="a table", fix="write [optimise]", where=where
-        )
-    for key in table:
-        if key not in KEYS:
-            raise unknown_name("key", key, KEYS, where=where, error=StudyError)
-    for key in ("metric", "variables", "training", "held_out"):
-        if key not in table:
-            raise StudyError(
-                "missing key",
-                expected=f"[{key}]" if key != "metric" else 'metric = "slip_per_metre"',
-                where=f"{where}.{key}",
-            )
-    variables = read_factors(table["variables"], f"{where}.variables")
-    if not variables or any(factor.name == SCENARIO_FACTOR for factor in variables):
-        raise StudyError(
-            "not variables",
-            got=[item.name for item in variables],
-            expected="settings or gains",
-            where=f"{where}.variables",
-        )
-    if any(factor.kind == NORMAL for factor in variables):
-        raise StudyError(
-            "a variable without bounds",
-            got=NORMAL,
-            expected="values, uniform, loguniform or integers",
-            where=f"{where}.variables",
-        )
+    _check_keys(table, where)
+    variables = _variables(table["variables"], f"{where}.variables")
     training, held_out = (
         _evaluation(table[part], f"{where}.{part}") for part in ("training", "held_out")
     )
@@ -117,6 +90,44 @@ def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]
         held_out=held_out,
     )
     return optimise, variables
+
+
+def _check_keys(table: Any, where: str) -> None:
+    """Raises StudyError for anything but a table with known keys and all required ones."""
+    if not isinstance(table, Mapping):
+        raise StudyError(
+            "wrong type", got=table, expected="a table", fix="write [optimise]", where=where
+        )
+    for key in table:
+        if key not in KEYS:
+            raise unknown_name("key", key, KEYS, where=where, error=StudyError)
+    for key in ("metric", "variables", "training", "held_out"):
+        if key not in table:
+            raise StudyError(
+                "missing key",
+                expected=f"[{key}]" if key != "metric" else 'metric = "slip_per_metre"',
+                where=f"{where}.{key}",
+            )
+
+
+def _variables(table: Any, where: str) -> tuple[Factor, ...]:
+    """Reads the variables, which are settings or gains with bounds. Raises StudyError."""
+    variables = read_factors(table, where)
+    if not variables or any(factor.name == SCENARIO_FACTOR for factor in variables):
+        raise StudyError(
+            "not variables",
+            got=[item.name for item in variables],
+            expected="settings or gains",
+            where=where,
+        )
+    if any(factor.kind == NORMAL for factor in variables):
+        raise StudyError(
+            "a variable without bounds",
+            got=NORMAL,
+            expected="values, uniform, loguniform or integers",
+            where=where,
+        )
+    return variables
 
 
 def _evaluation(table: Any, where: str) -> Evaluation:

@@ -62,8 +62,9 @@ STANDARD_TABLE = {
 
 
 def load_study(path_or_name: str | Path) -> Study:
-    """Reads a study file, or a bundled one by name. Raises StudyError, and ScenarioError for its
-    scenarios.
+    """Reads a study file, or a bundled one by name.
+
+    Raises StudyError, and ScenarioError for its scenarios.
     """
     path, bundled = Path(path_or_name), list_studies()
     if not path.suffix and len(path.parts) == 1 and not path.is_file():
@@ -293,20 +294,7 @@ def _case(
         vary: whether the standard variation is added.
         key: key of the study file that names the scenario.
     """
-    beside = folder / name  # a scenario file beside the study file
-    if inline is None and len(beside.name.encode()) > MAX_FILE_NAME:
-        expected = f"a name of at most {MAX_FILE_NAME} characters"
-        raise StudyError(
-            "no file has such a name",
-            got=name,
-            expected=expected,
-            fix="name a scenario",
-            where=f"{where}: scenario",
-        )
-    if inline is not None:
-        table, place = dict(inline), f"{where}: scenario"
-    else:
-        table, place = _read(beside, name, f"{where}: {key}")
+    table, place = _scenario_tables(name, inline, folder, where, key)
     scenario = scenario_from_table(table, where=place)
     check_scenario(scenario, names=list(scenario.parameters))
     try:
@@ -327,6 +315,24 @@ def _case(
         table["variation"] = dict(STANDARD_TABLE)
     table["outputs"] = {"plots": False}  # a study keeps no recordings
     return Case(name=name, table=table, where=place)
+
+
+def _scenario_tables(
+    name: str, inline: Mapping[str, Any] | None, folder: Path, where: str, key: str
+) -> tuple[dict[str, Any], str]:
+    """Returns the tables of a scenario and their place, for messages."""
+    if inline is not None:
+        return dict(inline), f"{where}: scenario"
+    beside = folder / name  # a scenario file beside the study file
+    if len(beside.name.encode()) > MAX_FILE_NAME:
+        raise StudyError(
+            "no file has such a name",
+            got=name,
+            expected=f"a name of at most {MAX_FILE_NAME} bytes",
+            fix="name a scenario",
+            where=f"{where}: scenario",
+        )
+    return _read(beside, name, f"{where}: {key}")
 
 
 def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:

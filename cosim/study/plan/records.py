@@ -149,8 +149,7 @@ class Order:
     run: int
     point: int
     case: str
-    values: tuple[
-        Value | None, ...
-    ]  # of the factors, in their order; None leaves a setting as it is
+    # of the factors, in their order; None leaves a setting as the scenario has it
+    values: tuple[Value | None, ...]
     seed: int
     control: str

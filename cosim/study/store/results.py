@@ -78,44 +78,52 @@ def read_results(folder: Path) -> Results:
     study, manifest = stored_study(folder)
     facts = read_json(folder / RUN_FILE)
     tables, damaged = _tables(folder, study, finished=facts["status"] == COMPLETED)
-    tally, kept, count = Tally(study), list[Point](), 0
-    wall = 0.0
-
-    def tallied() -> Iterator[Rows]:
-        nonlocal wall
-        for table in whole_pairs(tables, study.run_controls):
-            wall += pc.sum(table[WALL]).as_py() or 0.0
-            rows = Rows(table, study)
-            tally.add(rows)
-            yield rows
-
-    def point_tables() -> Iterator[pa.Table]:
-        nonlocal count
-        for block in blocks_of(tallied()):
-            places = np.flatnonzero(block.first["point"].to_numpy() % step == 0).tolist()
-            kept.extend(point_at(block, place, study) for place in places)
-            count += len(block.held_out)
-            yield points_table(block, study)
-
-    step = _point_step(study, manifest["runs"])
+    reader = _Reader(study, tables, _point_step(study, manifest["runs"]))
     schema = points_schema(study).with_metadata(provenance(manifest))
-    write_whole(folder / POINTS, point_tables(), schema)
-    trials = [] if study.optimise is None else trials_of(Optimisation(study), kept)
+    write_whole(folder / POINTS, reader.point_tables(), schema)
+    trials = [] if study.optimise is None else trials_of(Optimisation(study), reader.points)
     optimum = read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None
     results = Results(
         study=study,
         manifest=manifest,
         facts=facts,
-        overall=tally.overall(),
-        points=kept,
-        of_points=count,
+        overall=reader.tally.overall(),
+        points=reader.points,
+        of_points=reader.count,
         trials=trials,
         optimum=optimum,
         damaged=damaged,
-        wall=wall,
+        wall=reader.wall,
     )
     write_durably(folder / SUMMARY, (to_json(summary_of(results)) + "\n").encode())
     return results
+
+
+class _Reader:
+    """Reads the tables of all runs once and accumulates what Results holds."""
+
+    def __init__(self, study: Study, tables: Iterator[pa.Table], step: int) -> None:
+        self._study, self._tables, self._step = study, tables, step
+        self.tally = Tally(study)
+        self.points: list[Point] = []  # every `step`-th one
+        self.count = 0  # of all points
+        self.wall = 0.0  # s
+
+    def point_tables(self) -> Iterator[pa.Table]:
+        """Yields the rows of points.parquet."""
+        for block in blocks_of(self._rows()):
+            numbers = block.first["point"].to_numpy()
+            places = np.flatnonzero(numbers % self._step == 0).tolist()
+            self.points.extend(point_at(block, place, self._study) for place in places)
+            self.count += len(block.held_out)
+            yield points_table(block, self._study)
+
+    def _rows(self) -> Iterator[Rows]:
+        for table in whole_pairs(self._tables, self._study.run_controls):
+            self.wall += pc.sum(table[WALL]).as_py() or 0.0
+            rows = Rows(table, self._study)
+            self.tally.add(rows)
+            yield rows
 
 
 def _point_step(study: Study, runs: int) -> int:
