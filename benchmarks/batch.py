@@ -24,9 +24,10 @@ from typing import Any
 
 from benchmarks.run import RESULTS, machine
 from hexapod_cosim.controller import Gains
-from hexapod_cosim.cosim.run.batch import processors, run_batch
+from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.run import chosen_gains
 from hexapod_cosim.cosim.run.walker import Walker
+from hexapod_cosim.cosim.run.worker_pool import processor_count
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
@@ -86,7 +87,7 @@ def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
 
 def measured(count: int) -> Iterator[dict[str, Any]]:
     """A row for each control and setting of the solver, one for each control in Python."""
-    most = processors()
+    most = processor_count()
     for control in CONTROLS:
         gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
         for setting, changes in SETTINGS.items():

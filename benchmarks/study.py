@@ -38,7 +38,7 @@ from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
-from hexapod_cosim.cosim.study.execute import conduct
+from hexapod_cosim.cosim.study.execute import dispatch
 from hexapod_cosim.cosim.study.execute.study import Options, run_study
 from hexapod_cosim.cosim.study.plan.reading import study_from_table
 from hexapod_cosim.cosim.study.report.report import write_study_report
@@ -174,7 +174,7 @@ class Timed:
                 study_from_table(table, where="bench"),
                 Path(folder),
                 options=Options(**options),
-                begun=self._begun,
+                start=self._begun,
             )
             self.processor = (
                 processor_time() - begin
@@ -222,7 +222,7 @@ def _own_costs(common: dict[str, Any]) -> dict[str, float]:
     """Of runs that take no time. A study's own costs are what more runs take more."""
     many, small, large, most = *_measured_memory(RUNS, common), *_measured_memory(LARGE, common)
     by_dask = [through_cluster(runs, common) for runs in (FEW, BY_DASK)]
-    with patch.object(conduct, "CHUNK_TIME", 0.0):  # chunks of one run
+    with patch.object(dispatch, "CHUNK_TIME", 0.0):  # chunks of one run
         tasks = [through_cluster(runs, common) for runs in (FEW, TASKS)]
     report = [item.reported - item.processor for item in (many, large)]
     return {
@@ -421,7 +421,7 @@ def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
     )  # s
     hours = MILLION * walk / 3600.0
     per_second = CORES / walk
-    tasks = CORES / conduct.chunk_time(CORES)
+    tasks = CORES / dispatch.chunk_time(CORES)
     rows = [
         (
             f"processor time, {SOLVER_NAMES['']}",

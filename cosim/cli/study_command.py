@@ -1,4 +1,4 @@
-"""`hexapod study`: many runs."""
+"""The command `hexapod study`, which runs a study."""
 
 from __future__ import annotations
 
@@ -15,14 +15,17 @@ from hexapod_cosim.cosim.cli.terminal import Json, warn
 from hexapod_cosim.cosim.study.execute.engines import DEFAULT_ENGINE, ENGINES
 from hexapod_cosim.cosim.study.plan.records import StudyError
 
-EPILOG = f"A fall is a result of a study. Exit code {FELL} only when the robot walked to the end of no run at all and fell in some."
+EPILOG = (
+    f"A fall is a result of a study. The exit code is {FELL} only when no run walked to its end "
+    "and the robot fell in some of them."
+)
 MAX_WORKERS = 4096
 Workers = Annotated[
     int | None,
     typer.Option(
         "--workers",
         metavar="N",
-        help="Processes on this machine; default: one for each processor; 0: this one.",
+        help="Processes on this machine; default: one for each processor; 0: no other process.",
     ),
 ]
 Scheduler = Annotated[
@@ -36,7 +39,10 @@ Scheduler = Annotated[
 StudyFolder = Annotated[
     Path | None,
     typer.Option(
-        "-o", "--output", metavar="DIR", help="Where to write, or to go on; default out/STUDY."
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="Folder to write, or to resume; default out/STUDY.",
     ),
 ]
 EngineName = Annotated[
@@ -44,7 +50,7 @@ EngineName = Annotated[
     typer.Option(
         "--engine",
         metavar="|".join(ENGINES),
-        help="How figures are made; or MODULE:NAME of your own.",
+        help="How runs are simulated; or MODULE:NAME of your own.",
     ),
 ]
 
@@ -62,11 +68,12 @@ def study(
     gains: GainsFile = None,
     json: Json = False,
 ) -> int:
-    """Run a study: sweeps, Monte Carlo, tuning. Stopped at any point and started again, it goes
-    on where it was.
+    """Run a study: a sweep, a Monte Carlo study or an optimisation.
+
+    A study that was stopped resumes when the same command is started again.
     """
-    # slow to import, and no other command needs it
-    from hexapod_cosim.cosim.cli.studying import carry_out  # noqa: PLC0415
+    # imported here: it is slow, and no other command needs it
+    from hexapod_cosim.cosim.cli.studying import run_and_report  # noqa: PLC0415
     from hexapod_cosim.cosim.study.execute.study import Options  # noqa: PLC0415
 
     options = Options(
@@ -75,16 +82,17 @@ def study(
         gains=given_gains(gains),
         workers=_checked_workers(workers),
         scheduler=scheduler,
-        say=warn,
+        events=warn,
         command=_command_line(
             file,
             {"engine": engine if engine != DEFAULT_ENGINE else None, "fmu": fmu, "gains": gains},
         ),
     )
-    return carry_out(file, output or Path("out") / Path(file).stem, options, json=json)
+    return run_and_report(file, output or Path("out") / Path(file).stem, options, json=json)
 
 
 def _checked_workers(count: int | None) -> int | None:
+    """Returns a number of workers. Raises StudyError when it is out of range."""
     if count is not None and not 0 <= count <= MAX_WORKERS:
         raise StudyError(
             "not a number of workers",
@@ -97,6 +105,7 @@ def _checked_workers(count: int | None) -> int | None:
 
 
 def _command_line(file: str, options: Mapping[str, object]) -> str:
+    """Returns the command line that repeats the study, with the options that are not None."""
     words = [
         word
         for name, value in options.items()

@@ -1,5 +1,6 @@
-"""What `hexapod study` does and shows; apart from the command itself, since what this imports
-takes a second.
+"""Runs a study for `hexapod study` and shows its results.
+
+The command itself is in study_command.py, because the imports of this module take a second.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.results.comparison import METHOD
-from hexapod_cosim.cosim.study.execute.conduct import Tell
-from hexapod_cosim.cosim.study.execute.study import Begun, Options, run_study
+from hexapod_cosim.cosim.study.execute.dispatch import ProgressSink
+from hexapod_cosim.cosim.study.execute.study import Options, StartProgress, run_study
 from hexapod_cosim.cosim.study.plan.reading import load_study
 from hexapod_cosim.cosim.study.report.notes import NO_WALK, notes
 from hexapod_cosim.cosim.study.report.report import (
@@ -33,19 +34,21 @@ from hexapod_cosim.cosim.study.report.report import (
 from hexapod_cosim.cosim.study.store.manifest import TIMES
 from hexapod_cosim.cosim.study.store.results import Results, read_results, summary_of
 
-MOST_REASONS = 10
+MAX_REASONS = 10  # of failures that are shown
 
 
-def carry_out(file: str, folder: Path, options: Options, *, json: bool) -> int:
-    """Runs a study, or what is missing of it, writes its report and shows what came out. Returns
-    the exit code.
+def run_and_report(file: str, folder: Path, options: Options, *, json: bool) -> int:
+    """Runs a study, or what is missing of it, writes its report and shows the results.
+
+    Returns:
+        The exit code of the command.
     """
     plan = load_study(file)
     try:
-        with progress(plain=not json) as begun:
-            results = run_study(plan, folder, options=options, begun=begun)
+        with progress(plain=not json) as start:
+            results = run_study(plan, folder, options=options, start=start)
     except KeyboardInterrupt:
-        warn(f"stopped; what was run is in {folder}, and the same command goes on from there")
+        warn(f"stopped; the runs so far are in {folder}, and the same command resumes the study")
         raise
     found, files = report_on(folder)
     warn_of(found)
@@ -59,7 +62,7 @@ def carry_out(file: str, folder: Path, options: Options, *, json: bool) -> int:
 
 
 def _only_falls(found: Results) -> bool:
-    """Whether no run at all walked to its end, and the robot fell in some of them."""
+    """Returns whether no run walked to its end and the robot fell in some of them."""
     overall = found.overall
     return not any(overall.walked.values()) and any(
         status == COMPLETED for _, status, _ in overall.failures
@@ -67,15 +70,13 @@ def _only_falls(found: Results) -> bool:
 
 
 def warn_of(found: Results) -> None:
-    """What to know before reading the figures, as the report says it; where nothing walked, what
-    ended the runs instead.
-    """
-    for text in (*hopeless(found), *(note for note in notes(found) if note != NO_WALK)):
+    """Prints the notes of the report as warnings, and the reasons where no run walked."""
+    for text in (*failed_controls(found), *(note for note in notes(found) if note != NO_WALK)):
         warn(text)
 
 
-def hopeless(found: Results) -> list[str]:
-    """Controls under which no run at all walked to its end, and why."""
+def failed_controls(found: Results) -> list[str]:
+    """Returns a sentence for each control under which no run walked to its end."""
     texts = []
     for control, total in found.overall.total.items():
         if total and not found.overall.walked.get(control, 0):
@@ -87,48 +88,51 @@ def hopeless(found: Results) -> list[str]:
             count, status, reason = reasons[0]
             alike = "all" if len(reasons) == 1 else f"{count} of them"
             texts.append(
-                f"none of {total} {control} runs walked to its end; {alike} {_ending(status)}: {reason}"
+                f"none of {total} {control} runs walked to its end; "
+                f"{alike} {_ending(status)}: {reason}"
             )
     return texts
 
 
 def _ending(status: str) -> str:
-    """How a run that did not walk to its end came to it."""
+    """Returns the word for how a run ended that did not walk to its end."""
     return "fell" if status == COMPLETED else status
 
 
 def report_on(folder: Path) -> tuple[Results, list[Path]]:
-    """Reads a study's folder and writes its tables and report."""
+    """Reads a study's folder and writes its tables and report; returns the results and files."""
     found = read_results(folder)
     return found, write_study_report(found, folder)
 
 
 @contextmanager
-def progress(*, plain: bool) -> Iterator[Begun]:
-    """A bar with rate, estimate and failures on a terminal, `plain` lines elsewhere, from when
-    it is known how many runs there are.
+def progress(*, plain: bool) -> Iterator[StartProgress]:
+    """Yields a function that starts the display of progress when the number of runs is known.
+
+    The display is a bar with rate, remaining time and failures on a terminal, and lines elsewhere
+    if `plain`.
     """
     with ExitStack() as shown:
 
-        def begun(total: int, done: int) -> Tell:
+        def start(total: int, done: int) -> ProgressSink:
             if done:
-                print(f"goes on: {done} of {total} runs are there already", file=sys.stderr)
+                print(f"resumed: {done} of {total} runs are there already", file=sys.stderr)
             show = shown.enter_context(counting_bar("runs", total, plain=plain))
             show(done, 0)
             count, failed = done, 0
 
-            def tell(more: int, lost: int) -> None:
+            def add(more: int, lost: int) -> None:
                 nonlocal count, failed
                 count, failed = count + more, failed + lost
                 show(count, failed)
 
-            return tell
+            return add
 
-        yield begun
+        yield start
 
 
 def show_study(found: Results) -> None:
-    """Totals, the table of all runs, the optimum, failures by reason."""
+    """Prints the table of all runs, totals, failures by reason and the optimum."""
     overall, controls = found.overall, found.study.run_controls
     rows = overall_rows(found)
     columns = [
@@ -158,7 +162,7 @@ def show_study(found: Results) -> None:
     show_text(f"{overall.runs} runs at {found.of_points} points; walked to the end: {walked}")
     if len(controls) == 2:
         show_text(f"{METHOD}.")
-    for (control, status, reason), count in list(overall.failures.items())[:MOST_REASONS]:
+    for (control, status, reason), count in list(overall.failures.items())[:MAX_REASONS]:
         show_text(f"{count:6d} x {control} {_ending(status)}: {reason}")
     for row in optimum_rows(found):
         settings = ", ".join(
@@ -166,16 +170,18 @@ def show_study(found: Results) -> None:
             for name, text in zip((found.optimum or {})["variables"], row["settings"], strict=True)
         )
         show_text(
-            f"{row['label']}: {settings}; training {' '.join(row['training'])}, held out {' '.join(row['held_out'])}"
+            f"{row['label']}: {settings}; training {' '.join(row['training'])}, "
+            f"held out {' '.join(row['held_out'])}"
         )
-    show_gained(found)
+    show_optimum_changes(found)
 
 
-def show_gained(found: Results) -> None:
-    """What the best trials change of what the optimiser began from."""
+def show_optimum_changes(found: Results) -> None:
+    """Prints the changes from the settings before the optimisation to the best trials."""
     for row in optimum_changes(found):
         interval = f" (95 % interval {row['interval']})" if row["interval"] else ""
         verdict = f", {row['verdict']}" if row["verdict"] else ""
         show_text(
-            f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, {row['pairs']} pairs{verdict}"
+            f"{row['label']}, {row['part']}: {row['metric']} {row['change']}{interval}, "
+            f"{row['pairs']} pairs{verdict}"
         )

@@ -1,1 +1,1 @@
-"""Files, locks, messages and the places of the installed plant. Imports no other room."""
+"""Files, messages and the places of the installed plant. Imports no other room."""

@@ -1,4 +1,4 @@
-"""The set-up of a controller: robot, gait, period and gains."""
+"""Makes the set-up of a controller: robot, gait, period and gains."""
 
 from __future__ import annotations
 
@@ -18,16 +18,22 @@ def make_setup(
     gait: str | None = None,
     gains: Gains | None = None,
 ) -> ControllerSetup:
-    """What `simulate` would walk a robot with: its gait or one by name; under compliant control
-    gains designed for it, if none are given.
+    """Returns the controller's set-up as `simulate` would make it.
 
-    Raises HexapodError for an unknown control or gait, GainsError for gains without compliant
-    control or without a design.
+    Args:
+        control: "kinematic" or "compliant".
+        period: controller period [s].
+        gait: name of a gait; by default the gait of the robot file.
+        gains: gains of the compliant control; by default they are designed for the robot.
+
+    Raises:
+        HexapodError: the control or the gait is unknown.
+        GainsError: gains are given for kinematic control, or none can be designed.
     """
     if control not in CONTROLS:
         raise unknown_name("control", control, CONTROLS)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot, gait), period=period)
-    setup.build()  # refused before anything is designed
+    setup.build()  # refuses an impossible set-up before gains are designed
     if control == "kinematic":
         if gains is not None:
             raise GainsError(

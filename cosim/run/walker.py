@@ -1,5 +1,6 @@
-"""Run after run in one process on the compiled controller: FMUs are opened once, robots and
-designs are made once, the loop is C.
+"""Runs scenarios one after the other with the controller FMU and the master loop in C.
+
+FMUs are opened once, and gains are designed once.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from typing import Self
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.interface.controller_interface import (
     ControllerSetup,
     controller_parameters,
@@ -26,35 +26,33 @@ from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
 from hexapod_cosim.cosim.results.metrics import judged_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.run.preparation import Preparation
 from hexapod_cosim.cosim.run.run import (
     Plan,
-    chosen_gains,
     describe,
     foreign_settings,
     initialise_plant,
     judge,
-    known_robot,
     make_plan,
     sensor_settings,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
-from hexapod_cosim.models import HexapodError, Robot, load_robot
+from hexapod_cosim.models import HexapodError, Robot
 
-REMEMBERED = 64  # robots
+MAX_SETTINGS = 64  # robots whose settings are kept
 
 
 class Walker:
-    """Walks scenarios one after the other as `simulate` does, with the controller's FMU in place of
-    the Python controller.
+    """Runs scenarios as `simulate` does, with the controller FMU instead of the Python controller.
 
-    A context manager, for one thread: threads and processes have one each. Results do not depend on
-    what it walked before.
+    It is a context manager for use in one thread. Results do not depend on earlier runs.
 
     Args:
-        fmu: the plant's FMU for all runs; by default one is exported for each robot.
-        controller: a controller's FMU, whose parameters every run sets as its scenario says; by
-            default one is exported.
-        everything: whether all signals are recorded, not only what metrics and warnings look at.
+        fmu: the plant FMU of all runs; by default one is exported for each robot.
+        controller: the controller FMU, whose parameters every run sets; by default one is
+            exported.
+        everything: whether all signals are recorded, not only those that metrics and warnings
+            need.
     """
 
     def __init__(
@@ -63,17 +61,14 @@ class Walker:
         self._given, self._given_controller, self._everything = fmu, controller, everything
         self._open = ExitStack()
         self._folder = Path(self._open.enter_context(TemporaryDirectory(prefix="hexapod-walker-")))
-        # by robot, or by the FMU given; and by what is recorded
-        self._masters: dict[
-            tuple[str | Path, tuple[str, ...] | None], tuple[Fmu, NativeMaster]
-        ] = {}
+        self._preparation = Preparation(self._folder)
+        # by plant FMU and recorded columns
+        self._masters: dict[tuple[Path, tuple[str, ...] | None], tuple[Fmu, NativeMaster]] = {}
         self._controller: Fmu | None = None
-        self.loop_time = 0.0  # s  of the processor, the last run's loop alone
-        self._told: tuple[ControllerSetup, list[FmuBlock]] | None = (
-            None  # the controller's latest set-up and the blocks that set it
-        )
-        self._changes: dict[tuple[Path, Robot], dict[str, float]] = {}
-        self._designs: dict[tuple[str, float], Gains | None] = {}
+        self.loop_time = 0.0  # s    processor time of the last run's loop
+        # the controller's latest set-up and the blocks of parameters that make it
+        self._setup: tuple[ControllerSetup, list[FmuBlock]] | None = None
+        self._settings: dict[tuple[Path, Robot], dict[str, float]] = {}
 
     def simulate(
         self,
@@ -84,16 +79,17 @@ class Walker:
         progress: Progress | None = None,
         begin: Callable[[], None] | None = None,
     ) -> Result:
-        """A scenario's run and what came of it, on the plant `fmu` if given. Arguments are those of
-        run.simulate().
+        """Runs a scenario, on the plant FMU `fmu` and with `gains` if given.
 
-        Raises HexapodError for what keeps the run from starting.
+        Arguments are those of run.simulate(). Raises HexapodError when the run cannot start; how a
+        run that started ended is in the result.
         """
-        plan = make_plan(scenario, gains=self._gains(scenario, gains))
-        controller = self._told_controller(plan)
+        chosen = self._preparation.gains(scenario) if gains is None else gains
+        plan = make_plan(scenario, gains=chosen)
+        controller = self._controller_for(plan)
         plant, master = self._plant(plan, controller, fmu or self._given)
         plant.reset()
-        plant.set_parameters(self._settings(plant, plan.robot))
+        plant.set_parameters(self._settings_of(plant, plan.robot))
         parameters = initialise_plant(plant, plan)
         controller.initialise(scenario.start, scenario.start + scenario.duration)
         sensor = sensor_settings(scenario, plan.schedule)
@@ -106,9 +102,7 @@ class Walker:
         if begin is not None:
             begin()
         started = thread_time()
-        every = (
-            scenario.every if self._everything else 1
-        )  # what is judged is needed of every macro-step
+        every = scenario.every if self._everything else 1  # metrics need every macro-step
         outcome = master.run(
             plan.schedule, h=scenario.macro_step, every=every, sensor=sensor, progress=progress
         )
@@ -124,31 +118,21 @@ class Walker:
         gains: Gains | None = None,
         progress: Progress | None = None,
     ) -> Summary:
-        """What a scenario's run came to, a refusal to begin included."""
+        """Returns the summary of a scenario's run, also of a run that cannot start."""
         try:
             return summarise(self.simulate(scenario, fmu=fmu, gains=gains, progress=progress))
         except HexapodError as error:
             return refused(scenario, error)
 
-    def _gains(self, scenario: Scenario, gains: Gains | None) -> Gains | None:
-        """As `chosen_gains`, designed once for a robot and a macro-step."""
-        if gains is not None or scenario.control == "kinematic":
-            return gains
-        key = (known_robot(scenario).hash, scenario.macro_step)
-        if key not in self._designs:
-            self._designs[key] = chosen_gains(scenario)
-        return self._designs[key]
-
     def _plant(self, plan: Plan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
-        """A given FMU or that of the plan's robot, wired to the controller."""
-        name = plan.scenario.robot
+        """Returns the plant FMU of the plan and the master that connects it to the controller."""
+        path = self._preparation.fmu(plan.scenario.robot) if fmu is None else fmu
         bristles = (
             plan.robot.friction.law == "bristle" or "friction.law" in plan.scenario.parameters
         )
         columns = None if self._everything else judged_columns(bristles=bristles)
-        key = name if fmu is None else fmu, columns
+        key = path, columns
         if key not in self._masters:
-            path = fmu or export_fmu(load_robot(name), self._folder / f"{len(self._masters)}.fmu")
             plant = self._open.enter_context(Fmu(path))
             judged = judged_columns(bristles=True)
             self._masters[key] = (
@@ -157,8 +141,8 @@ class Walker:
             )
         return self._masters[key]
 
-    def _told_controller(self, plan: Plan) -> Fmu:
-        """The controller FMU with the parameters of the plan's."""
+    def _controller_for(self, plan: Plan) -> Fmu:
+        """Returns the controller FMU, reset, with the parameters of the plan."""
         setup = plan.controller
         if self._controller is None:
             path = self._given_controller or export_controller(
@@ -166,24 +150,24 @@ class Walker:
             )
             self._controller = self._open.enter_context(Fmu(path, name="controller"))
         self._controller.reset()
-        if self._told is None or self._told[0] != setup:
-            self._told = setup, self._controller.parameter_blocks(controller_parameters(setup))
-        self._controller.set_blocks(self._told[1])
+        if self._setup is None or self._setup[0] != setup:
+            self._setup = setup, self._controller.parameter_blocks(controller_parameters(setup))
+        self._controller.set_blocks(self._setup[1])
         return self._controller
 
-    def _settings(self, plant: Fmu, robot: Robot) -> dict[str, float]:
-        """What the plant, just reset, has to be told to be this robot; remembered for some."""
+    def _settings_of(self, plant: Fmu, robot: Robot) -> dict[str, float]:
+        """Returns the parameters in which the plant, just reset, differs from the robot."""
         key = plant.path, robot
-        if key not in self._changes:
-            if len(self._changes) >= REMEMBERED:
-                self._changes.clear()
-            self._changes[key] = foreign_settings(plant, robot)
-        return self._changes[key]
+        if key not in self._settings:
+            if len(self._settings) >= MAX_SETTINGS:
+                self._settings.clear()
+            self._settings[key] = foreign_settings(plant, robot)
+        return self._settings[key]
 
     def close(self) -> None:
-        """Frees the FMUs; harmless when called twice."""
+        """Frees the FMUs. A second call does nothing."""
         self._masters.clear()
-        self._told = None
+        self._setup = None
         self._controller = None
         self._open.close()
 

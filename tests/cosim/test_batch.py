@@ -1,4 +1,4 @@
-"""Many runs at once: the same figures in whatever processes, nothing lost, nothing left behind."""
+"""Batches of runs: figures do not depend on the processes, and no run or process is left over."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
+from hexapod_cosim.models import HexapodError
 
-PATIENCE = 60.0  # s    for what takes a second or two on an idle machine
+TIMEOUT = 60.0  # s    for what takes a second or two on an idle machine
 
 
 def short(*changes: str) -> Scenario:
@@ -35,9 +36,7 @@ def short(*changes: str) -> Scenario:
 
 
 def steady(summary: Summary) -> Summary:
-    """Without the one figure that the machine's load decides and without those that there are
-    none of: no NaN is equal to another.
-    """
+    """Returns the summary without the realtime factor, which depends on the machine, and NaNs."""
     figures = {
         name: value
         for name, value in summary.metrics.items()
@@ -111,20 +110,20 @@ def alive(group: int) -> bool:
     return True
 
 
-def _hear_interrupts() -> None:
-    """A test run in the background starts with them ignored, and its children with it."""
+def _enable_interrupts() -> None:
+    """Undoes that a test run in the background ignores interrupts, as its children do then."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def begun(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
-    """A comparison in a process group of its own, whose batch has come to run."""
+def start_comparison(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
+    """Starts a comparison in a process group of its own and waits until its batch runs."""
     plain = settings(long, "gait.period=0.4", "outputs.csv=['torso.roll']")
     command = [*COMMAND, "compare", "walk_flat", "-o", str(folder), "--seeds", "200", *plain]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        preexec_fn=_hear_interrupts,  # noqa: PLW1509  no other thread runs here
+        preexec_fn=_enable_interrupts,  # noqa: PLW1509  no other thread runs here
     )  # fmt: skip
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     done = folder / "compliant" / "run.json"
     while time.monotonic() < deadline and not (
         done.exists() and json.loads(done.read_text())["status"] == COMPLETED
@@ -135,7 +134,7 @@ def begun(folder: Path, *, long: str = "duration=20") -> subprocess.Popen[str]:
 
 
 def assert_none_left(group: int) -> None:
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while alive(group) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not alive(group)
@@ -146,10 +145,10 @@ def test_an_interrupted_comparison_keeps_whole_runs_and_leaves_no_process(
     plant_build: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
     folder = tmp_path / "out"
-    process = begun(folder)
+    process = start_comparison(folder)
     try:
         os.killpg(process.pid, number) if number == signal.SIGINT else process.send_signal(number)
-        out, err = process.communicate(timeout=PATIENCE)
+        out, err = process.communicate(timeout=TIMEOUT)
         assert_none_left(process.pid)
     finally:
         process.kill()
@@ -164,8 +163,20 @@ def test_an_interrupted_comparison_keeps_whole_runs_and_leaves_no_process(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
+def test_a_worker_that_dies_is_reported_with_its_run(plant_build: Path) -> None:
+    plans = [replace(short(), seed=7), *[replace(short(), duration=60.0, seed=8)] * 5]
+    with closing(run_batch(plans, workers=2)) as runs:
+        assert next(runs).walked
+        for child in multiprocessing.active_children():
+            child.kill()
+        with pytest.raises(HexapodError, match=r"worker process of the batch.*seed 8, kinematic"):
+            list(runs)
+    assert multiprocessing.active_children() == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such signal")
 def test_workers_end_when_the_command_is_killed(plant_build: Path, tmp_path: Path) -> None:
-    process = begun(tmp_path / "out")
+    process = start_comparison(tmp_path / "out")
     process.kill()
-    process.communicate(timeout=PATIENCE)
+    process.communicate(timeout=TIMEOUT)
     assert_none_left(process.pid)

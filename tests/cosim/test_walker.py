@@ -1,6 +1,4 @@
-"""Walks whose loop is C: bit for bit those of the Python master with the same FMUs, run after
-run; what goes wrong is said as there.
-"""
+"""The walker, whose loop is C: its walks and errors are those of the Python master, bit for bit."""
 
 from __future__ import annotations
 
@@ -48,11 +46,9 @@ FAULTS = (
 PUSH = "events=[{time=0.7, duration=0.103, force=[0, 12, 0], torque=[0.1, 0, 0]}]"
 TURN = ("command.yaw_rate=0.2", "command.roll=0.03", "command.vy=0.01")
 ENDLESS = "events=[{time=0.1, duration=0.1, force=[1e8, 1e8, 1e8], torque=[1e8, 1e8, 1e8]}]"
-# relative, of figures under the C controller and under the Python one, whose commands agree to
-# 1e-12 rad
+# relative, of figures under the C and the Python controller, whose commands agree to 1e-12 rad
 CLOSE = 1e-6
-# bytes    over 40 runs, whose recordings are 2 MB each: less than one of them is kept
-GROWTH = 1_000_000
+GROWTH = 1_000_000  # bytes    over 40 runs: less than one recording, of 2 MB
 
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -71,9 +67,9 @@ def gains_of(scenario: Scenario) -> Gains | None:
 
 
 def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
-    """A scenario on the plant FMU under the controller FMU as the Python master runs it."""
+    """Runs a scenario with the plant FMU and the controller FMU in the Python master."""
     plan = make_plan(scenario, gains=gains_of(scenario))
-    controller = walker._told_controller(plan)
+    controller = walker._controller_for(plan)
     controller.initialise(scenario.start, scenario.start + scenario.duration)
     with open_plant(scenario) as plant:
         parameters = initialise_plant(plant, plan)
@@ -85,9 +81,7 @@ def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
 
 
 def steady(summary: Summary) -> Summary:
-    """Without the one figure that the machine's load decides, and without those that there are
-    none of (no NaN is equal to another).
-    """
+    """Returns the summary without the realtime factor, which depends on the machine, and NaNs."""
     figures = {
         name: value
         for name, value in summary.metrics.items()
@@ -251,7 +245,7 @@ def test_fmus_that_are_missing_or_something_else_are_refused(
         assert summary.status == REFUSED
         assert said in summary.reason
     with Fmu(athena_fmu) as plant, Walker() as walker:
-        swapped = walker._told_controller(make_plan(WALKS[1])), plant
+        swapped = walker._controller_for(make_plan(WALKS[1])), plant
         with pytest.raises(FmuError, match="not a hexapod plant"):
             NativeMaster(*swapped)
 

@@ -159,7 +159,7 @@ def test_the_last_row_is_always_kept(rows: int, every: int, kept: list[int]) -> 
 def in_python(scenario: Scenario, walker: Walker) -> Outcome:
     """A scenario on the plant FMU under the controller FMU as the Python master runs it."""
     plan = make_plan(scenario, gains=gains_of(scenario))
-    controller = walker._told_controller(plan)
+    controller = walker._controller_for(plan)
     controller.initialise(scenario.start, scenario.start + scenario.duration)
     with open_plant(scenario) as plant:
         initialise_plant(plant, plan)

@@ -1,6 +1,4 @@
-"""A Dask cluster on loopback: a scheduler and workers, each a process of its own group, gone
-when the test is.
-"""
+"""A Dask cluster on loopback: a scheduler and workers in processes that end with the test."""
 
 from __future__ import annotations
 
@@ -16,14 +14,14 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 HELPERS = os.pathsep.join(str(ROOT / "tests" / room) for room in ("support", "study"))
-PATIENCE = 180.0  # s    for what takes a few on an idle machine
+TIMEOUT = 180.0  # s    for what takes some seconds on an idle machine
 COMMON = ("--host", "127.0.0.1", "--no-dashboard")
 ONE_THREAD = ("--nthreads", "1")
 
 
 @contextmanager
 def running(*words: str, cwd: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """A Python module as a process, killed with all its children when the block ends."""
+    """Runs a Python module as a process, killed with its children when the block ends."""
     process = subprocess.Popen(
         [sys.executable, "-m", *words],
         cwd=cwd,
@@ -39,15 +37,15 @@ def running(*words: str, cwd: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
-    """With its children."""
+    """Kills a process with its children."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
 
 
 @contextmanager
-def scheduling(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """The address of a scheduler without workers, and its process."""
+def dask_scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """Starts a scheduler without workers; yields its address and its process."""
     file = folder / "scheduler.json"
     with running(
         "distributed.cli.dask_scheduler",
@@ -58,7 +56,7 @@ def scheduling(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         str(file),
         cwd=folder,
     ) as process:
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while (
             not (file.exists() and file.read_text().rstrip().endswith("}"))
             and time.monotonic() < deadline
@@ -68,8 +66,8 @@ def scheduling(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 
 
 @contextmanager
-def lasting_workers(address: str, count: int, folder: Path) -> Iterator[None]:
-    """Workers that are begun anew when they die."""
+def restarting_workers(address: str, count: int, folder: Path) -> Iterator[None]:
+    """Starts workers that are restarted when they die."""
     with running(
         "distributed.cli.dask_worker",
         address,
@@ -86,7 +84,7 @@ def lasting_workers(address: str, count: int, folder: Path) -> Iterator[None]:
 def mortal_workers(
     address: str, count: int, folder: Path
 ) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Workers that stay dead; a process each."""
+    """Starts workers that are not restarted when they die; yields a process for each."""
     with ExitStack() as opened:
         words = ("distributed.cli.dask_worker", address, "--no-nanny", *ONE_THREAD, *COMMON)
         yield [opened.enter_context(running(*words, cwd=folder)) for _ in range(count)]

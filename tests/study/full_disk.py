@@ -1,6 +1,4 @@
-"""`hexapod` on a disk that is full after some files: FILES are flushed to it, and then nothing
-more. Run by the tests.
-"""
+"""Runs `hexapod` on a simulated disk that is full after FILES flushes. The tests run it."""
 
 from __future__ import annotations
 
@@ -10,17 +8,17 @@ import sys
 
 from hexapod_cosim.cosim.cli import main
 
-FILES = 6  # two of the folder, each with its name, and a part
-flush, flushed = os.fsync, [0]
+FILES = 6  # flushes: of two files and a part, each with its folder
+flush, count = os.fsync, [0]
 
 
-def filling(file: int) -> None:
-    flushed[0] += 1
-    if flushed[0] > FILES:
+def flush_or_fail(file: int) -> None:
+    count[0] += 1
+    if count[0] > FILES:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     flush(file)
 
 
 if __name__ == "__main__":
-    os.fsync = filling  # type: ignore[assignment]
+    os.fsync = flush_or_fail  # type: ignore[assignment]
     sys.exit(main(sys.argv[1:]))

@@ -1,4 +1,4 @@
-"""Small studies, run without a walk."""
+"""Small studies with engines that simulate no walk."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ def study_of(table: Mapping[str, Any] = SMALL, **changes: Any) -> Study:
 
 
 def quiet(_total: int, _done: int) -> Any:
+    """Starts no display of progress."""
     return lambda _more, _lost: None
 
 
 def run_quietly(study: Study, folder: Path, **options: Any) -> list[dict[str, Any]]:
-    """The rows of the results."""
+    """Runs a study without a display of progress; returns the rows of its results."""
     run_study(
-        study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), begun=quiet
+        study, folder, options=Options(**{"engine": FAKE, "workers": 0, **options}), start=quiet
     )
     return rows(folder)
 
@@ -47,19 +48,17 @@ def rows(folder: Path) -> list[dict[str, Any]]:
 
 
 def digest(folder: Path) -> str:
-    """Of the bytes of the results."""
+    """Returns the SHA-256 of the results."""
     return hashlib.sha256((folder / RESULTS).read_bytes()).hexdigest()
 
 
-def store_instead(
-    study: Study, folder: Path, kept: Callable[[dict[str, Any]], dict[str, Any] | None]
+def replace_stored(
+    study: Study, folder: Path, change: Callable[[dict[str, Any]], dict[str, Any] | None]
 ) -> None:
-    """Puts what `kept` makes of each stored run in its place, None taking it away: as another
-    past would have left the folder.
-    """
+    """Replaces each stored row by the result of `change`, or removes it for None."""
     store = Store(folder / RUNS, schema_of(study))
     stored = [row for table in store.sorted_rows() for row in table.to_pylist()]
     for part in store.parts():
         part.unlink()
-    store.add(row for row in map(kept, stored) if row is not None)
+    store.add(row for row in map(change, stored) if row is not None)
     store.flush()

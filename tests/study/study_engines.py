@@ -1,5 +1,6 @@
-"""Engines that make figures of nothing but the scenario, at once: for tests of what lies around
-them. A module that workers import.
+"""Engines for tests, which compute metrics from the scenario without a simulation.
+
+Workers import this module.
 """
 
 from __future__ import annotations
@@ -20,23 +21,20 @@ from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
 from hexapod_cosim.cosim.scenario.records import Scenario
 
-DEADLY, REFUSING, FALLING, SLOW = (
-    0.13,
-    0.17,
-    0.19,
-    0.02,
-)  # friction.mu that ends the process, is refused, falls; s a run takes
+# values of friction.mu with which the process ends, the run is refused, or the robot falls
+DEADLY, REFUSING, FALLING = 0.13, 0.17, 0.19
+SLOW = 0.02  # s    duration of a run of Slow
 
 DEATHS_FILE = "HEXAPOD_TEST_DEATHS"
 
 
 def figure(seed: int, mu: float, control: str, place: int) -> float:
-    """A metric: something that every setting shows in."""
+    """Returns a metric that depends on every setting."""
     return (place + 1) * (1.0 + 0.1 * seed + mu * mu) * (0.5 if control == "compliant" else 1.0)
 
 
 def die(who: str) -> None:
-    """Ends the process; where DEATHS_FILE names a file, a line of it says who did."""
+    """Ends the process, after a line about it to the file that DEATHS_FILE names, if any."""
     if DEATHS_FILE in os.environ:
         with Path(os.environ[DEATHS_FILE]).open("a") as file:
             file.write(f"{who}\n")
@@ -44,7 +42,7 @@ def die(who: str) -> None:
 
 
 class Fake:
-    """Figures at once."""
+    """Returns metrics without a simulation."""
 
     pause = 0.0  # s
 
@@ -53,7 +51,7 @@ class Fake:
         assert controller.is_file()
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says."""
+        """Implements Engine.summary()."""
         mu, control, seed = scenario.settings["friction"]["mu"], scenario.control, scenario.seed
         if mu == DEADLY:
             die(f"{control} {seed}")
@@ -79,14 +77,14 @@ class Fake:
         )
 
     def close(self) -> None:
-        """Nothing to free."""
+        """Implements Engine.close(): there is nothing to free."""
 
 
 class Brief(Fake):
-    """Too short for figures in the ripple gait."""
+    """Returns no metrics in the ripple gait, as for a walk that is too short."""
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says."""
+        """Implements Engine.summary()."""
         found = super().summary(scenario, gains=gains, progress=progress)
         return (
             replace(found, metrics=NO_FIGURES)
@@ -96,14 +94,14 @@ class Brief(Fake):
 
 
 class SourError(Exception):
-    """What cannot be sent to another process."""
+    """An exception that cannot be pickled."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self.cause = lambda: text
 
 
-MISTAKES: dict[float, Callable[[], object]] = {
+ERRORS: dict[float, Callable[[], object]] = {
     0.21: lambda: np.linalg.inv(np.zeros((2, 2))),
     0.22: lambda: np.zeros(2) + np.zeros(3),
     0.23: lambda: _raise(MemoryError("no more")),
@@ -114,7 +112,7 @@ MISTAKES: dict[float, Callable[[], object]] = {
 
 
 class BadTextError(Exception):
-    """What cannot even say what it is."""
+    """An exception without a text."""
 
     def __str__(self) -> str:
         raise RuntimeError
@@ -125,33 +123,33 @@ def _raise(error: Exception) -> None:
 
 
 class Buggy(Fake):
-    """Makes mistakes; each time it is used once after one it says so, which it must not be."""
+    """Raises errors; it must not be used again after one."""
 
     broken = False
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says, but for the mistakes."""
+        """Implements Engine.summary(), except for the errors."""
         assert not self.broken
         mu = scenario.settings["friction"]["mu"]
         if mu == 0.27:
             return "walked"  # type: ignore[return-value]
-        self.broken = mu in MISTAKES
-        MISTAKES.get(mu, lambda: None)()
+        self.broken = mu in ERRORS
+        ERRORS.get(mu, lambda: None)()
         return super().summary(scenario, gains=gains, progress=progress)
 
 
 class Counting(Fake):
-    """Keeps in this process what it was asked."""
+    """Keeps a list of its runs in this process."""
 
     asked: ClassVar[list[tuple[str, int]]] = []
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says."""
+        """Implements Engine.summary()."""
         self.asked.append((scenario.control, scenario.seed))
         return super().summary(scenario, gains=gains, progress=progress)
 
 
 class Slow(Fake):
-    """The same, and time to be killed in."""
+    """Takes some time for each run, in which it can be killed."""
 
     pause = SLOW

@@ -1,6 +1,4 @@
-"""Whatever a study file says, it is a study or refused with a reason: files changed at random,
-seeded.
-"""
+"""Any study file is read or refused with a reason: files with seeded random changes."""
 
 from __future__ import annotations
 
@@ -22,7 +20,7 @@ from hexapod_cosim.cosim.study.plan.reading import load_study, study_from_table
 from hexapod_cosim.cosim.study.store.columns import schema_of
 from hexapod_cosim.models import HexapodError
 
-SEEDS, EACH = 8, 60  # files per seed: 480 in all, of which one in fourteen is a study
+SEEDS, FILES = 8, 60  # files per seed: 480 in all, of which one in fourteen is a study
 CHANGES = 3  # to a file, at most
 NAN, INF = float("nan"), float("inf")
 ODD: list[Any] = [
@@ -152,7 +150,7 @@ BEGUN: list[dict[str, Any]] = [
 
 
 def places(table: Any) -> list[tuple[Any, Any]]:
-    """Every container in a table with one of its keys."""
+    """Returns every container in a table with each of its keys."""
     if isinstance(table, dict):
         return [(table, key) for key in table] + [
             pair for value in table.values() for pair in places(value)
@@ -165,7 +163,7 @@ def places(table: Any) -> list[tuple[Any, Any]]:
 
 
 def changed(table: Mapping[str, Any], draw: random.Random) -> dict[str, Any]:
-    """A copy with some of it replaced, renamed, added or taken away."""
+    """Returns a copy in which entries are replaced, renamed, added or removed."""
     found = deepcopy(dict(table))
     for _ in range(draw.randint(1, CHANGES)):
         container, key = draw.choice(places(found) or [(found, "title")])
@@ -185,7 +183,7 @@ def changed(table: Mapping[str, Any], draw: random.Random) -> dict[str, Any]:
 def test_a_file_changed_at_random_is_a_study_or_refused_with_a_reason(seed: int) -> None:
     draw = random.Random(seed)
     begun = [*BEGUN, *(dict(load_study(name).source) for name in list_studies())]
-    for _ in range(EACH):
+    for _ in range(FILES):
         table = changed(draw.choice(begun), draw)
         try:
             study = study_of(table)

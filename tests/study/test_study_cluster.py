@@ -1,4 +1,4 @@
-"""A cluster's workers and its scheduler may die at any time, and serve several studies at once."""
+"""Studies on a cluster: its workers and its scheduler may die, and several studies may share it."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from typing import Any
 
 import pytest
 from command import COMMAND
-from dask_cluster import HELPERS, PATIENCE, kill, lasting_workers, mortal_workers, scheduling
+from dask_cluster import HELPERS, TIMEOUT, dask_scheduler, kill, mortal_workers, restarting_workers
 from distributed import Client
 from studies import KINEMATIC, SLOW, digest, quiet, rows, run_quietly, study_of
 
 from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.study.execute import cluster
-from hexapod_cosim.cosim.study.execute.cluster_worker import work_here
-from hexapod_cosim.cosim.study.execute.crew import Chunk
+from hexapod_cosim.cosim.study.execute.chunk import Chunk
+from hexapod_cosim.cosim.study.execute.cluster_worker import run_chunk
 from hexapod_cosim.cosim.study.execute.job import make_job
 from hexapod_cosim.cosim.study.execute.study import Options, run_study
 from hexapod_cosim.cosim.study.plan.points import Sweep
@@ -36,38 +36,40 @@ REAL: dict[str, Any] = {
     "set": {"duration": 0.6},
     "factors": {"friction.mu": [0.3, 0.4, 0.5]},
 }
-SHORT = 3.0  # s    without workers, in place of a minute
+SHORT_TIMEOUT = 3.0  # s    without workers, in place of a minute
 
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a scheduler without workers."""
-    with scheduling(tmp_path_factory.mktemp("dask")) as (address, _):
+    """Starts a scheduler without workers; yields its address."""
+    with dask_scheduler(tmp_path_factory.mktemp("dask")) as (address, _):
         yield address
 
 
 @pytest.fixture
 def study_on(athena_fmu: Path, tmp_path: Path, scheduler: str) -> Callable[..., list[str]]:
-    """Runs the study on the cluster into tmp_path/out and does something once, after the first
-    runs came in. Returns what was said.
+    """A function that runs the study on the cluster into tmp_path/out.
+
+    It calls its argument once, when the first results are there, and returns the events.
     """
 
     def run(after_the_first: Callable[[], object], address: str = scheduler) -> list[str]:
-        said: list[str] = []
-        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=address, say=said.append)
-        run_study(study_of(TABLE), tmp_path / "out", options=options, begun=once(after_the_first))
-        return said
+        events: list[str] = []
+        options = Options(engine=SLOW, fmu=athena_fmu, scheduler=address, events=events.append)
+        run_study(study_of(TABLE), tmp_path / "out", options=options, start=once(after_the_first))
+        return events
 
     return run
 
 
 def once(act: Callable[[], object]) -> Any:
+    """Returns a start function whose progress display calls `act` once."""
     todo = [act]
     return lambda _total, _done: lambda _more, _lost: todo and todo.pop()()
 
 
 def assert_whole(folder: Path, fmu: Path) -> None:
-    """The results are those of this process alone."""
+    """Asserts that the results are those of a run within this process."""
     run_quietly(study_of(TABLE), folder.with_name("alone"), fmu=fmu, engine=SLOW)
     assert digest(folder) == digest(folder.with_name("alone"))
 
@@ -80,7 +82,7 @@ def test_a_killed_worker_costs_no_run(
     assert_whole(tmp_path / "out", athena_fmu)
 
 
-def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
+def test_without_workers_a_study_ends_with_what_is_stored_and_is_resumed_in_this_process(
     study_on: Callable[..., Any],
     scheduler: str,
     athena_fmu: Path,
@@ -88,10 +90,10 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with mortal_workers(scheduler, 2, tmp_path) as workers:
-        monkeypatch.setattr(cluster, "PATIENCE", PATIENCE)
+        monkeypatch.setattr(cluster, "NO_WORKER_TIMEOUT", TIMEOUT)
 
         def kill_all() -> None:
-            monkeypatch.setattr(cluster, "PATIENCE", SHORT)
+            monkeypatch.setattr(cluster, "NO_WORKER_TIMEOUT", SHORT_TIMEOUT)
             for worker in workers:
                 kill(worker)
 
@@ -105,7 +107,7 @@ def test_without_workers_a_study_ends_with_what_is_stored_and_goes_on_here(
     assert_whole(tmp_path / "out", athena_fmu)
 
 
-def test_workers_that_come_when_all_are_gone_get_the_job_and_go_on(
+def test_workers_that_join_when_all_are_gone_get_the_job_and_continue(
     study_on: Callable[..., Any], scheduler: str, athena_fmu: Path, tmp_path: Path
 ) -> None:
     with ExitStack() as opened, mortal_workers(scheduler, 1, tmp_path) as workers:
@@ -114,8 +116,8 @@ def test_workers_that_come_when_all_are_gone_get_the_job_and_go_on(
             kill(workers[0])
             opened.enter_context(mortal_workers(scheduler, 1, tmp_path))
 
-        said = study_on(replace)
-    assert any("waiting for some" in text for text in said)
+        events = study_on(replace)
+    assert any("waiting for some" in text for text in events)
     assert_whole(tmp_path / "out", athena_fmu)
 
 
@@ -123,8 +125,8 @@ def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
     study_on: Callable[..., Any], athena_fmu: Path, tmp_path: Path
 ) -> None:
     with (
-        scheduling(tmp_path) as (address, process),
-        lasting_workers(address, 1, tmp_path),
+        dask_scheduler(tmp_path) as (address, process),
+        restarting_workers(address, 1, tmp_path),
         pytest.raises(StudyError, match=r"the cluster is gone.*start the study again"),
     ):
         study_on(lambda: kill(process), address)
@@ -132,7 +134,7 @@ def test_a_scheduler_that_dies_ends_the_study_with_what_is_stored(
     assert_whole(tmp_path / "out", athena_fmu)
 
 
-def test_ctrl_c_is_heard_while_workers_are_waited_for(
+def test_ctrl_c_ends_a_study_that_waits_for_workers(
     scheduler: str, athena_fmu: Path, tmp_path: Path
 ) -> None:
     file = tmp_path / "study.toml"
@@ -155,11 +157,11 @@ def test_ctrl_c_is_heard_while_workers_are_waited_for(
         text=True,
     ) as process:
         assert process.stderr is not None
-        told = next(line for line in process.stderr if "waiting for some" in line)
+        warning = next(line for line in process.stderr if "waiting for some" in line)
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=PATIENCE)
-    assert "no workers" in told
-    assert "stopped; what was run is in" in err
+        _, err = process.communicate(timeout=TIMEOUT)
+    assert "no workers" in warning
+    assert "stopped; the runs so far are in" in err
     assert process.returncode == 130
 
 
@@ -179,11 +181,11 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
         "--scheduler",
         scheduler,
     ]
-    with lasting_workers(scheduler, 2, tmp_path):
+    with restarting_workers(scheduler, 2, tmp_path):
         process = subprocess.Popen(
             words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
         )
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while (
             not list(folder.glob("runs/*.parquet"))
             and time.monotonic() < deadline
@@ -198,7 +200,7 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
             left = client.run_on_scheduler(
                 lambda dask_scheduler: list(dask_scheduler.worker_plugins)
             )
-        assert not [name for name in left if name.startswith(cluster.OURS)]
+        assert not [name for name in left if name.startswith(cluster.JOB_PREFIX)]
     run_quietly(study, tmp_path / "alone", **options)
     assert digest(folder) == digest(tmp_path / "alone")
 
@@ -206,15 +208,12 @@ def test_a_program_killed_on_a_cluster_leaves_its_results_and_the_cluster_in_ord
 def test_studies_that_share_a_cluster_do_not_disturb_each_other(
     athena_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
-    tables = [
-        TABLE,
-        {**TABLE, "seeds": {"first": 500, "count": 20}},
-        TABLE,
-    ]  # the same FMU, scenario and factors
+    # all of them with the same FMU, scenario and factors
+    tables = [TABLE, {**TABLE, "seeds": {"first": 500, "count": 20}}, TABLE]
 
     def run(k: int) -> None:
         options = Options(engine=SLOW, fmu=athena_fmu, scheduler=scheduler)
-        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, begun=quiet)
+        run_study(study_of(tables[k]), tmp_path / f"out{k}", options=options, start=quiet)
 
     with mortal_workers(scheduler, 2, tmp_path), ThreadPoolExecutor(len(tables)) as together:
         list(together.map(run, range(len(tables))))
@@ -224,10 +223,10 @@ def test_studies_that_share_a_cluster_do_not_disturb_each_other(
     assert digest(tmp_path / "out0") == digest(tmp_path / "out2")
 
 
-def test_the_job_does_not_travel_with_chunks(athena_fmu: Path) -> None:
+def test_the_job_is_not_sent_with_chunks(athena_fmu: Path) -> None:
     study = study_of(TABLE)
     job = make_job(study, engine=SLOW, fmu=athena_fmu)
     orders = tuple(Sweep(study).orders(iter(range(120))))
-    per_run = len(pickle.dumps((work_here, job.name, Chunk(orders)))) / len(orders)
+    per_run = len(pickle.dumps((run_chunk, job.name, Chunk(orders)))) / len(orders)
     assert per_run < 200.0  # bytes: its number, point, case, values, seed and control
     assert len(pickle.dumps(job)) > athena_fmu.stat().st_size

@@ -1,4 +1,4 @@
-"""`hexapod study` as it is typed."""
+"""The command `hexapod study`: its output, messages and exit codes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def study_file(folder: Path, text: str) -> Path:
     return file
 
 
-def test_it_says_when_no_run_walked_at_all(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
+def test_a_warning_says_that_no_run_walked(call: Call, athena_fmu: Path, tmp_path: Path) -> None:
     file = study_file(tmp_path, KINEMATIC + "seeds = 4\n[factors]\nfriction.mu = [0.17]\n")
     code, out, err = call(
         "study",
@@ -51,7 +51,7 @@ def test_it_says_when_no_run_walked_at_all(call: Call, athena_fmu: Path, tmp_pat
     )
 
 
-def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(
+def test_a_warning_and_the_report_name_walks_too_short_for_figures(
     call: Call, athena_fmu: Path, tmp_path: Path
 ) -> None:
     mixed = '[factors]\ngait.name = ["tripod", "ripple"]\nscenario = ["walk_flat", "turn"]\n'
@@ -74,11 +74,11 @@ def test_it_says_which_walks_are_too_short_for_figures_as_the_report_does(
         tmp_path, KINEMATIC + GRIP + '[factors]\nscenario = ["walk_flat", "ripple"]\n'
     )
     code, _, err = call(*words[:3], tmp_path / "short", *words[4:])
-    told = "All 2 kinematic walks of ripple are too short for figures"
+    note = "All 2 kinematic walks of ripple are too short for figures"
     assert code == 0
-    assert err.startswith(f"warning: {told}")
-    assert told in (tmp_path / "short" / "report.html").read_text()
-    assert told in call("report", tmp_path / "short")[2]
+    assert err.startswith(f"warning: {note}")
+    assert note in (tmp_path / "short" / "report.html").read_text()
+    assert note in call("report", tmp_path / "short")[2]
     file = study_file(tmp_path, KINEMATIC + 'scenario = "ripple"\n' + GRIP)
     assert call(*words[:3], tmp_path / "none", *words[4:])[2].startswith(
         "warning: The walks are too short for figures"
@@ -95,16 +95,14 @@ def test_one_fmu_for_several_robots_is_refused(
     )
 
 
-def test_a_number_of_workers_that_is_none_is_refused(call: Call, tmp_path: Path) -> None:
+def test_a_negative_number_of_workers_is_refused(call: Call, tmp_path: Path) -> None:
     outcome = call("study", "friction_speed", "-o", tmp_path / "out", "--workers", "-1")
     assert_refused(outcome, "--workers", "not a number of workers", "0 to 4096")
 
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Callable[[str], Path]]:
-    """A file system of its own, whose size can be changed: mounted by root where that is
-    allowed.
-    """
+    """A function that mounts a file system of a size, or changes its size, if it is allowed to."""
     place = tmp_path / "disk"
     place.mkdir()
 
@@ -163,7 +161,7 @@ def run_in(words: list[str]) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
+def test_a_full_disk_stops_the_command_and_with_room_it_is_resumed(
     athena_fmu: Path, tmp_path: Path, small_disk: Callable[[str], Path], call: Call
 ) -> None:
     out = small_disk("150k") / "out"
@@ -173,13 +171,13 @@ def test_a_full_disk_stops_the_command_and_with_room_it_goes_on(
     small_disk("50m")
     code, _, err = call(*fake_study(tmp_path, athena_fmu, out))
     assert code == 0
-    assert "goes on: " in err
+    assert "resumed: " in err
     assert "walked to its end" not in err
     run_quietly(load_study(str(tmp_path / "study.toml")), tmp_path / "roomy", fmu=athena_fmu)
     assert digest(out) == digest(tmp_path / "roomy")
 
 
-def test_a_disk_that_takes_no_more_stops_the_command_and_what_it_took_stays(
+def test_a_disk_that_fills_up_stops_the_command_and_stored_runs_are_kept(
     athena_fmu: Path, tmp_path: Path, call: Call
 ) -> None:
     out = tmp_path / "out"
@@ -189,5 +187,5 @@ def test_a_disk_that_takes_no_more_stops_the_command_and_what_it_took_stays(
     assert 1024 <= kept < 3000
     code, _, err = call(*words)
     assert code == 0
-    assert f"goes on: {kept} of 3000 runs" in err
+    assert f"resumed: {kept} of 3000 runs" in err
     assert stored_runs(out) == 3000

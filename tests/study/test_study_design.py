@@ -1,6 +1,4 @@
-"""The points of a study: the product of a grid, strata that are filled, and the same whatever is
-asked first.
-"""
+"""The points of a study: grids, strata of drawn designs, and independence of the order of calls."""
 
 from __future__ import annotations
 
@@ -52,10 +50,8 @@ def test_a_grid_is_the_product_of_its_factors_the_last_fastest() -> None:
 
 
 def test_a_list_takes_the_factors_side_by_side() -> None:
-    factors = {
-        "friction.mu": [0.3, 0.6, 0.3],
-        "gait.name": ["tripod", "wave", "wave"],
-    }  # in a list a value may come again
+    # in a list values may be repeated
+    factors = {"friction.mu": [0.3, 0.6, 0.3], "gait.name": ["tripod", "wave", "wave"]}
     design = Design(study_of({"design": "list", "factors": factors}))
     assert [design.point(index) for index in range(design.count)] == [
         (0.3, "tripod"),
@@ -80,7 +76,7 @@ def test_sobol_points_fill_squares_too_and_random_ones_do_not() -> None:
 
 
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
-def test_points_are_the_seeds_alone_and_come_in_any_order(design: str) -> None:
+def test_points_depend_on_the_seed_only_and_not_on_the_order_of_calls(design: str) -> None:
     whole = table(drawn(design))
     again = Design(drawn(design))
     for index in (40, 3, 3, 63, 0, 41):
@@ -124,7 +120,7 @@ def test_runs_are_points_then_seeds_then_controls() -> None:
     assert list(sweep.orders(iter([1, 5]))) == [orders[1], orders[5]]
 
 
-def test_a_plan_of_a_hundred_million_runs_is_not_made_beforehand() -> None:
+def test_a_hundred_million_runs_are_not_held_in_memory() -> None:
     sweep = Sweep(drawn("random", points=5 * 10**7))
     assert sweep.count == 10**8
     (order,) = sweep.orders(iter([10**8 - 1]))

@@ -1,6 +1,4 @@
-"""What people see of a study: nothing that was not run, nothing of falls among walks, and every
-interval by its name.
-"""
+"""The figures and the page of a study: they show walks only, and name every interval."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ import numpy as np
 import pytest
 from gains import make_gains
 from matplotlib.figure import Figure
-from studies import KINEMATIC, run_quietly, store_instead, study_of
+from studies import KINEMATIC, replace_stored, run_quietly, study_of
 
 from hexapod_cosim.cosim.cli.studying import report_on
 from hexapod_cosim.cosim.results.comparison import made_change
@@ -58,7 +56,7 @@ def point(
     walked: int = 2,
     pairs: int = 2,
 ) -> Point:
-    """Of a slip by control, other figures 1."""
+    """Returns a point with a slip for each control; all other metrics are 1."""
     means = {
         name: {
             figure: Mean(slip if figure == "slip_per_metre" else 1.0, math.nan, walked)
@@ -93,7 +91,7 @@ def point(
 
 
 def shown(figure: Figure) -> np.ndarray[Any, Any]:
-    """The changes of a heat map."""
+    """Returns the changes that a heat map shows."""
     values = figure.axes[2].images[0].get_array()
     assert values is not None
     return np.ma.getdata(values)
@@ -106,7 +104,7 @@ def walked_points(study: Study, settings: Sequence[Mapping[str, Any]]) -> list[P
     ]
 
 
-def test_a_heat_map_is_of_grids_alone_whose_cells_are_all_run() -> None:
+def test_only_grids_have_a_heat_map() -> None:
     settings = [
         {"friction.mu": 0.3, "command.vx": 0.05, "gait.name": "tripod"},
         {"friction.mu": 0.5, "command.vx": 0.08, "gait.name": "wave"},
@@ -120,14 +118,15 @@ def test_a_heat_map_is_of_grids_alone_whose_cells_are_all_run() -> None:
         }
 
 
-def test_a_cell_without_a_figure_says_why() -> None:
+def test_the_mark_of_a_cell_without_a_value_shows_the_reason() -> None:
     study = study_of(GRID)
     nothing = {"kinematic": math.nan, "compliant": math.nan}
+    # the fourth cell has no run
     points = [
         point(0, {"friction.mu": 0.3, "command.vx": 0.05}, {"kinematic": 0.4, "compliant": 0.1}),
         point(1, {"friction.mu": 0.3, "command.vx": 0.08}, nothing, walked=0, pairs=0),  # fell
         point(2, {"friction.mu": 0.5, "command.vx": 0.05}, nothing),  # too short
-    ]  # and a cell of which nothing is run
+    ]
     figure = heat.heat_map(points, study.factors[0], study.factors[1], study)
     for axes in figure.axes[:3]:
         marks = {
@@ -139,7 +138,7 @@ def test_a_cell_without_a_figure_says_why() -> None:
 
 
 def test_the_change_of_a_cell_is_that_of_its_pairs() -> None:
-    """Of two points in one cell one has no pair: its means do not count."""
+    """One of the two points in a cell has no pair, so its means do not count."""
     study = study_of({"factors": {**GRID["factors"], "gait.name": ["tripod", "wave"]}})
     place = {"friction.mu": 0.3, "command.vx": 0.05}
     points = [
@@ -169,7 +168,10 @@ def test_trials_are_counted_in_whole_numbers() -> None:
 
 @pytest.fixture
 def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Runs a study without a walk and writes its report. Returns the page."""
+    """A function that runs a study, writes its report and returns the page.
+
+    `lost`: number of stored runs that are removed before.
+    """
 
     def made(table: Mapping[str, Any], *, lost: int = 0, pictures: bool = False) -> str:
         if not pictures:
@@ -179,7 +181,7 @@ def folder(athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         out = tmp_path / "out"
         run_quietly(study_of(table), out, fmu=athena_fmu, gains=make_gains(load_robot("athena")))
         if lost:
-            store_instead(study_of(table), out, lambda row: row if row["run"] >= lost else None)
+            replace_stored(study_of(table), out, lambda row: row if row["run"] >= lost else None)
             facts = (out / "run.json").read_text()
             (out / "run.json").write_text(facts.replace('"completed"', '"running"'))
         report_on(out)
@@ -215,7 +217,7 @@ def test_figures_of_all_designs_are_drawn_without_a_warning(
         item.draw().draw_without_rendering()
 
 
-def test_a_page_has_the_files_name_where_the_study_has_no_title_and_speaks_of_pairs_where_there_are_two_controls(
+def test_a_page_has_the_files_name_without_a_title_and_pairs_only_with_two_controls(
     folder: Any,
 ) -> None:
     page = folder({**KINEMATIC, "seeds": 2, "factors": {"friction.mu": [0.3, 0.19]}})
@@ -233,11 +235,10 @@ def test_sobol_points_that_are_no_power_of_two_have_a_note(folder: Any) -> None:
 
 def test_the_headline_has_an_interval_over_seeds_and_a_range_over_points(folder: Any) -> None:
     page = folder({"seeds": 3, **GRID}).partition("<h2>")[0]
-    assert re.search(
-        r"([+-]\d+%) \.\. \1 by point", page
-    )  # the fake engine changes all figures by one share
+    # the fake engine changes all metrics by the same share
+    assert re.search(r"([+-]\d+%) \.\. \1 by point", page)
     assert "95 %" not in page
-    assert "no interval of how sure" in page
+    assert "which is no confidence interval" in page
 
 
 def test_the_headline_of_one_point_has_its_interval(folder: Any) -> None:

@@ -1,6 +1,4 @@
-"""A file of results away from its folder says what made it, and in the same bytes however it was
-made.
-"""
+"""The metadata of result files say what made them, in the same bytes for any workers."""
 
 from __future__ import annotations
 
@@ -32,7 +30,7 @@ TABLE: dict[str, Any] = {
 
 @pytest.fixture
 def facts(athena_fmu: Path, tmp_path: Path) -> Mapping[str, str]:
-    """The metadata of a small study's results, by name; its folder is `out`."""
+    """Returns the metadata of a small study's results, by name; its folder is `out`."""
     run_quietly(
         study_of(TABLE), tmp_path / "out", fmu=athena_fmu, gains=make_gains(load_robot("athena"))
     )

@@ -1,4 +1,4 @@
-"""Study files: what they may say, and what is said of what they may not."""
+"""Study files: what is read from them, and the messages for mistakes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def test_studies_that_come_with_the_package_can_be_read(name: str) -> None:
 def test_names_with_dots_need_no_quotes_and_units_are_kept(tmp_path: Path) -> None:
     file = tmp_path / "one.toml"
     file.write_text(
-        '[set]\ngait.period = 0.5\n[factors]\nfriction.mu = [0.3]\nterrain.incline = {linspace = [0, 10, 3], unit = "deg"}\n'
+        "[set]\ngait.period = 0.5\n[factors]\nfriction.mu = [0.3]\n"
+        'terrain.incline = {linspace = [0, 10, 3], unit = "deg"}\n'
     )
     study = load_study(file)
     assert [factor.name for factor in study.factors] == ["friction.mu", "terrain.incline"]
@@ -102,7 +103,10 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
             {"factors": {"gains.slip.kp": [1.0]}, "controls": ["kinematic"]},
             ["a gain that no run has", 'add "compliant"'],
         ),
-        ({"factors": {"friction.mu": {"values": [1.0], "relative": True}}}, ["relative to what?"]),
+        (
+            {"factors": {"friction.mu": {"values": [1.0], "relative": True}}},
+            ["a relative factor that is no gain"],
+        ),
         (
             {"design": "list", "factors": {"friction.mu": [0.1, 0.2], "command.vx": [0.1]}},
             ["different lengths", 'design = "grid"'],
@@ -219,7 +223,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
                 "points": 4,
                 "factors": {"friction.mu": {"uniform": [0.1, 1e308]}},
             },
-            ["friction.mu", "so far apart"],
+            ["friction.mu", "ends that are closer"],
         ),
         (
             {"factors": {"friction.mu": {"linspace": [0.3, 0.3, 2]}}},
@@ -275,7 +279,7 @@ def test_several_seeds_differ_by_the_standard_variation_and_one_seed_is_the_plai
         ),
     ],
 )
-def test_a_mistake_is_named_with_its_place_and_a_way_out(
+def test_a_mistake_is_named_with_its_place_and_a_fix(
     table: dict[str, Any], parts: list[str]
 ) -> None:
     with pytest.raises(HexapodError) as refused:
@@ -340,12 +344,10 @@ name = "tripod"
         ('[parameters]\n"torso.mass" = 2.6\n', {}),
     ],
 )
-def test_a_held_out_scenario_is_told_from_training_by_its_walk_not_by_its_name(
+def test_a_held_out_scenario_is_compared_with_training_by_its_walk_not_its_name(
     tmp_path: Path, more: str, changes: dict[str, Any]
 ) -> None:
-    """A file that names the robot by a path, seconds by a unit, and settings that the study puts
-    the same in either walk.
-    """
+    """The file differs from the training scenario in its name, units and irrelevant settings."""
     (tmp_path / "own.toml").write_text(
         (Path(load_robot.__code__.co_filename).parent / "athena.toml").read_text()
     )

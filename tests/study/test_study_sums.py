@@ -1,6 +1,4 @@
-"""Sums of runs: those of the textbook, whichever runs are missing and however they are cut, in
-memory that does not grow with them.
-"""
+"""Sums of runs equal the textbook formulas for any missing runs and any cuts, in bounded memory."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ BOTH = TWO.run_controls
 
 
 def made_rows(study: Study, points: Sequence[int], *, seed: int = 0) -> list[dict[str, Any]]:
-    """All runs of some points: one in five falls, one figure in ten is missing."""
+    """Returns all runs of points; one run in five falls, and one metric in ten is missing."""
     drawn = np.random.default_rng([seed, *points])
     found = []
     for point in points:
@@ -57,7 +55,7 @@ def made_rows(study: Study, points: Sequence[int], *, seed: int = 0) -> list[dic
 
 
 def some_of(rows: Sequence[dict[str, Any]], *, share: float, seed: int) -> list[dict[str, Any]]:
-    """As of a study that is not done: runs are missing anywhere."""
+    """Returns a random share of the rows, as of a study that is not finished."""
     kept = np.random.default_rng(seed).random(len(rows)) < share
     return [row for row, keep in zip(rows, kept, strict=True) if keep]
 
@@ -83,7 +81,7 @@ def summed(
 
 
 def by_hand(rows: Sequence[dict[str, Any]], name: str) -> Change:
-    """Seed by seed and point by point, where both walked."""
+    """Returns the change over the pairs of which both runs walked, computed by pairs."""
     found = {
         (row["point"], row["case"], row["seed"], row["control"]): row[name]
         for row in rows
@@ -152,9 +150,8 @@ def test_means_and_counts_are_of_all_walks_with_a_pair_or_without(share: float) 
 
 
 def test_the_control_of_the_first_run_does_not_turn_a_change_round() -> None:
-    rows = [{**row, "walked": True} for row in made_rows(TWO, [0])][
-        1:
-    ]  # the first run, a kinematic one, is missing
+    rows = [{**row, "walked": True} for row in made_rows(TWO, [0])]
+    del rows[0]  # a kinematic run
     (point,), overall = summed(rows)
     assert (
         point.changes["peak_force"].before
@@ -212,9 +209,10 @@ def test_sums_of_numbers_far_from_zero_keep_their_spread() -> None:
                 if row["point"] == point.number and row["control"] == BOTH[0]
             ]
         )
+        # the values of 1e8 are doubles, of 16 digits
         assert point.means[BOTH[0]]["peak_force"].half_width == pytest.approx(
             half_width_of(values), rel=1e-6
-        )  # of 1e8 in doubles
+        )
 
 
 def test_a_columns_table_says_what_its_points_say() -> None:
@@ -242,8 +240,8 @@ def test_a_columns_table_says_what_its_points_say() -> None:
 def test_memory_does_not_grow_with_the_runs_nor_with_the_kinds_of_failures(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A point of very many seeds, half of them failing, each for a reason of its own."""
-    monkeypatch.setattr("hexapod_cosim.cosim.study.store.table.MOST_KINDS", 100)
+    """A point has very many seeds, half of which fail, each for another reason."""
+    monkeypatch.setattr("hexapod_cosim.cosim.study.store.table.MAX_KINDS", 100)
 
     def peak(count: int) -> int:
         tally = Tally(TWO)
@@ -272,7 +270,6 @@ def test_memory_does_not_grow_with_the_runs_nor_with_the_kinds_of_failures(
         assert len(tally.overall().failures) <= 30
         return used
 
-    peak(2)  # what is imported on the way
-    assert peak(80) < 1.1 * peak(
-        20
-    )  # 20 tables bring more kinds than are told apart; reasons are longer by some bytes
+    peak(2)  # imports modules
+    # 20 tables have more than MAX_KINDS kinds of failures; the reasons of 80 are some bytes longer
+    assert peak(80) < 1.1 * peak(20)

@@ -1,6 +1,4 @@
-"""What people read of a study: means, intervals and paired changes are those of the textbook,
-failures are counted by reason.
-"""
+"""The tables of a study: means, intervals and changes by the textbook, failures by reason."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 from gains import make_gains
 from scipy import stats
-from studies import FAKE, KINEMATIC, rows, run_quietly, store_instead, study_of
+from studies import FAKE, KINEMATIC, replace_stored, rows, run_quietly, study_of
 
 from hexapod_cosim.controller import save_gains
 from hexapod_cosim.cosim.cli.studying import report_on
@@ -32,7 +30,7 @@ Call = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture
 def compared(athena_fmu: Path, tmp_path: Path) -> Path:
-    """The folder of a study of both controls, 4 points and 3 seeds."""
+    """Returns the folder of a study of both controls, 4 points and 3 seeds."""
     gains = make_gains(load_robot("athena"))
     run_quietly(
         study_of({"seeds": 3, "factors": FACTORS}), tmp_path / "out", fmu=athena_fmu, gains=gains
@@ -118,7 +116,8 @@ def test_the_command_runs_a_study_and_its_report_holds_everything(
 ) -> None:
     file, gains, out = tmp_path / "mine.toml", tmp_path / "gains.toml", tmp_path / "out"
     file.write_text(
-        'title = "Mine <&>"\nseeds = 2\n[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n'
+        'title = "Mine <&>"\nseeds = 2\n'
+        "[factors]\nfriction.mu = [0.17, 0.5, 0.7]\ncommand.vx = [0.05, 0.08]\n"
     )
     save_gains(make_gains(load_robot("athena")), gains)
     code, told, err = call(
@@ -223,7 +222,7 @@ def optimisation(**changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "random"])
-def test_an_optimisation_stopped_and_started_again_asks_and_finds_the_same(
+def test_a_resumed_optimisation_has_the_same_trials_and_optimum(
     athena_fmu: Path, tmp_path: Path, sampler: str
 ) -> None:
     gains, study = make_gains(load_robot("athena")), study_of(optimisation(sampler=sampler))
@@ -258,9 +257,8 @@ def test_the_best_trial_is_the_least_and_held_out_runs_come_after_all_trials(
     assert {row["case"] for row in held} == {"ripple", "turn"}
     assert {row["case"] for row in training} == {"walk_flat", "push"}
     assert {row["point"] for row in held} == {12, best["trial"]}
-    assert {row["friction.mu"] for row in found if row["point"] == 12} == {
-        None
-    }  # before: nothing is set
+    # point 12 is before the optimisation: no variable is set
+    assert {row["friction.mu"] for row in found if row["point"] == 12} == {None}
 
 
 def test_what_the_best_trial_gains_is_paired_and_by_hand(athena_fmu: Path, tmp_path: Path) -> None:
@@ -300,9 +298,7 @@ def test_what_the_best_trial_gains_is_paired_and_by_hand(athena_fmu: Path, tmp_p
 def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
-    """The store is left with the first batch and with held-out runs whose figures would turn any
-    search and any choice.
-    """
+    """The store keeps the first batch, and held-out runs whose metrics would change the choice."""
     gains, study, out = (
         make_gains(load_robot("athena")),
         study_of(optimisation(sampler="tpe", trials=15)),
@@ -318,7 +314,7 @@ def test_held_out_runs_do_not_reach_the_optimiser_not_even_when_a_study_goes_on(
             return row if row["point"] < 3 else None
         return {**row, "slip_per_metre": row["slip_per_metre"] - 1e6}
 
-    store_instead(study, out, other)
+    replace_stored(study, out, other)
     assert [
         row for row in run_quietly(study, out, fmu=athena_fmu, gains=gains) if row["seed"] >= 10
     ] == whole

@@ -1,4 +1,4 @@
-"""Who runs a study does not show in it: this process' workers, a cluster's, those that die."""
+"""Results do not depend on the workers of a study: local ones, a cluster's, or ones that die."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from threading import Event, Thread
 from typing import Any
 
 import pytest
-from dask_cluster import lasting_workers, scheduling
+from dask_cluster import dask_scheduler, restarting_workers
 from gains import make_gains
 from studies import FAKE, KINEMATIC, SLOW, SMALL, digest, quiet, rows, run_quietly, study_of
 from study_engines import DEATHS_FILE, Counting
@@ -24,11 +24,11 @@ from study_engines import DEATHS_FILE, Counting
 from hexapod_cosim.cosim.master.loop import FAILED
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
-from hexapod_cosim.cosim.study.execute.conduct import DEAD
-from hexapod_cosim.cosim.study.execute.crew import DEATHS
+from hexapod_cosim.cosim.study.execute.chunk import MAX_DEATHS
+from hexapod_cosim.cosim.study.execute.dispatch import DIED
 from hexapod_cosim.cosim.study.execute.engines import ENGINES
 from hexapod_cosim.cosim.study.execute.job import make_job
-from hexapod_cosim.cosim.study.execute.scratch import JOB, LOCK, PREFIX, scratch
+from hexapod_cosim.cosim.study.execute.scratch import JOB, LOCK, PREFIX, scratch_folder
 from hexapod_cosim.cosim.study.execute.study import Options, run_study
 from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.cosim.study.store.columns import FIGURES
@@ -39,7 +39,7 @@ WALK: dict[str, Any] = {
     "factors": {"friction.mu": [0.5, 0.8], "gains.slip.kp": [0.1, 0.3]},
 }
 
-WAIT = 120.0  # s    a busy machine may take
+TIMEOUT = 120.0  # s    for what takes some seconds on an idle machine
 LONG = """
 controls = ["kinematic"]
 seeds = 2000
@@ -48,7 +48,7 @@ seeds = 2000
 
 @pytest.fixture(scope="module")
 def deaths(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Where engines say that they end their process."""
+    """The file to which engines write before they end their process."""
     file = tmp_path_factory.mktemp("deaths") / "deaths.txt"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(DEATHS_FILE, str(file))
@@ -57,11 +57,9 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory: pytest.TempPathFactory, deaths: Path) -> Iterator[str]:
-    """The address of a Dask scheduler with two worker processes on loopback, which are begun
-    anew when they die.
-    """
+    """Starts a scheduler with two workers that restart when they die; yields its address."""
     folder = tmp_path_factory.mktemp("dask")
-    with scheduling(folder) as (address, _), lasting_workers(address, 2, folder):
+    with dask_scheduler(folder) as (address, _), restarting_workers(address, 2, folder):
         yield address
 
 
@@ -98,7 +96,7 @@ def test_a_run_of_a_study_is_the_run_by_itself(athena_fmu: Path, tmp_path: Path)
     assert {name: row[name] for name in FIGURES} == figures
 
 
-def test_a_study_goes_from_this_machine_to_a_cluster_and_back(
+def test_a_study_is_resumed_on_a_cluster_and_on_this_machine_again(
     athena_fmu: Path, tmp_path: Path, scheduler: str
 ) -> None:
     study = study_of({**KINEMATIC, "seeds": 40, "factors": {"friction.mu": [0.3, 0.5, 0.7]}})
@@ -108,7 +106,7 @@ def test_a_study_goes_from_this_machine_to_a_cluster_and_back(
                 study,
                 tmp_path / "moved",
                 options=Options(engine=SLOW, fmu=athena_fmu, **place),
-                begun=_stop_after(20),
+                start=_stop_after(20),
             )
     run_quietly(study, tmp_path / "moved", engine=SLOW, fmu=athena_fmu)
     run_quietly(study, tmp_path / "stayed", engine=SLOW, fmu=athena_fmu)
@@ -134,16 +132,16 @@ def test_a_run_that_ends_its_worker_is_a_failure_with_a_reason_and_the_others_go
     place = {"scheduler": request.getfixturevalue("scheduler")} if cluster else {"workers": 1}
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.3, 0.5, 0.13, 0.6]}, "seeds": 2})
     found = run_quietly(study, tmp_path / "out", fmu=athena_fmu, **place)
-    died = [row for row in found if row["status"] == DEAD]
+    died = [row for row in found if row["status"] == DIED]
     assert [(row["friction.mu"], row["seed"]) for row in died] == [(0.13, 0), (0.13, 1)]
-    assert all(f"{DEATHS} times" in row["reason"] for row in died)
+    assert all(f"{MAX_DEATHS} times" in row["reason"] for row in died)
     assert sum(row["walked"] for row in found) == len(found) - 2
     assert [row["run"] for row in found] == list(range(8))
     counted = Counter(deaths.read_text().splitlines())
     assert set(counted) == {"kinematic 0", "kinematic 1"}
-    # by itself; before that among others, or unnoticed: a worker that ends right after a run may
-    # take that one's result with it
-    assert all(DEATHS <= number <= 2 * DEATHS for number in counted.values())
+    # more than MAX_DEATHS: a run may also end its worker among others, or together with the result
+    # of the run before it
+    assert all(MAX_DEATHS <= number <= 2 * MAX_DEATHS for number in counted.values())
 
 
 def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Path) -> None:
@@ -160,14 +158,14 @@ def test_workers_killed_from_outside_cost_no_run(athena_fmu: Path, tmp_path: Pat
         study,
         tmp_path / "out",
         options=Options(engine=SLOW, fmu=athena_fmu, workers=2),
-        begun=lambda _total, _done: tell,
+        start=lambda _total, _done: tell,
     )
     assert len(killed) == 2
     assert all(row["walked"] for row in rows(tmp_path / "out"))
     assert len(rows(tmp_path / "out")) == 200
 
 
-def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(
+def test_workers_killed_as_soon_as_they_start_cost_no_run_and_do_not_block(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     study = study_of({**KINEMATIC, "seeds": 10, "factors": {"friction.mu": [0.3, 0.5]}})
@@ -190,7 +188,7 @@ def test_workers_killed_as_soon_as_they_are_there_cost_no_run_and_no_time(
     )
     killer.start()
     runner.start()
-    runner.join(timeout=WAIT)
+    runner.join(timeout=TIMEOUT)
     end.set()
     assert not runner.is_alive()
     assert len(killed) == 2
@@ -207,7 +205,7 @@ def test_nothing_is_left_of_what_workers_unpacked(
     for folder in (dead, young):
         folder.mkdir()
     (dead / LOCK).touch()
-    with scratch(make_job(study_of(KINEMATIC), engine=FAKE, fmu=athena_fmu)) as alive:
+    with scratch_folder(make_job(study_of(KINEMATIC), engine=FAKE, fmu=athena_fmu)) as alive:
         assert not dead.exists()
         run_quietly(study_of(KINEMATIC), tmp_path / "out", fmu=athena_fmu, workers=1)
         assert alive.exists()
@@ -218,7 +216,7 @@ def test_nothing_is_left_of_what_workers_unpacked(
     assert [path.name for path in place.iterdir()] == [young.name]
 
 
-def test_a_workers_folder_goes_with_it_when_its_program_is_killed(
+def test_workers_remove_their_folder_when_their_program_is_killed(
     athena_fmu: Path, tmp_path: Path
 ) -> None:
     place, file = tmp_path / "temporary", tmp_path / "study.toml"
@@ -246,7 +244,7 @@ def test_a_workers_folder_goes_with_it_when_its_program_is_killed(
 
 
 def _wait_until(holds: Callable[[], bool]) -> None:
-    end = time.monotonic() + WAIT
+    end = time.monotonic() + TIMEOUT
     while not holds():
         assert time.monotonic() < end
         time.sleep(0.02)
@@ -256,12 +254,12 @@ def _children() -> set[int]:
     return {child.pid for child in multiprocessing.active_children() if child.pid is not None}
 
 
-def test_workers_that_cannot_work_at_all_end_the_study(
+def test_workers_that_only_die_end_the_study(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.conduct.USELESS", 1)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.dispatch.MAX_DEATHS_IN_A_ROW", 1)
     study = study_of({**KINEMATIC, "factors": {"friction.mu": [0.13]}, "seeds": 9})
-    with pytest.raises(StudyError, match="no worker lives to finish a run"):
+    with pytest.raises(StudyError, match="every worker dies before it has finished a run"):
         run_quietly(study, tmp_path / "out", fmu=athena_fmu, workers=2)
     assert not list((tmp_path / "out" / "runs").iterdir())
 
@@ -269,55 +267,54 @@ def test_workers_that_cannot_work_at_all_end_the_study(
 def test_a_scheduler_that_is_not_there_is_named(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.cluster.CONNECT", "1s")
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.cluster.CONNECT_TIMEOUT", "1s")
     with pytest.raises(StudyError, match=r"--scheduler: no scheduler answers.*tcp://127.0.0.1:9"):
         run_study(
             study_of({**SMALL, **KINEMATIC}),
             tmp_path,
             options=Options(fmu=athena_fmu, scheduler="tcp://127.0.0.1:9"),
-            begun=quiet,
+            start=quiet,
         )
 
 
 def test_a_worker_with_other_versions_is_refused(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9"
-    )  # here, not in the worker
+    # in this process, not in the worker
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.job.package_version", lambda: "9.9")
     with pytest.raises(
-        StudyError, match=r"not like the machine that sends.*hexapod-cosim 9.9, here"
+        StudyError, match=r"differs from the machine that sends.*hexapod-cosim 9.9, here"
     ):
         run_quietly(study_of({**SMALL, **KINEMATIC}), tmp_path, fmu=athena_fmu, workers=2)
 
 
 @pytest.mark.parametrize("workers", [0, 1])
-def test_mistakes_of_an_engine_are_results_and_the_study_goes_on(
+def test_errors_in_an_engine_are_results_and_the_study_continues(
     athena_fmu: Path, tmp_path: Path, workers: int
 ) -> None:
-    mistakes = {
+    errors = {
         0.21: "LinAlgError: Singular matrix",
         0.22: "ValueError: operands could not be broadcast",
         0.23: "MemoryError: no more",
         0.24: "SourError: nobody can send <object object at 0x...>",
         0.25: "SystemExit: enough",
-        0.26: "BadTextError: it cannot say what",
+        0.26: "BadTextError: its text cannot be read",
         0.27: "TypeError: the engine gave str, expected a Summary",
     }
-    study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *mistakes, 0.5]}})
+    study = study_of({**KINEMATIC, "seeds": 1, "factors": {"friction.mu": [0.3, *errors, 0.5]}})
     first, *bad, last = run_quietly(
         study, tmp_path / "out", engine="study_engines:Buggy", fmu=athena_fmu, workers=workers
     )
     assert first["walked"]
     assert last["walked"]
-    for row, expected in zip(bad, mistakes.values(), strict=True):
+    for row, expected in zip(bad, errors.values(), strict=True):
         assert row["status"] == FAILED
         assert row["reason"].startswith(expected)
         assert row["slip_per_metre"] is None
     assert "(study_engines.py, line" in bad[2]["reason"]
 
 
-def test_a_run_that_was_made_before_is_not_made_again(
+def test_a_run_with_equal_settings_is_not_repeated(
     athena_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table = {"seeds": 2, "factors": {"gains.slip.kp": [0.1, 0.2, 0.3], "friction.mu": [0.3, 0.5]}}
@@ -332,7 +329,7 @@ def test_a_run_that_was_made_before_is_not_made_again(
         "compliant": 3 * 2 * 2,
     }
     Counting.asked.clear()
-    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.worker.MOST_KNOWN", 0)
+    monkeypatch.setattr("hexapod_cosim.cosim.study.execute.worker.MAX_KNOWN", 0)
     assert run_quietly(study_of(table), tmp_path / "made", **options) == kept
     assert len(Counting.asked) == 24
     assert digest(tmp_path / "kept") == digest(tmp_path / "made")

@@ -1,9 +1,8 @@
-"""Workers of a Dask cluster, which may come, go and die while a study runs. Each gets the job once;
-the scheduler sees chunks.
+"""Executes the chunks of a study on the workers of a Dask cluster, which may join, leave and die.
 
-Chunks are handed to workers by name rather than to whichever the scheduler likes. So it is known
-what a worker that died was at, the scheduler does not try it again by itself, and a run that ends
-its worker costs as many of them as on one machine.
+Chunks are assigned to workers by name; Dask's scheduler does not choose. So it is known which
+chunk a dead worker was running, the scheduler does not retry it by itself, and a run that ends
+its worker costs as many workers as on one machine.
 """
 
 from __future__ import annotations
@@ -20,201 +19,202 @@ from typing import Any
 
 from hexapod_cosim.cosim.common.events import EventSink
 from hexapod_cosim.cosim.common.installation import install_extra
-from hexapod_cosim.cosim.study.execute.cluster_worker import job_plugin, work_here
-from hexapod_cosim.cosim.study.execute.crew import IN_FLIGHT, Chunk, Returned
+from hexapod_cosim.cosim.run.worker_pool import TASKS_PER_WORKER, Finished
+from hexapod_cosim.cosim.study.execute.chunk import Chunk, FinishedChunk
+from hexapod_cosim.cosim.study.execute.cluster_worker import job_plugin, run_chunk
 from hexapod_cosim.cosim.study.execute.job import Job
 from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.models import HexapodError
 
-CONNECT = "10s"  # until a scheduler that does not answer is given up
-PATIENCE = 60.0  # s    without any worker, until the study stops
-LOOK = (
-    1.0  # s    between looks at who is there; the scheduler also tells, but a message may be lost
-)
-# s    for a chunk's results to travel, until it is looked at whether their worker is still there
-FETCH = 5.0
-COME_AND_GO = ("add-worker", "remove-worker")
-OURS = "hexapod-"  # begins the names of jobs, which their client's ends
+CONNECT_TIMEOUT = "10s"
+NO_WORKER_TIMEOUT = 60.0  # s    without any worker, after which the study stops
+# s    between requests for the list of workers: the scheduler announces changes as well, but a
+# message may be lost
+CHECK_INTERVAL = 1.0
+FETCH_TIMEOUT = 5.0  # s    for the transfer of a chunk's results, before the worker is checked
+WORKER_EVENTS = ("add-worker", "remove-worker")
+JOB_PREFIX = "hexapod-"  # of the names of jobs, followed by their client's
 DIED = "its worker of the cluster died"
-AGAIN = "start the study again when it is back: it goes on, all runs stored so far are kept"
+FIX_RESUME = "start the study again when it is back: it goes on, all runs stored so far are kept"
 
 
 @dataclass(frozen=True)
-class _Gone:
-    """A worker that is not there any more."""
+class _RemovedWorker:
+    """The event that a worker has left the cluster."""
 
     address: str
-    expected: bool = False  # told to go, rather than ended by what it was at
+    expected: bool = False  # whether it was told to leave
 
 
-class Cluster:
-    """The workers of a connected client."""
+class ClusterExecutor:
+    """Runs chunks on the workers that a connected client sees."""
 
-    def __init__(self, client: Any, job: Job, say: EventSink) -> None:
-        self._client, self._job, self._say = client, job.name, say
-        self._lanes: dict[
-            str, deque[Any]
-        ] = {}  # by worker, the futures of chunks it was given, in their order
-        self._chunks: dict[
-            Any, tuple[str, Chunk]
-        ] = {}  # by future, its worker and what it was asked for
-        self._waiting: deque[Chunk] = deque()
+    def __init__(self, client: Any, job: Job, events: EventSink) -> None:
+        self._client, self._job, self._event_sink = client, job.name, events
+        # by worker, the futures of its chunks in the order of their submission
+        self._queues: dict[str, deque[Any]] = {}
+        # by future, its worker and chunk
+        self._chunks: dict[Any, tuple[str, Chunk]] = {}
+        self._waiting: deque[Chunk] = deque()  # chunks without a worker
         self._numbers = count()
-        self._news: SimpleQueue[Any] = (
-            SimpleQueue()
-        )  # futures that are done and workers that are gone, from Dask's threads
-        self._looked, self._seen, self._missed = -LOOK, monotonic(), False
-        client.subscribe_topic("all", self._hear)
-        self._look()
+        # finished futures and removed workers, from Dask's threads
+        self._events: SimpleQueue[Any] = SimpleQueue()
+        self._last_check = -CHECK_INTERVAL  # s
+        self._last_worker = monotonic()  # s    when there was a worker
+        self._warned = False  # that there are no workers
+        client.subscribe_topic("all", self._on_scheduler_event)
+        self._check_workers()
 
     @property
     def size(self) -> int:
-        """Workers now; they may become more or fewer. Threads of one would wait for each other."""
-        return max(len(self._lanes), 1)
+        """Number of workers now, at least 1. A worker runs one chunk, whatever its threads."""
+        return max(len(self._queues), 1)
 
-    def hand_in(self, chunk: Chunk) -> None:
-        """To the worker with the least to do, as soon as there is one."""
+    def submit(self, chunk: Chunk) -> None:
+        """Queues a chunk for the worker with the shortest queue, when there is a worker."""
         self._waiting.append(chunk)
-        self._hand_out()
+        self._assign()
 
-    def take(self) -> list[Returned]:
-        """Waits until a chunk is back. Raises StudyError when the scheduler is gone, or all
-        workers are for too long.
+    def wait(self) -> list[FinishedChunk]:
+        """Waits until a chunk is finished.
+
+        Raises StudyError when the scheduler is gone, or all workers are for too long.
         """
         while True:
-            found = [returned for news in self._heard() for returned in self._told(news)]
-            self._look()
-            self._hand_out()
-            if found:
-                return found
+            finished = [item for event in self._next_events() for item in self._handle(event)]
+            self._check_workers()
+            self._assign()
+            if finished:
+                return finished
 
     def close(self) -> None:
-        """Calls back what is still out."""
+        """Cancels the chunks that are not finished."""
         self._client.cancel(list(self._chunks))
 
-    def _hear(self, event: Any) -> None:
-        """What the scheduler tells everybody, in Dask's thread."""
-        _, told = event
-        if told.get("action") == "remove-worker":
-            self._news.put(_Gone(told["worker"], expected=bool(told.get("expected"))))
-        if told.get("action") in COME_AND_GO:
-            self._looked = -LOOK  # at once
+    def _on_scheduler_event(self, event: Any) -> None:
+        """Receives a message of the scheduler, in Dask's thread."""
+        _, message = event
+        if message.get("action") == "remove-worker":
+            expected = bool(message.get("expected"))
+            self._events.put(_RemovedWorker(message["worker"], expected=expected))
+        if message.get("action") in WORKER_EVENTS:
+            self._last_check = -CHECK_INTERVAL  # the next check is due
 
-    def _heard(self) -> list[Any]:
-        """All news, after waiting for some."""
-        news = []
+    def _next_events(self) -> list[Any]:
+        """Waits for an event, for a while, and returns all that there are."""
+        events = []
         with suppress(Empty):
-            news.append(self._news.get(timeout=LOOK / 4))
-            news.extend(self._news.get_nowait() for _ in range(self._news.qsize()))
-        return news
+            events.append(self._events.get(timeout=CHECK_INTERVAL / 4))
+            events.extend(self._events.get_nowait() for _ in range(self._events.qsize()))
+        return events
 
-    def _told(self, news: Any) -> list[Returned]:
-        return self._without(news) if isinstance(news, _Gone) else self._back(news)
+    def _handle(self, event: Any) -> list[FinishedChunk]:
+        return self._removed(event) if isinstance(event, _RemovedWorker) else self._done(event)
 
-    def _look(self) -> None:
-        """Sees who is there, now and then."""
-        if monotonic() - self._looked < LOOK:
+    def _check_workers(self) -> None:
+        """Compares the queues with the workers of the cluster, when a check is due."""
+        if monotonic() - self._last_check < CHECK_INTERVAL:
             return
-        self._looked = monotonic()  # first: what is told meanwhile asks for another look
+        self._last_check = monotonic()  # first: an event meanwhile makes another check due
         try:
             if self._client.status != "running":
-                raise lost(f"the client is {self._client.status}")
-            here = self._client.nthreads()
+                raise cluster_lost(f"the client is {self._client.status}")
+            workers = self._client.nthreads()
         except (OSError, RuntimeError) as error:
-            raise lost(f"{type(error).__name__}: {error}") from error
-        for address in here:
-            self._lanes.setdefault(address, deque())
-        for address in set(self._lanes) - set(here):
-            self._news.put(_Gone(address))
-        self._bear_with(bool(here))
+            raise cluster_lost(f"{type(error).__name__}: {error}") from error
+        for address in workers:
+            self._queues.setdefault(address, deque())
+        for address in set(self._queues) - set(workers):
+            self._events.put(_RemovedWorker(address))
+        self._check_timeout(bool(workers))
 
-    def _bear_with(self, some: bool) -> None:
-        """Waits for workers for a while, and says so."""
+    def _check_timeout(self, any_worker: bool) -> None:
+        """Warns that there are no workers, and raises StudyError after NO_WORKER_TIMEOUT."""
         now = monotonic()
-        if some:
-            self._seen, self._missed = now, False
-        elif not self._missed:
-            self._missed = True
-            self._say(f"the cluster has no workers: waiting for some, {PATIENCE:g} s at most")
-        elif now - self._seen > PATIENCE:
+        if any_worker:
+            self._last_worker, self._warned = now, False
+        elif not self._warned:
+            self._warned = True
+            self._event_sink(
+                f"the cluster has no workers: waiting for some, {NO_WORKER_TIMEOUT:g} s at most"
+            )
+        elif now - self._last_worker > NO_WORKER_TIMEOUT:
             raise no_workers(self._client.scheduler.address)
 
-    def _hand_out(self) -> None:
-        """Those that may have ended a worker first, each alone on one; while such a one waits
-        nothing else is handed out.
-        """
-        suspects = sorted(self._waiting, key=lambda chunk: not chunk.suspect)
-        self._waiting = deque(suspects)
-        while self._waiting and self._lanes:
-            chunk = self._waiting[0]
-            address = min(self._lanes, key=lambda worker: len(self._lanes[worker]))
-            lane = self._lanes[address]
-            alone = chunk.suspect or any(self._chunks[future][1].suspect for future in lane)
-            if len(lane) >= (1 if alone else IN_FLIGHT):
-                return
-            self._submit(self._waiting.popleft(), address)
+    def _assign(self) -> None:
+        """Submits waiting chunks to workers, suspect ones first.
 
-    def _submit(self, chunk: Chunk, address: str) -> None:
+        A suspect chunk is alone on its worker, and while one waits no other chunk is submitted.
+        """
+        self._waiting = deque(sorted(self._waiting, key=lambda chunk: not chunk.suspect))
+        while self._waiting and self._queues:
+            chunk = self._waiting[0]
+            address = min(self._queues, key=lambda worker: len(self._queues[worker]))
+            queue = self._queues[address]
+            alone = chunk.suspect or any(self._chunks[future][1].suspect for future in queue)
+            if len(queue) >= (1 if alone else TASKS_PER_WORKER):
+                return
+            self._submit_to(address, self._waiting.popleft())
+
+    def _submit_to(self, address: str, chunk: Chunk) -> None:
         key = f"hexapod-{self._job}-{next(self._numbers)}"
         future = self._client.submit(
-            work_here, self._job, chunk, key=key, pure=False, workers=[address], retries=0
+            run_chunk, self._job, chunk, key=key, pure=False, workers=[address], retries=0
         )
         self._chunks[future] = address, chunk
-        self._lanes[address].append(future)
-        future.add_done_callback(self._news.put)
+        self._queues[address].append(future)
+        future.add_done_callback(self._events.put)
 
-    def _without(self, gone: _Gone) -> list[Returned]:
-        """The chunk that a worker ended in; the others it had are handed out again."""
-        lane = self._lanes.pop(gone.address, deque())
-        left = [(future.status, self._chunks.pop(future)[1]) for future in lane]
-        _quietly(self._client.cancel, list(lane))
-        guilty = next(
-            (chunk for status, chunk in left if status == "pending" and not gone.expected), None
-        )
-        self._waiting.extendleft(chunk for _, chunk in reversed(left) if chunk is not guilty)
-        return [] if guilty is None else [Returned(guilty, [], died=DIED)]
+    def _removed(self, worker: _RemovedWorker) -> list[FinishedChunk]:
+        """Returns the chunk in which a worker ended; its other chunks wait for a worker again."""
+        queue = self._queues.pop(worker.address, deque())
+        left = [(future.status, self._chunks.pop(future)[1]) for future in queue]
+        _suppress_errors(self._client.cancel, list(queue))
+        running = (chunk for status, chunk in left if status == "pending")
+        cause = None if worker.expected else next(running, None)
+        self._waiting.extendleft(chunk for _, chunk in reversed(left) if chunk is not cause)
+        return [] if cause is None else [Finished(cause, None, death=DIED)]
 
-    def _back(self, future: Any) -> list[Returned]:
-        """What a future came to; nothing of one that was called back, or whose results are lost
-        or late.
+    def _done(self, future: Any) -> list[FinishedChunk]:
+        """Returns the chunk of a future with its results.
+
+        Returns nothing for a future that was cancelled by us, or whose results are lost or late.
         """
         from distributed import KilledWorker  # noqa: PLC0415
 
         if future not in self._chunks or future.status == "lost":
             return []
         if future.status == "cancelled":
-            raise lost("the connection to its scheduler ended")
-        died, done = "", []
+            raise cluster_lost("the connection to its scheduler ended")
+        death, results = "", None
         try:
-            done = future.result(timeout=FETCH)
+            results = future.result(timeout=FETCH_TIMEOUT)
         except TimeoutError:
-            self._news.put(future)
+            self._events.put(future)
             return []
         except KilledWorker:
-            died = DIED
+            death = DIED
         except HexapodError:
             raise
-        except Exception as error:  # of the chunk, or of fetching what it came to
-            raise (
-                unfit(error)
-                if future.status == "error"
-                else lost(f"{type(error).__name__}: {error}")
-            ) from error
+        except Exception as error:  # of the chunk, or of the transfer of its results
+            if future.status == "error":
+                raise unfit_worker(error) from error
+            raise cluster_lost(f"{type(error).__name__}: {error}") from error
         address, chunk = self._chunks.pop(future)
-        self._lanes[address].remove(future)
+        self._queues[address].remove(future)
         future.release()
-        return [Returned(chunk, done, died=died)]
+        return [Finished(chunk, results, death=death)]
 
 
-def lost(why: str) -> StudyError:
-    """The error for a cluster that is gone."""
+def cluster_lost(reason: str) -> StudyError:
+    """Returns the error for a cluster that cannot be reached any more."""
     return StudyError(
-        "the cluster is gone", got=why, expected="a scheduler with workers", fix=AGAIN
+        "the cluster is gone", got=reason, expected="a scheduler with workers", fix=FIX_RESUME
     )
 
 
-def unfit(error: Exception) -> StudyError:
-    """The error for a worker on which nothing runs."""
+def unfit_worker(error: Exception) -> StudyError:
+    """Returns the error for a worker that can run no chunk."""
     fix = "install the same versions on all machines of the cluster, with what --engine names"
     return StudyError(
         "a worker of the cluster cannot run the study",
@@ -224,40 +224,42 @@ def unfit(error: Exception) -> StudyError:
 
 
 def no_workers(address: str) -> StudyError:
-    """The error for a cluster without any."""
+    """Returns the error for a cluster without workers, given its scheduler's address."""
     fix = f"start some: dask worker {address} --nthreads 1; all runs stored so far are kept"
     return StudyError(
         "the cluster has no workers",
-        got=f"none for {PATIENCE:g} s",
+        got=f"none for {NO_WORKER_TIMEOUT:g} s",
         expected="one at least",
         fix=fix,
     )
 
 
 @contextmanager
-def cluster_crew(job: Job, address: str, say: EventSink) -> Iterator[Cluster]:
-    """The workers behind a scheduler's address. Raises StudyError when there are none."""
+def cluster_executor(job: Job, address: str, events: EventSink) -> Iterator[ClusterExecutor]:
+    """Runs chunks on the cluster of a scheduler, given its address.
+
+    Raises StudyError when no scheduler answers or a worker cannot run the study.
+    """
     client = _connect(address)
-    name = f"{OURS}{client.id}"
+    name = f"{JOB_PREFIX}{client.id}"
     with ExitStack() as opened:
-        opened.enter_context(
-            _silence("distributed")
-        )  # its tracebacks of a scheduler that died: we say what there is to say
-        opened.callback(_quietly, client.close, timeout=5)
-        _quietly(client.run_on_scheduler, _left_behind())
-        opened.callback(_while_there, client, client.unregister_worker_plugin, name)
+        # its tracebacks of a dead scheduler say no more than our error does
+        opened.enter_context(_silenced("distributed"))
+        opened.callback(_suppress_errors, client.close, timeout=5)
+        _suppress_errors(client.run_on_scheduler, _remove_stale_jobs())
+        opened.callback(_while_running, client, client.unregister_worker_plugin, name)
         try:
             client.register_plugin(job_plugin(job), name=name)
-        except Exception as error:  # whatever a worker without the package says
-            raise unfit(error) from error
-        crew = Cluster(client, job, say)
-        opened.callback(_while_there, client, crew.close)
-        yield crew
+        except Exception as error:  # of any kind, from a worker without the package
+            raise unfit_worker(error) from error
+        executor = ClusterExecutor(client, job, events)
+        opened.callback(_while_running, client, executor.close)
+        yield executor
 
 
 @contextmanager
-def _silence(name: str) -> Iterator[None]:
-    """Keeps a library's messages off the terminal for a while."""
+def _silenced(name: str) -> Iterator[None]:
+    """Suppresses the log messages of a library within the block."""
     log = logging.getLogger(name)
     before = log.level
     log.setLevel(logging.CRITICAL + 1)
@@ -267,27 +269,28 @@ def _silence(name: str) -> Iterator[None]:
         log.setLevel(before)
 
 
-def _left_behind() -> Callable[..., Any]:
-    """What takes the jobs of studies that were killed off the cluster; a function within, to
-    travel by value.
-    """
-    ours = OURS
+def _remove_stale_jobs() -> Callable[..., Any]:
+    """Returns a function for the scheduler that removes the jobs of programs that were killed.
 
-    async def clear(dask_scheduler: Any) -> None:
+    The function is a local one, because it must be sent by value.
+    """
+    prefix = JOB_PREFIX
+
+    async def remove(dask_scheduler: Any) -> None:
         for name in list(dask_scheduler.worker_plugins):
-            if name.startswith(ours) and name.removeprefix(ours) not in dask_scheduler.clients:
+            if name.startswith(prefix) and name.removeprefix(prefix) not in dask_scheduler.clients:
                 await dask_scheduler.unregister_worker_plugin(comm=None, name=name)
 
-    return clear
+    return remove
 
 
-def _while_there(client: Any, act: Callable[..., Any], *arguments: Any) -> None:
-    """Leaves a scheduler that is gone alone: it would be waited for."""
+def _while_running(client: Any, act: Callable[..., Any], *arguments: Any) -> None:
+    """Calls a function unless the scheduler is gone: the call would wait for it."""
     if client.status == "running":
-        _quietly(act, *arguments)
+        _suppress_errors(act, *arguments)
 
 
-def _quietly(act: Callable[..., Any], *arguments: Any, **options: Any) -> None:
+def _suppress_errors(act: Callable[..., Any], *arguments: Any, **options: Any) -> None:
     with suppress(Exception):
         act(*arguments, **options)
 
@@ -300,7 +303,7 @@ def _connect(address: str) -> Any:
             "Dask is not installed", fix=install_extra("cluster"), where="--scheduler"
         ) from error
     try:
-        return Client(address, timeout=CONNECT, set_as_default=False)
+        return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         fix = "start one: dask scheduler; it says its address"
         raise StudyError(

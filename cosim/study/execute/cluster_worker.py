@@ -1,50 +1,53 @@
-"""What runs on a worker of a Dask cluster: the job, sent there once, and its chunks."""
+"""What runs on a worker of a Dask cluster: the job, which is sent there once, and its chunks."""
 
 from __future__ import annotations
 
 import asyncio
 from typing import Any
 
-from hexapod_cosim.cosim.study.execute.crew import Chunk
+from hexapod_cosim.cosim.study.execute.chunk import Chunk
 from hexapod_cosim.cosim.study.execute.job import Job
-from hexapod_cosim.cosim.study.execute.worker import close_workshop, work
+from hexapod_cosim.cosim.study.execute.worker import close_job_context, run_orders
 from hexapod_cosim.cosim.study.plan.records import StudyError
-from hexapod_cosim.cosim.study.store.done import Done
+from hexapod_cosim.cosim.study.store.run_result import RunResult
 
-_jobs: dict[str, Job] = {}  # of this process, by their names
+_jobs: dict[str, Job] = {}  # the jobs of this process by name
 
 
 def job_plugin(job: Job) -> Any:
-    """What puts the job on every worker, those too that come later or begin anew, and takes it
-    away again.
+    """Returns the Dask plugin that installs the job on every worker and removes it at the end.
+
+    Workers that join later or restart get it as well.
     """
     from distributed import WorkerPlugin  # noqa: PLC0415  an extra
 
     class JobPlugin(WorkerPlugin):  # type: ignore[misc]  # untyped
         def setup(self, worker: Any) -> None:
-            take_job(job)
+            install_job(job)
 
         async def teardown(self, worker: Any) -> None:
-            await asyncio.to_thread(drop_job, job.name)  # may wait for a run to end
+            await asyncio.to_thread(remove_job, job.name)  # may wait for a run to end
 
     return JobPlugin()
 
 
-def take_job(job: Job) -> None:
-    """Before a job's first chunk: a function of its own, since the plugin travels by value and
-    would bring its own `_jobs`.
+def install_job(job: Job) -> None:
+    """Keeps a job for its chunks.
+
+    This is a function of the module because the plugin is sent by value: within it, `_jobs`
+    would be another dictionary.
     """
     _jobs[job.name] = job
 
 
-def drop_job(job: str) -> None:
-    """Forgets a job; a run of it that is under way ends."""
+def remove_job(job: str) -> None:
+    """Removes a job by its name; a run of it that is under way ends."""
     _jobs.pop(job, None)
-    close_workshop(job)
+    close_job_context(job)
 
 
-def work_here(job: str, chunk: Chunk) -> list[Done]:
-    """Runs a chunk on a worker that has the job. Raises StudyError on one that does not."""
+def run_chunk(job: str, chunk: Chunk) -> list[RunResult]:
+    """Runs a chunk of a job, given by its name. Raises StudyError when the job is not here."""
     if job not in _jobs:
         raise StudyError(
             "a worker of the cluster did not get the study's job",
@@ -55,4 +58,4 @@ def work_here(job: str, chunk: Chunk) -> list[Done]:
         if job not in _jobs:
             raise KeyboardInterrupt
 
-    return work(_jobs[job], chunk.orders, progress)
+    return run_orders(_jobs[job], chunk.orders, progress)

@@ -1,6 +1,4 @@
-"""How one run's figures are made, behind one small protocol: whatever turns a scenario into a
-Summary can take part.
-"""
+"""Engines: the ways to compute the summary of a scenario's run."""
 
 from __future__ import annotations
 
@@ -20,59 +18,62 @@ from hexapod_cosim.models import HexapodError, unknown_name
 
 
 class Engine(Protocol):
-    """Runs scenarios of one robot's FMU."""
+    """Runs scenarios on one robot's FMU."""
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """What a run came to; never raises HexapodError. A KeyboardInterrupt that `progress`
-        raises ends it as INTERRUPTED.
+        """Runs a scenario and returns its summary, also of a run that is refused.
+
+        `progress` is called every few steps with the simulated time [s]. When it raises
+        KeyboardInterrupt, the run ends with the status INTERRUPTED.
         """
         ...
 
     def close(self) -> None:
-        """Frees what it holds."""
+        """Frees the engine's resources."""
         ...
 
 
-Maker = Callable[[Path, Path], Engine]  # from a robot's FMU and a controller's
+EngineFactory = Callable[[Path, Path], Engine]  # of a plant FMU and a controller FMU
 
 
 def compiled_engine(fmu: Path, controller: Path) -> Engine:
-    """The loop in C, driving both FMUs: no Python between a walk's first step and its last."""
+    """Returns the engine that runs both FMUs in the master loop in C."""
     return Walker(fmu=fmu, controller=controller)
 
 
 class PythonEngine:
-    """The master and the controller in Python: the walk that `hexapod simulate` walks."""
+    """Runs the master and the controller in Python, as `hexapod simulate` does."""
 
     def __init__(self, fmu: Path, _controller: Path) -> None:
         self._fmu = fmu
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says."""
+        """Implements Engine.summary()."""
         try:
             return summarise(simulate(scenario, fmu=self._fmu, gains=gains, progress=progress))
         except HexapodError as error:
             return refused(scenario, error)
 
     def close(self) -> None:
-        """Nothing to free."""
+        """Implements Engine.close(): there is nothing to free."""
 
 
-ENGINES: dict[str, Maker] = {"compiled": compiled_engine, "python": PythonEngine}
+ENGINES: dict[str, EngineFactory] = {"compiled": compiled_engine, "python": PythonEngine}
 DEFAULT_ENGINE = "compiled"
 
 
-def engine_named(name: str) -> Maker:
-    """One of ENGINES, or MODULE:NAME of one's own, which all workers must be able to import.
-    Raises StudyError.
+def find_engine(name: str) -> EngineFactory:
+    """Returns an engine's factory by its name in ENGINES, or as MODULE:NAME.
+
+    All workers must be able to import the module. Raises StudyError.
     """
-    module, colon, maker = name.partition(":")
+    module, colon, factory = name.partition(":")
     if not colon:
         if name not in ENGINES:
             raise unknown_name("engine", name, ENGINES, where="--engine", error=StudyError)
         return ENGINES[name]
     try:
-        return cast(Maker, getattr(import_module(module), maker))
+        return cast(EngineFactory, getattr(import_module(module), factory))
     except (ImportError, AttributeError) as error:
         raise StudyError(
             "no such engine",

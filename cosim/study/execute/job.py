@@ -1,6 +1,4 @@
-"""What workers need, made once and sent to each as it is: scenarios, FMUs and robot files as
-bytes, gains, how figures are made.
-"""
+"""Makes the job of a study: what all its workers need, which is sent to each of them once."""
 
 from __future__ import annotations
 
@@ -18,36 +16,32 @@ from uuid import uuid4
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.common.plant_files import code_hash, package_version
 from hexapod_cosim.cosim.export.controller_export import export_controller
-from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.run.controller_setup import make_setup
-from hexapod_cosim.cosim.run.run import chosen_gains, known_robot
+from hexapod_cosim.cosim.run.preparation import Preparation, preparation_key
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table
-from hexapod_cosim.cosim.study.execute.engines import engine_named
+from hexapod_cosim.cosim.study.execute.engines import find_engine
 from hexapod_cosim.cosim.study.plan.records import Case, Factor, Study, StudyError
 from hexapod_cosim.cosim.study.store.manifest import FORMAT
 from hexapod_cosim.models import HexapodError, list_robots, load_robot
 
-CONTROLLER_PERIOD = 0.005  # s    of the FMU as packed, like all its parameters; a run has its own
+CONTROLLER_PERIOD = 0.005  # s    of the exported FMU; each run sets its own
 PACKAGES = ("fmpy", "numpy", "scipy", "control", "pyarrow")
-OF_DESIGN = ("robot", "macro_step", "servo.")  # factors that gains are designed anew for
+DESIGN_FACTORS = ("robot", "macro_step", "servo.")  # a design of gains depends on these
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """Everything but the orders."""
+    """Everything that a worker needs except the orders."""
 
-    name: str  # unlike any other's: studies share a cluster's workers
-
+    name: str  # unique: studies share the workers of a cluster
     cases: Mapping[str, Case]
     factors: tuple[Factor, ...]
-    fmus: Mapping[str, bytes]  # by robot, as scenarios name it
-    controller: bytes  # an FMU whose parameters each run sets
-    robots: Mapping[str, bytes]  # files of robots that do not come with the package, by their path
-    gains: (
-        Gains | None
-    )  # of all compliant runs; None: designed by the worker, for each robot and macro-step
+    fmus: Mapping[str, bytes]  # plant FMUs by robot, as scenarios name it
+    controller: bytes  # the controller FMU, whose parameters each run sets
+    robots: Mapping[str, bytes]  # robot files that are not part of the package, by path
+    gains: Gains | None  # of all compliant runs; None: workers design them
     engine: str
-    environment: Mapping[str, str]
+    environment: Mapping[str, str]  # versions, see environment()
 
 
 def make_job(
@@ -56,11 +50,11 @@ def make_job(
     """Exports the FMUs and designs the gains that all runs share. Raises HexapodError.
 
     Args:
-        engine: name of the way figures are made.
-        fmu: of all runs; by default one is exported for each robot.
-        gains: of all compliant runs; by default designed.
+        engine: name of the engine, or MODULE:NAME.
+        fmu: the plant FMU of all runs; by default one is exported for each robot.
+        gains: the gains of all compliant runs; by default they are designed.
     """
-    engine_named(engine)  # not first in a worker
+    find_engine(engine)  # an unknown name is refused here rather than in the workers
     names = _robots(study)
     if fmu is not None and len(names) > 1:
         fix = "leave --fmu out: each robot's is exported; or split the study by robots"
@@ -71,23 +65,24 @@ def make_job(
             fix=fix,
             where="--fmu",
         )
-    fmus = {name: _fmu(name) if fmu is None else _bytes(fmu) for name in names}
-    files = {name: _bytes(Path(name)) for name in names if name not in list_robots()}
-    return Job(
-        name=uuid4().hex,
-        cases=study.cases,
-        factors=study.factors,
-        fmus=fmus,
-        controller=_controller(),
-        robots=files,
-        gains=_gains(study, gains),
-        engine=engine,
-        environment=environment(study),
-    )
+    files = {name: _read(Path(name)) for name in names if name not in list_robots()}
+    with TemporaryDirectory(prefix="hexapod-study-") as folder:
+        preparation = Preparation(Path(folder), fmu=fmu, gains=gains)
+        return Job(
+            name=uuid4().hex,
+            cases=study.cases,
+            factors=study.factors,
+            fmus={name: _read(preparation.fmu(name)) for name in names},
+            controller=_controller(Path(folder)),
+            robots=files,
+            gains=gains or _common_gains(study, preparation),
+            engine=engine,
+            environment=environment(study),
+        )
 
 
 def _robots(study: Study) -> list[str]:
-    """All that its scenarios name."""
+    """Returns the names of all robots of a study."""
     swept = [
         str(value) for factor in study.factors if factor.name == "robot" for value in factor.values
     ]
@@ -95,18 +90,13 @@ def _robots(study: Study) -> list[str]:
     return list(dict.fromkeys(swept or own))
 
 
-def _fmu(robot: str) -> bytes:
-    with TemporaryDirectory(prefix="hexapod-study-") as folder:
-        return export_fmu(load_robot(robot), Path(folder) / "robot.fmu").read_bytes()
-
-
-def _controller() -> bytes:
+def _controller(folder: Path) -> bytes:
+    """Exports the controller FMU to a folder and returns its content."""
     setup = make_setup(load_robot(list_robots()[0]), control="kinematic", period=CONTROLLER_PERIOD)
-    with TemporaryDirectory(prefix="hexapod-study-") as folder:
-        return export_controller(setup, Path(folder) / "controller.fmu").read_bytes()
+    return export_controller(setup, folder / "controller.fmu").read_bytes()
 
 
-def _bytes(path: Path) -> bytes:
+def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
@@ -115,22 +105,25 @@ def _bytes(path: Path) -> bytes:
         ) from error
 
 
-def _gains(study: Study, given: Gains | None) -> Gains | None:
-    """Designed here when one set does for all runs."""
-    if "compliant" not in study.run_controls or given is not None:
-        return given
-    plans = [
+def _common_gains(study: Study, preparation: Preparation) -> Gains | None:
+    """Designs gains when all compliant runs share one set; returns None otherwise."""
+    if "compliant" not in study.run_controls:
+        return None
+    scenarios = [
         scenario_from_table({**case.table, "control": "compliant"}, where=case.where)
         for case in study.cases.values()
     ]
-    kinds = {(known_robot(plan).hash, plan.macro_step) for plan in plans}
-    if len(kinds) > 1 or any(factor.name.startswith(OF_DESIGN) for factor in study.factors):
+    varied = any(factor.name.startswith(DESIGN_FACTORS) for factor in study.factors)
+    if varied or len(set(map(preparation_key, scenarios))) > 1:
         return None
-    return chosen_gains(plans[0])
+    return preparation.gains(scenarios[0])
 
 
 def environment(study: Study | None = None) -> dict[str, str]:
-    """What figures may depend on beside the job: every worker's must be the same."""
+    """Returns the versions and the platform that results depend on beside the job, by name.
+
+    They must be the same on every worker.
+    """
     names = PACKAGES if study is None or study.optimise is None else (*PACKAGES, "optuna")
     return {
         "hexapod-cosim": package_version(),
@@ -142,8 +135,13 @@ def environment(study: Study | None = None) -> dict[str, str]:
 
 
 def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
-    """The study as its tables, the scenarios in full, seeds, versions, hashes of the FMUs,
-    gains.
+    """Returns the content of manifest.json.
+
+    It holds the study as its tables, the scenarios in full, seeds, versions, SHA-256 of the FMUs
+    and robot files, and gains.
+
+    Args:
+        runs: number of runs of the study.
     """
     return {
         "format": FORMAT,
@@ -152,7 +150,7 @@ def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
         "runs": runs,
         "seeds": [study.seeds[0], study.seeds[-1], len(study.seeds)]
         if study.optimise is None
-        else _judged(study),
+        else _optimiser_seeds(study),
         "scenarios": {name: case.table for name, case in study.cases.items()},
         "engine": job.engine,
         "environment": job.environment,
@@ -165,7 +163,7 @@ def manifest_of(study: Study, job: Job, *, runs: int) -> dict[str, Any]:
     }
 
 
-def _judged(study: Study) -> dict[str, list[int]]:
+def _optimiser_seeds(study: Study) -> dict[str, list[int]]:
     assert study.optimise is not None
     return {
         "training": list(study.optimise.training.seeds),

@@ -1,10 +1,9 @@
-"""Settings that an optimiser proposes, judged on training runs; its best, and what it began from,
-judged on runs it never saw.
+"""Runs an optimisation: trials of settings on training runs, then the best ones on held-out runs.
 
-Optuna's samplers are seeded and asked for a batch at a time, so the same answers bring the same
-questions: a study that goes on after a kill asks again from the first trial, and finds the answers
-in the store. Held-out runs are numbered after all of training, and made from scenarios and seeds
-that the loop around the optimiser does not have.
+Optuna's samplers are seeded and asked for a batch of trials at a time, so equal results lead to
+equal trials: a study that is resumed asks again from the first trial, and finds the results in
+the store. Held-out runs are numbered after all training runs, and made from scenarios and seeds
+that the search does not use.
 """
 
 from __future__ import annotations
@@ -21,8 +20,8 @@ from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.common.installation import install_extra
 from hexapod_cosim.cosim.results.comparison import change_of
 from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.study.execute.conduct import Desk, conduct
-from hexapod_cosim.cosim.study.execute.crew import Crew
+from hexapod_cosim.cosim.study.execute.chunk import ChunkExecutor
+from hexapod_cosim.cosim.study.execute.dispatch import ResultSink, dispatch
 from hexapod_cosim.cosim.study.plan.identity import identity
 from hexapod_cosim.cosim.study.plan.objective import WALKED
 from hexapod_cosim.cosim.study.plan.optimisation import Optimisation
@@ -39,53 +38,49 @@ from hexapod_cosim.cosim.study.plan.records import (
 from hexapod_cosim.cosim.study.store.store import write_durably
 from hexapod_cosim.cosim.study.store.trials import OPTIMUM, Trial, feasible
 
-WORST = 1e9  # what a trial without a figure gets; the samplers take no infinities as constraints
+WORST = 1e9  # objective of a trial without a mean; samplers take no infinities as constraints
 
 
-def optimise(desk: Desk, crew: Crew, folder: Path) -> None:
-    """Asks, runs and tells until all trials are known; then the held-out runs. Writes
-    optimum.json.
-    """
-    plan = Optimisation(desk.study)
-    trials = list(_search(plan, desk, crew))
-    begin = _judge(desk, crew, [plan.training(plan.asked.trials, plan.unset)])
+def optimise(sink: ResultSink, executor: ChunkExecutor, folder: Path) -> None:
+    """Runs all trials, then the held-out runs of the best ones, and writes optimum.json."""
+    plan = Optimisation(sink.study)
+    trials = list(_search(plan, sink, executor))
+    (start,) = _rows(sink, executor, [plan.training(plan.asked.trials, plan.unset)])
     chosen = best_of(trials, plan.asked)
     picked = [plan.unset, *(trial.values for trial in chosen)]
     points = [plan.asked.trials, *(trial.number for trial in chosen)]
     sets = [
         plan.held_out(place, *pair) for place, pair in enumerate(zip(points, picked, strict=True))
     ]
-    held = _judge(desk, crew, sets)
-    trained = _judge(desk, crew, [plan.training(trial.number, trial.values) for trial in chosen])
+    start_held, *held = _rows(sink, executor, sets)
+    trained = _rows(sink, executor, [plan.training(item.number, item.values) for item in chosen])
+    names = [factor.name for factor in plan.study.factors]
+    best = [
+        {
+            "trial": trial.number,
+            "values": dict(zip(names, trial.values, strict=True)),
+            "feasible": trial.feasible,
+            "training": dict(trial.means),
+            "held_out": _means(after, plan.asked),
+            "change": {
+                "training": _changes(start, rows, plan.asked),
+                "held_out": _changes(start_held, after, plan.asked),
+            },
+        }
+        for trial, rows, after in zip(chosen, trained, held, strict=True)
+    ]
+    before = {"training": _means(start, plan.asked), "held_out": _means(start_held, plan.asked)}
     content = {
         "metrics": list(plan.asked.metrics),
-        "variables": [factor.name for factor in plan.study.factors],
-        "before": {
-            "training": _means(begin[0], plan.asked),
-            "held_out": _means(held[0], plan.asked),
-        },
-        "best": [
-            {
-                "trial": trial.number,
-                "values": dict(
-                    zip((item.name for item in plan.study.factors), trial.values, strict=True)
-                ),
-                "feasible": trial.feasible,
-                "training": dict(trial.means),
-                "held_out": _means(after, plan.asked),
-                "change": {
-                    "training": _changes(begin[0], rows, plan.asked),
-                    "held_out": _changes(held[0], after, plan.asked),
-                },
-            }
-            for trial, rows, after in zip(chosen, trained, held[1:], strict=True)
-        ],
+        "variables": names,
+        "before": before,
+        "best": best,
     }
     write_durably(folder / OPTIMUM, (to_json(content) + "\n").encode())
 
 
-def _search(plan: Optimisation, desk: Desk, crew: Crew) -> Iterator[Trial]:
-    """All trials, a batch at a time."""
+def _search(plan: Optimisation, sink: ResultSink, executor: ChunkExecutor) -> Iterator[Trial]:
+    """Runs a batch of trials at a time and yields them."""
     study, number = make_sampler(plan.study), 0
     while number < plan.asked.trials:
         asked = [
@@ -96,21 +91,19 @@ def _search(plan: Optimisation, desk: Desk, crew: Crew) -> Iterator[Trial]:
             tuple(trial.params[factor.name] for factor in plan.study.factors) for trial in asked
         ]
         sets = [plan.training(number + k, item) for k, item in enumerate(values)]
-        for trial, item, rows in zip(asked, values, _judge(desk, crew, sets), strict=True):
+        results = _rows(sink, executor, sets)
+        for handle, item, rows in zip(asked, values, results, strict=True):
             means = _means(rows, plan.asked)
-            yield _told(
-                study,
-                trial,
-                Trial(
-                    number=number, values=item, means=means, feasible=feasible(means, plan.asked)
-                ),
-                plan.asked,
+            trial = Trial(
+                number=number, values=item, means=means, feasible=feasible(means, plan.asked)
             )
+            _tell_sampler(study, handle, trial, plan.asked)
+            yield trial
             number += 1
 
 
 def make_sampler(study: Study) -> Any:
-    """Optuna's study: seeded, in memory. Raises StudyError when Optuna is not installed."""
+    """Returns a seeded Optuna study in memory. Raises StudyError when Optuna is missing."""
     try:
         import optuna  # noqa: PLC0415  an extra, and slow to import
     except ImportError as error:
@@ -136,7 +129,7 @@ def make_sampler(study: Study) -> Any:
 
 
 def distributions(variables: Sequence[Factor]) -> dict[str, Any]:
-    """The variables as Optuna has them."""
+    """Returns Optuna's distributions of the variables, by name."""
     from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution  # noqa: PLC0415
 
     found: dict[str, Any] = {}
@@ -152,46 +145,52 @@ def distributions(variables: Sequence[Factor]) -> dict[str, Any]:
     return found
 
 
-def _told(study: Any, asked: Any, trial: Trial, question: Optimise) -> Trial:
+def _tell_sampler(study: Any, handle: Any, trial: Trial, question: Optimise) -> None:
+    """Gives Optuna the means of a trial; `handle` is its own object for the trial."""
     for bound in question.constraints:
-        asked.set_constraint(bound.metric, min(bound.excess(trial.means[bound.metric]), WORST))
+        handle.set_constraint(bound.metric, min(bound.excess(trial.means[bound.metric]), WORST))
     worst = [WORST if METRICS[name][1] else -WORST for name in question.metrics]
     values = [trial.means[name] for name in question.metrics]
-    study.tell(
-        asked,
-        [bad if math.isnan(value) else value for value, bad in zip(values, worst, strict=True)],
-    )
-    return trial
+    pairs = zip(values, worst, strict=True)
+    study.tell(handle, [bad if math.isnan(value) else value for value, bad in pairs])
 
 
-def _judge(desk: Desk, crew: Crew, sets: Sequence[list[Order]]) -> list[list[dict[str, Any]]]:
-    """The stored rows of sets of orders, after running those that are not stored."""
+def _rows(
+    sink: ResultSink, executor: ChunkExecutor, sets: Sequence[list[Order]]
+) -> list[list[dict[str, Any]]]:
+    """Returns the stored rows of sets of orders, after running those that are not stored."""
     orders = [order for part in sets for order in part]
-    stored = desk.store.rows([order.run for order in orders])
+    stored = sink.store.rows([order.run for order in orders])
     for order in orders:
-        if order.run in stored and stored[order.run]["identity"] != identity(
-            order, desk.study.factors
-        ):
-            fix = "choose another folder with -o"
-            raise StudyError(
-                "the optimiser asks something else than before",
-                got=f"run {order.run}",
-                fix=fix,
-                where=desk.study.where,
-            )
-    wanted = [order for order in orders if order.run not in stored]
-    with closing(conduct(desk, crew, wanted)) as results:
+        if order.run in stored:
+            _check_identity(order, stored[order.run], sink.study)
+    missing = [order for order in orders if order.run not in stored]
+    with closing(dispatch(sink, executor, missing)) as results:
         for _ in results:
             pass
-    stored |= desk.store.rows([order.run for order in wanted])
+    stored |= sink.store.rows([order.run for order in missing])
     return [[stored[order.run] for order in part] for part in sets]
 
 
+def _check_identity(order: Order, row: Mapping[str, Any], study: Study) -> None:
+    """Raises StudyError when the stored row is of another order."""
+    if row["identity"] != identity(order, study.factors):
+        raise StudyError(
+            "the optimiser asks something else than before",
+            got=f"run {order.run}",
+            expected="the run that is stored under this number",
+            fix="choose another folder with -o",
+            where=study.where,
+        )
+
+
 def _means(rows: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, float]:
-    """Of every metric that counts, over the walks that have it (none on the spot has a slip per
-    metre); NaN where a run did not walk.
+    """Returns the means of the metrics of objectives and constraints, by name.
+
+    A mean is over the walks that have the metric (a walk on the spot has no slip per metre). It
+    is NaN when one of the runs did not walk to its end.
     """
-    names = _judged(asked)
+    names = _metric_names(asked)
     whole = all(row["walked"] for row in rows)
     found: dict[str, float] = {}
     for name in names:
@@ -200,16 +199,17 @@ def _means(rows: Sequence[Mapping[str, Any]], asked: Optimise) -> dict[str, floa
     return found
 
 
-def _judged(asked: Optimise) -> list[str]:
-    """Every metric that counts, once."""
+def _metric_names(asked: Optimise) -> list[str]:
+    """Returns the metrics of objectives and constraints, each once."""
     return list(dict.fromkeys([*asked.metrics, *(bound.metric for bound in asked.constraints)]))
 
 
 def _changes(
     before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]], asked: Optimise
 ) -> dict[str, dict[str, Any]]:
-    """By metric, over pairs of runs of the same scenario, seed and control, of which both
-    walked: as `hexapod compare` has changes.
+    """Returns the changes of metrics as `hexapod compare` computes them, by name.
+
+    They are over pairs of runs of the same scenario, seed and control that both walked to the end.
     """
     pairs = [
         (first, second)
@@ -218,24 +218,26 @@ def _changes(
     ]
     return {
         name: change_of(
-            name, [(_figure(first[name]), _figure(second[name])) for first, second in pairs]
+            name, [(_or_nan(first[name]), _or_nan(second[name])) for first, second in pairs]
         ).as_table()
-        for name in _judged(asked)
+        for name in _metric_names(asked)
         if name != WALKED
     }
 
 
-def _figure(value: float | None) -> float:
+def _or_nan(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
 def best_of(trials: Sequence[Trial], asked: Optimise) -> list[Trial]:
-    """The best trial, or up to FRONT evenly chosen of those that no other is better than in all
-    metrics; none that breaks a constraint where there is one that does not.
+    """Returns the best trial, or with several metrics up to FRONT trials of their Pareto front.
+
+    The members of the front are chosen evenly. Trials that break a constraint count only when all
+    of them do.
     """
     able = [trial for trial in trials if trial.feasible] or list(trials)
     front = sorted(
-        (trial for trial in able if not any(_beats(other, trial, asked) for other in able)),
+        (trial for trial in able if not any(_dominates(other, trial, asked) for other in able)),
         key=lambda trial: _costs(trial, asked),
     )
     places = np.unique(
@@ -245,11 +247,11 @@ def best_of(trials: Sequence[Trial], asked: Optimise) -> list[Trial]:
 
 
 def _costs(trial: Trial, asked: Optimise) -> tuple[float, ...]:
-    """Less is better."""
+    """Returns the metrics with the sign that makes less better, and the number for ties."""
     signed = (trial.means[name] * (1.0 if METRICS[name][1] else -1.0) for name in asked.metrics)
     return (*(math.inf if math.isnan(value) else value for value in signed), float(trial.number))
 
 
-def _beats(other: Trial, trial: Trial, asked: Optimise) -> bool:
+def _dominates(other: Trial, trial: Trial, asked: Optimise) -> bool:
     pairs = list(zip(_costs(other, asked)[:-1], _costs(trial, asked)[:-1], strict=True))
     return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)

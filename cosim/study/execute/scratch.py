@@ -1,8 +1,7 @@
-"""Where a study's processes on this machine keep what they unpack: one folder, which goes when the
-study ends.
+"""The temporary folder of a study's worker processes, which is removed when the study ends.
 
-Killed processes leave theirs: workers that outlive their program take its folder with them, and
-what is left all the same goes when the next study begins.
+When the program is killed, its workers remove the folder before they end. When they are killed as
+well, the next study removes it.
 """
 
 from __future__ import annotations
@@ -14,43 +13,55 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from filelock import FileLock
+
 from hexapod_cosim.cosim.common.files import not_writable
-from hexapod_cosim.cosim.common.locks import lock_file
 from hexapod_cosim.cosim.study.execute.job import Job
 
-PREFIX, LOCK, JOB = "hexapod-crew-", "lock", "job"
+PREFIX, LOCK, JOB = "hexapod-workers-", "lock", "job"
 
 
 @contextmanager
-def scratch(job: Job) -> Iterator[Path]:
-    """A folder that holds the job, locked while it is in use. Raises HexapodError when there is
-    no room for it.
+def scratch_folder(job: Job) -> Iterator[Path]:
+    """Makes a folder that holds the job and is locked while it is in use.
+
+    Raises HexapodError when the disk has no room for it.
     """
-    sweep()
+    remove_stale_folders()
     with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        with (folder / LOCK).open("w", encoding="utf-8") as file:
-            with suppress(OSError):  # no locks on this file system: then nothing is swept either
-                lock_file(file)
-            try:
-                (folder / JOB).write_bytes(pickle.dumps(job))
-            except OSError as error:
-                raise not_writable(folder, error) from error
+        lock = _lock_of(folder)
+        with suppress(OSError):  # a file system without locks: no folder counts as stale there
+            lock.acquire()
+        try:
+            (folder / JOB).write_bytes(pickle.dumps(job))
+        except OSError as error:
+            raise not_writable(folder, error) from error
+        try:
             yield folder
+        finally:
+            lock.release()
 
 
-def job_in(folder: Path) -> Job:
-    """The job of a study's folder. Whoever calls this was begun by the process that wrote it."""
+def read_job(folder: Path) -> Job:
+    """Reads the job from a folder that the parent of this process has written."""
     job: Job = pickle.loads((folder / JOB).read_bytes())
     return job
 
 
-def sweep() -> None:
-    """Takes away folders whose program is gone; one without a lock is left alone, for it may
-    just be made.
+def remove_stale_folders() -> None:
+    """Removes the folders of programs that have ended.
+
+    A folder without a lock file is left alone: another program may just have made it.
     """
     for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
-        with suppress(OSError):
-            with (folder / LOCK).open("r+", encoding="utf-8") as file:
-                lock_file(file)
-            shutil.rmtree(folder, ignore_errors=True)
+        if (folder / LOCK).exists():
+            with suppress(OSError):  # of which Timeout is one: the lock is held
+                with _lock_of(folder):
+                    pass
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _lock_of(folder: Path) -> FileLock:
+    """Returns the lock of a folder, which the system releases when its process is killed."""
+    return FileLock(folder / LOCK, blocking=False, fallback_to_soft=False)

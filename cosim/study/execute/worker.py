@@ -1,4 +1,4 @@
-"""A study's runs in whatever process: the job unpacked once, then orders turned into rows."""
+"""Runs the orders of a study in any process; the job is unpacked once for all of them."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import FAILED, INTERRUPTED, Progress
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import NO_FIGURES, REFUSED, Summary
-from hexapod_cosim.cosim.run.run import chosen_gains, known_robot
+from hexapod_cosim.cosim.run.preparation import Preparation
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
-from hexapod_cosim.cosim.study.execute.engines import Engine, engine_named
+from hexapod_cosim.cosim.study.execute.engines import Engine, find_engine
 from hexapod_cosim.cosim.study.execute.job import Job, environment
 from hexapod_cosim.cosim.study.plan.identity import canonical, settings_of
 from hexapod_cosim.cosim.study.plan.records import (
@@ -32,31 +32,22 @@ from hexapod_cosim.cosim.study.plan.records import (
     StudyError,
     Value,
 )
-from hexapod_cosim.cosim.study.store.done import Done
+from hexapod_cosim.cosim.study.store.run_result import RunResult
 from hexapod_cosim.models import HexapodError
 
-MOST_DESIGNS = 64  # sets of gains a worker keeps
-MOST_KNOWN = 4096  # summaries a worker keeps: some 10 MB
-MOST_TEXT = 400  # characters of what an exception says
-ADDRESS = re.compile(r"0x[0-9a-fA-F]+")  # of an object in memory: another one each time
+MAX_KNOWN = 4096  # summaries that a worker keeps: some 10 MB
+MAX_TEXT = 400  # characters of an exception's text
+ADDRESS = re.compile(r"0x[0-9a-fA-F]+")  # of an object in memory, which differs each time
 
 
-class Workshop:
-    """A job unpacked in this process; `close` takes its files away."""
+class JobContext:
+    """A job that is unpacked in this process.
+
+    Raises StudyError when the process has other versions or the disk is full.
+    """
 
     def __init__(self, job: Job) -> None:
-        differences = [
-            f"{name} {job.environment[name]}, here {have}"
-            for name, have in environment().items()
-            if job.environment[name] != have
-        ]
-        if differences:
-            fix = "install the same versions on all machines of the cluster"
-            raise StudyError(
-                "this worker is not like the machine that sends the study",
-                got="; ".join(differences),
-                fix=fix,
-            )
+        _check_environment(job)
         self._job, self._folder = job, _folder()
         self._files = {
             name: self._unpack(f"robot{k}", Path(name).suffix, data)
@@ -68,7 +59,7 @@ class Workshop:
         }
         self._controller = self._unpack("controller", ".fmu", job.controller)
         self._engines: dict[str, Engine] = {}
-        self._designs: OrderedDict[tuple[str, float], Gains] = OrderedDict()
+        self._preparation = Preparation(Path(self._folder.name), gains=job.gains)
         self._known: OrderedDict[bytes, Summary] = OrderedDict()
 
     def _unpack(self, name: str, suffix: str, content: bytes) -> Path:
@@ -79,39 +70,44 @@ class Workshop:
             raise _no_room(error, self._folder.name) from error
         return path
 
-    def run(self, orders: Sequence[Order], progress: Progress) -> Iterator[Done]:
-        """Each order's run; ends early when `progress` raises KeyboardInterrupt within one."""
+    def run(self, orders: Sequence[Order], progress: Progress) -> Iterator[RunResult]:
+        """Yields the result of each order.
+
+        The iterator ends early when `progress` raises KeyboardInterrupt within a run.
+        """
         for order in orders:
             begin = perf_counter()
             summary = self._summary(order, progress)
             if summary.status == INTERRUPTED:
                 return
-            yield Done(order, summary, perf_counter() - begin)
+            yield RunResult(order, summary, perf_counter() - begin)
 
     def _summary(self, order: Order, progress: Progress) -> Summary:
-        """What a run came to, whatever happens; a run that was made before is not made again."""
-        key = effective(order, self._job.factors)
+        """Returns the summary of an order's run, whatever happens in it.
+
+        A run with equal settings is not repeated: its summary is kept.
+        """
+        key = effective_settings(order, self._job.factors)
         if key in self._known:
             self._known.move_to_end(key)
             return self._known[key]
         try:
-            summary = checked(self._walked(order, progress))
+            summary = checked(self._run(order, progress))
         except HexapodError as error:
-            return self._portable(failed(order, str(error)))
+            return self._portable(summary_without_figures(order, str(error)))
         except KeyboardInterrupt:
             raise
-        except (
-            BaseException
-        ) as error:  # a mistake in an engine, or no memory: this run's result, not the study's end
-            self._drop_engines()
-            return self._portable(failed(order, told(error), status=FAILED))
+        except BaseException as error:  # an error in an engine ends this run, not the study
+            self._close_engines()
+            reason = describe_exception(error)
+            return self._portable(summary_without_figures(order, reason, status=FAILED))
         if summary.status != INTERRUPTED:
             self._known[key] = self._portable(summary)
-            if len(self._known) > MOST_KNOWN:
+            if len(self._known) > MAX_KNOWN:
                 self._known.popitem(last=False)
         return self._portable(summary)
 
-    def _walked(self, order: Order, progress: Progress) -> Summary:
+    def _run(self, order: Order, progress: Progress) -> Summary:
         scenario = self._scenario(order)
         robot = scenario.robot
         scenario = replace(scenario, robot=str(self._files.get(robot, robot)))
@@ -120,7 +116,7 @@ class Workshop:
         )
 
     def _portable(self, summary: Summary) -> Summary:
-        """Without the place where this process unpacked the job."""
+        """Returns the summary without the path of this process' folder in its reason."""
         place = str(Path(self._folder.name) / " ").rstrip()
         return (
             replace(summary, reason=summary.reason.replace(place, ""))
@@ -129,6 +125,7 @@ class Workshop:
         )
 
     def _scenario(self, order: Order) -> Scenario:
+        """Returns the scenario of an order, with the values of the factors."""
         case = self._job.cases[order.case]
         settings = {
             factor.name: factor.setting(value)
@@ -143,39 +140,45 @@ class Workshop:
         )
 
     def _gains(self, scenario: Scenario, order: Order) -> Gains | None:
-        if order.control == "kinematic":
+        """Returns the gains of an order, with the values of the factors."""
+        gains = self._preparation.gains(scenario)
+        if gains is None:
             return None
-        gains = self._job.gains or self._designed(scenario)
         return changed_gains(gains, settings_of(order, self._job.factors))
-
-    def _designed(self, scenario: Scenario) -> Gains:
-        key = (known_robot(scenario).hash, scenario.macro_step)
-        if key not in self._designs:
-            gains = chosen_gains(scenario)
-            assert gains is not None  # compliant
-            self._designs[key] = gains
-            if len(self._designs) > MOST_DESIGNS:
-                self._designs.popitem(last=False)
-        return self._designs[key]
 
     def _engine(self, robot: str) -> Engine:
         if robot not in self._engines:
-            self._engines[robot] = engine_named(self._job.engine)(
+            self._engines[robot] = find_engine(self._job.engine)(
                 self._fmus[robot], self._controller
             )
         return self._engines[robot]
 
-    def _drop_engines(self) -> None:
-        """They begin anew: who knows how an exception left them."""
+    def _close_engines(self) -> None:
+        """Closes all engines, whose state is unknown after an exception; new ones are made."""
         for engine in self._engines.values():
             with suppress(Exception):
                 engine.close()
         self._engines.clear()
 
     def close(self) -> None:
-        """Takes away what was unpacked."""
-        self._drop_engines()
+        """Closes the engines and removes the unpacked files."""
+        self._close_engines()
         self._folder.cleanup()
+
+
+def _check_environment(job: Job) -> None:
+    """Raises StudyError when this process has other versions than the job was made with."""
+    differences = [
+        f"{name} {job.environment[name]}, here {have}"
+        for name, have in environment().items()
+        if job.environment[name] != have
+    ]
+    if differences:
+        raise StudyError(
+            "this worker differs from the machine that sends the study",
+            got="; ".join(differences),
+            fix="install the same versions on all machines of the cluster",
+        )
 
 
 def _folder() -> TemporaryDirectory[str]:
@@ -196,8 +199,8 @@ def _no_room(error: OSError, where: str) -> StudyError:
     )
 
 
-def effective(order: Order, factors: Sequence[Factor]) -> bytes:
-    """All that a run depends on: kinematic control has no gains."""
+def effective_settings(order: Order, factors: Sequence[Factor]) -> bytes:
+    """Returns the key of all that a run depends on. Kinematic control has no gains."""
     settings = {
         factor.name: value
         for factor, value in settings_of(order, factors)
@@ -207,7 +210,10 @@ def effective(order: Order, factors: Sequence[Factor]) -> bytes:
 
 
 def checked(summary: Summary) -> Summary:
-    """What an engine gave, if it can be stored. Raises TypeError, ValueError, KeyError."""
+    """Converts an engine's summary to plain types, so that it can be stored.
+
+    Raises TypeError, ValueError or KeyError when it is not a complete summary.
+    """
     if not isinstance(summary, Summary):
         raise TypeError(f"the engine gave {type(summary).__name__}, expected a Summary")
     fallback = None if summary.fallback is None else float(summary.fallback)
@@ -222,18 +228,19 @@ def checked(summary: Summary) -> Summary:
     )
 
 
-def told(error: BaseException) -> str:
-    """An exception's kind, text and place, the same on every machine."""
+def describe_exception(error: BaseException) -> str:
+    """Returns an exception's kind, text and place, the same on every machine."""
     try:
         text = ADDRESS.sub("0x...", str(error))
     except Exception:
-        text = "it cannot say what"
+        text = "its text cannot be read"
     *_, last = traceback.extract_tb(error.__traceback__)
-    return f"{type(error).__name__}: {text[:MOST_TEXT]} ({Path(last.filename).name}, line {last.lineno})"
+    place = f"{Path(last.filename).name}, line {last.lineno}"
+    return f"{type(error).__name__}: {text[:MAX_TEXT]} ({place})"
 
 
 def changed_gains(gains: Gains, settings: Sequence[tuple[Factor, Value]]) -> Gains:
-    """Gains with those that are factors in their place, or times them."""
+    """Returns gains changed by the values of the factors; relative factors scale them."""
     for factor, value in settings:
         if factor.name.startswith(GAINS):
             part, _, name = factor.name.removeprefix(GAINS).partition(".")
@@ -245,36 +252,37 @@ def changed_gains(gains: Gains, settings: Sequence[tuple[Factor, Value]]) -> Gai
     return gains
 
 
-def failed(order: Order, reason: str, *, status: str = REFUSED) -> Summary:
-    """A run without figures."""
+def summary_without_figures(order: Order, reason: str, *, status: str = REFUSED) -> Summary:
+    """Returns the summary of a run that has no figures."""
     return Summary(
         control=order.control, seed=order.seed, status=status, reason=reason, metrics=NO_FIGURES
     )
 
 
-_shops: dict[
-    str, Workshop
-] = {}  # of this process, by the name of their job; a cluster's worker may serve several studies
-_one_at_a_time = (
-    Lock()
-)  # a cluster's worker may have threads; the FMU's loader changes the process' folder
+# by the name of their job: a cluster's worker may serve several studies
+_contexts: dict[str, JobContext] = {}
+# a cluster's worker may have threads, and the loader of an FMU changes the working directory
+_one_at_a_time = Lock()
 
 
-def close_workshop(job: str) -> None:
-    """Takes this process' workshop of a job away, when nothing is being run."""
+def close_job_context(job: str) -> None:
+    """Closes the context of a job in this process, given by its name, between two chunks."""
     with _one_at_a_time:
-        shop = _shops.pop(job, None)
-        if shop is not None:
-            shop.close()
+        context = _contexts.pop(job, None)
+        if context is not None:
+            context.close()
 
 
-def work(job: Job, orders: Sequence[Order], progress: Progress) -> list[Done]:
-    """Runs orders in this process; fewer come back when it is told to stop."""
+def run_orders(job: Job, orders: Sequence[Order], progress: Progress) -> list[RunResult]:
+    """Runs orders in this process.
+
+    Returns their results, fewer than orders when `progress` raises KeyboardInterrupt.
+    """
     with _one_at_a_time:
         try:
             progress(0.0)
         except KeyboardInterrupt:
             return []
-        if job.name not in _shops:
-            _shops[job.name] = Workshop(job)
-        return list(_shops[job.name].run(orders, progress))
+        if job.name not in _contexts:
+            _contexts[job.name] = JobContext(job)
+        return list(_contexts[job.name].run(orders, progress))

@@ -1,3 +1,3 @@
-"""What a study runs: its file, factors, design points and identities of runs. Imports no other
-room of `study`.
+"""Plans a study: its file, factors, design points and identities of runs. Imports no other room
+of `study`.
 """

@@ -1,6 +1,4 @@
-"""Whether a study's factors are what its scenarios know: each value is tried by itself before
-anything is run.
-"""
+"""Checks the factors of a study: each value is tried in its scenarios before anything is run."""
 
 from __future__ import annotations
 
@@ -15,8 +13,8 @@ from hexapod_cosim.cosim.interface.interface import Interface, load_interface
 from hexapod_cosim.cosim.scenario.quantities import QUANTITY
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_from_table, with_values
-from hexapod_cosim.cosim.study.plan.apart import check_scenarios_apart
 from hexapod_cosim.cosim.study.plan.factors import PARAMETERS, samples
+from hexapod_cosim.cosim.study.plan.held_out import check_held_out_scenarios
 from hexapod_cosim.cosim.study.plan.points import check_design
 from hexapod_cosim.cosim.study.plan.records import (
     DRAWN,
@@ -33,6 +31,7 @@ from hexapod_cosim.cosim.study.plan.records import (
 )
 from hexapod_cosim.models import HexapodError, load_robot, unknown_name
 
+# settings that a study gives its runs itself, and what to write instead
 ELSEWHERE = {
     "control": 'controls = ["kinematic", "compliant"]',
     "seed": "seeds = 10",
@@ -40,49 +39,48 @@ ELSEWHERE = {
     "events": "a scenario",
     "outputs": "nothing: a study keeps no recordings",
 }
-MAX_TRIED = (
-    200  # values of a factor that are tried, evenly spread, the least and the largest among them
-)
+MAX_TRIED = 200  # values of a factor that are tried, evenly chosen, with both extremes
 MAX_RUNS = 10**8
-UNBOUNDED = 1e30  # what an FMU without a bound says
+UNBOUNDED = 1e30  # bounds of this size are not shown in messages
 
 
 def check_study(study: Study) -> None:
-    """Raises StudyError for a factor that no run could have, or that the design cannot take."""
+    """Raises StudyError for a factor that scenarios or the design do not accept."""
     if study.optimise is None:
         check_design(study)
     _check_size(study)
+    table = "factors" if study.optimise is None else "optimise.variables"
     for factor in study.factors:
-        where = f"{study.where}: {'factors' if study.optimise is None else 'optimise.variables'}.{factor.name}"
-        check_settable(factor.name, where)
-        if (study.design != LIST or study.optimise is not None) and len(set(factor.values)) < len(
-            factor.values
-        ):
-            raise StudyError(
-                "value not allowed",
-                got=list(factor.values),
-                expected="different values",
-                fix="correct it",
-                where=where,
-            )
-        if factor.name.startswith(GAINS):
-            _check_gain(factor, study, where)
-        elif factor.relative:
-            raise StudyError(
-                "relative to what?",
-                got=factor.name,
-                expected=f"a gain, {GAINS}...",
-                fix="leave out relative",
-                where=where,
-            )
-        elif factor.name != SCENARIO_FACTOR:
-            _check_setting(factor, study, where)
-        elif factor.kind != VALUES:
-            raise StudyError(
-                "not scenarios", got=factor.kind, expected="a list of names", where=where
-            )
+        _check_factor(factor, study, f"{study.where}: {table}.{factor.name}")
     if study.optimise is not None:
-        check_scenarios_apart(study, study.optimise)
+        check_held_out_scenarios(study, study.optimise)
+
+
+def _check_factor(factor: Factor, study: Study, where: str) -> None:
+    check_settable(factor.name, where)
+    repeated = len(set(factor.values)) < len(factor.values)
+    if repeated and (study.design != LIST or study.optimise is not None):
+        raise StudyError(
+            "value not allowed",
+            got=list(factor.values),
+            expected="different values",
+            fix="correct it",
+            where=where,
+        )
+    if factor.name.startswith(GAINS):
+        _check_gain(factor, study, where)
+    elif factor.relative:
+        raise StudyError(
+            "a relative factor that is no gain",
+            got=factor.name,
+            expected=f"a gain, {GAINS}...",
+            fix="leave out relative",
+            where=where,
+        )
+    elif factor.name != SCENARIO_FACTOR:
+        _check_setting(factor, study, where)
+    elif factor.kind != VALUES:
+        raise StudyError("not scenarios", got=factor.kind, expected="a list of names", where=where)
 
 
 def check_settable(name: str, where: str, *, kind: str = "factor") -> None:
@@ -95,7 +93,7 @@ def check_settable(name: str, where: str, *, kind: str = "factor") -> None:
 
 
 def _check_size(study: Study) -> None:
-    """No more runs than a folder can hold and a person can want."""
+    """Raises StudyError for more than MAX_RUNS runs."""
     if study.optimise is not None:
         count = study.optimise.most
     else:
@@ -118,7 +116,7 @@ def _check_size(study: Study) -> None:
 
 
 def gain_names() -> list[str]:
-    """All gains by the names that factors have: gains.slip.kp and so on."""
+    """Returns the names of all gains as factors have them, for instance gains.slip.kp."""
     hints = get_type_hints(Gains)
     parts = {
         name: kind
@@ -142,17 +140,16 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
             where=where,
         )
     part, _, name = factor.name.removeprefix(GAINS).partition(".")
-    above = name in POSITIVE[part]
-    numbers = [float(value) for value in samples(factor)]
-    bad = next((value for value in numbers if not (value > 0.0 if above else value >= 0.0)), None)
-    if bad is not None:
-        raise StudyError(
-            "not a gain's value",
-            got=bad,
-            expected="numbers > 0" if above else "numbers >= 0",
-            fix="correct it",
-            where=where,
-        )
+    positive = name in POSITIVE[part]
+    for value in map(float, samples(factor)):
+        if not (value > 0.0 if positive else value >= 0.0):
+            raise StudyError(
+                "not a gain's value",
+                got=value,
+                expected="numbers > 0" if positive else "numbers >= 0",
+                fix="correct it",
+                where=where,
+            )
     if "compliant" not in study.run_controls:
         fix = 'add "compliant" to the controls, or take the gain away: kinematic control has none'
         raise StudyError(
@@ -165,7 +162,7 @@ def _check_gain(factor: Factor, study: Study, where: str) -> None:
 
 
 def _check_setting(factor: Factor, study: Study, where: str) -> None:
-    """Tries values by themselves on the first scenario, the ends on all others."""
+    """Tries the values in the first scenario, and the first and last one in all others."""
     values = _spread(samples(factor))
     for value in values:
         if isinstance(value, str) and factor.name != "robot" and QUANTITY.fullmatch(value):
@@ -183,6 +180,7 @@ def _check_setting(factor: Factor, study: Study, where: str) -> None:
 
 
 def _spread(values: Sequence[Value]) -> list[Value]:
+    """Returns at most about MAX_TRIED values, evenly chosen, with both extremes."""
     if len(values) <= MAX_TRIED:
         return list(values)
     step = math.ceil(len(values) / MAX_TRIED)
@@ -202,10 +200,12 @@ def _try(case: Case, factor: Factor, value: Value, where: str) -> None:
 
 
 def check_scenario(scenario: Scenario, *, names: Sequence[str]) -> None:
-    """What a scenario's file alone does not tell: that there is its robot, and that these
-    parameters of its FMU can have their values.
+    """Checks that a scenario's robot exists and that parameters of its FMU may have their values.
 
     Raises HexapodError.
+
+    Args:
+        names: the parameters to check.
     """
     try:
         robot = load_robot(scenario.robot)
@@ -225,7 +225,7 @@ def check_scenario(scenario: Scenario, *, names: Sequence[str]) -> None:
 
 
 def _check_parameter(interface: Interface, name: str, value: Any, where: str) -> None:
-    """As the FMU takes it: a number of its range in its own unit, or the name of a choice."""
+    """Raises StudyError unless the value is a number in range, or the name of a choice."""
     variable = interface.by_name[name]
     choices = (
         [item for item, _ in interface.enumerations[variable.enumeration].items]

@@ -1,11 +1,22 @@
-"""Factors of a study file: the values or the distribution behind a name, and what lies at a
-quantile of it.
+"""Reads the factors of a study file: a list of values or a distribution for each name.
 
-"friction.mu" = [0.3, 0.6]                           values
-"friction.mu" = { linspace = [0.2, 1.0, 9] }         evenly spaced values; logspace: evenly in the
-logarithm "torso.mass"  = { uniform = [2.0, 4.0] }             drawn; loguniform, normal = [mean,
-standard deviation], integers = [first, last] "terrain.incline" = { linspace = [0, 10, 6], unit =
-"deg" } "gains.slip.kp"   = { loguniform = [0.3, 3.0], relative = true }     times the designed gain
+Values, evenly spaced values and values that are evenly spaced in their logarithm:
+
+    "friction.mu" = [0.3, 0.6]
+    "friction.mu" = { linspace = [0.2, 1.0, 9] }
+    "friction.mu" = { logspace = [0.2, 1.0, 9] }
+
+Distributions; `normal` takes the mean and the standard deviation, `integers` the first and the
+last integer:
+
+    "torso.mass" = { uniform = [2.0, 4.0] }
+    "torso.mass" = { loguniform = [2.0, 4.0] }
+    "torso.mass" = { normal = [2.7, 0.1] }
+
+A unit, and a factor of the designed gain:
+
+    "terrain.incline" = { linspace = [0, 10, 6], unit = "deg" }
+    "gains.slip.kp" = { loguniform = [0.3, 3.0], relative = true }
 """
 
 from __future__ import annotations
@@ -31,17 +42,18 @@ from hexapod_cosim.models import unknown_name
 
 SPACED = ("linspace", "logspace")
 KINDS = (VALUES, *SPACED, UNIFORM, LOGUNIFORM, NORMAL, INTEGERS)
-BESIDES = ("unit", "relative")
+OPTIONS = ("unit", "relative")
 MAX_VALUES, MAX_FACTORS = 1_000_000, 1000
-LARGEST_INTEGER = 2**53  # that a double holds with all below
+LARGEST_INTEGER = 2**53  # a double holds all integers up to it
 PARAMETERS = "parameters."
-LEAST_QUANTILE = 2.0**-53  # a normal distribution has no value at 0
+LEAST_QUANTILE = 2.0**-53  # a normal distribution has no value at quantile 0
 EXAMPLE = '"friction.mu" = { uniform = [0.3, 0.9] }'
 
 
 def read_factors(table: Any, where: str) -> tuple[Factor, ...]:
-    """The factors of a table, whose names may be written with dots in quotes or as tables.
-    Raises StudyError.
+    """Reads the factors of a table. Raises StudyError.
+
+    Names with dots may be written in quotes or as nested tables.
     """
     if not isinstance(table, Mapping):
         raise StudyError(
@@ -71,12 +83,12 @@ def read_factors(table: Any, where: str) -> tuple[Factor, ...]:
 
 
 def plain_name(name: str) -> str:
-    """Of a setting: parameters.torso.mass is another way to write torso.mass."""
+    """Returns a setting's name without the prefix "parameters.", which is optional."""
     return name.removeprefix(PARAMETERS)
 
 
 def _named(table: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
-    """Names with dots: friction.mu without quotes is a table in a table to TOML."""
+    """Yields names with dots and their values: TOML reads friction.mu as nested tables."""
     for key, value in table.items():
         name = f"{before}{key}"
         if "." not in key and isinstance(value, Mapping) and _is_section(value):
@@ -86,6 +98,7 @@ def _named(table: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
 
 
 def _is_section(table: Mapping[str, Any]) -> bool:
+    """Returns whether a table holds factors rather than a distribution."""
     return bool(table) and all(
         isinstance(item, Mapping | list) and key not in KINDS for key, item in table.items()
     )
@@ -103,8 +116,8 @@ def _read_factor(name: str, value: Any, where: str) -> Factor:
             where=where,
         )
     for key in value:
-        if key not in (*KINDS, *BESIDES):
-            raise unknown_name("key", key, (*KINDS, *BESIDES), where=where, error=StudyError)
+        if key not in (*KINDS, *OPTIONS):
+            raise unknown_name("key", key, (*KINDS, *OPTIONS), where=where, error=StudyError)
     kinds = [key for key in value if key in KINDS]
     if len(kinds) != 1:
         raise StudyError(
@@ -132,23 +145,11 @@ def _read_factor(name: str, value: Any, where: str) -> Factor:
 
 
 def _of_kind(kind: str, given: Any, where: str) -> dict[str, Any]:
+    """Returns the kind and the values or ends of a factor, as keywords of Factor."""
     if kind == VALUES:
         return {"kind": VALUES, "values": _values(given, where)}
     if kind in SPACED:
-        low, high, count = _numbers(given, 3, where)
-        space = np.linspace if kind == "linspace" else np.geomspace
-        _require(
-            count == int(count) and 1 <= count <= MAX_VALUES,
-            given,
-            f"a whole number of 1 to {MAX_VALUES} values",
-            where,
-        )
-        _require(kind == "linspace" or (low > 0.0 and high > 0.0), given, "ends > 0", where)
-        _require(low != high or count == 1, given, "different ends", where)
-        _require(
-            _spans(low, high, kind == "logspace"), given, "ends that are not so far apart", where
-        )
-        return {"kind": VALUES, "values": tuple(space(low, high, int(count)).tolist())}
+        return {"kind": VALUES, "values": _spaced(kind, given, where)}
     low, high = _numbers(given, 2, where)
     _require(kind != NORMAL or high >= 0.0, given, "a standard deviation >= 0", where)
     _require(kind == NORMAL or low <= high, given, "the lower end first", where)
@@ -162,12 +163,28 @@ def _of_kind(kind: str, given: Any, where: str) -> dict[str, Any]:
         "whole numbers within 53 bits",
         where,
     )
-    _require(_spans(low, high, kind == LOGUNIFORM), given, "ends that are not so far apart", where)
+    _require(_is_finite(low, high, kind == LOGUNIFORM), given, "ends that are closer", where)
     return {"kind": kind, "low": low, "high": high}
 
 
-def _spans(low: float, high: float, ratio: bool) -> bool:
-    """Whether what lies between can be counted with."""
+def _spaced(kind: str, given: Any, where: str) -> tuple[Value, ...]:
+    """Returns the values of a linspace or a logspace."""
+    low, high, count = _numbers(given, 3, where)
+    space = np.linspace if kind == "linspace" else np.geomspace
+    _require(
+        count == int(count) and 1 <= count <= MAX_VALUES,
+        given,
+        f"a whole number of 1 to {MAX_VALUES} values",
+        where,
+    )
+    _require(kind == "linspace" or (low > 0.0 and high > 0.0), given, "ends > 0", where)
+    _require(low != high or count == 1, given, "different ends", where)
+    _require(_is_finite(low, high, kind == "logspace"), given, "ends that are closer", where)
+    return tuple(space(low, high, int(count)).tolist())
+
+
+def _is_finite(low: float, high: float, ratio: bool) -> bool:
+    """Returns whether the range, or the ratio of its ends, does not overflow."""
     return math.isfinite(high / low if ratio else max(abs(low), abs(high)) * 10.0)
 
 
@@ -181,15 +198,15 @@ def _values(given: Any, where: str) -> tuple[Value, ...]:
         raise StudyError(
             "not values",
             got=given,
-            expected="a list of numbers, names or truths",
+            expected="a list of numbers, names or booleans",
             fix=fix,
             where=where,
         )
-    kinds = {bool: "truths", str: "texts"}
+    kinds = {bool: "booleans", str: "texts"}
     _require(
         len({kinds.get(type(item), "numbers") for item in given}) == 1,
         given,
-        "values of one kind: numbers, texts or truths",
+        "values of one kind: numbers, texts or booleans",
         where,
     )
     _require(len(given) <= MAX_VALUES, f"{len(given)} values", f"at most {MAX_VALUES}", where)
@@ -220,8 +237,9 @@ def _require(holds: bool, got: Any, expected: str, where: str) -> None:
 
 
 def at_quantile(factor: Factor, share: float) -> Value:
-    """The value below which a share, 0 to 1, of the factor's distribution lies; all values of a
-    list are equally likely.
+    """Returns the value at a quantile, 0 to 1, of the factor's distribution.
+
+    All values of a list are equally likely.
     """
     low, high = factor.low, factor.high
     if factor.kind == VALUES:
@@ -236,11 +254,11 @@ def at_quantile(factor: Factor, share: float) -> Value:
 
 
 def samples(factor: Factor) -> tuple[Value, ...]:
-    """Values that tell whether the factor's name, unit and range are right: all of a list, the ends
-    of a distribution.
+    """Returns values by which the factor's name, unit and range can be checked.
 
-    A normal one has no ends: a deviation from the mean either way stands for them, and what is
-    drawn further out is judged when it is run.
+    They are all values of a list, and the ends of a distribution. For a normal distribution they
+    are the mean and the values one standard deviation away; a value further out is checked when it
+    is run.
     """
     if factor.kind == VALUES:
         return factor.values

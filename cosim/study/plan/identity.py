@@ -1,4 +1,4 @@
-"""The identity of a run: a hash of the settings that decide its figures."""
+"""The identity of a run: a hash of the settings that its figures depend on."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hexapod_cosim.cosim.study.plan.records import Factor, Order, Value
 
 
 def canonical(content: Any) -> bytes:
-    """JSON whose bytes are the content's alone."""
+    """Returns JSON with sorted keys, whose bytes depend on the content only."""
     return json.dumps(content, sort_keys=True, default=str).encode()
 
 
 def identity(order: Order, factors: Sequence[Factor]) -> str:
-    """A hash of a run's settings, whatever its number."""
+    """Returns the hash of a run's settings, which does not depend on its number."""
     settings = {factor.name: value for factor, value in zip(factors, order.values, strict=True)}
     return hashlib.sha256(canonical([order.case, settings, order.seed, order.control])).hexdigest()[
         :16
@@ -24,7 +24,7 @@ def identity(order: Order, factors: Sequence[Factor]) -> str:
 
 
 def settings_of(order: Order, factors: Sequence[Factor]) -> list[tuple[Factor, Value]]:
-    """Each factor that is set, with its value."""
+    """Returns the factors that the order sets, with their values."""
     return [
         (factor, value)
         for factor, value in zip(factors, order.values, strict=True)

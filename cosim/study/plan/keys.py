@@ -1,4 +1,4 @@
-"""Values of a study file's keys, each judged."""
+"""Reads and checks values of a study file's keys."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ from typing import Any
 from hexapod_cosim.cosim.study.plan.records import StudyError
 from hexapod_cosim.models import unknown_name
 
-LARGEST = 2**63 - 1  # a whole number of TOML, and of a column
-MOST_LETTERS, MOST_DEPTH = 1000, 12  # of a text, of tables in tables
+LARGEST = 2**63 - 1  # integer of TOML and of a Parquet column
+MAX_LENGTH = 1000  # characters of a text
+MAX_DEPTH = 12  # of nested tables and lists
 
 
 def check_plain(value: Any, where: str, depth: int = 0) -> None:
-    """Nothing in a file that could not be kept as JSON and in columns, and read again the same.
-    Raises StudyError.
-    """
-    if depth > MOST_DEPTH:
+    """Raises StudyError for a value that JSON or a Parquet column cannot hold unchanged."""
+    if depth > MAX_DEPTH:
         raise StudyError(
             "too deep",
-            expected=f"no more than {MOST_DEPTH} tables or lists in each other",
+            expected=f"no more than {MAX_DEPTH} nested tables or lists",
             fix="take it apart",
             where=where,
         )
@@ -44,20 +43,22 @@ def check_plain(value: Any, where: str, depth: int = 0) -> None:
                 fix="correct it",
                 where=where,
             )
-    elif not isinstance(value, str) or len(value) > MOST_LETTERS or not value.isprintable():
+    elif not isinstance(value, str) or len(value) > MAX_LENGTH or not value.isprintable():
         got = (
             value
-            if not isinstance(value, str) or len(value) < MOST_LETTERS
-            else f"{len(value)} letters"
+            if not isinstance(value, str) or len(value) < MAX_LENGTH
+            else f"{len(value)} characters"
         )
-        expected = f"a number, true or false, or a printable text of at most {MOST_LETTERS} letters"
+        expected = (
+            f"a number, true or false, or a printable text of at most {MAX_LENGTH} characters"
+        )
         raise StudyError(
             "value not allowed", got=got, expected=expected, fix="correct it", where=where
         )
 
 
 def whole(value: Any, where: str, *, least: int, most: int | None = None) -> int:
-    """A whole number within bounds. Raises StudyError."""
+    """Returns a whole number within bounds. Raises StudyError."""
     if (
         isinstance(value, bool)
         or not isinstance(value, int)
@@ -72,7 +73,7 @@ def whole(value: Any, where: str, *, least: int, most: int | None = None) -> int
 
 
 def text_of(table: Mapping[str, Any], key: str, default: str, where: str) -> str:
-    """A text. Raises StudyError."""
+    """Returns the text under a key. Raises StudyError."""
     value = table.get(key, default)
     if not isinstance(value, str):
         raise StudyError(
@@ -81,8 +82,8 @@ def text_of(table: Mapping[str, Any], key: str, default: str, where: str) -> str
     return value
 
 
-def truth_of(table: Mapping[str, Any], key: str, default: bool, where: str) -> bool:
-    """True or false. Raises StudyError."""
+def boolean_of(table: Mapping[str, Any], key: str, default: bool, where: str) -> bool:
+    """Returns the boolean under a key. Raises StudyError."""
     value = table.get(key, default)
     if not isinstance(value, bool):
         raise StudyError(
@@ -96,7 +97,7 @@ def truth_of(table: Mapping[str, Any], key: str, default: bool, where: str) -> b
 
 
 def names_of(value: Any, known: Sequence[str], where: str) -> tuple[str, ...]:
-    """Different names of a closed list, one at least. Raises StudyError."""
+    """Returns a list of one or more different names among `known`. Raises StudyError."""
     if not isinstance(value, list) or not value or len({str(item) for item in value}) != len(value):
         raise StudyError(
             "wrong type", got=value, expected=f"a list of some of {', '.join(known)}", where=where
@@ -108,7 +109,7 @@ def names_of(value: Any, known: Sequence[str], where: str) -> tuple[str, ...]:
 
 
 def read_seeds(value: Any, where: str, *, most: int) -> Sequence[int]:
-    """A number of seeds from 0 on, { first, count }, or the seeds themselves. Raises StudyError."""
+    """Returns seeds from their number, { first, count } or a list of them. Raises StudyError."""
     if isinstance(value, Mapping):
         for key in value:
             if key not in ("first", "count"):
@@ -130,8 +131,9 @@ def read_seeds(value: Any, where: str, *, most: int) -> Sequence[int]:
 
 
 def flat(table: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Values by name with dots, written in quotes or as tables. Raises StudyError for a name
-    that is given twice.
+    """Returns the values of nested tables by their names with dots.
+
+    Raises StudyError for a name that is given twice.
     """
     found: dict[str, Any] = {}
     for name, value in _leaves(table, ""):

@@ -1,18 +1,20 @@
-"""[optimise]: what an optimiser is asked, and on what its answer is judged that it never saw.
+"""Reads the table [optimise] of a study file: objectives, constraints, training and held-out runs.
 
-[optimise]
-metric = "slip_per_metre"                 # or a list: the front between them
-constraints = { torque_rms = { at_most = 1.0 } }   # of means; that every run walked to its end is
-always one trials = 60
-batch = 4                                 # settings asked at once
-[optimise.variables]
-gains.slip.kp = { loguniform = [0.3, 3.0], relative = true }
-[optimise.training]
-scenarios = ["walk_flat"]
-seeds = { first = 100, count = 4 }
-[optimise.held_out]                       # no scenario and no seed of training
-scenarios = ["ripple", "wave"]
-seeds = { first = 0, count = 10 }
+    [optimise]
+    metric = "slip_per_metre"   # or a list, for the Pareto front
+    constraints = { torque_rms = { at_most = 1.0 } }
+    trials = 60
+    batch = 4                   # trials that run at the same time
+    [optimise.variables]
+    gains.slip.kp = { loguniform = [0.3, 3.0], relative = true }
+    [optimise.training]
+    scenarios = ["walk_flat"]
+    seeds = { first = 100, count = 4 }
+    [optimise.held_out]         # no scenario and no seed of training
+    scenarios = ["ripple", "wave"]
+    seeds = { first = 0, count = 10 }
+
+Constraints are of means; that every run walks to its end is always one.
 """
 
 from __future__ import annotations
@@ -23,16 +25,16 @@ from typing import Any
 
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.scenario.records import CONTROLS
-from hexapod_cosim.cosim.study.plan.apart import check_seeds_apart
 from hexapod_cosim.cosim.study.plan.factors import read_factors
+from hexapod_cosim.cosim.study.plan.held_out import check_held_out_seeds
 from hexapod_cosim.cosim.study.plan.keys import names_of, read_seeds, text_of, whole
 from hexapod_cosim.cosim.study.plan.records import (
     NORMAL,
     SAMPLERS,
     SCENARIO_FACTOR,
     Bound,
+    Evaluation,
     Factor,
-    Judging,
     Optimise,
     StudyError,
 )
@@ -50,51 +52,25 @@ KEYS = (
     "held_out",
 )
 WALKED = "walked"
-JUDGED = tuple(
+# metrics of which less or more is better
+OBJECTIVES = tuple(
     name for name, (_, less_is_better, _) in METRICS.items() if less_is_better is not None
 )
 MAX_TRIALS, MAX_SEEDS = 100_000, 10_000
 
 
 def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]:
-    """The question and its variables. Raises StudyError."""
-    if not isinstance(table, Mapping):
-        raise StudyError(
-            "wrong type", got=table, expected="a table", fix="write [optimise]", where=where
-        )
-    for key in table:
-        if key not in KEYS:
-            raise unknown_name("key", key, KEYS, where=where, error=StudyError)
-    for key in ("metric", "variables", "training", "held_out"):
-        if key not in table:
-            raise StudyError(
-                "missing key",
-                expected=f"[{key}]" if key != "metric" else 'metric = "slip_per_metre"',
-                where=f"{where}.{key}",
-            )
-    variables = read_factors(table["variables"], f"{where}.variables")
-    if not variables or any(factor.name == SCENARIO_FACTOR for factor in variables):
-        raise StudyError(
-            "not variables",
-            got=[item.name for item in variables],
-            expected="settings or gains",
-            where=f"{where}.variables",
-        )
-    if any(factor.kind == NORMAL for factor in variables):
-        raise StudyError(
-            "a variable without bounds",
-            got=NORMAL,
-            expected="values, uniform, loguniform or integers",
-            where=f"{where}.variables",
-        )
+    """Returns the optimisation and its variables. Raises StudyError."""
+    _check_keys(table, where)
+    variables = _variables(table["variables"], f"{where}.variables")
     training, held_out = (
-        _judging(table[part], f"{where}.{part}") for part in ("training", "held_out")
+        _evaluation(table[part], f"{where}.{part}") for part in ("training", "held_out")
     )
-    check_seeds_apart(training, held_out, where)
+    check_held_out_seeds(training, held_out, where)
     metric = table["metric"]
     optimise = Optimise(
         metrics=names_of(
-            metric if isinstance(metric, list) else [metric], JUDGED, f"{where}.metric"
+            metric if isinstance(metric, list) else [metric], OBJECTIVES, f"{where}.metric"
         ),
         constraints=(
             Bound(metric=WALKED, at_least=1.0),
@@ -116,7 +92,45 @@ def read_optimise(table: Any, where: str) -> tuple[Optimise, tuple[Factor, ...]]
     return optimise, variables
 
 
-def _judging(table: Any, where: str) -> Judging:
+def _check_keys(table: Any, where: str) -> None:
+    """Raises StudyError for anything but a table with known keys and all required ones."""
+    if not isinstance(table, Mapping):
+        raise StudyError(
+            "wrong type", got=table, expected="a table", fix="write [optimise]", where=where
+        )
+    for key in table:
+        if key not in KEYS:
+            raise unknown_name("key", key, KEYS, where=where, error=StudyError)
+    for key in ("metric", "variables", "training", "held_out"):
+        if key not in table:
+            raise StudyError(
+                "missing key",
+                expected=f"[{key}]" if key != "metric" else 'metric = "slip_per_metre"',
+                where=f"{where}.{key}",
+            )
+
+
+def _variables(table: Any, where: str) -> tuple[Factor, ...]:
+    """Reads the variables, which are settings or gains with bounds. Raises StudyError."""
+    variables = read_factors(table, where)
+    if not variables or any(factor.name == SCENARIO_FACTOR for factor in variables):
+        raise StudyError(
+            "not variables",
+            got=[item.name for item in variables],
+            expected="settings or gains",
+            where=where,
+        )
+    if any(factor.kind == NORMAL for factor in variables):
+        raise StudyError(
+            "a variable without bounds",
+            got=NORMAL,
+            expected="values, uniform, loguniform or integers",
+            where=where,
+        )
+    return variables
+
+
+def _evaluation(table: Any, where: str) -> Evaluation:
     if not isinstance(table, Mapping):
         raise StudyError(
             "wrong type", got=table, expected="scenarios = [...], seeds = ...", where=where
@@ -141,7 +155,7 @@ def _judging(table: Any, where: str) -> Judging:
         raise StudyError(
             "wrong type", got=names, expected="a list of scenarios", where=f"{where}.scenarios"
         )
-    return Judging(
+    return Evaluation(
         cases=tuple(names),
         seeds=read_seeds(table.get("seeds", 1), f"{where}.seeds", most=MAX_SEEDS),
     )
@@ -156,8 +170,8 @@ def _bounds(table: Any, where: str) -> tuple[Bound, ...]:
 
 
 def _bound(name: str, table: Any, where: str) -> Bound:
-    if name not in JUDGED:
-        raise unknown_name("metric", name, JUDGED, where=where, error=StudyError)
+    if name not in OBJECTIVES:
+        raise unknown_name("metric", name, OBJECTIVES, where=where, error=StudyError)
     limits = (
         {key: float(value) for key, value in table.items() if _is_limit(key, value)}
         if isinstance(table, Mapping)

@@ -1,16 +1,14 @@
-"""The numbers of all runs of an optimisation: trials, the start, then the held-out runs."""
+"""Numbers the runs of an optimisation."""
 
 from __future__ import annotations
 
 from itertools import product
 
-from hexapod_cosim.cosim.study.plan.records import Judging, Order, Study, Value
+from hexapod_cosim.cosim.study.plan.records import Evaluation, Order, Study, Value
 
 
 class Optimisation:
-    """The numbers of all its runs: trials, the beginning (no setting at all), then the held-out
-    runs.
-    """
+    """Numbers the runs: those of all trials, of the unchanged settings, then the held-out ones."""
 
     def __init__(self, study: Study) -> None:
         assert study.optimise is not None
@@ -18,19 +16,19 @@ class Optimisation:
         self.trained, self.most = self.asked.trained, self.asked.most
 
     def training(self, point: int, values: tuple[Value | None, ...]) -> list[Order]:
-        """The training runs of a trial."""
+        """Returns the training runs of a trial, whose number is `point`."""
         return self._orders(self.asked.training, point * self.asked.training.runs, point, values)
 
     def held_out(self, place: int, point: int, values: tuple[Value | None, ...]) -> list[Order]:
-        """The held-out runs of the `place`-th of what is tried in the end."""
+        """Returns the held-out runs of the settings that are evaluated as number `place`."""
         return self._orders(
             self.asked.held_out, self.trained + place * self.asked.held_out.runs, point, values
         )
 
     def _orders(
-        self, judging: Judging, first: int, point: int, values: tuple[Value | None, ...]
+        self, evaluation: Evaluation, first: int, point: int, values: tuple[Value | None, ...]
     ) -> list[Order]:
-        pairs = enumerate(product(judging.cases, judging.seeds))
+        pairs = enumerate(product(evaluation.cases, evaluation.seeds))
         return [
             Order(
                 run=first + k,
@@ -45,5 +43,5 @@ class Optimisation:
 
     @property
     def unset(self) -> tuple[None, ...]:
-        """The values that leave all as it is without the study."""
+        """The values that leave all variables as the scenarios have them."""
         return (None,) * len(self.study.factors)

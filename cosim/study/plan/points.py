@@ -1,6 +1,6 @@
-"""The points of a study, each made from its number alone, so that no list of them is ever held.
+"""Computes the points of a study from their numbers, without a list of all points in memory.
 
-The Latin hypercube is the exception: its strata are permutations, 8 bytes per point and factor.
+The Latin hypercube is the exception: it is held as a whole, with 8 bytes per point and factor.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from hexapod_cosim.cosim.study.plan.records import (
 )
 
 MAX_STRATA = 10**7  # of all factors of a Latin hypercube
-STREAM = 2  # of the study's seed; a scenario's own are 0 and 1
+STREAM = 2  # of random numbers of the study's seed; scenarios use the streams 0 and 1
 Shares = Callable[[int], np.ndarray[tuple[int], np.dtype[np.float64]]]
 
 
 class Design:
-    """A study's points by their number."""
+    """The points of a study."""
 
     def __init__(self, study: Study) -> None:
         self._study, self.count = study, _count(study)
         self._shares = _shares(study)
 
     def point(self, index: int) -> tuple[Value, ...]:
-        """The factors' values at a point."""
+        """Returns the values of the factors at a point, given its number."""
         factors = self._study.factors
         if self._study.design == LIST:
             return tuple(factor.values[index] for factor in factors)
@@ -54,7 +54,7 @@ class Design:
 
 
 def _of_grid(factors: tuple[Factor, ...], index: int) -> tuple[Value, ...]:
-    """The last factor changes fastest."""
+    """Returns a point of a grid, in which the last factor changes fastest."""
     values: list[Value] = []
     for factor in reversed(factors):
         index, place = divmod(index, len(factor.values))
@@ -70,7 +70,7 @@ def _count(study: Study) -> int:
 
 
 def _shares(study: Study) -> Shares:
-    """Points in the unit cube of the factors' quantiles, by number."""
+    """Returns a function from a point's number to the quantiles (factors,) of its values."""
     size = len(study.factors)
     if study.design == LATIN_HYPERCUBE and size:
         cube = qmc.LatinHypercube(size, seed=np.random.default_rng([study.seed, STREAM])).random(
@@ -83,7 +83,7 @@ def _shares(study: Study) -> Shares:
 
 
 class _Sobol:
-    """Scrambled Sobol points, of which going back costs a start from the first."""
+    """Scrambled Sobol points; a smaller number than the last one restarts the sequence."""
 
     def __init__(self, size: int, seed: int) -> None:
         self._size, self._seed = size, seed
@@ -106,7 +106,7 @@ class _Sobol:
 
 
 class Sweep:
-    """All runs of a study by their number: points, within them seeds, within them controls."""
+    """The runs of a study without an optimiser, numbered by point, then seed, then control."""
 
     def __init__(self, study: Study) -> None:
         self._study, self._design = study, Design(study)
@@ -118,7 +118,7 @@ class Sweep:
         self.count = self.points * len(study.seeds) * len(study.controls)
 
     def orders(self, runs: Iterator[int]) -> Iterator[Order]:
-        """Those of numbers that grow."""
+        """Yields the orders of runs, whose numbers should ascend."""
         known = -1
         values: tuple[Value, ...] = ()
         seeds, controls = self._study.seeds, self._study.controls
@@ -143,7 +143,10 @@ def check_design(study: Study) -> None:
     where = f"{study.where}: factors"
     drawn = [factor.name for factor in study.factors if factor.kind != VALUES]
     if study.design not in DRAWN and drawn:
-        fix = f'write design = "{RANDOM}" (or another of {", ".join(DRAWN)}) and points = 100, or give values'
+        fix = (
+            f'write design = "{RANDOM}" (or another of {", ".join(DRAWN)}) and points = 100, '
+            "or give values"
+        )
         raise StudyError(
             f"a distribution in a design {study.design!r}",
             got=drawn[0],

@@ -17,12 +17,12 @@ from hexapod_cosim.cosim.study.plan.bundled import list_studies
 from hexapod_cosim.cosim.study.plan.checks import check_scenario, check_settable, check_study
 from hexapod_cosim.cosim.study.plan.factors import plain_name, read_factors
 from hexapod_cosim.cosim.study.plan.keys import (
+    boolean_of,
     check_plain,
     flat,
     names_of,
     read_seeds,
     text_of,
-    truth_of,
     whole,
 )
 from hexapod_cosim.cosim.study.plan.objective import read_optimise
@@ -54,16 +54,17 @@ KEYS = (
     "optimise",
 )
 MAX_POINTS, MAX_SEEDS = 10**8, 10**7
-MAX_SEED = 2**32 - 1  # that all generators of random numbers take
-MOST_OF_NAME = 255  # bytes of a file's
+MAX_SEED = 2**32 - 1  # that all random number generators accept
+MAX_FILE_NAME = 255  # bytes
 STANDARD_TABLE = {
     name: getattr(STANDARD, name) for name in ("attitude", "height", "joint_angle", "command_delay")
 }
 
 
 def load_study(path_or_name: str | Path) -> Study:
-    """Reads a study file, or a bundled one by name. Raises StudyError, and ScenarioError for its
-    scenarios.
+    """Reads a study file, or a bundled one by name.
+
+    Raises StudyError, and ScenarioError for its scenarios.
     """
     path, bundled = Path(path_or_name), list_studies()
     if not path.suffix and len(path.parts) == 1 and not path.is_file():
@@ -97,10 +98,12 @@ def study_from_table(
     folder: Path = Path(),
     scenarios: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Study:
-    """A checked study from the tables of a file in `folder`, against which scenario files are
-    looked for. Raises StudyError.
+    """Makes a checked study from the tables of its file. Raises StudyError.
 
-    `scenarios`: in full, by name, when they are known already and no file is read.
+    Args:
+        where: name of the file, for messages.
+        folder: folder of the file, which paths of scenario files are relative to.
+        scenarios: the scenarios by name, when no file shall be read and nothing be checked again.
     """
     check_plain(table, where)
     for key in table:
@@ -111,7 +114,7 @@ def study_from_table(
         read_optimise(table["optimise"], f"{where}: optimise") if "optimise" in table else None
     )
     if optimise is not None:
-        _refuse(table, ("factors", "design", "points", "seeds", "controls"), where)
+        _refuse_keys(table, ("factors", "design", "points", "seeds", "controls"), where)
     study = Study(
         title=text_of(table, "title", Path(where).stem, where),
         cases={},
@@ -138,7 +141,8 @@ def study_from_table(
     return study
 
 
-def _refuse(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
+def _refuse_keys(table: Mapping[str, Any], keys: Sequence[str], where: str) -> None:
+    """Raises StudyError for keys that an optimisation does not have."""
     for key in keys:
         if key in table:
             fix = "leave it out: the variables, training and held_out of [optimise] say what is run"
@@ -176,8 +180,9 @@ def _points(table: Mapping[str, Any], where: str) -> int:
 
 
 def _cases(study: Study, folder: Path) -> dict[str, Case]:
-    """The scenarios that runs are of: the file's own, those of the factor `scenario`, those an
-    optimiser is judged on.
+    """Returns the scenarios of a study by name.
+
+    They are the study's own one, those of the factor `scenario` and those of an optimisation.
     """
     source, where = study.source, study.where
     own = source.get("scenario", "walk_flat")
@@ -194,7 +199,9 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
     for name in changed:
         check_settable(plain_name(name), f"{where}: set.{name}", kind="setting")
         _refuse_twice(name, study)
-    vary = truth_of(source, "variation", len(study.seeds) > 1 or study.optimise is not None, where)
+    vary = boolean_of(
+        source, "variation", len(study.seeds) > 1 or study.optimise is not None, where
+    )
     names = [
         own if isinstance(own, str) else study.title,
         *_named_scenarios(study.factors, study.optimise),
@@ -225,21 +232,24 @@ def _cases(study: Study, folder: Path) -> dict[str, Case]:
 
 
 def _key_of(name: str, study: Study) -> str:
-    """The key under which a scenario stands in the file."""
+    """Returns the key of the study file that names a scenario."""
     if any(factor.name == SCENARIO_FACTOR and name in factor.values for factor in study.factors):
         return "factors.scenario"
     if study.optimise is not None:
-        for part, judging in (
+        for part, evaluation in (
             ("training", study.optimise.training),
             ("held_out", study.optimise.held_out),
         ):
-            if name in judging.cases:
+            if name in evaluation.cases:
                 return f"optimise.{part}.scenarios"
     return "scenario"
 
 
 def _refuse_twice(name: str, study: Study) -> None:
-    """A setting that is a factor too; where an optimiser begins is its own to set."""
+    """Raises StudyError for a setting that is a factor as well.
+
+    For a variable of an optimiser the setting is allowed: it is the value before the optimisation.
+    """
     if study.optimise is None and plain_name(name) in {factor.name for factor in study.factors}:
         fix = "take one of them away: the factor's values would replace it in every run"
         raise StudyError(
@@ -275,28 +285,22 @@ def _case(
     vary: bool,
     key: str,
 ) -> Case:
-    """Raises ScenarioError for a scenario that cannot be run as it is."""
-    beside = folder / name
-    if inline is None and len(beside.name.encode()) > MOST_OF_NAME:
-        expected = f"a name of at most {MOST_OF_NAME} letters"
-        raise StudyError(
-            "no file has such a name",
-            got=name,
-            expected=expected,
-            fix="name a scenario",
-            where=f"{where}: scenario",
-        )
-    table, told = (
-        (dict(inline), f"{where}: scenario")
-        if inline is not None
-        else _read(beside, name, f"{where}: {key}")
-    )
-    scenario = scenario_from_table(table, where=told)
+    """Makes a case. Raises ScenarioError for its scenario, StudyError for a change.
+
+    Args:
+        inline: the tables of a scenario in the study file; None for one of a file.
+        changes: the settings of [set] by name.
+        folder: folder of the study file.
+        vary: whether the standard variation is added.
+        key: key of the study file that names the scenario.
+    """
+    table, place = _scenario_tables(name, inline, folder, where, key)
+    scenario = scenario_from_table(table, where=place)
     check_scenario(scenario, names=list(scenario.parameters))
     try:
         table = with_values(table, changes)
         check_scenario(
-            scenario_from_table(table, where=told, given=list(changes)),
+            scenario_from_table(table, where=place, given=list(changes)),
             names=[plain_name(name) for name in changes],
         )
     except HexapodError as error:
@@ -310,12 +314,31 @@ def _case(
     if vary and "variation" not in table:
         table["variation"] = dict(STANDARD_TABLE)
     table["outputs"] = {"plots": False}  # a study keeps no recordings
-    return Case(name=name, table=table, where=told)
+    return Case(name=name, table=table, where=place)
+
+
+def _scenario_tables(
+    name: str, inline: Mapping[str, Any] | None, folder: Path, where: str, key: str
+) -> tuple[dict[str, Any], str]:
+    """Returns the tables of a scenario and their place, for messages."""
+    if inline is not None:
+        return dict(inline), f"{where}: scenario"
+    beside = folder / name  # a scenario file beside the study file
+    if len(beside.name.encode()) > MAX_FILE_NAME:
+        raise StudyError(
+            "no file has such a name",
+            got=name,
+            expected=f"a name of at most {MAX_FILE_NAME} bytes",
+            fix="name a scenario",
+            where=f"{where}: scenario",
+        )
+    return _read(beside, name, f"{where}: {key}")
 
 
 def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
-    """A scenario's tables, from a file beside the study if there is one. Raises HexapodError; of
-    an unknown name with the study's place.
+    """Reads a scenario's tables and its place, from a file beside the study if there is one.
+
+    Raises HexapodError; for an unknown name it cites the place in the study file.
     """
     try:
         return read_tables(beside if beside.is_file() else name)
@@ -328,6 +351,6 @@ def _read(beside: Path, name: str, where: str) -> tuple[dict[str, Any], str]:
 
 
 def _place(error: HexapodError, where: str) -> str:
-    """The key that is wrong, as one of [set]."""
+    """Returns the place in [set] of an error in a scenario."""
     key = (error.where or "").rpartition(": ")[2].removeprefix("--set ")
     return f"{where}: set.{plain_name(key)}"

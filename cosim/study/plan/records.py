@@ -1,4 +1,4 @@
-"""What a study says, as frozen records."""
+"""The records of a study: factors, cases, optimisation and orders."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ GRID, LIST, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = (
     "latin_hypercube",
     "sobol",
 )
-DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs of a number of points that the file gives
+DRAWN = (RANDOM, LATIN_HYPERCUBE, SOBOL)  # designs with a given number of points
 SCENARIO_FACTOR = "scenario"
-GAINS = "gains."  # what begins so is a gain of the compliant control
-FRONT = 8  # members of a front that are tried on the held-out runs
+GAINS = "gains."  # prefix of factors that are gains of the compliant control
+FRONT = 8  # members of a Pareto front that are evaluated on the held-out runs
 SAMPLERS = ("tpe", "nsga2", "random")
 
 
@@ -38,8 +38,9 @@ class StudyError(HexapodError):
 
 @dataclass(frozen=True, kw_only=True)
 class Factor:
-    """What a study varies: a setting by its name as --set knows it, a gain (gains.slip.kp), or
-    the scenario itself.
+    """A quantity that a study varies: a setting, a gain, or the scenario.
+
+    Settings have the names that --set accepts; gains have names like gains.slip.kp.
     """
 
     name: str
@@ -47,17 +48,17 @@ class Factor:
     values: tuple[Value, ...] = ()  # of kind VALUES
     low: float = math.nan  # of a distribution; the mean of a normal one
     high: float = math.nan  # its standard deviation
-    unit: str = ""  # of all of these; "": the setting's own
-    relative: bool = False  # to the designed gain
+    unit: str = ""  # of the values; empty: the unit of the setting
+    relative: bool = False  # whether values are multiples of the designed gain
 
     def setting(self, value: Value) -> Value:
-        """The value as a scenario takes it."""
+        """Returns the value as a scenario accepts it, with its unit."""
         return f"{value!r} {self.unit}" if self.unit else value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A scenario of a study, as the tables of its file with what the study sets."""
+    """A scenario of a study: the tables of its file with the settings of the study."""
 
     name: str
     table: Mapping[str, Any]
@@ -65,67 +66,67 @@ class Case:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judging:
-    """Scenarios, by name, and seeds that an optimiser's settings are judged on."""
+class Evaluation:
+    """The runs that settings are evaluated on: names of scenarios, and seeds."""
 
     cases: tuple[str, ...]
     seeds: Sequence[int]
 
     @property
     def runs(self) -> int:
-        """For one control."""
+        """Number of runs."""
         return len(self.cases) * len(self.seeds)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bound:
-    """What a mean metric has to keep to."""
+    """A constraint on the mean of a metric."""
 
     metric: str  # or WALKED, the share of runs that walked to the end
     at_least: float = -math.inf
     at_most: float = math.inf
 
     def excess(self, value: float) -> float:
-        """How far the value is out of bounds; not above 0 within them, infinite for NaN."""
+        """Returns by how much a value exceeds the bounds: <= 0 within them, infinite for NaN."""
         return math.inf if math.isnan(value) else max(self.at_least - value, value - self.at_most)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Optimise:
-    """What an optimiser is asked."""
+    """An optimisation: objectives, constraints and the runs for them."""
 
     metrics: tuple[str, ...]
     constraints: tuple[Bound, ...]
     trials: int
-    batch: int  # asked at once, before any of them is known
+    batch: int  # trials that are proposed before the result of any of them is known
     sampler: str
     control: str
-    training: Judging
-    held_out: Judging
+    training: Evaluation
+    held_out: Evaluation
 
     @property
     def chosen(self) -> int:
-        """How many trials are tried on the held-out runs, at most."""
+        """Largest number of trials that are evaluated on the held-out runs."""
         return 1 if len(self.metrics) == 1 else FRONT
 
     @property
     def trained(self) -> int:
-        """Training runs: those of all trials and of what they began from."""
+        """Number of training runs, of all trials and of the unchanged settings."""
         return (self.trials + 1) * self.training.runs
 
     @property
     def most(self) -> int:
-        """Runs in all, at most."""
+        """Largest number of all runs."""
         return self.trained + (1 + self.chosen) * self.held_out.runs
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study, complete: cases hold all that their files said."""
+    """A complete study: its cases hold the content of their files."""
 
     title: str
-    cases: Mapping[str, Case]  # by name; the first is the one without a factor SCENARIO_FACTOR
-    factors: tuple[Factor, ...]  # the optimiser's variables, if there is one
+    cases: Mapping[str, Case]  # by name; without SCENARIO_FACTOR all runs use the first
+    factors: tuple[Factor, ...]  # with an optimiser, its variables
     design: str
     points: int  # of a drawn design
     seeds: Sequence[int]
@@ -137,7 +138,7 @@ class Study:
 
     @property
     def run_controls(self) -> tuple[str, ...]:
-        """Those that its runs have."""
+        """The controls of its runs."""
         return self.controls if self.optimise is None else (self.optimise.control,)
 
 
@@ -148,8 +149,7 @@ class Order:
     run: int
     point: int
     case: str
-    values: tuple[
-        Value | None, ...
-    ]  # of the factors, in their order; None leaves a setting as it is
+    # of the factors, in their order; None leaves a setting as the scenario has it
+    values: tuple[Value | None, ...]
     seed: int
     control: str

@@ -1,6 +1,4 @@
-"""Parallel coordinates of a study: an axis per factor that varies, then slip and cost; a line
-per point and control.
-"""
+"""Draws parallel coordinates of a study: factors, slip and cost, with a line for each point."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from matplotlib.figure import Figure
 
 from hexapod_cosim.cosim.results.metrics import FLOORS
 from hexapod_cosim.cosim.study.plan.records import Factor, Study
-from hexapod_cosim.cosim.study.report.marks import (
+from hexapod_cosim.cosim.study.report.style import (
     COLOURMAP,
     COST,
     SLIP,
@@ -28,12 +26,13 @@ from hexapod_cosim.cosim.study.report.marks import (
 )
 from hexapod_cosim.cosim.study.store.table import Point
 
-FIGURES = 2  # the last axes: slip and cost
+RESULT_AXES = 2  # the last axes: slip and cost
 
 
 def parallel(points: Sequence[Point], study: Study) -> Figure:
-    """An axis per factor, then slip and cost; points without these end, grey and dashed, at the
-    last factor.
+    """Draws a panel for each control, with an axis for each factor that varies, slip and cost.
+
+    Points without slip or cost are grey dashed lines that end at the last factor.
     """
     factors = [factor for factor in study.factors if len(set(factor.values)) != 1] or list(
         study.factors
@@ -47,13 +46,13 @@ def parallel(points: Sequence[Point], study: Study) -> Figure:
     ]
     rows = [
         [
-            (*place, _decades(mean_of(point, control, SLIP)), mean_of(point, control, COST))
+            (*place, _log_slip(mean_of(point, control, SLIP)), mean_of(point, control, COST))
             for point, place in zip(chosen, places, strict=True)
         ]
         for control in controls
     ]
     table = np.array(rows, dtype=np.float64).reshape(
-        len(controls), len(chosen), len(factors) + FIGURES
+        len(controls), len(chosen), len(factors) + RESULT_AXES
     )
     low, high = (limit(table, np.isfinite(table)) for limit in (_least, _largest))
     scaled = np.where(
@@ -65,14 +64,14 @@ def parallel(points: Sequence[Point], study: Study) -> Figure:
     panels = np.atleast_1d(figure.subplots(len(controls), 1))
     for axes, control, lines in zip(panels, controls, scaled, strict=True):
         ran = np.array([point.runs[control] > 0 for point in chosen], dtype=np.bool_)
-        collection = _lines(axes, lines[ran], (low[-FIGURES], high[-FIGURES]))
+        collection = _lines(axes, lines[ran], (low[-RESULT_AXES], high[-RESULT_AXES]))
         _axes(axes, control, factors, (low, high))
     figure.colorbar(collection, ax=list(panels), label="slip [m/m]", shrink=0.7)
     return figure
 
 
 def _least(table: Array, known: Array) -> Array:
-    """Over points and controls; NaN where there is none."""
+    """Returns the least known value of each axis; NaN where there is none."""
     least = np.where(known, table, math.inf).min(axis=(0, 1), initial=math.inf)
     return np.where(np.isfinite(least), least, math.nan)
 
@@ -81,24 +80,25 @@ def _largest(table: Array, known: Array) -> Array:
     return -_least(-table, known)
 
 
-def _lines(axes: Axes, lines: Array, decades: tuple[float, float]) -> LineCollection:
-    count, (low, high) = lines.shape[1], decades
-    has = np.isfinite(lines).all(axis=1)
-    whole, ended = lines[has], lines[~has, :-FIGURES]
-    whole = whole[np.argsort(-whole[:, -FIGURES])]  # little slip on top
+def _lines(axes: Axes, lines: Array, log_slips: tuple[float, float]) -> LineCollection:
+    """Draws lines (points, axes) of values scaled to 0 .. 1; returns those with a colour."""
+    count, (low, high) = lines.shape[1], log_slips
+    complete = np.isfinite(lines).all(axis=1)
+    whole, ended = lines[complete], lines[~complete, :-RESULT_AXES]
+    whole = whole[np.argsort(-whole[:, -RESULT_AXES])]  # little slip on top
     slips = 10.0 ** (
-        whole[:, -FIGURES] * (high - low) + low if high > low else np.full(len(whole), low)
+        whole[:, -RESULT_AXES] * (high - low) + low if high > low else np.full(len(whole), low)
     )
     axes.add_collection(
         LineCollection(
-            [np.column_stack([np.arange(count - FIGURES), line]) for line in ended],
+            [np.column_stack([np.arange(count - RESULT_AXES), line]) for line in ended],
             colors="0.55",
             linewidth=0.8,
             linestyle="--",
         )
     )
     paths = [np.column_stack([np.arange(count), line]) for line in whole]
-    norm = logarithmic(10.0 ** np.array(decades))
+    norm = logarithmic(10.0 ** np.array(log_slips))
     collection = LineCollection(
         paths, array=slips, cmap=COLOURMAP, norm=norm, linewidth=0.9, alpha=0.75
     )
@@ -107,6 +107,7 @@ def _lines(axes: Axes, lines: Array, decades: tuple[float, float]) -> LineCollec
 
 
 def _axes(axes: Axes, control: str, factors: Sequence[Factor], limits: tuple[Array, Array]) -> None:
+    """Draws the axes, whose lowest and highest values are `limits`."""
     low, high = limits
     count = len(low)
     axes.set(xlim=(-0.15, count - 0.85), ylim=(-0.12, 1.12), yticks=[])
@@ -121,7 +122,7 @@ def _axes(axes: Axes, control: str, factors: Sequence[Factor], limits: tuple[Arr
         axes.plot([place, place], [0.0, 1.0], color="0.6", linewidth=0.8, zorder=0)
         ends = (
             (10.0 ** low[place], 10.0 ** high[place])
-            if place == count - FIGURES
+            if place == count - RESULT_AXES
             else (low[place], high[place])
         )
         _ends(
@@ -134,9 +135,7 @@ def _axes(axes: Axes, control: str, factors: Sequence[Factor], limits: tuple[Arr
 
 
 def _ends(axes: Axes, place: int, factor: Factor | None, low: float, high: float) -> None:
-    """What the ends of an axis mean: numbers, or the first and last of names; in the middle
-    where both are the same.
-    """
+    """Labels the ends of an axis with numbers, or with the first and the last name."""
     if not math.isfinite(low):
         axes.text(
             place,
@@ -162,6 +161,6 @@ def _ends(axes: Axes, place: int, factor: Factor | None, low: float, high: float
         axes.text(place, y, text, ha="center", va=side, fontsize=7, color="0.35")
 
 
-def _decades(slip: float) -> float:
-    """Its logarithm: compliant walks slip decades less than kinematic ones."""
+def _log_slip(slip: float) -> float:
+    """Returns log10 of a slip: compliant walks slip decades less than kinematic ones."""
     return math.log10(max(slip, FLOORS[SLIP])) if math.isfinite(slip) else math.nan

@@ -1,6 +1,4 @@
-"""Figures of a study with an axis for a factor, a metric or the trials: what a factor does, slip
-against cost, how an optimiser got on.
-"""
+"""Draws curves of a study: metrics over factors, slip against cost, and metrics over trials."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.study.plan.records import Factor, Study
-from hexapod_cosim.cosim.study.report.marks import (
+from hexapod_cosim.cosim.study.report.style import (
     COLOURS,
     COST,
     MARKS,
@@ -31,13 +29,13 @@ from hexapod_cosim.cosim.study.report.marks import (
 from hexapod_cosim.cosim.study.store.table import Point
 from hexapod_cosim.cosim.study.store.trials import Trial
 
-MOST_EFFECTS, ACROSS = 9, 3  # factors that get a panel, panels side by side
-WIDE = 10.0  # largest over least value beyond which an axis is logarithmic
+MAX_EFFECTS, COLUMNS = 9, 3  # panels, and panels side by side
+LOG_RATIO = 10.0  # largest over least value beyond which an axis is logarithmic
 GREY = "0.55"
 
 
 def response(points: Sequence[Point], factor: Factor, study: Study) -> Figure:
-    """Slip and cost over one factor, with the intervals over the seeds."""
+    """Draws slip and cost over one factor, with the intervals over the seeds."""
     figure = Figure(figsize=(9.0, 3.4))
     for axes, metric in zip(figure.subplots(1, 2), (SLIP, COST), strict=True):
         for control in study.run_controls:
@@ -83,12 +81,12 @@ def _factor_axis(axes: Axes, factor: Factor) -> None:
 
 
 def effects(points: Sequence[Point], study: Study) -> Figure:
-    """Slip over each factor by itself; points at which no run walked along the lower edge."""
+    """Draws slip over each factor by itself; points where no run walked are at the lower edge."""
     factors = shown_effects(study)
-    across = min(len(factors), ACROSS)
-    down = math.ceil(len(factors) / across)
-    figure = Figure(figsize=(3.1 * across + 0.6, 2.5 * down + 0.5))
-    panels = np.atleast_1d(figure.subplots(down, across, sharey=True, squeeze=False).ravel())
+    columns = min(len(factors), COLUMNS)
+    rows = math.ceil(len(factors) / columns)
+    figure = Figure(figsize=(3.1 * columns + 0.6, 2.5 * rows + 0.5))
+    panels = np.atleast_1d(figure.subplots(rows, columns, sharey=True, squeeze=False).ravel())
     for axes, factor in zip(panels, factors, strict=False):
         for control in study.run_controls:
             _marks(axes, some_of(points), factor, control)
@@ -97,15 +95,15 @@ def effects(points: Sequence[Point], study: Study) -> Figure:
         axes.margins(x=0.05, y=0.12)
     for axes in panels[len(factors) :]:
         axes.set_visible(False)
-    for axes in panels[::across]:
+    for axes in panels[::columns]:
         axes.set_ylabel(NAMES[SLIP])
     panels[0].legend(fontsize=7)
     return figure
 
 
 def shown_effects(study: Study) -> list[Factor]:
-    """Factors that vary, not more than can be looked at."""
-    return [factor for factor in study.factors if len(set(factor.values)) != 1][:MOST_EFFECTS]
+    """Returns the factors that vary, MAX_EFFECTS at most."""
+    return [factor for factor in study.factors if len(set(factor.values)) != 1][:MAX_EFFECTS]
 
 
 def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str) -> None:
@@ -137,7 +135,7 @@ def _marks(axes: Axes, points: Sequence[Point], factor: Factor, control: str) ->
 
 
 def pareto(points: Sequence[Point], study: Study) -> Figure:
-    """Slip against cost of transport with the front of each control."""
+    """Draws slip against cost of transport with the Pareto front of each control."""
     figure = Figure(figsize=(6.4, 4.2))
     axes = figure.subplots()
     for control in study.run_controls:
@@ -164,7 +162,7 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
         axes.set(
             **{
                 name: "log"
-                if values.min() > 0.0 and values.max() > WIDE * values.min()
+                if values.min() > 0.0 and values.max() > LOG_RATIO * values.min()
                 else "linear"
             }
         )
@@ -175,7 +173,7 @@ def pareto(points: Sequence[Point], study: Study) -> Figure:
 
 
 def slip_and_cost(points: Sequence[Point], control: str) -> Array:
-    """(k, 2) cost of transport and slip of the points that have both."""
+    """Returns cost of transport and slip (k, 2) of the points that have both."""
     pairs = np.array(
         [(mean_of(point, control, COST), mean_of(point, control, SLIP)) for point in points]
     ).reshape(-1, 2)
@@ -183,7 +181,7 @@ def slip_and_cost(points: Sequence[Point], control: str) -> Array:
 
 
 def front(pairs: Array) -> Array:
-    """(k, 2) the points, by their first figure, that no other is below or equal to in both."""
+    """Returns the Pareto front (k, 2) of points (n, 2), less being better, by the first value."""
     kept, best = [], math.inf
     for first, second in pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist():
         if second < best:
@@ -193,45 +191,20 @@ def front(pairs: Array) -> Array:
 
 
 def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:
-    """The first metric of each trial, the best so far, and what it began from."""
+    """Draws the first metric of each trial, the best so far, and the value before."""
     assert study.optimise is not None
     name = study.optimise.metrics[0]
     unit, less, _ = METRICS[name]
     figure = Figure(figsize=(8.0, 3.4))
     axes = figure.subplots()
-    for feasible, mark, label in ((True, "o", "trial"), (False, "x", "breaks a constraint")):
-        some = [
-            (trial.number, trial.means[name])
-            for trial in trials
-            if trial.feasible is feasible and math.isfinite(trial.means[name])
-        ]
-        if some:
-            colour = "#0072B2" if feasible else GREY
-            axes.plot(
-                *zip(*some, strict=True),
-                linestyle="",
-                marker=mark,
-                markersize=4.5,
-                color=colour,
-                label=label,
-            )
-    lost = [trial.number for trial in trials if not math.isfinite(trial.means[name])]
-    if lost:
-        axes.plot(
-            lost,
-            [0.03] * len(lost),
-            "|",
-            color="#D55E00",
-            label="no figure: a run fell",
-            transform=axes.get_xaxis_transform(),
-        )
-    able = [trial for trial in trials if trial.feasible and math.isfinite(trial.means[name])]
-    if able:
+    _trial_marks(axes, trials, name)
+    complete = [trial for trial in trials if trial.feasible and math.isfinite(trial.means[name])]
+    if complete:
         best = (np.minimum if less else np.maximum).accumulate(
-            [trial.means[name] for trial in able]
+            [trial.means[name] for trial in complete]
         )
         axes.step(
-            [trial.number for trial in able],
+            [trial.number for trial in complete],
             best,
             where="post",
             color="#009E73",
@@ -247,3 +220,32 @@ def history(study: Study, trials: Sequence[Trial], before: float) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     figure.legend(loc="outside upper center", ncols=5)
     return figure
+
+
+def _trial_marks(axes: Axes, trials: Sequence[Trial], name: str) -> None:
+    """Draws a mark for the metric of each trial, and one at the lower edge where it has none."""
+    for feasible, mark, label in ((True, "o", "trial"), (False, "x", "breaks a constraint")):
+        shown = [
+            (trial.number, trial.means[name])
+            for trial in trials
+            if trial.feasible is feasible and math.isfinite(trial.means[name])
+        ]
+        if shown:
+            axes.plot(
+                *zip(*shown, strict=True),
+                linestyle="",
+                marker=mark,
+                markersize=4.5,
+                color="#0072B2" if feasible else GREY,
+                label=label,
+            )
+    lost = [trial.number for trial in trials if not math.isfinite(trial.means[name])]
+    if lost:
+        axes.plot(
+            lost,
+            [0.03] * len(lost),
+            "|",
+            color="#D55E00",
+            label="no figure: a run fell",
+            transform=axes.get_xaxis_transform(),
+        )

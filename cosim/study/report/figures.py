@@ -1,7 +1,6 @@
-"""Figures of a study: what two factors do, all factors at once, slip against cost, and how an
-optimiser got where it got.
+"""Chooses the figures of a study's report, and saves them.
 
-Colours are told apart by colour-blind readers, and marks by their shape too.
+Colour-blind readers can distinguish the colours, and marks differ in shape as well.
 """
 
 from __future__ import annotations
@@ -28,17 +27,20 @@ from hexapod_cosim.cosim.study.report.curves import (
     slip_and_cost,
 )
 from hexapod_cosim.cosim.study.report.heat import heat_map
-from hexapod_cosim.cosim.study.report.marks import MOST_CELLS, SLIP, mean_of
+from hexapod_cosim.cosim.study.report.style import MAX_CELLS, SLIP, mean_of
 from hexapod_cosim.cosim.study.store.table import Point
 from hexapod_cosim.cosim.study.store.trials import Trial
 from hexapod_cosim.models import HexapodError
 
-WHY_NOT = "A dot: no run (no pair) there yet; a cross: none walked; a dash: walked, too short for a figure."
+EMPTY_CELLS = (
+    "A dot: no run (no pair) there yet; a cross: none walked; "
+    "a dash: walked, too short for a figure."
+)
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure with what to say about it."""
+    """A figure with its title and caption."""
 
     title: str
     caption: str
@@ -48,8 +50,10 @@ class Drawing:
 def drawings(
     study: Study, points: Sequence[Point], trials: Sequence[Trial], *, before: float = math.nan
 ) -> dict[str, Drawing]:
-    """The figures that a study's points allow, by the name of their files; none of what has no
-    figure.
+    """Returns the figures that a study's points allow, by the names of their files.
+
+    Args:
+        before: the first objective before the optimisation, NaN without one.
     """
     found: dict[str, Drawing] = {}
     walks = any(
@@ -58,7 +62,10 @@ def drawings(
         for control in study.run_controls
     )
     if study.optimise is not None and trials:
-        caption = f"Mean {study.optimise.metrics[0]} of each trial over its training runs, and the best so far; dashed: what it began from."
+        caption = (
+            f"Mean {study.optimise.metrics[0]} of each trial over its training runs, and the best "
+            "so far; dashed: before the optimisation."
+        )
         found["history"] = Drawing("Optimisation", caption, partial(history, study, trials, before))
     elif study.optimise is None:
         found |= _of_factors(study, points, walks=walks)
@@ -70,7 +77,10 @@ def drawings(
         len(slip_and_cost([item for item in points if not item.held_out], control))
         for control in study.run_controls
     ):
-        caption = "A mark per point and control, means over its walks; line: what no other point betters in both."
+        caption = (
+            "A mark per point and control, means over its walks; "
+            "line: the points that no other point betters in both."
+        )
         found["pareto"] = Drawing(
             "Slip against cost of transport", caption, partial(pareto, points, study)
         )
@@ -78,15 +88,16 @@ def drawings(
 
 
 def _of_factors(study: Study, points: Sequence[Point], *, walks: bool) -> dict[str, Drawing]:
-    """What factors do: over two of a grid, over the only one, or over each by itself."""
+    """Returns the figure over two factors of a grid, over the only factor or over each factor."""
     axes = [
         factor
         for factor in study.factors
-        if factor.kind == VALUES and 1 < len(factor.values) <= MOST_CELLS
+        if factor.kind == VALUES and 1 < len(factor.values) <= MAX_CELLS
     ]
     if study.design == GRID and len(axes) >= 2 and walks:
         title = f"{axes[0].name} and {axes[1].name}"
-        caption = f"Mean slip per metre{', averaged over the others' if len(study.factors) > 2 else ''}. {WHY_NOT}"
+        averaged = ", averaged over the others" if len(study.factors) > 2 else ""
+        caption = f"Mean slip per metre{averaged}. {EMPTY_CELLS}"
         return {
             "heat_map": Drawing(title, caption, partial(heat_map, points, axes[0], axes[1], study))
         }
@@ -100,7 +111,10 @@ def _of_factors(study: Study, points: Sequence[Point], *, walks: bool) -> dict[s
             )
         }
     if study.factors and shown_effects(study) and walks:
-        caption = "Mean slip per metre of each point over each factor by itself; crosses at the lower edge: no run walked."
+        caption = (
+            "Mean slip per metre of each point over each factor by itself; "
+            "crosses at the lower edge: no run walked."
+        )
         return {
             "effects": Drawing("Slip over each factor", caption, partial(effects, points, study))
         }
@@ -108,7 +122,7 @@ def _of_factors(study: Study, points: Sequence[Point], *, walks: bool) -> dict[s
 
 
 def save(found: dict[str, Drawing], folder: Path) -> list[Path]:
-    """Writes every figure as SVG and PNG."""
+    """Writes every figure as SVG and PNG; returns the files. Raises HexapodError."""
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
@@ -120,8 +134,7 @@ def save(found: dict[str, Drawing], folder: Path) -> list[Path]:
             for kind, metadata in UNDATED.items():
                 with atomic_path(folder / f"{name}.{kind}") as path:
                     figure.savefig(path, format=kind, dpi=DPI, metadata=metadata)
-                figure.set_layout_engine(
-                    "none"
-                )  # laid out once is enough: it takes as long as the drawing
+                # the layout takes as long as the drawing, and is the same for both formats
+                figure.set_layout_engine("none")
                 files.append(folder / f"{name}.{kind}")
     return files

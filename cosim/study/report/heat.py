@@ -1,6 +1,4 @@
-"""The heat map of a grid's first two factors: a panel per control, and the paired change between
-them.
-"""
+"""Draws the heat map of a grid's first two factors."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from hexapod_cosim.cosim.study.plan.records import Factor, Study
-from hexapod_cosim.cosim.study.report.marks import (
+from hexapod_cosim.cosim.study.report.style import (
     CHANGES,
     COLOURMAP,
     SLIP,
@@ -27,26 +25,24 @@ from hexapod_cosim.cosim.study.report.marks import (
 )
 from hexapod_cosim.cosim.study.store.table import Point
 
-MOST_NUMBERED = 60  # cells with their numbers in them
+MAX_NUMBERED = 60  # cells that show their values as numbers
 GREY = "0.5"
 
 
 @dataclass(frozen=True)
 class _Panel:
-    """Values by cell (second, first), NaN where there is none, and how many runs and walks a
-    cell has.
-    """
+    """A panel with arrays by cell (values of the second factor, values of the first)."""
 
     title: str
-    values: Array
-    runs: Array
-    walked: Array
+    values: Array  # NaN in cells without one
+    runs: Array  # numbers of runs
+    walked: Array  # numbers of walks
     norm: Normalize
     colours: str
 
 
 def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Study) -> Figure:
-    """Slip over two factors, a panel per control, and the change of its pairs."""
+    """Draws the slip over two factors for each control, and the change over pairs."""
     cells = _Cells(points, first, second)
     controls = study.run_controls
     slips = [cells.mean(_slip(control)) for control in controls]
@@ -69,7 +65,7 @@ def heat_map(points: Sequence[Point], first: Factor, second: Factor, study: Stud
             _Panel(
                 title,
                 change,
-                cells.total(_judged),
+                cells.total(_pairs_known),
                 cells.total(lambda point: point.pairs),
                 Normalize(-100.0, 100.0),
                 CHANGES,
@@ -98,10 +94,8 @@ def _walked(control: str) -> Callable[[Point], int]:
     return lambda point: point.walked[control]
 
 
-def _judged(point: Point) -> int:
-    """Whether it is known if there is a pair of walks: there is one, or one of the controls has
-    run and never walked.
-    """
+def _pairs_known(point: Point) -> int:
+    """Returns > 0 when the point has pairs, or when it has none as one control never walked."""
     return point.pairs or int(
         any(point.runs[name] and not point.walked[name] for name in point.runs)
     )
@@ -125,7 +119,10 @@ class _Cells:
         ]
 
     def mean(self, figures: Callable[[Point], tuple[float, float]]) -> Array:
-        """Sum over sum of what each point has of both; NaN where there is none."""
+        """Returns the ratio of sums over the points of each cell; NaN where there is none.
+
+        `figures` returns the numerator and the denominator of a point.
+        """
         above, below = np.zeros(self._shape), np.zeros(self._shape)
         for place, point in self._points:
             pair = figures(point)
@@ -137,7 +134,7 @@ class _Cells:
         )
 
     def total(self, figure: Callable[[Point], int]) -> Array:
-        """Sum over the points of a cell."""
+        """Returns the sum over the points of each cell."""
         found = np.zeros(self._shape)
         for place, point in self._points:
             found[place] += figure(point)
@@ -145,8 +142,10 @@ class _Cells:
 
 
 def _draw(figure: Figure, axes: Axes, panel: _Panel, first: Factor, second: Factor) -> None:
-    """Cells without a figure say why: a dot where nothing was run yet, a cross where no run
-    walked, a dash where the walk has none.
+    """Draws a panel, with a mark in cells without a value.
+
+    The mark is a dot where nothing was run yet, a cross where no run walked, and a dash where the
+    walk has no value.
     """
     axes.set_title(panel.title)
     axes.grid(visible=False)
@@ -161,7 +160,7 @@ def _draw(figure: Figure, axes: Axes, panel: _Panel, first: Factor, second: Fact
     for row, column in np.argwhere(~np.isfinite(panel.values)):
         mark = "." if not panel.runs[row, column] else "x" if not panel.walked[row, column] else "_"
         axes.plot(column, row, marker=mark, color=GREY)
-    if panel.values.size <= MOST_NUMBERED:
+    if panel.values.size <= MAX_NUMBERED:
         _numbers(axes, panel.values, image)
     axes.set_xticks(
         range(len(first.values)), ticks_of(first), rotation=45 if len(first.values) > 6 else 0

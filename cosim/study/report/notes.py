@@ -1,6 +1,4 @@
-"""What to know before reading a study's figures: for the top of its report, and for the
-terminal.
-"""
+"""Notes on the limits of a study's results, for its report and the terminal."""
 
 from __future__ import annotations
 
@@ -10,36 +8,44 @@ from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.study.plan.records import SOBOL, Study
 from hexapod_cosim.cosim.study.store.results import Results
 
-NO_WALK = "No run walked to its end, so there are no figures of walks. What ended the runs stands under Failures."
+NO_WALK = (
+    "No run walked to its end, so there are no figures of walks. "
+    "The reasons are listed under Failures."
+)
 TOO_SHORT = (
     "too short for figures, which are of whole gait cycles after the second: set a longer duration."
 )
 
 
 def notes(results: Results) -> list[str]:
-    """Whole sentences."""
-    return [*_of_design(results.study), *_of_what_is_there(results), *_of_walks(results)]
+    """Returns the notes as sentences."""
+    return [*_of_design(results.study), *_of_missing_runs(results), *_of_walks(results)]
 
 
 def _of_design(study: Study) -> Iterator[str]:
     if study.design == SOBOL and study.optimise is None and study.points & (study.points - 1):
         below = 1 << (study.points.bit_length() - 1)
-        yield f"{study.points} Sobol points are no power of two: only {below} or {2 * below} would cover the factors evenly."
+        yield (
+            f"{study.points} Sobol points are no power of two: only {below} or {2 * below} would "
+            "cover the factors evenly."
+        )
 
 
-def _of_what_is_there(results: Results) -> Iterator[str]:
+def _of_missing_runs(results: Results) -> Iterator[str]:
     if results.damaged:
-        again = "Start the study again: their runs are run again"
-        yield f"Damaged parts of the results are left out, and their runs with them: {', '.join(results.damaged)}. {again}."
+        yield (
+            "Damaged parts of the results are left out, and their runs with them: "
+            f"{', '.join(results.damaged)}. Start the study again: their runs are run again."
+        )
     if results.facts["status"] != COMPLETED and results.study.optimise is None:
-        means = "Means by control are of what is there, which need not be the same points and seeds"
-        yield f"Not all runs are there. {means}; changes are of whole pairs."
+        yield (
+            "Not all runs are there. Means by control are of the runs that are there, which need "
+            "not be of the same points and seeds; changes are of whole pairs."
+        )
 
 
 def _of_walks(results: Results) -> Iterator[str]:
-    """Where no run walked, or walks gave no figures: under a scenario or a control too, where
-    others gave them.
-    """
+    """Yields notes where no run walked, or where the walks of a scenario gave no figures."""
     walks = results.overall.walks
     if results.overall.runs and not walks:
         yield NO_WALK

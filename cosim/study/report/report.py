@@ -1,6 +1,4 @@
-"""report.html of a study: one file with everything in it, made from the folder alone, also of a
-study that is not done.
-"""
+"""Writes report.html, the report of a study in one file, also of a study that is not finished."""
 
 from __future__ import annotations
 
@@ -25,13 +23,13 @@ from hexapod_cosim.cosim.study.store.results import POINTS, SUMMARY, Results
 from hexapod_cosim.cosim.study.store.table import Mean, Point
 
 REPORT, FIGURES_FOLDER = "report.html", "plots"
-SHOWN_POINTS = 100  # rows of the table; points.parquet has all
-OF_POINTS = (
+SHOWN_POINTS = 100  # rows of the table of points; points.parquet has all
+POINT_METRICS = (  # in that table
     "slip_per_metre",
     "cost_of_transport",
     "peak_force",
     "torque_rms",
-)  # metrics in that table
+)
 
 
 def write_study_report(results: Results, folder: Path) -> list[Path]:
@@ -60,14 +58,14 @@ def write_study_report(results: Results, folder: Path) -> list[Path]:
         points=point_rows(results),
         figures=pictures,
         optimum=optimum_rows(results),
-        gained=optimum_changes(results),
+        optimum_changes=optimum_changes(results),
         failures=[(*key, count) for key, count in results.overall.failures.items()],
         toml=_toml(results),
         notes=notes(results),
-        of_what=of_what(results),
+        interval_meaning=interval_meaning(results),
         method=METHOD,
         wall=shown_time(results.wall),
-        metrics=OF_POINTS,
+        metrics=POINT_METRICS,
     )
     write_text(folder / REPORT, page)
     return [folder / POINTS, folder / SUMMARY, *files, folder / REPORT]
@@ -78,30 +76,34 @@ def _embedded(svg: Path) -> str:
 
 
 def _toml(results: Results) -> dict[str, str]:
-    """What it takes to run it again, as files."""
+    """Returns the files that repeat the study, by title."""
     gains = results.manifest["gains"]
-    texts = {"The study": to_toml(_known(results.manifest["study"]))}
+    texts = {"The study": to_toml(_without_none(results.manifest["study"]))}
     texts |= {
-        f"Scenario {name}": to_toml(_known(table))
+        f"Scenario {name}": to_toml(_without_none(table))
         for name, table in results.manifest["scenarios"].items()
     }
-    return texts | ({} if gains is None else {"Gains": to_toml(_known(gains))})
+    return texts | ({} if gains is None else {"Gains": to_toml(_without_none(gains))})
 
 
-def _known(content: Any) -> Any:
-    """Without what JSON could not hold: an endless duration, which a file says by saying
-    nothing.
+def _without_none(content: Any) -> Any:
+    """Returns the content without None, which JSON has for an unlimited duration.
+
+    In a scenario file such a duration is left out.
     """
     if isinstance(content, Mapping):
-        return {key: _known(value) for key, value in content.items() if value is not None}
-    return [_known(value) for value in content] if isinstance(content, list) else content
+        return {key: _without_none(value) for key, value in content.items() if value is not None}
+    return [_without_none(value) for value in content] if isinstance(content, list) else content
 
 
-def of_what(results: Results) -> str:
-    """What the intervals of the table over all runs are over."""
+def interval_meaning(results: Results) -> str:
+    """Returns what the intervals of the table over all runs are over."""
     study = results.study
     if study.optimise is not None:
-        return "over all trials, training and held-out runs together: how far trials lie apart, not how sure the optimum is"
+        return (
+            "over all trials, training and held-out runs together: how much trials differ, "
+            "not how certain the optimum is"
+        )
     if results.of_points == 1:
         return "over seeds"
     seeds = (
@@ -111,11 +113,14 @@ def of_what(results: Results) -> str:
     )
     if study.design in DRAWN:
         return f"over points drawn from the factors' distributions{seeds}"
-    return "as if the points had been drawn at random: mostly how far they lie apart. The table of points has intervals over seeds alone"
+    return (
+        "as if the points had been drawn at random: mostly how much they differ. "
+        "The table of points has intervals over seeds alone"
+    )
 
 
 def overall_rows(results: Results) -> list[dict[str, Any]]:
-    """A row per metric: mean of all runs that walked by control, change over all pairs."""
+    """Returns a row per metric: means over all walks by control, and the change over all pairs."""
     overall, rows = results.overall, []
     means = {
         control: {name: overall.means[control][name].value for name in FIGURES}
@@ -143,18 +148,14 @@ def overall_rows(results: Results) -> list[dict[str, Any]]:
 
 
 def spread(results: Results, name: str) -> str:
-    """The least and the largest change of a metric over the points, relative; "" where fewer
-    than two have one.
-    """
+    """Returns the least and the largest relative change over the points, if there are two."""
     found = [point.changes[name].relative for point in results.points if name in point.changes]
     known = [value for value in found if math.isfinite(value)]
     return f"{min(known):+.0%} .. {max(known):+.0%}" if len(known) > 1 else ""
 
 
 def point_rows(results: Results) -> list[dict[str, Any]]:
-    """A row per point, of some evenly chosen ones when there are many: settings, walked, a few
-    metrics.
-    """
+    """Returns rows of at most about SHOWN_POINTS evenly chosen points."""
     points = (
         [point for point in results.points if not point.held_out]
         if results.study.optimise is None
@@ -171,7 +172,7 @@ def _point_row(point: Point, results: Results) -> dict[str, Any]:
             "values": [shown_mean(name, point.means[control][name]) for control in controls],
             **shown_change(point.changes.get(name)),
         }
-        for name in OF_POINTS
+        for name in POINT_METRICS
     ]
     return {
         "number": point.number,
@@ -183,7 +184,7 @@ def _point_row(point: Point, results: Results) -> dict[str, Any]:
 
 
 def shown_time(seconds: float) -> str:
-    """For people."""
+    """Returns a duration as text."""
     for unit, size in (("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.3g} {unit}"
@@ -191,12 +192,12 @@ def shown_time(seconds: float) -> str:
 
 
 def shown_value(value: Any) -> str:
-    """A setting for people."""
+    """Returns the value of a setting as text."""
     return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def shown_mean(name: str, item: Mean) -> str:
-    """A mean with half its interval, for people."""
+    """Returns a mean with the half width of its interval as text."""
     if not math.isfinite(item.value):
         return "-"
     value = 0.0 if abs(item.value) < DUST * FLOORS[name] else item.value
@@ -209,13 +210,13 @@ def shown_mean(name: str, item: Mean) -> str:
 
 
 def short(value: float, digits: int) -> str:
-    """A number of so many digits, in plain decimals unless it is tiny."""
+    """Returns a number with a number of digits, without an exponent unless it is tiny."""
     text = f"{value:.{digits}g}"
     return f"{value:.0f}" if "e+" in text else text
 
 
 def shown_change(change: Change | None) -> dict[str, str]:
-    """A change relative to the first control's mean, where that has a meaning, and its interval."""
+    """Returns a change relative to the first control's mean, its interval and its verdict."""
     if change is None or not change.pairs or not math.isfinite(change.relative):
         return {"change": "", "interval": "", "verdict": "" if change is None else change.verdict}
     return {
@@ -230,38 +231,39 @@ def _shown_interval(low: float, high: float) -> str:
 
 
 def optimum_rows(results: Results) -> list[dict[str, Any]]:
-    """What the optimiser began from and what it found: settings, training, held out."""
+    """Returns rows of the settings before the optimisation and of the best trials."""
     optimum = results.optimum
     if optimum is None:
         return []
     before = {
         "label": "before",
         "settings": ["-"] * len(optimum["variables"]),
-        **_judged(optimum["before"]),
+        **_shown_means(optimum["before"]),
     }
     return [before, *(_best_row(item, optimum) for item in optimum["best"])]
 
 
 def optimum_changes(results: Results) -> list[dict[str, Any]]:
-    """A row per best trial, metric and part (held out first): how it differs from what the
-    optimiser began from, over pairs of runs.
+    """Returns the changes from the settings before the optimisation to the best trials.
+
+    There is a row for each trial, metric and part of the runs, held-out runs first.
     """
     return [
         {
             "label": f"trial {item['trial']}",
             "part": part.replace("_", " "),
             "metric": name,
-            **_found_change(table),
+            **_change_row(table),
         }
         for item in (results.optimum or {"best": []})["best"]
         for part in ("held_out", "training")
         for name, table in item.get("change", {})
         .get(part, {})
-        .items()  # folders of before have none
+        .items()  # folders of earlier versions have none
     ]
 
 
-def _found_change(table: Mapping[str, Any]) -> dict[str, Any]:
+def _change_row(table: Mapping[str, Any]) -> dict[str, Any]:
     relative, low, high = (_number(table[key]) for key in ("relative", "low", "high"))
     change = f"{relative:+.1%}" if math.isfinite(relative) else "-"
     return {
@@ -277,11 +279,11 @@ def _best_row(item: Mapping[str, Any], optimum: Mapping[str, Any]) -> dict[str, 
     return {
         "label": label,
         "settings": [shown_value(item["values"][name]) for name in optimum["variables"]],
-        **_judged(item),
+        **_shown_means(item),
     }
 
 
-def _judged(item: Mapping[str, Any]) -> dict[str, list[str]]:
+def _shown_means(item: Mapping[str, Any]) -> dict[str, list[str]]:
     return {
         part: [_shown_figure(name, value) for name, value in item[part].items()]
         for part in ("training", "held_out")

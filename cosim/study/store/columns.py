@@ -1,6 +1,4 @@
-"""A run as a row of the store: its number and settings, how it ended, its metrics, and what it
-took.
-"""
+"""The columns of the store: number, settings, status, metrics and time of a run."""
 
 from __future__ import annotations
 
@@ -18,25 +16,29 @@ from hexapod_cosim.cosim.study.plan.records import (
     Study,
     Value,
 )
-from hexapod_cosim.cosim.study.store.done import Done
+from hexapod_cosim.cosim.study.store.run_result import RunResult
 
-OF_TIME = "realtime_factor"  # the metric that is the machine's
-FIGURES = tuple(name for name in METRICS if name != OF_TIME)
+MACHINE_METRIC = "realtime_factor"  # depends on the machine
+FIGURES = tuple(name for name in METRICS if name != MACHINE_METRIC)
 UNITS = {name: unit for name, (unit, _, _) in METRICS.items()}
 WALL = "wall"
-BETWEEN = " | "  # warnings of a run
+WARNING_SEPARATOR = " | "
 
 
 def schema_of(study: Study) -> pa.Schema:
-    """The columns, with their units; a scenario that is a factor stands under `case`."""
+    """Returns the schema of the store, with units in the metadata of its fields.
+
+    A scenario that is a factor is in the column `case`.
+    """
     fields = [
         pa.field("run", pa.int64()),
         pa.field("point", pa.int64()),
         pa.field("case", pa.string()),
     ]
     fields += [
-        _unit(pa.field(factor.name, _type(factor)), _unit_of(factor))
-        for factor in _own_columns(study)
+        _with_unit(pa.field(factor.name, _type(factor)), _unit_of(factor))
+        for factor in study.factors
+        if factor.name != SCENARIO_FACTOR
     ]
     fields += [
         pa.field("seed", pa.int64()),
@@ -51,22 +53,18 @@ def schema_of(study: Study) -> pa.Schema:
     ]
     fields += [
         pa.field("warnings", pa.string()),
-        *(_unit(pa.field(name, pa.float64()), UNITS[name]) for name in FIGURES),
+        *(_with_unit(pa.field(name, pa.float64()), UNITS[name]) for name in FIGURES),
     ]
-    fields += [pa.field("identity", pa.string()), _unit(pa.field(WALL, pa.float64()), "s")]
+    fields += [pa.field("identity", pa.string()), _with_unit(pa.field(WALL, pa.float64()), "s")]
     return pa.schema(fields)
 
 
 def result_schema(schema: pa.Schema) -> pa.Schema:
-    """The columns that are the same whenever and wherever a run is run."""
+    """Returns the schema without the columns that differ between repetitions of a run."""
     return pa.schema([item for item in schema if item.name != WALL])
 
 
-def _own_columns(study: Study) -> list[Factor]:
-    return [factor for factor in study.factors if factor.name != SCENARIO_FACTOR]
-
-
-def _unit(item: pa.Field, unit: str) -> pa.Field:
+def _with_unit(item: pa.Field, unit: str) -> pa.Field:
     return item.with_metadata({"unit": unit}) if unit else item
 
 
@@ -81,9 +79,9 @@ def _type(factor: Factor) -> pa.DataType:
     return pa.float64() if kinds <= {int, float} else pa.string()
 
 
-def row_of(done: Done, study: Study) -> dict[str, object]:
-    """A run by column."""
-    order, summary = done.order, done.summary
+def row_of(result: RunResult, study: Study) -> dict[str, object]:
+    """Returns the row of a run: its values by column."""
+    order, summary = result.order, result.summary
     values = {
         factor.name: _cell(factor, value)
         for factor, value in zip(study.factors, order.values, strict=True)
@@ -101,26 +99,21 @@ def row_of(done: Done, study: Study) -> dict[str, object]:
         "upright": summary.upright,
         "walked": summary.walked,
         "fallback": summary.fallback,
-        "warnings": BETWEEN.join(summary.warnings),
+        "warnings": WARNING_SEPARATOR.join(summary.warnings),
         **{
             name: None if math.isnan(summary.metrics[name]) else summary.metrics[name]
             for name in FIGURES
         },
         "identity": identity(order, study.factors),
-        WALL: done.wall,
+        WALL: result.wall,
     }
 
 
 def _cell(factor: Factor, value: Value | None) -> Value | None:
+    """Converts the value of a factor to the type of its column."""
     if value is None:
         return None
     kind = _type(factor)
     if kind == pa.string():
-        return (
-            value
-            if isinstance(value, str)
-            else str(value).lower()
-            if isinstance(value, bool)
-            else str(value)
-        )
+        return str(value).lower() if isinstance(value, bool) else str(value)
     return value if kind == pa.bool_() else float(value)

@@ -1,6 +1,4 @@
-"""What a study's folder says of itself: enough to run it again, and to refuse going on with
-anything else.
-"""
+"""The manifest of a study's folder, which allows to repeat the study and to refuse another one."""
 
 from __future__ import annotations
 
@@ -12,6 +10,8 @@ from pathlib import Path
 from time import time
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from hexapod_cosim.cosim.common.files import (
     RUN_FILE,
     RUNNING,
@@ -20,10 +20,9 @@ from hexapod_cosim.cosim.common.files import (
     read_json,
     to_json,
 )
-from hexapod_cosim.cosim.common.locks import HELD, lock_file
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.study.plan.records import StudyError
-from hexapod_cosim.cosim.study.store.store import LEFTOVERS, write_durably
+from hexapod_cosim.cosim.study.store.store import UNFINISHED, write_durably
 
 MANIFEST, LOCK, RUNS, RESULTS, TIMES = (
     "manifest.json",
@@ -33,18 +32,18 @@ MANIFEST, LOCK, RUNS, RESULTS, TIMES = (
     "times.parquet",
 )
 FORMAT = 1
-OF_FILE = "hexapod."  # keys of a file's metadata
-MOST_NAMED = 6  # differences in a message
-WHILE = 600.0  # s    after which nobody is writing a file any more
+METADATA_PREFIX = "hexapod."  # of the keys of a file's metadata
+MAX_NAMED = 6  # differences in a message
+MAX_WRITE_TIME = 600.0  # s    after which an unfinished file is of a process that was killed
 
 
 def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """What a file of results needs to be trusted by itself, as texts for its metadata; the same
-    however, wherever and how often it was run.
+    """Returns the metadata of a file of results, by which it can be trusted without its folder.
 
-    By hexapod.NAME: format, study (its file as JSON), scenarios (in full), seeds, engine,
-    environment (versions), fmus, controller and robots (SHA-256), gains (as JSON, and their
-    SHA-256).
+    The metadata depend on the study only, not on where, when and how often it was run. Keys are
+    hexapod.NAME with NAME: format, study (its file as JSON), scenarios (in full), seeds, engine,
+    environment (versions), fmus, controller and robots (SHA-256), gains (as JSON) and
+    gains_sha256.
     """
     names = (
         "format",
@@ -61,24 +60,27 @@ def provenance(manifest: Mapping[str, Any]) -> dict[str, str]:
         "gains",
     )
     found = {
-        f"{OF_FILE}{name}": manifest[name]
+        f"{METADATA_PREFIX}{name}": manifest[name]
         if isinstance(manifest[name], str)
-        else _plain(manifest[name])
+        else _compact_json(manifest[name])
         for name in names
     }
-    return found | {
-        f"{OF_FILE}gains_sha256": hashlib.sha256(found[f"{OF_FILE}gains"].encode()).hexdigest()
-    }
+    gains = found[f"{METADATA_PREFIX}gains"].encode()
+    return found | {f"{METADATA_PREFIX}gains_sha256": hashlib.sha256(gains).hexdigest()}
 
 
-def _plain(content: Any) -> str:
-    """JSON in one line, in the content's own order."""
+def _compact_json(content: Any) -> str:
+    """Returns JSON in one line, with the keys in their order."""
     return json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> None:
-    """Makes the folder the study's, or sees that it is: the same study, FMU, gains and versions.
-    Raises StudyError, HexapodError.
+    """Writes the manifest into a new folder, or checks that the folder has the same one.
+
+    Raises StudyError when the folder holds anything else, HexapodError when it cannot be written.
+
+    Args:
+        command: the command line that repeats the study.
     """
     if (folder / MANIFEST).exists():
         _compare(read_json(folder / MANIFEST), json.loads(to_json(manifest)), folder)
@@ -87,7 +89,7 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
         entries = sorted(
             entry.name
             for entry in folder.iterdir()
-            if entry.name != LOCK and not entry.match(LEFTOVERS)
+            if entry.name != LOCK and not entry.match(UNFINISHED)
         )
     except OSError as error:
         raise not_writable(folder, error) from error
@@ -107,21 +109,23 @@ def begin_folder(folder: Path, manifest: Mapping[str, Any], *, command: str) -> 
     write_durably(folder / MANIFEST, _text(manifest))
 
 
-def clear_leftovers(folder: Path, *, shared: Sequence[str]) -> None:
-    """Takes half-written files of killed processes away; of `shared` files, which others may
-    write just now, after a while.
+def remove_unfinished(folder: Path, *, shared: Sequence[str]) -> None:
+    """Removes unfinished files of processes that were killed.
+
+    Args:
+        shared: names of files that other processes may be writing; their unfinished versions are
+            removed after MAX_WRITE_TIME.
     """
-    for left in folder.glob(LEFTOVERS):
+    prefixes = tuple(f".{name}." for name in shared)
+    for path in folder.glob(UNFINISHED):
         with suppress(OSError):
-            if (
-                not left.name.startswith(tuple(f".{name}." for name in shared))
-                or time() - left.stat().st_mtime > WHILE
-            ):
-                left.unlink()
+            old = time() - path.stat().st_mtime > MAX_WRITE_TIME
+            if old or not path.name.startswith(prefixes):
+                path.unlink()
 
 
 def finish_folder(folder: Path) -> None:
-    """Says that all is there."""
+    """Marks the study as completed."""
     write_durably(folder / RUN_FILE, _text({**read_json(folder / RUN_FILE), "status": COMPLETED}))
 
 
@@ -130,13 +134,14 @@ def _text(content: Mapping[str, Any]) -> bytes:
 
 
 def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
+    """Raises StudyError when two manifests differ."""
     found = list(differences(stored, now))
     if found:
-        more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+        more = f" and {len(found) - MAX_NAMED} more" if len(found) > MAX_NAMED else ""
         fix = "choose another folder with -o, or put back what changed"
         raise StudyError(
             "the folder holds another study's runs",
-            got="; ".join(found[:MOST_NAMED]) + more,
+            got="; ".join(found[:MAX_NAMED]) + more,
             expected="what they were begun with",
             fix=fix,
             where=str(folder),
@@ -144,7 +149,7 @@ def _compare(stored: Mapping[str, Any], now: Mapping[str, Any], folder: Path) ->
 
 
 def differences(stored: Any, now: Any, name: str = "") -> Iterator[str]:
-    """In words, where two manifests differ."""
+    """Yields a sentence for each entry in which two manifests differ."""
     if isinstance(stored, Mapping) and isinstance(now, Mapping):
         for key in dict.fromkeys([*stored, *now]):
             yield from differences(stored.get(key), now.get(key), f"{name}.{key}" if name else key)
@@ -159,21 +164,28 @@ def _short(value: Any) -> str:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Makes the folder if need be; no other process runs a study into it meanwhile. Raises
-    StudyError, HexapodError.
+    """Makes the folder and locks it: within the block no other process runs a study into it.
+
+    Raises StudyError when another process has the lock, HexapodError when the folder cannot be
+    written. On a file system without locks the folder is not locked.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / LOCK).open("w")
+        (folder / LOCK).touch()
     except OSError as error:
         raise not_writable(folder, error) from error
-    with file:
-        try:
-            lock_file(file)
-        except OSError as error:
-            if error.errno in HELD:
-                fix = "wait for it, or choose another with -o"
-                raise StudyError(
-                    "another process runs a study into this folder", fix=fix, where=str(folder)
-                ) from error
+    lock = FileLock(folder / LOCK, blocking=False, fallback_to_soft=False)
+    try:
+        lock.acquire()
+    except Timeout as error:
+        raise StudyError(
+            "another process runs a study into this folder",
+            fix="wait for it, or choose another with -o",
+            where=str(folder),
+        ) from error
+    except OSError:
+        pass  # a file system without locks
+    try:
         yield
+    finally:
+        lock.release()

@@ -1,11 +1,11 @@
-"""Counts, means and squared deviations of many samples at once, kept instead of their values:
-memory does not grow with these.
+"""Running moments of many samples: count, mean and sum of squared deviations.
 
-Within a block of values both are summed in two passes; blocks are put together as Chan, Golub and
-LeVeque do (1983):
+They are kept instead of the values, so memory does not grow with the number of values. Within a
+block the moments are computed in two passes. Blocks are merged by the formulas of Chan, Golub and
+LeVeque (1983), with d = mean_b - mean_a and n = n_a + n_b:
 
-    mean = mean_a + d n_b/n        square = square_a + square_b + d^2 n_a n_b/n        d = mean_b -
-    mean_a, n = n_a + n_b
+    mean   = mean_a + d n_b/n
+    square = square_a + square_b + d^2 n_a n_b/n
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Moments:
-    """Of samples, one at each place of the arrays."""
+    """The moments of samples, one for each element of the arrays."""
 
     count: Array
     mean: Array  # 0 of an empty sample
@@ -37,29 +37,30 @@ class Moments:
 
     @property
     def value(self) -> Array:
-        """The means, NaN of empty samples."""
+        """The means, NaN for empty samples."""
         return np.where(self.count > 0, self.mean, math.nan)
 
     @property
     def half_width(self) -> Array:
-        """Half of Student's 95 % intervals; NaN for fewer than two values."""
+        """Half widths of Student's 95 % intervals, NaN for fewer than two values."""
         return half_widths(self.count, self.square)
 
     def merged(self, other: Moments) -> Moments:
-        """Each sample with the other's at its place."""
+        """Merges each sample with the other one at the same place."""
         count = self.count + other.count
         share = other.count / np.maximum(count, 1.0)
-        apart = other.mean - self.mean
+        difference = other.mean - self.mean
         return Moments(
             count,
-            self.mean + apart * share,
-            self.square + other.square + apart**2 * self.count * share,
+            self.mean + difference * share,
+            self.square + other.square + difference**2 * self.count * share,
         )
 
 
 def ratio_half_widths(before: Moments, after: Moments, difference: Moments) -> Array:
-    """Of pairs, half of the 95 % intervals of ln(mean after / mean before); NaN where there is
-    none.
+    """Returns half widths of the 95 % intervals of ln(mean after / mean before).
+
+    All arguments are moments over the same pairs. The result is NaN where there is no interval.
     """
     return log_half_widths(
         difference.count, before.mean, after.mean, (before.square, after.square, difference.square)
@@ -67,23 +68,27 @@ def ratio_half_widths(before: Moments, after: Moments, difference: Moments) -> A
 
 
 def no_moments(*shape: int) -> Moments:
-    """Of empty samples."""
+    """Returns the moments of empty samples."""
     return Moments(np.zeros(shape), np.zeros(shape), np.zeros(shape))
 
 
 def moments_of(values: Array, valid: Truths, starts: Numbers) -> Moments:
-    """Of the valid ones among values (n, ...), in groups of neighbours that begin at `starts`
-    (g,), the first at 0; (g, ...).
+    """Returns the moments (g, ...) of groups of successive values.
+
+    Args:
+        values: (n, ...) the values.
+        valid: (n, ...) which values count.
+        starts: (g,) indices of the first values of the groups; the first is 0.
     """
     count = np.add.reduceat(valid, starts, axis=0, dtype=np.float64)
     sizes = np.diff(np.append(starts, len(values)))
     kept = np.where(valid, values, 0.0)
     mean = np.add.reduceat(kept, starts, axis=0) / np.maximum(count, 1.0)
-    apart = np.where(valid, values - np.repeat(mean, sizes, axis=0), 0.0)
-    return Moments(count, mean, np.add.reduceat(apart**2, starts, axis=0))
+    deviation = np.where(valid, values - np.repeat(mean, sizes, axis=0), 0.0)
+    return Moments(count, mean, np.add.reduceat(deviation**2, starts, axis=0))
 
 
-def appended(first: Moments, second: Moments) -> Moments:
-    """The samples of both, along the first axis."""
+def concatenated(first: Moments, second: Moments) -> Moments:
+    """Joins the samples of both along the first axis."""
     pairs = ((first.count, second.count), (first.mean, second.mean), (first.square, second.square))
     return Moments(*(np.concatenate(pair) for pair in pairs))

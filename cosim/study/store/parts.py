@@ -1,6 +1,4 @@
-"""Parts of a study's store: Parquet files that are never changed, whose names hold their number
-and the checksum of their bytes.
-"""
+"""Parts of a study's store: immutable Parquet files named by their number and checksum."""
 
 from __future__ import annotations
 
@@ -16,19 +14,19 @@ import pyarrow.parquet as pq
 
 from hexapod_cosim.cosim.study.plan.records import StudyError
 
-SMALL, MERGED = "part", "merged"
-RUN = "run"  # the column that they are sorted by
+SMALL, MERGED = "part", "merged"  # kinds of parts
+RUN = "run"  # the column that parts are sorted by
 COMPRESSION = "zstd"
-DAMAGED = ".damaged"  # ends the name of one that was set aside
+DAMAGED = ".damaged"  # suffix of a part that was set aside
 NAME = re.compile(rf"({SMALL}|{MERGED})-([0-9]{{8,}})-([0-9a-f]{{8}})\.parquet")
 
 
 class DamagedPartError(StudyError):
-    """A part that is not what was written."""
+    """A part whose content is not what was written."""
 
 
 def part_of(table: pa.Table, *, kind: str, number: int) -> tuple[str, bytes]:
-    """A part's name and content."""
+    """Returns the name and the content of the part that holds a table."""
     buffer = io.BytesIO()
     pq.write_table(table.sort_by(RUN), buffer, compression=COMPRESSION)
     content = buffer.getvalue()
@@ -36,7 +34,7 @@ def part_of(table: pa.Table, *, kind: str, number: int) -> tuple[str, bytes]:
 
 
 def parts_in(folder: Path, *, kind: str = "") -> list[Path]:
-    """The parts in a folder, of one kind or of all, in the order of their numbers."""
+    """Returns the parts in a folder, of one kind or of all, in the order of their numbers."""
     found = [
         path
         for path in folder.glob("*.parquet")
@@ -46,15 +44,19 @@ def parts_in(folder: Path, *, kind: str = "") -> list[Path]:
 
 
 def number_of(path: Path) -> int:
-    """A part's number."""
+    """Returns the number of a part."""
     match = NAME.fullmatch(path.name)
     assert match is not None  # one of parts_in
     return int(match[2])
 
 
 def read_part(path: Path, schema: pa.Schema, columns: Sequence[str] | None = None) -> pa.Table:
-    """A part, or columns of it. Raises FileNotFoundError when it is gone, DamagedPartError,
-    StudyError when it cannot be read.
+    """Reads a part, or some of its columns.
+
+    Raises:
+        FileNotFoundError: the part is gone.
+        DamagedPartError: its content is damaged or has other columns.
+        StudyError: it cannot be read.
     """
     try:
         content = path.read_bytes()
@@ -73,23 +75,23 @@ def read_part(path: Path, schema: pa.Schema, columns: Sequence[str] | None = Non
             return file.read(columns=columns)
     except (pa.ArrowException, OSError) as error:
         raise damaged(path, str(error)) from error
-    raise damaged(path, "columns of something else")
+    raise damaged(path, "the columns of another study")
 
 
 def runs_of(path: Path, schema: pa.Schema) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """The numbers of a part's runs, in order. Raises as `read_part` does."""
+    """Returns the numbers of a part's runs in ascending order. Raises as read_part() does."""
     runs: np.ndarray[tuple[int], np.dtype[np.int64]] = read_part(path, schema, [RUN])[
         RUN
     ].to_numpy()
     return runs
 
 
-def damaged(path: Path, why: str) -> DamagedPartError:
-    """The error for a part that is not what was written."""
+def damaged(path: Path, reason: str) -> DamagedPartError:
+    """Returns the error for a damaged part."""
     fix = "start the study again: it sets the part aside and runs its runs again"
     return DamagedPartError(
         "a damaged part of the results",
-        got=why,
+        got=reason,
         expected="the Parquet file that was stored",
         fix=fix,
         where=str(path),

@@ -1,4 +1,4 @@
-"""A study's folder read again: its runs so far, points, totals; points.parquet and summary.json."""
+"""Reads the results of a study's folder; writes points.parquet and summary.json."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from hexapod_cosim.cosim.study.store.sums import (
     DIFFERENCE,
     Block,
     Rows,
+    Sums,
     blocks_of,
     whole_pairs,
 )
@@ -37,28 +38,28 @@ from hexapod_cosim.cosim.study.store.trials import OPTIMUM, Trial, trials_of
 from hexapod_cosim.models import HexapodError
 
 POINTS, SUMMARY = "points.parquet", "summary.json"
-HALF = ".half_width"  # of a 95 % interval
-MOST_POINTS = 4000  # kept for figures and tables, evenly chosen of more
+HALF_WIDTH = ".half_width"  # suffix of columns with half widths of 95 % intervals
+MAX_POINTS = 4000  # kept for figures and tables; evenly chosen if there are more
 
 
 @dataclass(frozen=True, kw_only=True)
 class Results:
-    """What a study came to so far."""
+    """The results of a study so far."""
 
     study: Study
     manifest: Mapping[str, Any]
     facts: Mapping[str, Any]  # of run.json
     overall: Overall
-    points: list[Point]  # MOST_POINTS at most
-    of_points: int  # how many there are
+    points: list[Point]  # MAX_POINTS at most
+    of_points: int  # number of all points
     trials: list[Trial]  # of an optimiser
     optimum: Mapping[str, Any] | None
-    damaged: list[str]  # parts that could not be read, in words
-    wall: float  # s    elapsed, added up over all runs, whatever ran beside them
+    damaged: list[str]  # descriptions of parts that could not be read
+    wall: float  # s    sum of the elapsed times of all runs
 
 
 def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
-    """The study of a folder and its manifest. Raises HexapodError when there is none."""
+    """Reads the study of a folder and its manifest. Raises HexapodError when there is none."""
     try:
         manifest: dict[str, Any] = read_json(folder / MANIFEST)
     except HexapodError as error:
@@ -68,80 +69,85 @@ def stored_study(folder: Path) -> tuple[Study, dict[str, Any]]:
         ) from error
     where = str(folder / MANIFEST)
     study = study_from_table(manifest["study"], where=where, scenarios=manifest["scenarios"])
-    return replace(
-        study, title=manifest["title"]
-    ), manifest  # which is the file's name where the file has none
+    # a study without a title has the name of its file
+    return replace(study, title=manifest["title"]), manifest
 
 
 def read_results(folder: Path) -> Results:
-    """Reads all runs once. Writes points.parquet and summary.json. Raises HexapodError."""
+    """Reads all runs once; writes points.parquet and summary.json. Raises HexapodError."""
     study, manifest = stored_study(folder)
     facts = read_json(folder / RUN_FILE)
     tables, damaged = _tables(folder, study, finished=facts["status"] == COMPLETED)
-    tally, kept, count = Tally(study), list[Point](), 0
-    wall = 0.0
-
-    def watched() -> Iterator[Rows]:
-        nonlocal wall
-        for table in whole_pairs(tables, study.run_controls):
-            wall += pc.sum(table[WALL]).as_py() or 0.0
-            rows = Rows(table, study)
-            tally.add(rows)
-            yield rows
-
-    def chosen() -> Iterator[pa.Table]:
-        nonlocal count
-        for block in blocks_of(watched()):
-            places = np.flatnonzero(block.first["point"].to_numpy() % step == 0).tolist()
-            kept.extend(point_at(block, place, study) for place in places)
-            count += len(block.held_out)
-            yield points_table(block, study)
-
-    step = (
-        max(
-            math.ceil(
-                manifest["runs"] / (len(study.seeds) * len(study.run_controls)) / MOST_POINTS
-            ),
-            1,
-        )
-        if study.optimise is None
-        else 1
-    )
-    write_whole(folder / POINTS, chosen(), points_schema(study).with_metadata(provenance(manifest)))
-    trials = [] if study.optimise is None else trials_of(Optimisation(study), kept)
+    reader = _Reader(study, tables, _point_step(study, manifest["runs"]))
+    schema = points_schema(study).with_metadata(provenance(manifest))
+    write_whole(folder / POINTS, reader.point_tables(), schema)
+    trials = [] if study.optimise is None else trials_of(Optimisation(study), reader.points)
     optimum = read_json(folder / OPTIMUM) if (folder / OPTIMUM).exists() else None
     results = Results(
         study=study,
         manifest=manifest,
         facts=facts,
-        overall=tally.overall(),
-        points=kept,
-        of_points=count,
+        overall=reader.tally.overall(),
+        points=reader.points,
+        of_points=reader.count,
         trials=trials,
         optimum=optimum,
         damaged=damaged,
-        wall=wall,
+        wall=reader.wall,
     )
     write_durably(folder / SUMMARY, (to_json(summary_of(results)) + "\n").encode())
     return results
 
 
-def _tables(folder: Path, study: Study, *, finished: bool) -> tuple[Iterator[pa.Table], list[str]]:
-    """All runs in order from their parts, which have checksums; where one is damaged, from a
-    finished study's results or from the others.
+class _Reader:
+    """Reads the tables of all runs once and accumulates what Results holds."""
 
-    And in words, which parts are missing.
+    def __init__(self, study: Study, tables: Iterator[pa.Table], step: int) -> None:
+        self._study, self._tables, self._step = study, tables, step
+        self.tally = Tally(study)
+        self.points: list[Point] = []  # every `step`-th one
+        self.count = 0  # of all points
+        self.wall = 0.0  # s
+
+    def point_tables(self) -> Iterator[pa.Table]:
+        """Yields the rows of points.parquet."""
+        for block in blocks_of(self._rows()):
+            numbers = block.first["point"].to_numpy()
+            places = np.flatnonzero(numbers % self._step == 0).tolist()
+            self.points.extend(point_at(block, place, self._study) for place in places)
+            self.count += len(block.held_out)
+            yield points_table(block, self._study)
+
+    def _rows(self) -> Iterator[Rows]:
+        for table in whole_pairs(self._tables, self._study.run_controls):
+            self.wall += pc.sum(table[WALL]).as_py() or 0.0
+            rows = Rows(table, self._study)
+            self.tally.add(rows)
+            yield rows
+
+
+def _point_step(study: Study, runs: int) -> int:
+    """Returns every how many points one is kept, for a study of a number of runs."""
+    if study.optimise is not None:
+        return 1
+    points = runs / (len(study.seeds) * len(study.run_controls))
+    return max(math.ceil(points / MAX_POINTS), 1)
+
+
+def _tables(folder: Path, study: Study, *, finished: bool) -> tuple[Iterator[pa.Table], list[str]]:
+    """Returns all runs in order, and descriptions of the parts that are left out.
+
+    Runs are read from the parts, which have checksums. When one is damaged, they are read from
+    results.parquet of a finished study, or else from the other parts.
     """
     store = Store(folder / RUNS, schema_of(study))
     damaged = store.skip_damaged()
-    whole = _readable(folder, study) if finished and (damaged or not store.parts()) else None
-    return (store.sorted_rows(), damaged) if whole is None else (_blocks(*whole), [])
+    files = _result_files(folder, study) if finished and (damaged or not store.parts()) else None
+    return (store.sorted_rows(), damaged) if files is None else (_file_tables(*files), [])
 
 
-def _readable(folder: Path, study: Study) -> tuple[pq.ParquetFile, pq.ParquetFile] | None:
-    """The results and times of a finished study, if they are there and whole as far as their
-    ends tell.
-    """
+def _result_files(folder: Path, study: Study) -> tuple[pq.ParquetFile, pq.ParquetFile] | None:
+    """Opens results.parquet and times.parquet; None when they are missing or do not match."""
     try:
         files = pq.ParquetFile(folder / RESULTS), pq.ParquetFile(folder / TIMES)
     except (OSError, pa.ArrowException):
@@ -150,15 +156,14 @@ def _readable(folder: Path, study: Study) -> tuple[pq.ParquetFile, pq.ParquetFil
     return files if known and files[0].metadata.num_rows == files[1].metadata.num_rows else None
 
 
-def _blocks(results: pq.ParquetFile, times: pq.ParquetFile) -> Iterator[pa.Table]:
-    """Runs with what they took, some ten thousand at a time."""
+def _file_tables(results: pq.ParquetFile, times: pq.ParquetFile) -> Iterator[pa.Table]:
+    """Yields the runs with their times, ROWS_AT_ONCE at a time."""
     try:
-        for runs, took in zip(
-            results.iter_batches(ROWS_AT_ONCE), times.iter_batches(ROWS_AT_ONCE), strict=True
-        ):
-            yield pa.Table.from_batches([runs]).append_column(WALL, took[WALL])
+        batches = (file.iter_batches(ROWS_AT_ONCE) for file in (results, times))
+        for runs, durations in zip(*batches, strict=True):
+            yield pa.Table.from_batches([runs]).append_column(WALL, durations[WALL])
     except (OSError, pa.ArrowException) as error:
-        fix = "start the study again: it runs what is missing and writes them anew"
+        fix = "start the study again: it runs what is missing and writes them again"
         raise HexapodError(
             "damaged results",
             got=str(error),
@@ -168,9 +173,7 @@ def _blocks(results: pq.ParquetFile, times: pq.ParquetFile) -> Iterator[pa.Table
 
 
 def summary_of(results: Results) -> dict[str, Any]:
-    """For JSON: totals, means with half their interval, changes, failures by reason, the
-    optimum.
-    """
+    """Returns the content of summary.json: totals, means, changes, failures and the optimum."""
     overall = results.overall
     failures = [
         {"control": control, "status": status, "reason": reason, "runs": count}
@@ -199,8 +202,10 @@ def _mean(item: Mean) -> dict[str, float]:
 
 
 def points_schema(study: Study) -> pa.Schema:
-    """A point's settings, then by control runs, walked and each metric's mean with half its
-    interval, then pairs and their changes.
+    """Returns the schema of points.parquet.
+
+    Its columns are the settings; for each control the numbers of runs and walks and the means of
+    the metrics with the half widths of their intervals; then the pairs and their changes.
     """
     runs = schema_of(study)
     fields = [runs.field(name) for name in ("point", "case")] + [
@@ -215,21 +220,21 @@ def points_schema(study: Study) -> pa.Schema:
         fields += [
             runs.field(name).with_name(f"{control}.{name}{part}")
             for name in FIGURES
-            for part in ("", HALF)
+            for part in ("", HALF_WIDTH)
         ]
     if len(study.run_controls) == 2:
         fields.append(pa.field("pairs", pa.int64()))
         fields += [
             runs.field(name).with_name(f"change.{name}{part}")
             for name in FIGURES
-            for part in ("", HALF)
+            for part in ("", HALF_WIDTH)
         ]
         fields += [pa.field(f"change.{name}.verdict", pa.string()) for name in FIGURES]
     return pa.schema(fields)
 
 
 def points_table(block: Block, study: Study) -> pa.Table:
-    """A block's points as rows of points.parquet."""
+    """Returns the rows of points.parquet for a block of points."""
     sums, schema = block.sums, points_schema(study)
     columns: dict[str, Any] = {
         name: block.first[name] for name in schema.names if name in block.first.schema.names
@@ -240,21 +245,7 @@ def points_table(block: Block, study: Study) -> pa.Table:
         part = sums.moments[:, k]
         columns |= _by_metric(control, part.value, part.half_width)
     if len(study.run_controls) == 2:
-        before, after, half_width = (sums.moments[:, part] for part in (BEFORE, AFTER, DIFFERENCE))
-        ratio = ratio_half_widths(before, after, half_width)
-        columns |= {
-            "pairs": sums.pairs,
-            **_by_metric("change", after.value - before.value, half_width.half_width),
-        }
-        for k, name in enumerate(FIGURES):
-            verdict = verdicts(
-                name,
-                before.value[:, k],
-                after.value[:, k],
-                half_width.half_width[:, k],
-                ratio[:, k],
-            )
-            columns[f"change.{name}.verdict"] = verdict.tolist()
+        columns |= {"pairs": sums.pairs, **_change_columns(sums)}
     arrays = [
         pa.array(item, schema.field(name).type, from_pandas=True)
         if isinstance(item, np.ndarray)
@@ -264,9 +255,23 @@ def points_table(block: Block, study: Study) -> pa.Table:
     return pa.table(arrays, schema=schema)
 
 
-def _by_metric(what: str, values: Array, half_widths: Array) -> dict[str, Any]:
-    """(g, figures) as columns."""
-    found: dict[str, Any] = {}
+def _change_columns(sums: Sums) -> dict[str, Any]:
+    """Returns the columns of the changes from the first control to the second."""
+    before, after, difference = (sums.moments[:, part] for part in (BEFORE, AFTER, DIFFERENCE))
+    half_width, ratio = difference.half_width, ratio_half_widths(before, after, difference)
+    columns = _by_metric("change", after.value - before.value, half_width)
     for k, name in enumerate(FIGURES):
-        found |= {f"{what}.{name}": values[:, k], f"{what}.{name}{HALF}": half_widths[:, k]}
-    return found
+        verdict = verdicts(
+            name, before.value[:, k], after.value[:, k], half_width[:, k], ratio[:, k]
+        )
+        columns[f"change.{name}.verdict"] = verdict.tolist()
+    return columns
+
+
+def _by_metric(prefix: str, values: Array, half_widths: Array) -> dict[str, Any]:
+    """Returns columns from arrays (points, metrics)."""
+    columns: dict[str, Any] = {}
+    for k, name in enumerate(FIGURES):
+        columns[f"{prefix}.{name}"] = values[:, k]
+        columns[f"{prefix}.{name}{HALF_WIDTH}"] = half_widths[:, k]
+    return columns

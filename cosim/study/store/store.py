@@ -1,10 +1,10 @@
-"""Where runs are kept as they come: Parquet parts in a folder, each written whole, flushed to the
-disk and renamed into place.
+"""The store of a study's runs: Parquet parts in a folder.
 
-A part is never changed. Many small ones are put together into one, written before they are taken
-away; a run that stands in two parts is the same in both. So a folder is valid whenever the power
-goes, and may be read while a study runs. A part that is damaged all the same is set aside, and its
-runs are run again.
+Each part is written completely, flushed to the disk and renamed to its name, and is never changed.
+Many small parts are merged into one, which is written before the small ones are removed; a run
+that is in two parts is the same in both. So the folder is valid at any time, also after a power
+failure, and may be read while a study runs. A part that is damaged all the same is set aside, and
+its runs are run again.
 """
 
 from __future__ import annotations
@@ -41,21 +41,19 @@ from hexapod_cosim.cosim.study.store.parts import (
     runs_of,
 )
 
-MANY = 64  # small parts are put together
-ROWS_AT_ONCE = 16_384  # in memory, of the whole
-FLUSH_ROWS, FLUSH_SECONDS = 1024, 2.0  # no more than this is lost to a kill
-MOST_LOOKS = (
-    100  # for parts that vanish while they are read, because a running study puts them together
-)
-# half-written files of processes that were killed, or files that others write just now
-LEFTOVERS = ".*.new"
+MERGE_COUNT = 64  # small parts that are merged into one
+ROWS_AT_ONCE = 16_384  # rows that are read into memory at a time
+FLUSH_ROWS, FLUSH_SECONDS = 1024, 2.0  # a killed process loses no more than this
+MAX_RETRIES = 100  # of reading parts that a running study merges meanwhile
+UNFINISHED = ".*.new"  # files that are being written, or whose writer was killed
 
 Writer = Callable[[Path, bytes], None]
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Writes a file whole or not at all, on the disk when this returns. Raises StudyError when
-    the disk is full, HexapodError else.
+    """Writes a file completely or not at all; it is on the disk when this function returns.
+
+    Raises StudyError when the disk is full, HexapodError when the file cannot be written.
     """
     part = _unfinished(path)
     try:
@@ -72,12 +70,12 @@ def write_durably(path: Path, content: bytes) -> None:
 
 
 def _unfinished(path: Path) -> Path:
-    """Where a file is while it is written; each writer has its own."""
+    """Returns the path of a file while it is written, which is another one for each writer."""
     return path.with_name(f".{path.name}.{uuid4().hex[:8]}.new")
 
 
 def _sync_folder(folder: Path) -> None:
-    """The rename itself, too; Windows has no such thing."""
+    """Flushes a rename to the disk; Windows offers no way to do so."""
     if hasattr(os, "O_DIRECTORY"):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -87,6 +85,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _not_written(path: Path, error: OSError) -> Exception:
+    """Returns the error for a file that could not be written."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         fix = "make room and start the study again: it goes on, all runs stored so far are kept"
         return StudyError(
@@ -100,7 +99,13 @@ def _not_written(path: Path, error: OSError) -> Exception:
 
 
 class Store:
-    """The parts of a study's folder. `schema` is that of all of them."""
+    """The parts in a study's folder.
+
+    Args:
+        folder: folder of the parts.
+        schema: the schema of all parts.
+        write: function that writes a file durably.
+    """
 
     def __init__(self, folder: Path, schema: pa.Schema, *, write: Writer = write_durably) -> None:
         self._folder, self._schema, self._write = folder, schema, write
@@ -110,20 +115,22 @@ class Store:
         self._rows: list[dict[str, object]] = []
         self._flushed = monotonic()
 
-    def prepare(self, count: int, *, say: EventSink = ignore_event) -> None:
-        """Makes the folder for `count` runs, takes away what a killed study left half written,
-        and sets damaged parts aside.
+    def prepare(self, count: int, *, events: EventSink = ignore_event) -> None:
+        """Makes the folder for `count` runs, or recovers it after a study was killed.
+
+        Unfinished files are removed, and damaged parts are set aside with a message to `events`.
         """
         try:
             self._folder.mkdir(exist_ok=True)
-            for left in self._folder.glob(LEFTOVERS):
-                left.unlink()
+            for path in self._folder.glob(UNFINISHED):
+                path.unlink()
             for path in self.parts():
-                self._judge(path, count, say)
+                self._check_part(path, count, events)
         except OSError as error:
             raise _not_written(self._folder, error) from error
 
-    def _judge(self, path: Path, count: int, say: EventSink) -> None:
+    def _check_part(self, path: Path, count: int, events: EventSink) -> None:
+        """Renames a part that is damaged or holds runs of another study."""
         try:
             runs = runs_of(path, self._schema)
             if len(runs) and not 0 <= runs[0] <= runs[-1] < count:
@@ -131,51 +138,54 @@ class Store:
         except DamagedPartError as error:
             aside = path.with_name(path.name + DAMAGED)
             os.replace(path, aside)
-            say(
-                f"{path}: {error.what} ({error.got}): set aside as {aside.name}, its runs are run again"
+            events(
+                f"{path}: {error.what} ({error.got}): "
+                f"set aside as {aside.name}, its runs are run again"
             )
 
     def parts(self) -> list[Path]:
-        """All parts, in the order of their numbers."""
+        """Returns all parts in the order of their numbers."""
         return parts_in(self._folder)
 
     def add(self, rows: Iterable[dict[str, object]]) -> None:
-        """Keeps rows; they are on the disk within FLUSH_SECONDS, if more come. Raises StudyError
-        when the disk is full.
+        """Adds rows, which are on the disk within FLUSH_SECONDS if more rows follow.
+
+        Raises StudyError when the disk is full.
         """
         self._rows.extend(rows)
         if len(self._rows) >= FLUSH_ROWS or monotonic() - self._flushed >= FLUSH_SECONDS:
             self.flush()
 
     def flush(self) -> None:
-        """Puts what was added on the disk. Raises StudyError when it is full: the rows are then
-        lost, and run again another time.
+        """Writes the added rows to the disk.
+
+        Raises StudyError when the disk is full. The rows are lost then; their runs are run again
+        when the study is resumed.
         """
         rows, self._rows, self._flushed = self._rows, [], monotonic()
         if rows:
             self._write_part(SMALL, pa.Table.from_pylist(rows, schema=self._schema))
-            self._put_together()
+            self._merge_parts()
 
     def _write_part(self, kind: str, table: pa.Table) -> None:
         name, content = part_of(table, kind=kind, number=self._next)
         self._write(self._folder / name, content)
         self._next += 1
 
-    def _put_together(self) -> None:
+    def _merge_parts(self) -> None:
         small = parts_in(self._folder, kind=SMALL)
-        if len(small) >= MANY:
-            self._write_part(
-                MERGED, pa.concat_tables(read_part(path, self._schema) for path in small)
-            )
+        if len(small) >= MERGE_COUNT:
+            tables = [read_part(path, self._schema) for path in small]
+            self._write_part(MERGED, pa.concat_tables(tables))
             for path in small:
-                with suppress(
-                    PermissionError
-                ):  # somebody reads it on Windows: it stays, with runs that stand twice
+                # on Windows a part that is being read stays: its runs are in two parts then
+                with suppress(PermissionError):
                     path.unlink()
 
     def done(self, count: int) -> NDArray[np.bool_]:
-        """(count,) which runs are stored: a byte each. Raises StudyError for a part that cannot
-        be read.
+        """Returns which of `count` runs are stored, as an array (count,).
+
+        Raises StudyError for a part that cannot be read.
         """
         found = np.zeros(count, dtype=np.bool_)
         for path in self.parts():
@@ -183,7 +193,7 @@ class Store:
         return found
 
     def rows(self, runs: Sequence[int]) -> dict[int, dict[str, Any]]:
-        """Stored rows of some runs, by number."""
+        """Returns the rows of those of the given runs that are stored, by run number."""
         found: dict[int, dict[str, Any]] = {}
         for path in self.parts() if runs else ():
             low, high = self._range(path)
@@ -196,21 +206,25 @@ class Store:
         return found
 
     def skip_damaged(self) -> list[str]:
-        """Leaves damaged parts out of `sorted_rows` from now on, and says in words which they
-        are. They stay where they are.
+        """Leaves damaged parts out of sorted_rows() from now on, and returns descriptions of them.
+
+        The files are not changed.
         """
         for path in self.parts():
             try:
                 self._range(path)
-            except FileNotFoundError:  # a running study put it together with others
+            except FileNotFoundError:  # a running study has merged it with others
                 continue
             except DamagedPartError as error:
                 self._skipped[path] = error
         return [f"{path.name} ({error.got})" for path, error in self._skipped.items()]
 
     def sorted_rows(self) -> Iterator[pa.Table]:
-        """All runs once, in the order of their numbers, some ten thousand at a time."""
-        begin, looks = 0, 0
+        """Yields each run once, in the order of their numbers, ROWS_AT_ONCE numbers at a time.
+
+        Raises StudyError for parts that cannot be read or keep vanishing.
+        """
+        begin, retries = 0, 0
         while True:
             try:
                 ranges = {
@@ -221,21 +235,21 @@ class Store:
                 if begin > max((high for _, high in ranges.values()), default=-1):
                     return
                 table = self._block(begin, begin + ROWS_AT_ONCE, ranges)
-            except (
-                FileNotFoundError
-            ) as error:  # a running study put parts together: what was in them is elsewhere now
-                looks += 1
-                if looks > MOST_LOOKS:
+            except FileNotFoundError as error:  # a running study has merged it with others
+                retries += 1
+                if retries > MAX_RETRIES:
                     raise StudyError(
                         "parts of the results vanish", got=str(error.filename), fix="try again"
                     ) from error
                 continue
             yield table
-            begin, looks = begin + ROWS_AT_ONCE, 0
+            begin, retries = begin + ROWS_AT_ONCE, 0
 
     def _settled_parts(self) -> list[Path]:
-        """All parts, listed twice alike: a listing during which one came and others went may
-        have neither.
+        """Returns all parts, after two equal listings.
+
+        A listing during which parts are merged may hold neither the small parts nor the merged
+        one.
         """
         before, now = None, self.parts()
         while now != before:
@@ -243,7 +257,7 @@ class Store:
         return now
 
     def _block(self, begin: int, stop: int, ranges: Mapping[Path, tuple[int, int]]) -> pa.Table:
-        """The runs from `begin` to before `stop`. Raises FileNotFoundError."""
+        """Returns the runs from `begin` to before `stop`. Raises FileNotFoundError."""
         place = pa.compute.field(RUN)
         paths = [path for path, (low, high) in ranges.items() if low < stop and high >= begin]
         tables = [
@@ -255,6 +269,7 @@ class Store:
         return table.filter(pa.array(np.append(True, runs[1:] != runs[:-1])[: len(runs)]))
 
     def _range(self, path: Path) -> tuple[int, int]:
+        """Returns the first and the last run of a part; (0, -1) for an empty one."""
         if path not in self._ranges:
             runs = runs_of(path, self._schema)
             self._ranges[path] = (int(runs[0]), int(runs[-1])) if len(runs) else (0, -1)
@@ -262,8 +277,9 @@ class Store:
 
 
 def write_whole(path: Path, tables: Iterable[pa.Table], schema: pa.Schema) -> None:
-    """One Parquet file of tables, whole or not at all: the same bytes for the same rows. Raises
-    StudyError when the disk is full.
+    """Writes tables to one Parquet file, completely or not at all.
+
+    The same rows give the same bytes. Raises StudyError when the disk is full.
     """
     part = _unfinished(path)
     try:

@@ -1,9 +1,8 @@
-"""Sorted runs turned into sums: of each point, and of all. No more than a block of rows is ever
-held, however many runs a point has.
+"""Sums over sorted runs: of each point and of all runs, with one block of rows in memory.
 
-A pair is two runs of the same point, scenario and seed, one under each control: in sorted runs they
-stand next to each other, and where one of them is missing the other has no pair. It counts by
-itself, not in a change.
+A pair consists of two runs of the same point, scenario and seed, one under each control. In sorted
+runs they are next to each other. A run whose partner is missing counts in the means of its control
+and not in the changes.
 """
 
 from __future__ import annotations
@@ -17,19 +16,26 @@ import pyarrow.compute as pc
 
 from hexapod_cosim.cosim.study.plan.records import Study
 from hexapod_cosim.cosim.study.store.columns import FIGURES
-from hexapod_cosim.cosim.study.store.moments import Moments, Numbers, Truths, appended, moments_of
+from hexapod_cosim.cosim.study.store.moments import (
+    Moments,
+    Numbers,
+    Truths,
+    concatenated,
+    moments_of,
+)
 
-BEFORE, AFTER, DIFFERENCE = -3, -2, -1  # samples of pairs, after those of each control
+# indices of the samples of pairs, which follow those of each control
+BEFORE, AFTER, DIFFERENCE = -3, -2, -1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sums:
-    """Of g groups of runs under c controls: points, or all runs."""
+    """The sums of g groups of runs under c controls; a group is a point, or all runs."""
 
     runs: Numbers  # (g, c)
     walked: Numbers  # (g, c)
-    pairs: Numbers  # (g,) in which both walked
-    moments: Moments  # (g, c + 3, figures) of walks: by control, then of pairs
+    pairs: Numbers  # (g,) pairs of which both runs walked to the end
+    moments: Moments  # (g, c + 3, metrics) of walks: by control, then of pairs
 
     def __getitem__(self, place: slice) -> Sums:
         return Sums(
@@ -40,7 +46,7 @@ class Sums:
         )
 
     def merged(self, other: Sums) -> Sums:
-        """Each group with the other's at its place."""
+        """Merges each group with the other one at the same place."""
         return Sums(
             runs=self.runs + other.runs,
             walked=self.walked + other.walked,
@@ -48,28 +54,26 @@ class Sums:
             moments=self.moments.merged(other.moments),
         )
 
-    def appended(self, other: Sums) -> Sums:
-        """The groups of both."""
+    def concatenated(self, other: Sums) -> Sums:
+        """Joins the groups of both."""
         counts = ((self.runs, other.runs), (self.walked, other.walked), (self.pairs, other.pairs))
         runs, walked, pairs = (np.concatenate(pair) for pair in counts)
         return Sums(
-            runs=runs, walked=walked, pairs=pairs, moments=appended(self.moments, other.moments)
+            runs=runs, walked=walked, pairs=pairs, moments=concatenated(self.moments, other.moments)
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """Whole points next to each other: a row of each for its settings, and the sums of their
-    runs.
-    """
+    """Successive points, all of whose runs are in the sums."""
 
-    first: pa.Table
-    held_out: Truths
+    first: pa.Table  # the first row of each point, for its settings
+    held_out: Truths  # (g,) whether the runs are held out from the optimiser
     sums: Sums
 
 
 class Rows:
-    """A table's runs as numbers."""
+    """The runs of a sorted table as arrays."""
 
     def __init__(self, table: pa.Table, study: Study) -> None:
         self.table, self._size = table, len(study.run_controls)
@@ -83,12 +87,12 @@ class Rows:
             self.held_out = np.isin(table["seed"].to_numpy(), list(study.optimise.held_out.seeds))
 
     def starts(self) -> Numbers:
-        """(g,) where a point begins, or the part of it that is held out."""
+        """Returns the indices (g,) where a point begins, or the held-out part of a point."""
         new = (self._point[1:] != self._point[:-1]) | (self.held_out[1:] != self.held_out[:-1])
         return np.append(0, 1 + np.flatnonzero(new))
 
     def sums(self, starts: Numbers) -> Sums:
-        """Of groups of neighbours that begin at `starts`."""
+        """Returns the sums of groups of successive runs that begin at `starts` (g,)."""
         own = self._control[:, None] == np.arange(self._size)
         first = self._first_of_pairs()
         both = first & self._walked & np.append(self._walked[1:], False)
@@ -112,7 +116,7 @@ class Rows:
         )
 
     def _first_of_pairs(self) -> Truths:
-        """(n,) whether the next run is the same under the other control."""
+        """Returns which runs (n,) are followed by the same run under the second control."""
         case = pc.index_in(self.table["case"], value_set=pc.unique(self.table["case"])).to_numpy()
         same = self._size == 2
         for column in (self._point, case, self.table["seed"].to_numpy()):
@@ -121,17 +125,17 @@ class Rows:
 
 
 def whole_pairs(tables: Iterable[pa.Table], controls: Sequence[str]) -> Iterator[pa.Table]:
-    """The same rows, cut so that no pair is."""
-    left: pa.Table | None = None
+    """Yields the same rows in tables that separate no pair."""
+    left: pa.Table | None = None  # the last row of a table, when it may begin a pair
     for part in tables:
         table = part if left is None else pa.concat_tables([left, part])
-        waits = (
+        begins_pair = (
             len(controls) == 2
             and table.num_rows > 0
             and table["control"][-1].as_py() == controls[0]
         )
-        kept = table.num_rows - waits
-        left = table.slice(kept) if waits else None
+        kept = table.num_rows - begins_pair
+        left = table.slice(kept) if begins_pair else None
         if kept:
             yield table.slice(0, kept)
     if left is not None:
@@ -139,12 +143,12 @@ def whole_pairs(tables: Iterable[pa.Table], controls: Sequence[str]) -> Iterator
 
 
 def blocks_of(parts: Iterable[Rows]) -> Iterator[Block]:
-    """The points of sorted runs, many at a time, each whole."""
-    open_end: Block | None = None
+    """Yields blocks of the points of sorted runs."""
+    last: Block | None = None  # the last point, which may go on in the next table
     for rows in parts:
         starts = rows.starts()
         block = _joined(
-            open_end,
+            last,
             Block(
                 first=rows.table.take(starts),
                 held_out=rows.held_out[starts],
@@ -154,18 +158,19 @@ def blocks_of(parts: Iterable[Rows]) -> Iterator[Block]:
         count = len(block.held_out)
         if count > 1:
             yield _cut(block, slice(0, count - 1))
-        open_end = _cut(block, slice(count - 1, count))
-    if open_end is not None:
-        yield open_end
+        last = _cut(block, slice(count - 1, count))
+    if last is not None:
+        yield last
 
 
 def _cut(block: Block, place: slice) -> Block:
+    """Returns some of a block's points."""
     table = block.first.slice(place.start, place.stop - place.start)
     return Block(first=table, held_out=block.held_out[place], sums=block.sums[place])
 
 
 def _joined(left: Block | None, right: Block) -> Block:
-    """A block after a single point, which may go on in it."""
+    """Joins a single point and a block; merges their points when they are the same."""
     if left is None:
         return right
     if left.first["point"][0] == right.first["point"][0] and left.held_out[0] == right.held_out[0]:
@@ -177,5 +182,5 @@ def _joined(left: Block | None, right: Block) -> Block:
     return Block(
         first=pa.concat_tables([left.first, right.first]),
         held_out=np.concatenate([left.held_out, right.held_out]),
-        sums=left.sums.appended(right.sums),
+        sums=left.sums.concatenated(right.sums),
     )

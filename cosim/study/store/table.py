@@ -1,8 +1,7 @@
-"""What runs of a point come to: means with 95 % intervals over seeds, and paired changes from the
-first control to the second.
+"""Means with 95 % intervals and paired changes, of each point and of all runs.
 
-All are of walks that came to their end: what a fall leaves behind is no figure of a walk, and
-stands in results.parquet alone.
+They are over the runs that walked to the end. Metrics of runs in which the robot fell are in
+results.parquet only.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Mean:
-    """Of a metric over the walks of a point."""
+    """The mean of a metric over walks."""
 
     value: float  # NaN where no walk has the metric
     half_width: float  # of its 95 % interval; NaN for fewer than two walks
@@ -37,52 +36,45 @@ class Mean:
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """A point's runs, by control."""
+    """The results of a point."""
 
     number: int
     case: str
-    values: Mapping[str, Any]  # of the factors
+    values: Mapping[str, Any]  # by factor
     held_out: bool
-    runs: Mapping[str, int]  # by control; 0 where none has run
-    walked: Mapping[str, int]
-    pairs: int  # in which both walked
-    means: Mapping[str, Mapping[str, Mean]]  # by control, then metric
+    runs: Mapping[str, int]  # numbers of runs by control
+    walked: Mapping[str, int]  # numbers of walks by control
+    pairs: int  # of which both runs walked to the end
+    means: Mapping[str, Mapping[str, Mean]]  # by control and metric
     changes: Mapping[str, Change]  # by metric; empty for a single control
 
 
 @dataclass(frozen=True, kw_only=True)
 class Overall:
-    """All runs of a study."""
+    """The results over all runs of a study."""
 
     runs: int
-    walked: Mapping[str, int]  # by control
-    total: Mapping[str, int]
-    pairs: int  # in which both walked
-    failures: Mapping[
-        tuple[str, str, str], int
-    ]  # by control, status and reason, the most frequent first
-    changes: Mapping[str, Change]  # over all pairs
-    means: Mapping[str, Mapping[str, Mean]]
-    walks: Mapping[
-        tuple[str, str], tuple[int, int]
-    ]  # by scenario and control: how many walked, how many of these have any figure
+    walked: Mapping[str, int]  # numbers of walks by control
+    total: Mapping[str, int]  # numbers of runs by control
+    pairs: int  # of which both runs walked to the end
+    # numbers of runs by control, status and reason, the largest first
+    failures: Mapping[tuple[str, str, str], int]
+    changes: Mapping[str, Change]  # by metric, over all pairs
+    means: Mapping[str, Mapping[str, Mean]]  # by control and metric
+    # numbers of walks, and of walks with any metric, by scenario and control
+    walks: Mapping[tuple[str, str], tuple[int, int]]
 
 
-MOST_REASONS = 30
-MOST_KINDS = (
-    1000  # of reasons that are told apart, so that their number does not grow with the runs
-)
+MAX_REASONS = 30  # that are shown
+MAX_KINDS = 1000  # of failures that are counted apart, which bounds the memory
 OTHER = "other reasons"
 DIGITS = str.maketrans("0123456789", "#" * 10)
 
 
 def point_at(block: Block, place: int, study: Study) -> Point:
-    """One of a block's points."""
-    row, sums, controls = (
-        block.first.slice(place, 1).to_pylist()[0],
-        block.sums[place : place + 1],
-        study.run_controls,
-    )
+    """Returns the results of one of a block's points."""
+    (row,) = block.first.slice(place, 1).to_pylist()
+    sums, controls = block.sums[place : place + 1], study.run_controls
     return Point(
         number=row["point"],
         case=row["case"],
@@ -100,7 +92,7 @@ def point_at(block: Block, place: int, study: Study) -> Point:
 
 
 def _means(sums: Sums, study: Study) -> dict[str, dict[str, Mean]]:
-    """By control and metric, of the first group."""
+    """Returns the means of the first group by control and metric."""
     found = {}
     for k, control in enumerate(study.run_controls):
         part = sums.moments[0, k]
@@ -118,9 +110,7 @@ def _means(sums: Sums, study: Study) -> dict[str, dict[str, Mean]]:
 
 
 def _changes(sums: Sums, study: Study) -> dict[str, Change]:
-    """By metric, of the first group; as `hexapod compare` has them, of the pairs in which both
-    walked.
-    """
+    """Returns the changes of the first group by metric, as `hexapod compare` computes them."""
     if len(study.run_controls) != 2:
         return {}
     before, after, difference = (sums.moments[0, part] for part in (BEFORE, AFTER, DIFFERENCE))
@@ -137,7 +127,7 @@ def _changes(sums: Sums, study: Study) -> dict[str, Change]:
 
 
 class Tally:
-    """Adds runs up, table by table, and keeps none of them."""
+    """Accumulates the results over all runs without keeping the runs."""
 
     def __init__(self, study: Study) -> None:
         self._study = study
@@ -146,7 +136,7 @@ class Tally:
         self._walks: dict[tuple[str, str], tuple[int, int]] = {}
 
     def add(self, rows: Rows) -> None:
-        """Runs of which no pair is cut."""
+        """Adds runs; both runs of a pair must be added together."""
         sums = rows.sums(np.zeros(1, dtype=np.int64))
         self._sums = sums if self._sums is None else self._sums.merged(sums)
         for case, control, walked, figured in _walks(rows.table):
@@ -157,12 +147,12 @@ class Tally:
         )
         for row in lost.to_pylist():
             kind = (row["control"], row["status"], _reason(row))
-            if kind not in self._failures and len(self._failures) >= MOST_KINDS:
+            if kind not in self._failures and len(self._failures) >= MAX_KINDS:
                 kind = (row["control"], row["status"], OTHER)
             self._failures[kind] += 1
 
     def overall(self) -> Overall:
-        """All that was added."""
+        """Returns the results over all runs that were added."""
         controls, sums = self._study.run_controls, self._sums or _no_sums(self._study)
         runs, walked = sums.runs[0].tolist(), sums.walked[0].tolist()
         return Overall(
@@ -170,7 +160,7 @@ class Tally:
             walked=dict(zip(controls, walked, strict=True)),
             total=dict(zip(controls, runs, strict=True)),
             pairs=int(sums.pairs[0]),
-            failures=dict(self._failures.most_common(MOST_REASONS)),
+            failures=dict(self._failures.most_common(MAX_REASONS)),
             changes=_changes(sums, self._study),
             means=_means(sums, self._study),
             walks=dict(self._walks),
@@ -178,7 +168,7 @@ class Tally:
 
 
 def _walks(table: pa.Table) -> list[tuple[str, str, int, int]]:
-    """By scenario and control: how many walked, and how many of these have any figure."""
+    """Returns scenario, control, and the numbers of walks and of walks with any metric."""
     kept = table.filter(table["walked"])
     figured = pc.is_valid(pc.coalesce(*(kept[name] for name in FIGURES if name not in OF_THE_RUN)))
     groups = pa.table(
@@ -199,8 +189,9 @@ def _no_sums(study: Study) -> Sums:
 
 
 def _reason(row: Row) -> str:
-    """Why a run did not walk to its end, without the figures in it, so that like is counted with
-    like.
+    """Returns why a run did not walk to the end, without the numbers in the text.
+
+    So reasons that differ in numbers only are counted together.
     """
     text = str(row["reason"] or row["warnings"].partition(" | ")[0] or "the robot fell")
     return _without_numbers(text)

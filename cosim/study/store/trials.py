@@ -1,4 +1,4 @@
-"""The trials of an optimisation, as its training runs tell them."""
+"""The trials of an optimisation, computed from its training runs."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ OPTIMUM = "optimum.json"
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """Settings and what they came to on the training runs."""
+    """The settings of a trial and its results on the training runs."""
 
     number: int
     values: tuple[Value, ...]
-    means: Mapping[str, float]  # of the metrics and bounds
+    means: Mapping[str, float]  # by metric of the objectives and constraints
     feasible: bool
 
 
 def feasible(means: Mapping[str, float], asked: Optimise) -> bool:
+    """Returns whether the means meet all constraints."""
     return all(bound.excess(means[bound.metric]) <= 0.0 for bound in asked.constraints)
 
 
 def trials_of(plan: Optimisation, points: Sequence[Point]) -> list[Trial]:
-    """Trials from the points of their runs, for people to look at; those that are whole."""
+    """Returns the trials of which all training runs are stored, from the points of the study."""
     found = []
     for point in points:
         if (

@@ -1,4 +1,4 @@
-"""What a study's figures have in common: colours, marks, names of axes."""
+"""The style of a study's figures: colours, marks, names of axes."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ MARKS = {"kinematic": "s", "compliant": "o"}
 SLIP, COST = "slip_per_metre", "cost_of_transport"
 NAMES = {SLIP: "slip [m/m]", COST: "cost of transport [1]"}
 COLOURMAP, CHANGES = "viridis", "RdBu_r"
-MOST_LINES, MOST_CELLS = 1500, 40  # beyond them a figure only gets slower and darker
+MAX_LINES, MAX_CELLS = 1500, 40  # more make a figure slower and no clearer
 
 
 def mean_of(point: Point, control: str, metric: str) -> float:
-    """NaN where there is none."""
+    """Returns the mean of a metric at a point, NaN where there is none."""
     return point.means[control][metric].value
 
 
 def label_of(factor: Factor) -> str:
-    """Its name with its unit."""
+    """Returns the name of a factor with its unit."""
     unit = "x designed" if factor.relative else factor.unit
     return f"{factor.name} [{unit}]" if unit else factor.name
 
 
 def named(factor: Factor) -> bool:
-    """Whether its values are names or truths rather than numbers."""
+    """Returns whether the values of a factor are names or booleans rather than numbers."""
     return factor.kind == VALUES and not all(
         isinstance(value, int | float) and not isinstance(value, bool) for value in factor.values
     )
 
 
 def place_of(factor: Factor, value: Any) -> float:
-    """Where a value stands on an axis: a name by its order."""
+    """Returns the coordinate of a value on an axis; for a name, its index."""
     return float(list(dict.fromkeys(factor.values)).index(value)) if named(factor) else float(value)
 
 
 def ticks_of(factor: Factor) -> list[str]:
-    """Different values, for people."""
+    """Returns the different values of a factor as labels."""
     return [
         f"{value:.4g}" if isinstance(value, float) else str(value)
         for value in dict.fromkeys(factor.values)
@@ -57,7 +57,7 @@ def ticks_of(factor: Factor) -> list[str]:
 
 
 def logarithmic(slips: Array) -> LogNorm:
-    """Colours of slips that lie decades apart."""
+    """Returns the logarithmic colour scale of slips."""
     seen = np.clip(slips[np.isfinite(slips)], FLOORS[SLIP], None)
     return (
         LogNorm(float(seen.min()), float(seen.max()) * (1.0 + 1e-9))
@@ -67,6 +67,6 @@ def logarithmic(slips: Array) -> LogNorm:
 
 
 def some_of(items: Sequence[_Item]) -> list[_Item]:
-    """Not more than can be seen, evenly chosen."""
-    step = max(math.ceil(len(items) / MOST_LINES), 1)
+    """Returns at most MAX_LINES items, evenly chosen."""
+    step = max(math.ceil(len(items) / MAX_LINES), 1)
     return list(items[::step])

@@ -1,4 +1,4 @@
-"""A run of a study that has ended."""
+"""The result of one run of a study."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from hexapod_cosim.cosim.study.plan.records import Order
 
 
 @dataclass(frozen=True)
-class Done:
-    """A run and what it came to."""
+class RunResult:
+    """A run that has ended, with its summary."""
 
     order: Order
     summary: Summary
-    wall: float  # s
+    wall: float  # s    elapsed time

@@ -1,10 +1,9 @@
-"""Held-out scenarios kept apart from those that an optimiser is trained on: no scenario and no seed
-stands on both sides.
+"""Checks that an optimiser's held-out scenarios and seeds are not among those of training.
 
-What counts is the walk, not what a file calls it: robot, ground, gait, commands, events, sensors
-and parameters, with what [set] and the optimiser's variables put in their place. Two scenarios that
-differ in title, file, seed, variation, length or numerics alone are the same one: with no variation
-their walks would be those trained on, or a part of them.
+Scenarios are compared by their walks: robot, ground, gait, commands, events, sensors and
+parameters, after [set] and the optimiser's variables. Scenarios that differ only in title, file,
+seed, variation, duration or numerics are the same: without variation the one walk would be a part
+of the other.
 """
 
 from __future__ import annotations
@@ -24,15 +23,23 @@ from hexapod_cosim.cosim.scenario.scenario import (
 )
 from hexapod_cosim.cosim.study.plan.factors import samples
 from hexapod_cosim.cosim.study.plan.keys import flat
-from hexapod_cosim.cosim.study.plan.records import GAINS, Case, Judging, Optimise, Study, StudyError
+from hexapod_cosim.cosim.study.plan.records import (
+    GAINS,
+    Case,
+    Evaluation,
+    Optimise,
+    Study,
+    StudyError,
+)
 from hexapod_cosim.models import HexapodError, load_robot
 
-SUGGESTED = 3  # scenarios in a fix
+MAX_SUGGESTIONS = 3  # scenarios that a message suggests
 
 
-def check_seeds_apart(training: Judging, held_out: Judging, where: str) -> None:
-    """A seed draws the same changes in any scenario, so it is either trained on or held out.
-    Raises StudyError.
+def check_held_out_seeds(training: Evaluation, held_out: Evaluation, where: str) -> None:
+    """Raises StudyError for a held-out seed that is one of training.
+
+    A seed draws the same changes in every scenario.
     """
     shared = sorted(set(training.seeds) & set(held_out.seeds))
     if shared:
@@ -49,24 +56,24 @@ def check_seeds_apart(training: Judging, held_out: Judging, where: str) -> None:
         )
 
 
-def check_scenarios_apart(study: Study, asked: Optimise) -> None:
-    """Raises StudyError for a held-out scenario that is one of training, whatever it is called."""
-    trained = {name: content_of(study.cases[name], study) for name in asked.training.cases}
+def check_held_out_scenarios(study: Study, asked: Optimise) -> None:
+    """Raises StudyError for a held-out scenario with the same walk as one of training."""
+    trained = {name: walk_of(study.cases[name], study) for name in asked.training.cases}
     for name in asked.held_out.cases:
-        content = content_of(study.cases[name], study)
-        same = next((other for other, item in trained.items() if item == content), None)
+        walk = walk_of(study.cases[name], study)
+        same = next((other for other, item in trained.items() if item == walk), None)
         if same is not None:
             raise StudyError(
                 "a held-out scenario that is trained on",
                 got=name if same == name else f"{name}, the same walk as {same}",
-                expected="walks that the optimiser never sees, whatever their seeds",
+                expected="walks that the optimiser never sees, with any seed",
                 fix=_fix(study, asked, list(trained.values())),
                 where=f"{study.where}: optimise.held_out.scenarios",
             )
 
 
-def content_of(case: Case, study: Study) -> Any:
-    """What makes a scenario's walk, to be compared."""
+def walk_of(case: Case, study: Study) -> Any:
+    """Returns a value that is equal for scenarios with the same walk."""
     settings = {
         factor.name: factor.setting(samples(factor)[0])
         for factor in study.factors
@@ -103,25 +110,23 @@ def content_of(case: Case, study: Study) -> Any:
 
 
 def _fix(study: Study, asked: Optimise, trained: Sequence[Any]) -> str:
-    """Names scenarios of the same robot that go somewhere and are not trained on."""
+    """Suggests scenarios of the same robot that walk and are not among those of training."""
     settings = flat(study.source.get("set", {}), study.where)
     robot, names = study.cases[asked.training.cases[0]].table.get("robot"), []
     for name in list_scenarios():
-        table, told = read_tables(name)
+        table, where = read_tables(name)
         try:
-            case = Case(name=name, table=with_values(table, settings), where=told)
-            other = content_of(case, study) not in trained
+            case = Case(name=name, table=with_values(table, settings), where=where)
+            other = walk_of(case, study) not in trained
         except HexapodError:
             continue
-        if other and case.table.get("robot") == robot and _goes(case):
+        if other and case.table.get("robot") == robot and _walks(case):
             names.append(f'"{name}"')
-    return (
-        f"write scenarios = [{', '.join(names[:SUGGESTED])}], or files of your own"
-        if names
-        else "name other scenarios"
-    )
+    if not names:
+        return "name other scenarios"
+    return f"write scenarios = [{', '.join(names[:MAX_SUGGESTIONS])}], or files of your own"
 
 
-def _goes(case: Case) -> bool:
+def _walks(case: Case) -> bool:
     commands = scenario_from_table(case.table, where=case.where).commands
     return any(command.vx or command.vy for command in commands)
