@@ -1,6 +1,4 @@
-"""What the master asks of a plant, so that anything that can do the same may stand in for an
-FMU.
-"""
+"""The interface of a plant that the master needs, which an FMU or a replacement implements."""
 
 from __future__ import annotations
 
@@ -11,20 +9,18 @@ from numpy.typing import NDArray
 
 
 class Block(Protocol):
-    """Variables of one type, moved in one call."""
+    """Variables of one type that are read or written in one call."""
 
     @property
     def names(self) -> tuple[str, ...]: ...
     @property
-    def values(
-        self,
-    ) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer the calls fill and read
+    def values(self) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer of get and set
     def get(self) -> None: ...
     def set(self) -> None: ...
 
 
 class Plant(Protocol):
-    """What the master asks of a plant. Times in s."""
+    """What the master needs of a plant. Times are in s."""
 
     def names(self, causality: str, kind: str = "Real") -> list[str]: ...
     def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> Block: ...

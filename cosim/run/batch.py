@@ -19,9 +19,9 @@ from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.export.export import export_fmu
-from hexapod_cosim.cosim.master.interrupts import deaf_to_interrupts
+from hexapod_cosim.cosim.master.interrupts import blocked_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
-from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.run import chosen_gains, known_robot, simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.run.workers import METHOD, begin_worker, stop_if_told
@@ -92,7 +92,7 @@ def _prepare(
                     load_robot(scenario.robot), folder / f"{len(fmus)}.fmu"
                 )
         except HexapodError as error:
-            tasks.append(refused(scenario, error))
+            tasks.append(refused_summary(scenario, error))
         else:
             tasks.append(
                 _Task(scenario, fmus[scenario.robot] if fmu is None else fmu, designs[key])
@@ -111,7 +111,7 @@ def _run(task: _Task | Summary, walker: Walker | None) -> Summary:
             simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=stop_if_told)
         )
     except HexapodError as error:
-        return refused(task.scenario, error)
+        return refused_summary(task.scenario, error)
 
 
 def _run_here(tasks: Sequence[_Task | Summary], *, compiled: bool) -> Iterator[Summary]:
@@ -130,7 +130,7 @@ def _run_in_processes(
         waiting: deque[Future[Summary]] = deque()
         for task in tasks:
             with (
-                deaf_to_interrupts()
+                blocked_interrupts()
             ):  # the workers; they are told by us, and begin when a run is handed in
                 waiting.append(pool.submit(_work, task, compiled))
             if len(waiting) > QUEUED * count:

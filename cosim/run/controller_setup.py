@@ -1,4 +1,4 @@
-"""The set-up of a controller: robot, gait, period and gains."""
+"""Makes the set-up of a controller: robot, gait, period and gains."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ def make_setup(
     gait: str | None = None,
     gains: Gains | None = None,
 ) -> ControllerSetup:
-    """What `simulate` would walk a robot with: its gait or one by name; under compliant control
-    gains designed for it, if none are given.
+    """Returns the set-up that `simulate` uses for a robot, with its own gait or one by name.
 
-    Raises HexapodError for an unknown control or gait, GainsError for gains without compliant
-    control or without a design.
+    Under compliant control, gains are designed for the robot unless they are given. Raises
+    HexapodError for an unknown control or gait; GainsError for gains without compliant control and
+    where no gains can be designed.
     """
     if control not in CONTROLS:
         raise unknown_name("control", control, CONTROLS)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot, gait), period=period)
-    setup.build()  # refused before anything is designed
+    setup.build()  # raises errors before the design, which takes long
     if control == "kinematic":
         if gains is not None:
             raise GainsError(

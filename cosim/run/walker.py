@@ -21,18 +21,18 @@ from hexapod_cosim.cosim.interface.controller_interface import (
 from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
-from hexapod_cosim.cosim.results.metrics import judged_columns
+from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.run import (
     Plan,
     chosen_gains,
     describe,
-    foreign_settings,
+    different_settings,
     initialise_plant,
-    judge,
     known_robot,
     make_plan,
+    make_result,
     sensor_settings,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -101,7 +101,9 @@ class Walker:
         )
         self.loop_time = thread_time() - begin
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.warnings})
+        return make_result(
+            plan, outcome, parameters, facts | {"warnings": plan.controller.warnings}
+        )
 
     def summary(
         self,
@@ -115,7 +117,7 @@ class Walker:
         try:
             return summarise(self.simulate(scenario, fmu=fmu, gains=gains, progress=progress))
         except HexapodError as error:
-            return refused(scenario, error)
+            return refused_summary(scenario, error)
 
     def _gains(self, scenario: Scenario, gains: Gains | None) -> Gains | None:
         """As `chosen_gains`, designed once for a robot and a macro-step."""
@@ -132,12 +134,12 @@ class Walker:
         bristles = (
             plan.robot.friction.law == "bristle" or "friction.law" in plan.scenario.parameters
         )
-        columns = None if self._everything else judged_columns(bristles=bristles)
+        columns = None if self._everything else metric_columns(bristles=bristles)
         key = name if fmu is None else fmu, columns
         if key not in self._masters:
             path = fmu or export_fmu(load_robot(name), self._folder / f"{len(self._masters)}.fmu")
             plant = self._open.enter_context(Fmu(path))
-            judged = judged_columns(bristles=True)
+            judged = metric_columns(bristles=True)
             self._masters[key] = (
                 plant,
                 NativeMaster(plant, controller, columns=columns, judged=judged),
@@ -164,7 +166,7 @@ class Walker:
         if key not in self._changes:
             if len(self._changes) >= REMEMBERED:
                 self._changes.clear()
-            self._changes[key] = foreign_settings(plant, robot)
+            self._changes[key] = different_settings(plant, robot)
         return self._changes[key]
 
     def close(self) -> None:

@@ -21,7 +21,7 @@ from hexapod_cosim.cosim.master.loop import (
     INTERRUPTED,
     JointController,
     Outcome,
-    insides,
+    diagnostic_columns,
     run,
 )
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
@@ -30,7 +30,7 @@ from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import describe_walk
-from hexapod_cosim.cosim.run.run import adopt_settings, make_sensor, simulate
+from hexapod_cosim.cosim.run.run import apply_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
@@ -178,7 +178,9 @@ class Cautious(FakeController):
 def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told() -> None:
     scenario, controller = scenario_of("duration=0.1"), Cautious()
     signals, schedule = Signals(FakePlant()), make_schedule(scenario)
-    recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
+    recorder = Recorder(
+        signals, schedule.times, schedule.rows, extra=diagnostic_columns(controller)
+    )
     recording = run(
         FakePlant(), signals, controller, schedule, recorder, h=scenario.macro_step
     ).recording
@@ -370,7 +372,7 @@ def test_a_given_fmu_of_the_robot_walks_like_the_exported_one(
 def test_settings_reach_a_given_fmu(athena_fmu: Path) -> None:
     robot = scenario_robot(scenario_of("friction.mu=0.4", "contact.law=flores", "servo.kp=50"))
     with Fmu(athena_fmu) as plant:
-        adopt_settings(plant, robot)
+        apply_settings(plant, robot)
         parameters = plant.parameters()
     assert (parameters["friction.mu"], parameters["contact.law"], parameters["servo.kp"]) == (
         0.4,
@@ -386,7 +388,7 @@ def test_the_fmu_of_another_robot_is_refused(athena_fmu: Path) -> None:
             FmuError, match=r"the FMU holds another robot: torso\.mass: got 2\.6, expected 1\.52"
         ),
     ):
-        adopt_settings(plant, load_robot("phantomx_mk4"))
+        apply_settings(plant, load_robot("phantomx_mk4"))
 
 
 def test_a_parameter_of_the_fmu_can_be_set_by_name(plant_build: Path) -> None:

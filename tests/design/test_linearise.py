@@ -86,7 +86,7 @@ def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) ->
         for k, change in enumerate(told):
             forces.append(bench.force() - still)
             predicted.append(plant.system.C[:ANGLES] @ state)
-            bench.tell(inputs + np.concatenate([change, np.zeros(6)]))
+            bench.set_inputs(inputs + np.concatenate([change, np.zeros(6)]))
             bench.step(k)
             state = plant.system.A @ state + plant.system.B @ change
         found = bench.motion().less(motion)

@@ -15,7 +15,12 @@ from typing import Any
 import pytest
 from command import COMMAND, Call, assert_refused, settings
 
-from hexapod_cosim.cosim.results.accuracy import accuracy_of_table, finer, halved, judge_accuracy
+from hexapod_cosim.cosim.results.accuracy import (
+    accuracy_from_table,
+    compare_accuracy,
+    halved_scenario,
+    reference_scenario,
+)
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -68,7 +73,7 @@ def test_the_reference_differs_by_its_tolerance_or_its_fixed_step_alone(
     overrides: tuple[str, ...], section: str, key: str, value: float
 ) -> None:
     plan = walk(*overrides)
-    fine = finer(plan)
+    fine = reference_scenario(plan)
     found = fine.parameters if section == "parameters" else fine.settings["solver"]
     assert found[key] == pytest.approx(value, rel=1e-12)
     assert replace(fine, settings=plan.settings, parameters=plan.parameters) == plan
@@ -77,8 +82,8 @@ def test_the_reference_differs_by_its_tolerance_or_its_fixed_step_alone(
 
 def test_half_the_macro_step_is_all_that_the_other_run_differs_by() -> None:
     plan = walk("macro_step=4 ms")
-    assert halved(plan).macro_step == 0.002
-    assert replace(halved(plan), macro_step=0.004) == plan
+    assert halved_scenario(plan).macro_step == 0.002
+    assert replace(halved_scenario(plan), macro_step=0.004) == plan
 
 
 # laws
@@ -87,7 +92,7 @@ def test_half_the_macro_step_is_all_that_the_other_run_differs_by() -> None:
 def test_where_nothing_changes_every_error_is_zero(plant_build: Path) -> None:
     plan = walk()
     runs, again, once_more = (summaries(plan) for _ in range(3))
-    found = judge_accuracy(plan, runs, again, once_more)
+    found = compare_accuracy(plan, runs, again, once_more)
     assert list(found.solver_error) == SOLVER_METRICS
     assert (
         {found.solver_error[name] for name in WALKED}
@@ -105,8 +110,8 @@ def test_a_hundredth_of_the_tolerance_makes_the_errors_smaller_by_a_power_of_ten
     sizes = []
     for tolerance in ("1e-2", "1e-4"):
         plan = walk(f"solver.tolerance={tolerance}")
-        (run,), reference = summaries(plan), summaries(finer(plan))
-        found = judge_accuracy(plan, [run], reference, [run])
+        (run,), reference = summaries(plan), summaries(reference_scenario(plan))
+        found = compare_accuracy(plan, [run], reference, [run])
         assert found.reference == f"solver.tolerance={float(tolerance) / 100.0:g}"
         sizes.append(
             sum(
@@ -122,12 +127,12 @@ def test_errors_of_several_runs_are_of_the_means_over_those_that_walked_each_tim
     runs = [made(1.0, 5.0), made(2.0, 6.0, seed=1), made(99.0, seed=2)]
     fine = [made(1.5, math.nan), made(2.1, 6.5, seed=1), made(50.0, seed=2, upright=False)]
     half = [made(0.0, 5.0), made(4.0, 6.0, seed=1), made(70.0, seed=2)]
-    found = judge_accuracy(walk(), runs, fine, half)
+    found = compare_accuracy(walk(), runs, fine, half)
     assert found.runs == 2
     assert found.solver_error == {"way": pytest.approx(-0.3), "heat": pytest.approx(-0.5)}
     assert found.macro_step_effect == {"way": pytest.approx(0.5), "heat": 0.0}
     assert found.notes == (
-        "kinematic, seed 2, at solver.tolerance=1e-06 went another way: it walked on",
+        "kinematic, seed 2, at solver.tolerance=1e-06 ended differently: it walked to the end",
     )
 
 
@@ -135,10 +140,10 @@ def test_a_reference_without_figures_leaves_errors_open_and_is_told() -> None:
     failed = replace(
         made(math.nan, math.nan), status="failed", reason="the step is too long", upright=False
     )
-    found = judge_accuracy(walk(), [made(1.0)], [failed], [made(1.0)])
+    found = compare_accuracy(walk(), [made(1.0)], [failed], [made(1.0)])
     assert all(map(math.isnan, found.solver_error.values()))
     assert found.notes == (
-        "kinematic, seed 0, at solver.tolerance=1e-06 went another way: the step is too long",
+        "kinematic, seed 0, at solver.tolerance=1e-06 ended differently: the step is too long",
     )
 
 
@@ -321,4 +326,4 @@ def test_a_run_too_long_for_half_the_macro_step_is_refused_before_it_begins(
 )
 def test_damaged_errors_are_refused_by_name(table: Any) -> None:
     with pytest.raises(HexapodError, match=r"metrics.json: damaged accuracy.*--check-accuracy"):
-        accuracy_of_table(table, where="metrics.json")
+        accuracy_from_table(table, where="metrics.json")

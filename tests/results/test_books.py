@@ -1,4 +1,4 @@
-"""Runs whose energy books do not close, and servos above their rating: told from where to where,
+"""Runs whose energy balance do not close, and servos above their rating: told from where to where,
 in literal numbers.
 """
 
@@ -13,7 +13,7 @@ from command import Call
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.warnings import doubts, hot_servo, unbalanced_books
+from hexapod_cosim.cosim.results.warnings import energy_warnings, servo_warnings, walk_warnings
 
 
 def books(missing: float) -> Walk:
@@ -31,10 +31,10 @@ def books(missing: float) -> Walk:
 def test_books_that_miss_more_than_a_hundredth_of_the_motors_work_are_told(
     missing: float, told: str
 ) -> None:
-    found = unbalanced_books(View(books(missing).recording, PARAMETERS, PERIOD))
+    found = energy_warnings(View(books(missing).recording, PARAMETERS, PERIOD))
     assert len(found) == (1 if told else 0)
     assert all(
-        f"the energy books do not explain {told} of the motors' work: tighten solver.tolerance"
+        f"the energy balance does not explain {told} of the motors' work: tighten solver.tolerance"
         in text
         for text in found
     )
@@ -45,14 +45,15 @@ def test_books_that_are_wrong_in_the_middle_of_a_run_are_told_though_they_close_
 ):
     walk = books(0.0)
     walk.set("energy.residual", 2.0 * np.sin(np.pi * walk.time / 10.0))
-    assert "2.00%" in unbalanced_books(View(walk.recording, PARAMETERS, PERIOD))[0]
+    assert "2.00%" in energy_warnings(View(walk.recording, PARAMETERS, PERIOD))[0]
 
 
 def test_a_doubt_of_the_books_is_a_doubt_of_the_run() -> None:
     walk = books(5.0)
     walk.set("torso.position[3]", 0.13)
     assert any(
-        "energy books" in text for text in doubts(View(walk.recording, PARAMETERS, PERIOD), ROBOT)
+        "energy balance" in text
+        for text in walk_warnings(View(walk.recording, PARAMETERS, PERIOD), ROBOT)
     )
 
 
@@ -61,9 +62,9 @@ def test_a_servo_above_its_rating_over_the_run_is_told(torque: float, told: bool
     """1.2 N m, the root of the mean square of all the run's time."""
     walk = Walk()
     walk.grow("LM.femur.torque_squared", torque**2)
-    found = hot_servo(walk.recording, ROBOT)
+    found = servo_warnings(walk.recording, ROBOT)
     assert found == (
-        [f"servo LM.femur works at {torque:.2f} N m RMS, above the 1.2 N m it bears for long"]
+        [f"servo LM.femur works at {torque:.2f} N m RMS, above its continuous rating of 1.2 N m"]
         if told
         else []
     )
@@ -85,7 +86,7 @@ def test_a_run_at_a_coarse_fixed_step_says_in_terminal_report_and_metrics_that_i
     )
     code, out, err = call("simulate", "stand", "-o", tmp_path / "out", *changes)
     assert code == 0
-    told = "the energy books do not explain"
+    told = "the energy balance does not explain"
     assert told in err
     assert "energy_residual" in out
     assert told in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

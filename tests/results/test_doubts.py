@@ -14,7 +14,7 @@ from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.warnings import fall, slipping_ground
+from hexapod_cosim.cosim.results.warnings import describe_fall, friction_warnings
 
 Array = NDArray[np.float64]
 STANDING = 0.130  # m
@@ -60,7 +60,7 @@ class Run(Walk):
         changed = PARAMETERS | {
             name.replace("__", "."): value for name, value in parameters.items()
         }
-        return fall(View(self.recording, changed, PERIOD), ROBOT)
+        return describe_fall(View(self.recording, changed, PERIOD), ROBOT)
 
 
 def test_a_robot_that_stands_has_not_fallen() -> None:
@@ -216,22 +216,22 @@ def parameters(**changes: float) -> dict[str, float]:
 
 
 def test_ground_that_holds_the_robot_is_not_worth_a_word() -> None:
-    assert slipping_ground(PARAMETERS) == []
-    assert slipping_ground(parameters(**SLOPE)) == []  # tan 0.5 = 0.546 < mu = 0.7
+    assert friction_warnings(PARAMETERS) == []
+    assert friction_warnings(parameters(**SLOPE)) == []  # tan 0.5 = 0.546 < mu = 0.7
 
 
 def test_static_friction_holds_a_robot_where_the_law_has_it() -> None:
     """tan 0.5 = 0.546 lies between 0.3 and 0.6: bristles hold it, the tanh law does not."""
     between = {"friction__mu": 0.3, "friction__mu_static": 0.6}
-    assert slipping_ground(parameters(**SLOPE, **between, friction__law=3.0)) == []
-    assert slipping_ground(parameters(**SLOPE, **between, friction__law=1.0)) != []
+    assert friction_warnings(parameters(**SLOPE, **between, friction__law=3.0)) == []
+    assert friction_warnings(parameters(**SLOPE, **between, friction__law=1.0)) != []
 
 
 @pytest.mark.parametrize(
     "changes", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["mu = 0", "none"]
 )
 def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> None:
-    assert slipping_ground(parameters(**changes)) == [
+    assert friction_warnings(parameters(**changes)) == [
         "the ground has no friction: feet cannot push, and the robot does not get ahead"
     ]
 
@@ -250,6 +250,6 @@ def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> Non
 def test_a_slope_that_friction_does_not_hold_is_told_with_the_acceleration(
     changes: dict[str, float], says: str
 ) -> None:
-    assert slipping_ground(parameters(**SLOPE, **changes)) == [
+    assert friction_warnings(parameters(**SLOPE, **changes)) == [
         f"the robot slides: the ground's slope pulls it downhill {says}"
     ]

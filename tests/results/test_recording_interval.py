@@ -15,10 +15,10 @@ from gains import make_gains
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.fmu_controller import FmuController
-from hexapod_cosim.cosim.master.loop import Outcome, insides, run
+from hexapod_cosim.cosim.master.loop import Outcome, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Peaks, Recorder, Recording, kept_moments
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.metrics import compute_metrics, judged_columns
+from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.run.run import initialise_plant, make_plan, open_plant, simulate
@@ -127,9 +127,9 @@ def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -
     kept = (0, 3, 4, 6)
     for k, (force, rate, count) in enumerate(moments):
         row = np.array([0.0, force, rate, float(count)])
-        peaks.see(row)
+        peaks.update(row)
         if k in kept:
-            peaks.show(row)
+            peaks.write(row)
             shown.append((row[1], row[2]))
     assert shown == [(5.0, 9.0), (7.0, 4.0), (3.0, 4.0), (0.0, 3.0)]
 
@@ -143,8 +143,8 @@ def test_bounces_between_two_rows_leave_the_steepest_landing() -> None:
         (10.0, 3),
     ):  # before them the rate of an older landing was 90
         row[:] = 0.0, rate, count
-        peaks.see(row)
-    peaks.show(row)
+        peaks.update(row)
+    peaks.write(row)
     assert row[1] == 80.0
 
 
@@ -168,9 +168,9 @@ def in_python(scenario: Scenario, walker: Walker) -> Outcome:
             signals,
             plan.schedule.times,
             plan.schedule.rows,
-            extra=insides(ours),
+            extra=diagnostic_columns(ours),
             every=scenario.every,
-            judged=judged_columns(bristles=True),
+            judged=metric_columns(bristles=True),
         )
         return run(plant, signals, ours, plan.schedule, recorder, h=scenario.macro_step)
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
-from hexapod_cosim.cosim.master.interrupts import deaf_to_interrupts
+from hexapod_cosim.cosim.master.interrupts import blocked_interrupts
 from hexapod_cosim.cosim.run.workers import METHOD, begin_worker, stop_if_told
 from hexapod_cosim.cosim.study.execute.crew import Chunk, Returned
 from hexapod_cosim.cosim.study.execute.job import Job
@@ -43,7 +43,7 @@ class _Lane:
 
     def hand_in(self, chunk: Chunk) -> None:
         try:
-            with deaf_to_interrupts():  # the process, which may begin now
+            with blocked_interrupts():  # the process, which may begin now
                 future = self._pool.submit(_work, chunk)
         except BrokenProcessPool as error:  # it died since; told when what it had is taken
             future = Future()
