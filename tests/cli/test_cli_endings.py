@@ -1,6 +1,4 @@
-"""Runs of the hexapod command that do not complete: what was recorded is kept, under another
-name.
-"""
+"""Runs of the hexapod command that do not complete keep their recordings under another name."""
 
 from __future__ import annotations
 
@@ -231,7 +229,10 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
 def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
     call: Call, tmp_path: Path, modes: list[str], code: int
 ) -> None:
-    text = f'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n[factors]\nservo.mode = {json.dumps(modes)}\n'
+    text = (
+        'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n'
+        f"[factors]\nservo.mode = {json.dumps(modes)}\n"
+    )
     (tmp_path / "sinks.toml").write_text(text)
     returned, out, _ = call(
         "study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json"

@@ -1,6 +1,4 @@
-"""The co-simulation loop: order, times, what is recorded, and how a run ends that does not
-complete.
-"""
+"""The co-simulation loop: order of calls, times, recorded rows, and runs that do not complete."""
 
 from __future__ import annotations
 
@@ -155,7 +153,7 @@ def test_any_error_of_a_controller_ends_the_run_and_keeps_its_rows() -> None:
 
 
 class Cautious(FakeController):
-    """Does not believe one foot's sensor in the last quarter of 0.1 s."""
+    """A controller that rejects one foot's sensor in the last quarter of 0.1 s."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -175,7 +173,7 @@ class Cautious(FakeController):
         return super().step(t, command, measurement)
 
 
-def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told() -> None:
+def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_reported() -> None:
     scenario, controller = scenario_of("duration=0.1"), Cautious()
     signals, schedule = Signals(FakePlant()), make_schedule(scenario)
     recorder = Recorder(
@@ -186,12 +184,12 @@ def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told(
     ).recording
     assert recording.column("controller.RM.fallback").tolist() == [0.0] * 15 + [1.0] * 6
     assert not recording.column("controller.LM.fallback").any()
-    told = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
-    assert told["fallback"] == pytest.approx(6 / 21)
+    measured = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
+    assert measured["fallback"] == pytest.approx(6 / 21)
 
 
 def test_progress_reaches_the_whole_duration() -> None:
-    told: list[float] = []
+    measured: list[float] = []
     plant = FakePlant()
     signals, schedule = Signals(plant), make_schedule(scenario_of("duration=1"))
     run(
@@ -201,10 +199,10 @@ def test_progress_reaches_the_whole_duration() -> None:
         schedule,
         Recorder(signals, schedule.times, schedule.rows),
         h=0.005,
-        progress=told.append,
+        progress=measured.append,
     )
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(1.0)
+    assert measured == sorted(measured)
+    assert measured[-1] == pytest.approx(1.0)
 
 
 def test_a_command_holds_from_its_time_on() -> None:
@@ -238,7 +236,7 @@ def test_a_push_reaches_the_plant_only_while_it_lasts() -> None:
     np.testing.assert_allclose(np.delete(pushed, range(4, 10), axis=0), 0.0)
 
 
-def forces_told(seed: int, noise: float) -> np.ndarray:
+def measured_forces(seed: int, noise: float) -> np.ndarray:
     plant, controller = FakePlant(), FakeController()
     plant.values["LF.foot.force[3]"] = 10.0
     run_fake(
@@ -250,13 +248,13 @@ def forces_told(seed: int, noise: float) -> np.ndarray:
 
 
 def test_force_noise_is_seeded_unbiased_and_of_the_size_asked_for() -> None:
-    told = forces_told(1, 0.05)
-    np.testing.assert_array_equal(told, forces_told(1, 0.05))
-    assert not np.array_equal(told, forces_told(2, 0.05))
-    vertical = told[:, 0, 2]
+    measured = measured_forces(1, 0.05)
+    np.testing.assert_array_equal(measured, measured_forces(1, 0.05))
+    assert not np.array_equal(measured, measured_forces(2, 0.05))
+    vertical = measured[:, 0, 2]
     assert vertical.std() == pytest.approx(0.5, rel=0.15)  # 400 samples: 3.5 % standard error
     assert vertical.mean() == pytest.approx(10.0, abs=0.1)
-    assert not told[:, 1:].any()
+    assert not measured[:, 1:].any()
 
 
 def test_a_plant_that_lacks_a_variable_is_refused_by_its_name() -> None:

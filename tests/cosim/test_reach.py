@@ -1,4 +1,4 @@
-"""Commands that the legs cannot walk are refused before the run, with the most that they can."""
+"""Commands that the legs cannot follow are refused before the run, with the largest possible."""
 
 from __future__ import annotations
 
@@ -64,9 +64,7 @@ def test_the_limit_told_can_be_walked_and_a_little_more_cannot(
 
 
 def unreachable(speed: float) -> tuple[bool, bool]:
-    """Whether a standing foot, and any foot, is beyond reach from 2 s to 6 s of a tripod walk
-    with the master's default step.
-    """
+    """Whether a standing foot, and any foot, is out of reach from 2 s to 6 s of a tripod walk."""
     period, measurement = 0.005, Measurement()
     controller = Controller(ROBOT, period=period, gait=make_gait(ROBOT, "tripod"))
     shown, standing, anyone = controller.diagnostics, False, False

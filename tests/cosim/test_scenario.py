@@ -1,5 +1,5 @@
-"""Scenario files: what they may say, what --set does, and that every mistake is told by file,
-key, what was got and what is allowed.
+"""Scenario files and --set: valid content, and messages with file, key, what was got and what is
+allowed.
 """
 
 from __future__ import annotations
@@ -141,7 +141,8 @@ def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
     [
         (
             "gravity=-1.62",
-            r"walk_flat\.toml: gravity: value not allowed: got -1\.62, expected a finite number > 0 \[m/s2\]",
+            r"walk_flat\.toml: gravity: value not allowed: got -1\.62, "
+            r"expected a finite number > 0 \[m/s2\]",
         ),
         ("gravity=0", r"gravity: value not allowed: got 0, expected a finite number > 0"),
         (
@@ -178,7 +179,10 @@ def test_static_friction_is_refused_where_it_has_no_effect(law: str) -> None:
     scenario = load_scenario(
         "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"]
     )
-    message = rf"friction\.mu_static: static friction that has no effect: got '0\.8 with the law {law}', expected friction\.law = bristle"
+    message = (
+        r"friction\.mu_static: static friction that has no effect: "
+        rf"got '0\.8 with the law {law}', expected friction\.law = bristle"
+    )
     with pytest.raises(RobotError, match=message):
         scenario_robot(scenario)
     sticks = load_scenario(
@@ -206,7 +210,8 @@ def test_a_robot_file_is_found_beside_its_scenario(tmp_path: Path) -> None:
 
 
 EVERYTHING = [
-    "events=[{time=1, leg='LM', fault='stuck'}, {time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
+    "events=[{time=1, leg='LM', fault='stuck'}, "
+    "{time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
     "sensors.foot_force_delay=7 ms",
     "compliance.slip_pid=false",
     "variation.attitude=1 deg",
@@ -366,7 +371,7 @@ def test_a_mistake_in_a_file_is_told_by_file_then_key(
     assert caught.value.where == f"{path}: {place}"
 
 
-def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_without_quotes_with_them(
+def test_the_message_for_an_unknown_parameter_of_a_file_names_the_nearest_and_asks_for_quotes(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "mine.toml"

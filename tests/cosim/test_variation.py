@@ -1,6 +1,4 @@
-"""Small variations: seeded, of the size asked for, nothing without being asked, and no foot
-driven into the ground.
-"""
+"""Small variations are seeded, have the requested sizes, and drive no foot into the ground."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The design: requirements met by python-control's judgement, kept in a file, told when
-impossible.
+"""The design of gains: requirements verified by python-control, files, and errors for impossible
+ones.
 """
 
 from __future__ import annotations
@@ -119,8 +119,9 @@ def test_the_quick_margins_are_python_controls(gains: Gains) -> None:
 
 
 def test_margins_of_a_loop_known_in_closed_form() -> None:
-    """k / s with a delay T: crossover k, phase margin 90 deg - k T, gain margin pi / (2 k T),
-    delay margin (pi/2)/k - T.
+    """The loop k / s with a delay T has crossover k and phase margin 90 deg - k T.
+
+    Its gain margin is pi / (2 k T) and its delay margin (pi/2)/k - T.
     """
     k, late, omega = 10.0, 0.02, np.geomspace(0.1, 300.0, 600)
     loop = k / (1j * omega) * np.exp(-1j * omega * late)
@@ -132,7 +133,7 @@ def test_margins_of_a_loop_known_in_closed_form() -> None:
 
 
 def test_the_eigenloci_are_the_characteristic_function_of_all_feet(gains: Gains) -> None:
-    """det(1 - l S P W) over all feet is the product of 1 + l locus, whatever l."""
+    """det(1 - l S P W) over all feet is the product of all 1 + l locus, for any l."""
     robot, plant, omega = (
         load_robot(gains.robot),
         plants_of(gains.robot)[NOMINAL],
@@ -185,7 +186,9 @@ def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
 
 
 def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains) -> None:
-    """Generalised Nyquist against the eigenvalues of the whole loop, the suspension left out."""
+    """Compares the generalised Nyquist criterion with the eigenvalues of the loop without the
+    suspension.
+    """
     robot, name = load_robot(gains.robot), "six legs, load 2, gears slip"
     plant, omega = plants_of(gains.robot)[name], frequencies(PERIOD, FINE)
     critical = (
@@ -208,7 +211,7 @@ def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains)
 
 
 def test_the_design_uses_the_margin_it_has(gains: Gains) -> None:
-    """A tenth more gain breaks the margin that is said to bind."""
+    """A gain larger by a tenth violates the margin that is reported as binding."""
     omega = frequencies(PERIOD, FINE)
     law, needs = laws_of(scaled(gains, 1.1)).responses(omega)[0], gains.requirements
     margin, name = gains.margins.binding.removesuffix(")").split(" (", 1)
@@ -234,8 +237,9 @@ def test_less_delay_or_less_margin_allows_more_integral_action() -> None:
 
 
 def test_the_steady_slip_is_what_a_steady_drag_is_left_with() -> None:
-    """Feet whose targets splay at a constant rate: the force with the law over that without it,
-    after the transients.
+    """The targets of the feet splay at a constant rate.
+
+    The force with the law is compared with that without it, after the transients.
     """
     robot, plant, gains = (
         load_robot("athena"),
@@ -272,7 +276,7 @@ def test_the_laws_closed_form_response_is_its_systems(gains: Gains) -> None:
 
 
 def test_the_law_is_the_difference_equations_that_run() -> None:
-    """Tustin part by part: filter, integral, derivative, each with its own last value."""
+    """Filter, integral and derivative are discretised by Tustin, each with its own last value."""
     gains, h = replace(designed("athena").slip, kp=0.7, kd=0.003), PERIOD
     force = np.random.default_rng(2).standard_normal(80)
     e, smooth, total, slope, expected = 0.0, 0.0, 0.0, 0.0, []

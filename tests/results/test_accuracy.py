@@ -1,5 +1,5 @@
-"""The errors beside metrics: those of independent runs, none where nothing changes, smaller
-where the solver is more exact.
+"""Accuracies equal the errors of independent runs, are zero where nothing changes, and shrink with
+a more exact solver.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def summaries(*plans: Scenario) -> list[Summary]:
 
 
 def made(value: float, other: float = 0.0, *, seed: int = 0, upright: bool = True) -> Summary:
-    """A run with metrics of any name."""
+    """Returns a run with metrics of any name."""
     return Summary(
         control="kinematic",
         seed=seed,
@@ -104,9 +104,7 @@ def test_where_nothing_changes_every_error_is_zero(plant_build: Path) -> None:
 def test_a_hundredth_of_the_tolerance_makes_the_errors_smaller_by_a_power_of_ten_at_least(
     plant_build: Path,
 ) -> None:
-    """The sum of all metrics' errors, each relative to its metric, but for the books' residual,
-    which is itself an error.
-    """
+    """Sums the relative errors of all metrics but the energy residual, which is itself an error."""
     sizes = []
     for tolerance in ("1e-2", "1e-4"):
         plan = walk(f"solver.tolerance={tolerance}")
@@ -154,7 +152,7 @@ def test_a_reference_without_figures_leaves_errors_open_and_is_told() -> None:
 def checked(
     plant_build: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Mapping[str, Any]]:
-    """A comparison of one seed, its accuracy checked."""
+    """Runs a comparison of one seed with --check-accuracy."""
     folder = tmp_path_factory.mktemp("checked") / "out"
     command = [
         *COMMAND,
@@ -284,10 +282,8 @@ def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     quick = settings("duration=0.2", "outputs.plots=false")
     code, _, err = call(*command, "stand", "-o", tmp_path / "out", "--check-accuracy", *quick)
     assert code == 130
-    assert (
-        f"the results in {tmp_path / 'out'} are whole, their accuracy was not checked; `hexapod report"
-        in err
-    )
+    missing = f"the results in {tmp_path / 'out'} are whole, their accuracy was not checked"
+    assert f"{missing}; `hexapod report" in err
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
     assert "accuracy" not in json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert call("report", tmp_path / "out")[0] == 0

@@ -1,4 +1,4 @@
-"""Rows further apart than macro-steps: figures stay, peaks are kept, and both masters record the
+"""Recordings with fewer rows than macro-steps: metrics and peaks stay, and both masters record the
 same.
 """
 
@@ -67,7 +67,7 @@ def gains_of(scenario: Scenario) -> Gains | None:
 
 @pytest.fixture(scope="module", params=CONTROLS)
 def runs(request: pytest.FixtureRequest, plant_build: Path) -> tuple[Result, Result]:
-    """One walk recorded at every macro-step of 1 ms, and every 20 ms."""
+    """Records one walk at every macro-step of 1 ms, and every 20 ms."""
     plans = [walk_of(request.param, interval) for interval in (0.0, 0.02)]
     every, coarse = (simulate(plan, gains=gains_of(plan)) for plan in plans)
     return every, coarse
@@ -88,7 +88,7 @@ def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(
 def test_what_the_plant_measures_can_be_had_from_rows_far_apart(
     runs: tuple[Result, Result],
 ) -> None:
-    """Of the rows that are kept, and no others, within 1 %."""
+    """The kept rows alone give the metrics within 1 %."""
     every, coarse = runs
     view = View(coarse.outcome.recording, coarse.parameters, 0.8)
     found = compute_metrics(view, servo=load_robot("athena").servo, realtime_factor=1.0)
@@ -157,7 +157,7 @@ def test_the_last_row_is_always_kept(rows: int, every: int, kept: list[int]) -> 
 
 
 def in_python(scenario: Scenario, walker: Walker) -> Outcome:
-    """A scenario on the plant FMU under the controller FMU as the Python master runs it."""
+    """Runs a scenario in the Python master with the plant FMU and the controller FMU."""
     plan = make_plan(scenario, gains=gains_of(scenario))
     controller = walker._told_controller(plan)
     controller.initialise(scenario.start, scenario.start + scenario.duration)
@@ -183,8 +183,9 @@ def same(found: Recording, expected: Recording) -> None:
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_masters_keep_the_same_rows(control: str) -> None:
-    """Bit for bit; 43 macro-steps are no whole number of intervals, so the last row is an extra
-    one.
+    """They agree bit for bit.
+
+    43 macro-steps are no multiple of the interval, so the last row is an extra one.
     """
     plan = load_scenario(
         "walk_flat",
