@@ -80,16 +80,16 @@ def simulate(
     if accuracy:
         halved_scenario(plan)  # raises errors before anything is run
     used = chosen_gains(plan, given) if accuracy else given
+    command = command_line(
+        "simulate",
+        scenario,
+        control=control,
+        settings=settings,
+        fmu=fmu,
+        gains=gains,
+        accuracy=accuracy,
+    )
     with results_folder(output or default_folder(scenario)) as folder:
-        command = command_line(
-            "simulate",
-            scenario,
-            control=control,
-            settings=settings,
-            fmu=fmu,
-            gains=gains,
-            accuracy=accuracy,
-        )
         result, files = run_into(plan, [folder], command, fmu=fmu, gains=used)
         checked: dict[str, Accuracy] = {}
         if accuracy:
@@ -102,10 +102,7 @@ def simulate(
                 runs = {plan.control: stored_result(result)}
                 files += write_report(runs, folder.path, warn=warn, accuracies=checked)
     if json:
-        summary = _summary(result, folder.path, files)
-        if accuracy:
-            summary[ACCURACY] = checked[plan.control].as_table()
-        show_json(summary)
+        show_json(_summary(result, folder.path, files, checked))
     else:
         metrics = {plan.control: result.metrics}
         rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
@@ -159,12 +156,18 @@ def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
     )
 
 
-def _summary(result: Result, folder: Path, files: list[Path]) -> dict[str, Any]:
-    """Returns what --json prints of a run."""
+def _summary(
+    result: Result, folder: Path, files: list[Path], checked: Mapping[str, Accuracy]
+) -> dict[str, Any]:
+    """Returns what --json prints of a run; `checked` is its accuracy by control, if checked."""
     names = {
         "control": result.scenario.control,
         "directory": str(folder),
         "files": [str(file) for file in files],
     }
     shown = {key: result.facts[key] for key in ("robot", "walk", "warnings")}
-    return {"metrics": dict(result.metrics), **names, **shown, "status": result.outcome.status}
+    status = {"status": result.outcome.status}
+    summary = {"metrics": dict(result.metrics), **names, **shown, **status}
+    if checked:
+        summary[ACCURACY] = checked[result.scenario.control].as_table()
+    return summary

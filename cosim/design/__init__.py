@@ -1,4 +1,4 @@
 """Linearises the plant FMU and designs controller gains for it.
 
-May import `common` to `export`.
+Imports `common` to `export`.
 """

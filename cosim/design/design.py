@@ -54,6 +54,34 @@ def examine_stances(
     left out; the returned texts name them, with the reason. Raises GainsError for a robot that
     stands in no stance, and for a robot or a period that no gains can be designed for.
     """
+    _check_can_design(robot, period)
+    plants: dict[str, StandingPlant] = {}
+    failures: dict[str, StanceError] = {}
+    frictions = {"gears stick": robot.servo.coulomb_friction, "gears slip": 0.0}
+    with level_fmu(robot) as fmu:
+        for stance, standing in STANCES.items():
+            for load, (motion, inputs) in _rests(fmu, robot, stance, standing, failures).items():
+                for gears, friction in frictions.items():
+                    plants[f"{stance}, load {load:g}, {gears}"] = linearise(
+                        fmu, robot, motion, inputs, period=period, coulomb_friction=friction
+                    )
+    if not plants:
+        first = failures[next(iter(STANCES))]
+        raise GainsError(
+            "the robot does not stand",
+            got=f"{first.what}: {first.got}",
+            expected="rest on six legs or on one of its tripods",
+            fix=first.fix,
+            where=robot.name,
+        )
+    return plants, tuple(
+        f"{name}: {error.what} (got {error.got}, expected {error.expected})"
+        for name, error in failures.items()
+    )
+
+
+def _check_can_design(robot: Robot, period: float) -> None:
+    """Raises GainsError for a period that is not positive and for feet without friction."""
     if not period > 0.0:
         raise GainsError(
             "impossible controller period",
@@ -69,33 +97,6 @@ def examine_stances(
             fix="give the file the friction of ordinary ground, and a scenario friction.mu = 0",
             where=robot.name,
         )
-    plants: dict[str, StandingPlant] = {}
-    failures: dict[str, StanceError] = {}
-    with level_fmu(robot) as fmu:
-        for stance, standing in STANCES.items():
-            for load, (motion, inputs) in _rests(fmu, robot, stance, standing, failures).items():
-                for gears, friction in (
-                    ("gears stick", robot.servo.coulomb_friction),
-                    ("gears slip", 0.0),
-                ):
-                    plant = linearise(
-                        fmu, robot, motion, inputs, period=period, coulomb_friction=friction
-                    )
-                    plants[f"{stance}, load {load:g}, {gears}"] = plant
-    if not plants:
-        first = failures[next(iter(STANCES))]
-        expected = "rest on six legs or on one of its tripods"
-        raise GainsError(
-            "the robot does not stand",
-            got=f"{first.what}: {first.got}",
-            expected=expected,
-            fix=first.fix,
-            where=robot.name,
-        )
-    return plants, tuple(
-        f"{name}: {error.what} (got {error.got}, expected {error.expected})"
-        for name, error in failures.items()
-    )
 
 
 def _rests(

@@ -74,14 +74,10 @@ class FmuBlock:
             )
         self.names, self.values = tuple(names), values
         self._fmu = fmu
-        numbers, size, address = (
-            (ctypes.c_uint * len(names))(*references),
-            ctypes.c_size_t(len(names)),
-            ctypes.c_void_p(values.ctypes.data),
-        )
-        self._get, self._set = (
-            fmu.bind(f"fmi2{verb}{SUFFIX[kind]}", numbers, size, address) for verb in ("Get", "Set")
-        )
+        numbers = (ctypes.c_uint * len(names))(*references)
+        size, address = ctypes.c_size_t(len(names)), ctypes.c_void_p(values.ctypes.data)
+        self._get = fmu.bind(f"fmi2Get{SUFFIX[kind]}", numbers, size, address)
+        self._set = fmu.bind(f"fmi2Set{SUFFIX[kind]}", numbers, size, address)
 
     def get(self) -> None:
         """Reads all values from the FMU. Raises FmuError."""
@@ -277,9 +273,9 @@ class Fmu:
             raise self._unknown(name, parameters)
         kind = self.variables[name].causality
         if kind != "parameter":
-            fix = (
-                "[[events]] push the torso" if name.startswith("torso.push") else "set a parameter"
-            )
+            fix = "set a parameter"
+            if name.startswith("torso.push"):
+                fix = "[[events]] push the torso"
             raise FmuError(
                 "not a parameter",
                 got=name,
@@ -292,11 +288,9 @@ class Fmu:
     def _number(self, name: str, value: Any) -> float:
         """Converts a value to the number that the FMU takes."""
         variable = self.variables[name]
-        items = (
-            {item.name: item.value for item in variable.declaredType.items}
-            if variable.type == "Enumeration"
-            else {}
-        )
+        items = {}
+        if variable.type == "Enumeration":
+            items = {item.name: item.value for item in variable.declaredType.items}
         if isinstance(value, str) and items:
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)

@@ -68,11 +68,9 @@ class Recording:
         for name in names:
             if name not in self._index:
                 near = nearest_name(name, self.names)
-                fix = (
-                    f"did you mean {near!r}?"
-                    if near
-                    else "record it: outputs.csv names the columns that are kept"
-                )
+                fix = "record it: outputs.csv names the columns that are kept"
+                if near:
+                    fix = f"did you mean {near!r}?"
                 raise ColumnError("no such column in the recording", got=name, fix=fix)
         return self.data[:, [self._index[name] for name in names]]
 

@@ -1,4 +1,4 @@
 """Writes the report of a run or of a comparison: one HTML file that works without a network.
 
-May import `common` to `results`.
+Imports `common` to `results`.
 """

@@ -105,6 +105,11 @@ def write_report(
         warn(text)
     first = next(iter(runs.values()))
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
+    content["warnings"] = [
+        f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
+    ] + content.pop("losses")
+    content["scenario"] = first.scenario if scenario is None else scenario
+    content["command"] = first.facts.get("command", "") if command is None else command
     metrics: Mapping[str, Mapping[str, float | None]]
     if comparison is None:
         metrics = {label: run.metrics for label, run in runs.items()}
@@ -113,32 +118,44 @@ def write_report(
     page = render(
         "report.html.jinja",
         title=first.facts["title"],
-        labels=list(runs),
-        facts={label: run.facts for label, run in runs.items()},
-        durations={label: _duration(run.facts) for label, run in runs.items()},
-        walked={label: _walked(run.facts) for label, run in runs.items()},
-        warnings=[
-            f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
-        ]
-        + content.pop("losses"),
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
-        scenario=first.scenario if scenario is None else scenario,
-        command=first.facts.get("command", "") if command is None else command,
         creep=creep_note(first.facts["parameters"]),
-        gains={
-            label: to_toml(run.facts["gains"])
-            for label, run in runs.items()
-            if run.facts.get("gains")
-        },
-        accuracy=about_accuracy(accuracies),
-        effects=effect_rows(content["rows"], accuracies, metrics),
-        notes=[f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
-        **content | {"rows": with_errors(content["rows"], accuracies)},
+        **content | _accuracy(content["rows"], accuracies, metrics),
+        **_facts(runs),
         **_replay(runs),
     )
     write_text(folder / REPORT, page)
     return [*files, folder / REPORT]
+
+
+def _accuracy(
+    rows: Rows,
+    accuracies: Mapping[str, Accuracy],
+    metrics: Mapping[str, Mapping[str, float | None]],
+) -> dict[str, Any]:
+    """Returns the parts of the page on accuracy, and the rows of the table with errors."""
+    return {
+        "accuracy": about_accuracy(accuracies),
+        "effects": effect_rows(rows, accuracies, metrics),
+        "notes": [f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
+        "rows": with_errors(rows, accuracies),
+    }
+
+
+def _facts(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
+    """Returns the facts of all runs, by control."""
+    return {
+        "labels": list(runs),
+        "facts": {label: run.facts for label, run in runs.items()},
+        "durations": {label: _duration(run.facts) for label, run in runs.items()},
+        "walked": {label: _walked(run.facts) for label, run in runs.items()},
+        "gains": {
+            label: to_toml(run.facts["gains"])
+            for label, run in runs.items()
+            if run.facts.get("gains")
+        },
+    }
 
 
 def _one_run(run: StoredResult) -> dict[str, Any]:

@@ -124,7 +124,7 @@ _TABLE: dict[str, Metric] = {
         "m", False, "least distance of the centre of mass from the support polygon's edge", 1e-4
     ),
     "energy_residual": Metric(
-        "1", None, "what the energy books do not explain, in shares of the motors' work", 0.0
+        "1", None, "energy that the balance does not explain, over the motors' work", 0.0
     ),
     "realtime_factor": Metric("1", None, "simulated over wall time of the whole loop", 0.0),
 }

@@ -1,6 +1,6 @@
 """Runs scenarios, one or many, in this process or in worker processes.
 
-May import every folder of `cosim` above it but `validate` and `report`.
+Imports every folder of `cosim` above it but `validate` and `report`.
 """
 
 from hexapod_cosim.cosim.run.run import simulate

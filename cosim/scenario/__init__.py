@@ -1,4 +1,4 @@
 """Scenarios: what is run, read from TOML files and checked.
 
-May import `common` and `interface`.
+Imports `common` and `interface`.
 """

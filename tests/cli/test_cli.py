@@ -28,6 +28,7 @@ RUN = {
     "run.json",
     "scenario.toml",
 }
+# of robots that turn on the spot
 TWINS = {
     "slip_per_radian",
     "path_error_per_radian",
@@ -35,7 +36,7 @@ TWINS = {
     "heat_per_radian",
     "cost_per_radian",
     "electrical_cost_per_radian",
-}  # of robots that turn on the spot
+}
 SHOWN = set(METRICS) - TWINS - {"slip_net_per_metre"}
 FIGURES = {"foot_forces", "slip", "feet", "posture", "path", "torques", "energy", "footfall"}
 

@@ -19,7 +19,7 @@ from command import COMMAND, QUICK, Call, assert_refused, settings
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_csv, write_commands
-from hexapod_cosim.cosim.results.summary import Summary, refused
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
@@ -109,9 +109,8 @@ def test_a_controller_that_raises_keeps_the_recording_and_fails(
         return step(self, t, command, measurement)
 
     monkeypatch.setattr(Controller, "step", broken)
-    monkeypatch.setattr(
-        "hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None
-    )  # it tries the controller out
+    # it tries the controller out
+    monkeypatch.setattr("hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None)
     folder = tmp_path / "out"
     code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK)
     assert (code, out) == (1, "")
@@ -146,9 +145,8 @@ def test_an_interrupt_while_figures_are_drawn_says_what_is_there(
         return []
 
     monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.write_report", struck)
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # a test run in the background starts with it ignored
+    # a test run in the background starts with it ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     code, _, err = call("simulate", "stand", "-o", tmp_path / "out", "--set", "duration=0.2")
     assert code == 130
@@ -202,7 +200,7 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
         for scenario in scenarios:
             stands = upright[("kinematic", "compliant").index(scenario.control)]
             yield replace(
-                refused(scenario, HexapodError("")),
+                refused_summary(scenario, HexapodError("")),
                 status="completed",
                 upright=stands,
                 warnings=() if stands else ("it fell",),

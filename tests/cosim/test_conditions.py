@@ -32,9 +32,8 @@ def test_a_robot_on_ice_walks_on_the_spot_and_is_warned_why(
 ) -> None:
     result = run("walk_flat", friction, "duration=2")
     position = result.outcome.recording.vector("torso.position")
-    assert (
-        float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01
-    )  # m: of 0.12 commanded; its legs swing its torso to and fro
+    # m: of 0.12 commanded; its legs swing its torso to and fro
+    assert float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01
     assert NO_PUSH in result.facts["warnings"]
     assert result.facts["walk"]["upright"]
 
@@ -75,9 +74,8 @@ def test_a_robot_dropped_from_a_metre_lands_on_its_feet_and_has_not_fallen(
     assert result.facts["walk"]["upright"]
     recording = result.outcome.recording
     landed = recording.time[np.argmax((recording.feet("contact") > 0.5).any(axis=1))]
-    assert landed == pytest.approx(
-        (2.0 * (1.0 - 0.132) / 9.81) ** 0.5, abs=0.006
-    )  # s    to a macro-step; it stands at 0.132 m
+    # s    to a macro-step; it stands at 0.132 m
+    assert landed == pytest.approx((2.0 * (1.0 - 0.132) / 9.81) ** 0.5, abs=0.006)
     assert recording.column("torso.position[3]")[-1] == pytest.approx(0.1317, abs=1e-3)
 
 

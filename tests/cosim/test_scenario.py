@@ -189,9 +189,8 @@ def test_static_friction_is_refused_where_it_has_no_effect(law: str) -> None:
         "walk_flat", overrides=["friction.law=bristle", "friction.mu_static=0.8"]
     )
     assert scenario_robot(sticks).friction.mu_static == 0.8
-    same = load_scenario(
-        "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"]
-    )  # the kinetic one's
+    # the kinetic one's
+    same = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"])
     assert scenario_robot(same).friction.mu_static == 0.7
 
 

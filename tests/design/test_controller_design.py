@@ -180,9 +180,8 @@ def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
         loop = closed_loop(robot, plant, laws)
         assert spectral_radius(loop, feet=feet) < 1.0, name
         held = np.abs(np.linalg.eigvals(loop.A) - 1.0) < AT_ONE
-        assert (
-            held.sum() == PLACES + 2 * feet
-        )  # what nothing holds is exactly 1, and nothing else is
+        # what nothing holds is exactly 1, and nothing else is
+        assert held.sum() == PLACES + 2 * feet
 
 
 def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains) -> None:
@@ -270,9 +269,8 @@ def test_the_laws_closed_form_response_is_its_systems(gains: Gains) -> None:
     )
     slow = np.array([1.0, 3.0])
     s = [slip_law(gains.slip)(1j * w) for w in slow]
-    np.testing.assert_allclose(
-        slip_response(gains.slip, slow, period=PERIOD), s, rtol=1e-3
-    )  # at 1 % of the Nyquist frequency
+    # at 1 % of the Nyquist frequency
+    np.testing.assert_allclose(slip_response(gains.slip, slow, period=PERIOD), s, rtol=1e-3)
 
 
 def test_the_law_is_the_difference_equations_that_run() -> None:

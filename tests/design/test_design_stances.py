@@ -131,9 +131,10 @@ def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> 
 
     lifted = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0])
     np.testing.assert_allclose(lifts(robot), 0.04 * lifted, atol=1e-12)
+    # legs of 0.16 m
     np.testing.assert_allclose(
         lifts(scaled_robot(robot, 0.5)), 0.04 * 0.16 / 0.22 * lifted, atol=1e-12
-    )  # legs of 0.16 m
+    )
     np.testing.assert_allclose(
         lifts(scaled_robot(robot, 2.0)), 0.04 * 0.64 / 0.44 * lifted, atol=1e-12
     )

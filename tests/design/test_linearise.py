@@ -28,16 +28,18 @@ ROUNDING = 1e-5  # N/m and the like    of forces of 10 N over 1e-6 m
 # differences
 PREDICTED = 2e-3
 SMALL = 1e-4  # rad    of the inputs' changes there
+# 1    slope of friction and stiffness of the contact, of the robot's own
 STUCK, HARD = (
     300.0,
     100.0,
-)  # 1    slope of friction and stiffness of the contact, of the robot's own
+)
 # 1    what still creeps of a force in 0.3 s, and the contact's compliance beside the leg's
 YIELDED = 0.01
+# rad/s, 1    what the load does to the legs' stiffness by leaning on them
 SLOW, STIFFENED = (
     1e-2,
     0.1,
-)  # rad/s, 1    what the load does to the legs' stiffness by leaning on them
+)
 BALANCE = 1e-4  # 1    of the force: rest is reached to 1e-3 m/s
 pytestmark = pytest.mark.usefixtures("plant_build")
 

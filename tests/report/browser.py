@@ -12,17 +12,17 @@ from typing import Any
 
 import pytest
 
-REQUIRED = (
-    os.environ.get("HEXAPOD_BROWSER", "") != ""
-)  # a missing browser is a failure, not a reason to skip
+# a missing browser is a failure, not a reason to skip
+REQUIRED = os.environ.get("HEXAPOD_BROWSER", "") != ""
 FULL = os.environ.get("HEXAPOD_BROWSER") == "full"  # the 60 s walk too
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# WebGL without a graphics card
 FLAGS = (
     "--no-sandbox",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
-)  # WebGL without a graphics card
+)
 PATIENCE = (
     120_000  # ms    for a loaded machine without a graphics card; nothing is asserted about it
 )

@@ -101,9 +101,8 @@ def test_a_long_recording_is_thinned_to_the_budget_and_its_peaks_stay() -> None:
     assert np.all(np.diff(chosen.time) > 0.0)
     assert chosen.columns["roll"].max() == pytest.approx(np.degrees(peak), rel=ROUND_OFF)
     exact = np.interp(chosen.time, recording.time, recording.column("torso.position[1]"))
-    np.testing.assert_array_equal(
-        chosen.columns["torso.x"], exact
-    )  # what is replayed is as it was, not an extreme
+    # what is replayed is as it was, not an extreme
+    np.testing.assert_array_equal(chosen.columns["torso.x"], exact)
 
 
 def test_a_recording_within_the_budget_is_kept_whole() -> None:

@@ -30,12 +30,10 @@ from hexapod_cosim.models import HexapodError
 
 CYCLES = ("duration=2.4", "gait.period=0.8")  # the shortest walk with metrics
 SOLVER_METRICS = [name for name in METRICS if name != "realtime_factor"]
-WALKED = [
-    name for name in SOLVER_METRICS if not name.endswith("_per_radian")
-]  # what a straight walk has
-SHOWN = [
-    name for name in WALKED if name != "slip_net_per_metre"
-]  # which is kept out of tables under the tanh law
+# what a straight walk has
+WALKED = [name for name in SOLVER_METRICS if not name.endswith("_per_radian")]
+# which is kept out of tables under the tanh law
+SHOWN = [name for name in WALKED if name != "slip_net_per_metre"]
 
 
 def walk(*overrides: str) -> Scenario:

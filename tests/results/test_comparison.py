@@ -101,9 +101,8 @@ def test_the_relative_interval_holds_the_true_ratio_in_95_of_100_cases(
             "slip_per_metre", list(zip(before.tolist(), after.tolist(), strict=True))
         ).interval
         held += low <= ratio - 1.0 <= high
-    assert held / 1000 == pytest.approx(
-        0.95, abs=0.025
-    )  # of 1000 cases: three standard errors, and first order's own error
+    # of 1000 cases: three standard errors, and first order's own error
+    assert held / 1000 == pytest.approx(0.95, abs=0.025)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -265,9 +264,10 @@ def test_where_no_pair_walked_the_figures_are_of_all_that_have_any() -> None:
 
 def test_a_single_seed_has_changes_and_no_intervals() -> None:
     rows = comparison_rows(compare_runs(runs("kinematic", [0.3]), runs("compliant", [0.1])))
+    # of the tanh law
     assert [row["name"] for row in rows] == [
         name for name in METRICS if name != "slip_net_per_metre"
-    ]  # of the tanh law
+    ]
     slip = row_of(rows, "slip_per_metre")
     assert (slip["change"], slip["interval"], slip["verdict"]) == ("-66.7 %", "", BETTER)
     assert row_of(rows, "yaw_drift")["change"] == ""

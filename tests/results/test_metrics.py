@@ -291,9 +291,8 @@ def test_a_commanded_circle_is_followed_without_error() -> None:
     walk.set("torso.position[1]", SPEED / rate * np.sin(yaw))
     walk.set("torso.position[2]", SPEED / rate * (1.0 - np.cos(yaw)))
     metrics = walk.metrics()
-    assert metrics["path_error"] == pytest.approx(
-        0.0, abs=rate * H
-    )  # the held command turns in steps
+    # the held command turns in steps
+    assert metrics["path_error"] == pytest.approx(0.0, abs=rate * H)
     assert metrics["yaw_drift"] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -363,14 +362,12 @@ def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> No
     walk = Walk()
     force = np.linspace(0.0, 1.0, len(walk.time))
     walk.set("LF.foot.normal_force", force * WEIGHT)
-    walk.set(
-        "LF.foot.peak_force", np.where(np.abs(walk.time - 5.0) < 0.3 * H, 1.7, 0.0) * WEIGHT
-    )  # between two rows
+    # between two rows
+    walk.set("LF.foot.peak_force", np.where(np.abs(walk.time - 5.0) < 0.3 * H, 1.7, 0.0) * WEIGHT)
     metrics = walk.metrics()
     assert metrics["peak_force"] == pytest.approx(1.7)
-    assert metrics["force_p95"] == pytest.approx(
-        0.2 + 0.95 * 0.8, abs=1e-3
-    )  # of what rises from 0.2 to 1
+    # of what rises from 0.2 to 1
+    assert metrics["force_p95"] == pytest.approx(0.2 + 0.95 * 0.8, abs=1e-3)
 
 
 def test_a_peak_before_the_judged_cycles_does_not_count() -> None:
@@ -397,9 +394,8 @@ def landings(
 
 def test_loading_rate_is_a_percentile_over_landings() -> None:
     walk = Walk()
-    landings(
-        walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)]
-    )  # the first two cycles do not count
+    # the first two cycles do not count
+    landings(walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)])
     assert walk.metrics()["loading_rate"] == pytest.approx(1.0 + 0.95 * 7.0)
 
 

@@ -60,9 +60,8 @@ def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def numbers() -> Recording:
     rng = np.random.default_rng(1)
-    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(
-        np.float64
-    )  # any double there is
+    # any double there is
+    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(np.float64)
     data = np.vstack([np.tile(AWKWARD, (3, 1)).T, np.where(np.isnan(bits), np.nan, bits)])
     return Recording(("time", "torso.position[1]", "LF.foot.contact"), data)
 

@@ -24,7 +24,7 @@ const SHOWN_CYCLES = 3;
 /** The functions available on the console and to tests as `window.hexapod`. */
 const consoleFunctions: Record<string, unknown> = {};
 
-/** Shows text and tables first, then plots, then the replay, which waits for the graphics driver. */
+/** Shows text and tables first, then plots, then the replay, which needs the graphics driver. */
 async function start(): Promise<void> {
   await afterPaint();
   const payload = JSON.parse(byId("recording")!.textContent!) as Payload;

@@ -34,7 +34,7 @@ export function isDark(): boolean {
   return chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
-/** The light or dark theme: the system's, or the reader's choice, stored where the browser allows. */
+/** The light or dark theme: the system's, or the reader's choice, stored if the browser can. */
 export class Theme {
   private readonly listeners: (() => void)[] = [];
 
