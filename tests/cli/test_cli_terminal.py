@@ -23,9 +23,8 @@ from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
 from hexapod_cosim.cosim.results.results import NEEDED
 
 ESCAPE = "\x1b"
-COMMANDS = {
-    name: command for name, command in get_command(app).commands.items() if not command.hidden
-}  # type: ignore[attr-defined]
+ALL_COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS = {name: command for name, command in ALL_COMMANDS.items() if not command.hidden}
 
 
 class Terminal(io.StringIO):
