@@ -59,7 +59,7 @@ def check_accuracy(
             )
     except KeyboardInterrupt:
         warn(
-            f"the results in {folder} are whole, their accuracy was not checked; "
+            f"the results in {folder} are complete, their accuracy was not checked; "
             f"`hexapod report {folder}` draws their figures"
         )
         raise

@@ -191,7 +191,7 @@ def _all_seeds(
     except BaseException:
         with deferred_interrupts():
             write_seeds(folder / SEEDS_PARTIAL, done)
-            warn(f"the runs that came to their end are in {folder / SEEDS_PARTIAL}")
+            warn(f"the completed runs are in {folder / SEEDS_PARTIAL}")
         raise
     write_seeds(folder / SEEDS, done)
     comparison = compare_runs(

@@ -138,7 +138,7 @@ def drawing(folder: Path) -> Iterator[None]:
             yield
     except KeyboardInterrupt:
         warn(
-            f"the results in {folder} are whole, the figures are not: "
+            f"the results in {folder} are complete, the figures are not: "
             f"`hexapod report {folder}` draws them"
         )
         raise

@@ -32,7 +32,8 @@ Progress = Callable[[float], None]  # simulated time since the start [s]
 class JointController(Protocol):
     """What the master needs of a controller."""
 
-    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand: ...
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """Returns the joint commands that hold from t [s] for one macro-step."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,7 @@ def _loop(
     h: float,
     progress: Progress | None,
 ) -> None:
+    """Runs all macro-steps; the last row, at the end of the run, is followed by no step."""
     # bound methods are looked up once: this loop is the hot path
     read, control, write = signals.read, controller.step, signals.write
     record, advance = recorder.record, plant.step

@@ -279,7 +279,7 @@ def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
         raise ScenarioError(
             "commands out of order",
             got=times,
-            expected="times that grow",
+            expected="increasing times",
             fix="sort the [[command]] entries by time",
             where=where,
         )
@@ -407,7 +407,7 @@ def _check_gravity(robot: Robot, *, where: str) -> None:
     fix = "write gravity = 1.62, or a vector that points down: [0, 0, -1.62]"
     expected = "gravity that presses the robot onto the ground [m/s2]"
     raise ScenarioError(
-        "nothing stands under this gravity",
+        "the robot cannot stand under this gravity",
         got=list(robot.gravity),
         expected=expected,
         fix=fix,

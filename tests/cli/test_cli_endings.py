@@ -238,7 +238,7 @@ def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
     assert returned == code, out
 
 
-def test_the_exit_codes_are_told_by_help(call: Call) -> None:
+def test_the_exit_codes_are_in_the_help(call: Call) -> None:
     said = " ".join(call("--help")[1].split())
     assert "0 success; 1 an error" in said
     assert "3 the robot fell" in said
@@ -246,7 +246,7 @@ def test_the_exit_codes_are_told_by_help(call: Call) -> None:
         assert "xit code 3" in " ".join(call(command, "--help")[1].split())
 
 
-def test_what_has_no_effect_is_told(call: Call, tmp_path: Path) -> None:
+def test_what_has_no_effect_is_warned_of(call: Call, tmp_path: Path) -> None:
     idle = settings("events=[{time=5, duration=0.1, force=[0, 1, 0]}]", "terrain.incline=0.1")
     _, _, err = call("simulate", "stand", "-o", tmp_path / "out", *QUICK, *idle)
     assert "the event at 5 s does nothing" in err

@@ -140,7 +140,7 @@ def test_a_foreign_fmu_is_refused(call: Call, tmp_path: Path, athena_fmu: Path) 
     )
 
 
-def test_an_unknown_option_is_told_and_not_zero(call: Call) -> None:
+def test_an_unknown_option_is_reported_and_not_zero(call: Call) -> None:
     code, out, err = call("simulate", "--speed", "3")
     assert (code, out) == (2, "")
     assert "No such option: --speed" in err

@@ -341,7 +341,7 @@ def test_json_is_all_that_is_printed(
         (["export", "--robot", "file"], ["not a TOML file"]),
     ],
 )
-def test_a_misuse_is_told_in_one_paragraph_of_what_got_expected_and_fix(
+def test_a_misuse_is_reported_in_one_paragraph_of_what_got_expected_and_fix(
     call: Call,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -425,7 +425,7 @@ def test_a_wrong_parameter_is_refused_by_name(
 
 
 @pytest.mark.parametrize("h", [-0.005, float("nan")])
-def test_an_impossible_step_is_refused_with_the_fmus_words(athena_fmu: Path, h: float) -> None:
+def test_an_impossible_step_is_refused_with_the_fmus_message(athena_fmu: Path, h: float) -> None:
     with Fmu(athena_fmu) as plant:
         plant.initialise(0.0, 1.0)
         with pytest.raises(StepError, match=r"the step from 0 s: got '.+'"):

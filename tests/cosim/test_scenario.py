@@ -164,12 +164,13 @@ def test_impossible_gravity_is_refused(override: str, message: str) -> None:
 def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(override: str) -> None:
     scenario = load_scenario("walk_flat", overrides=[override])
     with pytest.raises(
-        ScenarioError, match=r"gravity: nothing stands under this gravity: .* write gravity = 1\.62"
+        ScenarioError,
+        match=r"gravity: the robot cannot stand under this gravity: .* write gravity = 1\.62",
     ):
         scenario_robot(scenario)
 
 
-def test_static_friction_is_the_kinetic_one_unless_said() -> None:
+def test_static_friction_is_the_kinetic_one_unless_set() -> None:
     robot = scenario_robot(load_scenario("walk_flat", overrides=["friction.mu=0.9"]))
     assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.0)
 
@@ -330,7 +331,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("setting", MISTAKES)
-def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -> None:
+def test_a_mistake_is_reported_with_what_was_got_and_what_is_allowed(setting: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario("walk_flat", overrides=[setting])
     message = str(caught.value)
@@ -360,7 +361,7 @@ def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -
         ("parameters = {torso.mass = 1}", "parameters"),
     ],
 )
-def test_a_mistake_in_a_file_is_told_by_file_then_key(
+def test_a_mistake_in_a_file_is_reported_by_file_then_key(
     tmp_path: Path, text: str, place: str
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -388,7 +389,7 @@ def test_the_longest_run_allowed_is_allowed() -> None:
     )
 
 
-def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
+def test_an_unknown_scenario_or_robot_is_reported_with_the_nearest_name() -> None:
     with pytest.raises(ScenarioError, match="did you mean 'walk_flat'"):
         load_scenario("walk_flt")
     with pytest.raises(RobotError, match="did you mean 'athena'"):
@@ -403,7 +404,7 @@ def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
         ("\udc80", "not a TOML file"),
     ],
 )
-def test_a_bad_file_is_told_by_its_name(tmp_path: Path, text: str, message: str) -> None:
+def test_a_bad_file_is_reported_by_its_name(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "mine.toml"
     path.write_bytes(text.encode("utf-8", errors="surrogateescape"))
     with pytest.raises(ScenarioError, match=message) as caught:

@@ -233,7 +233,7 @@ def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afres
         ),
     ],
 )
-def test_a_walk_that_cannot_begin_is_refused_in_words(
+def test_a_walk_that_cannot_begin_is_refused_with_a_message(
     walker: Walker, changes: dict[str, object], said: str
 ) -> None:
     good = walker.summary(WALKS[1])

@@ -374,7 +374,7 @@ def test_a_damaged_gains_file_is_refused(old: str, new: str, message: str, tmp_p
         load_gains(path)
 
 
-def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
+def test_a_missing_file_or_folder_is_reported(gains: Gains, tmp_path: Path) -> None:
     with pytest.raises(GainsError, match="cannot read the gains file"):
         load_gains(tmp_path / "none.toml")
     with pytest.raises(GainsError, match="cannot write the gains file"):
@@ -396,7 +396,7 @@ def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
         ("phase_margin=steep", "not a number: got 'steep'"),
     ],
 )
-def test_requirements_that_cannot_be_met_are_told_by_name(setting: str, message: str) -> None:
+def test_requirements_that_cannot_be_met_are_reported_by_name(setting: str, message: str) -> None:
     robot = load_robot("athena")
     with pytest.raises(GainsError, match=message):
         design_gains(

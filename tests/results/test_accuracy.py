@@ -132,7 +132,7 @@ def test_errors_of_several_runs_are_of_the_means_over_those_that_walked_each_tim
     )
 
 
-def test_a_reference_without_figures_leaves_errors_open_and_is_told() -> None:
+def test_a_reference_without_figures_leaves_errors_open_and_is_reported() -> None:
     failed = replace(
         made(math.nan, math.nan), status="failed", reason="the step is too long", upright=False
     )
@@ -252,7 +252,7 @@ def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_p
     assert list(stored["accuracy"]["solver_error"]) == SOLVER_METRICS
 
 
-def test_without_the_option_nothing_is_walked_again_and_nothing_said(
+def test_without_the_option_nothing_is_walked_again_and_nothing_printed(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr("hexapod_cosim.cosim.cli.accuracy_check.run_batch")
@@ -280,7 +280,7 @@ def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     quick = settings("duration=0.2", "outputs.plots=false")
     code, _, err = call(*command, "stand", "-o", tmp_path / "out", "--check-accuracy", *quick)
     assert code == 130
-    missing = f"the results in {tmp_path / 'out'} are whole, their accuracy was not checked"
+    missing = f"the results in {tmp_path / 'out'} are complete, their accuracy was not checked"
     assert f"{missing}; `hexapod report" in err
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
     assert "accuracy" not in json.loads((tmp_path / "out" / "metrics.json").read_text())

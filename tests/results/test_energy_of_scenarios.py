@@ -22,7 +22,9 @@ def walker(plant_build: Path) -> Iterator[Walker]:
 
 @pytest.mark.parametrize("name", list_scenarios())
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_the_books_of_every_shipped_scenario_close(walker: Walker, name: str, control: str) -> None:
+def test_the_energy_balance_of_every_bundled_scenario_closes(
+    walker: Walker, name: str, control: str
+) -> None:
     """The residual is below 1e-4 of the motors' gross work with the default solver, 1e-3 at the
     fastest setting.
     """

@@ -230,7 +230,7 @@ def test_static_friction_holds_a_robot_where_the_law_has_it() -> None:
 @pytest.mark.parametrize(
     "changes", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["mu = 0", "none"]
 )
-def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> None:
+def test_level_ground_without_friction_is_warned_of(changes: dict[str, float]) -> None:
     assert friction_warnings(parameters(**changes)) == [
         "the ground has no friction: feet cannot push, and the robot does not get ahead"
     ]
@@ -248,7 +248,7 @@ def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> Non
         ),
     ],
 )
-def test_a_slope_that_friction_does_not_hold_is_told_with_the_acceleration(
+def test_a_slope_that_friction_does_not_hold_is_warned_of_with_the_acceleration(
     changes: dict[str, float], says: str
 ) -> None:
     assert friction_warnings(parameters(**SLOPE, **changes)) == [

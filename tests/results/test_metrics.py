@@ -163,7 +163,7 @@ def test_cone_use_is_over_the_time_that_feet_bear_load() -> None:
     assert walk.metrics(friction__mu=1.4)["cone_use_p95"] == pytest.approx(0.475)
 
 
-def test_cone_use_is_told_by_percentiles_over_time() -> None:
+def test_cone_use_is_described_by_percentiles_over_time() -> None:
     """The use rises from 0 to 80 % of the cone in each cycle, uniformly in time."""
     walk, normal = Walk(), 0.3 * WEIGHT
     walk.set("LF.foot.normal_force", normal)
