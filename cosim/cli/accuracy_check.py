@@ -45,9 +45,13 @@ def check_accuracy(
 ) -> Accuracy:
     """Returns the accuracy of runs of one control, whose results are in a folder already.
 
-    plans: the runs' scenarios.
-    used: the gains of the runs.
-    given: the user's gains, which half the macro-step keeps; without them it designs its own.
+    Args:
+        plans: the scenarios of the runs.
+        runs: their summaries.
+        folder: where their results are, for the message after an interrupt.
+        fmu: the plant; None: exported for the robot.
+        used: the gains of the runs.
+        given: the user's gains, which half the macro-step keeps; without them it designs its own.
     """
     fine = [reference_scenario(plan) for plan in plans]
     half = [halved_scenario(plan) for plan in plans]

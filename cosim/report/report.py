@@ -12,7 +12,13 @@ from markupsafe import Markup
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.common.toml_text import to_toml
-from hexapod_cosim.cosim.report.accuracy import about_accuracy, effect_rows, with_errors
+from hexapod_cosim.cosim.report.accuracy import (
+    Metrics,
+    Rows,
+    about_accuracy,
+    effect_rows,
+    with_errors,
+)
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
@@ -22,8 +28,6 @@ from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_s
 from hexapod_cosim.cosim.results.results import StoredResult
 
 REPORT, PLOTS = "report.html", "plots"
-
-Rows = list[dict[str, Any]]
 
 
 class Section(NamedTuple):
@@ -90,11 +94,13 @@ def write_report(
 ) -> list[Path]:
     """Draws the figures and writes report.html; returns the files, the report last.
 
-    runs: by control; of a comparison, those of the first seed.
-    warn: called with a message for each figure that cannot be drawn.
-    comparison: the metrics over all seeds; without it the report is of a single run.
-    scenario (TOML), command: of a comparison; a single run has its own.
-    accuracies: by control, where they were checked.
+    Args:
+        runs: by control; of a comparison, those of the first seed.
+        folder: where report.html and the folder of figures are written.
+        warn: called with a message for each figure that cannot be drawn.
+        comparison: the metrics over all seeds; without it the report is of a single run.
+        scenario, command: of a comparison; a single run has its own. The scenario is TOML.
+        accuracies: by control, where they were checked.
     """
     # imported only here because matplotlib is slow to import
     from hexapod_cosim.cosim.report.plots import FIGURES, save_figures  # noqa: PLC0415
@@ -110,11 +116,7 @@ def write_report(
     ] + content.pop("losses")
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
-    metrics: Mapping[str, Mapping[str, float | None]]
-    if comparison is None:
-        metrics = {label: run.metrics for label, run in runs.items()}
-    else:
-        metrics = comparison.means
+    metrics = _metrics(runs, comparison)
     page = render(
         "report.html.jinja",
         title=first.facts["title"],
@@ -129,10 +131,17 @@ def write_report(
     return [*files, folder / REPORT]
 
 
+def _metrics(runs: Mapping[str, StoredResult], comparison: Comparison | None) -> Metrics:
+    """Returns the metrics of the table: means of a comparison, or those of a single run."""
+    if comparison is None:
+        return {label: run.metrics for label, run in runs.items()}
+    return comparison.means
+
+
 def _accuracy(
     rows: Rows,
     accuracies: Mapping[str, Accuracy],
-    metrics: Mapping[str, Mapping[str, float | None]],
+    metrics: Metrics,
 ) -> dict[str, Any]:
     """Returns the parts of the page on accuracy, and the rows of the table with errors."""
     return {
@@ -221,7 +230,7 @@ def _robot(facts: Mapping[str, Any]) -> str:
     return f"Robot {facts['robot']['name']}, {_duration(facts)}."
 
 
-def metric_rows(metrics: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> Rows:
+def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
     """Returns a row per metric that the runs have: name, unit, meaning and values as texts.
 
     metrics: by control.

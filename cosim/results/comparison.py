@@ -242,7 +242,9 @@ def half_width_of(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
 def half_widths(count: Array, square: Array) -> Array:
     """Returns half the widths of Student's intervals of means; NaN for fewer than two values.
 
-    count: numbers of values; square: sums of squared deviations from the mean.
+    Args:
+        count: numbers of values.
+        square: sums of squared deviations from the mean.
     """
     from scipy.special import stdtrit  # noqa: PLC0415  slow to import
 
@@ -257,8 +259,11 @@ def log_half_widths(
 ) -> Array:
     """Returns half the widths of the intervals of ln(after/before); NaN unless both means are > 0.
 
-    count, before, after: numbers of pairs and their means; squares: sums of squared deviations from
-    the mean of the first values, the second values and the differences.
+    Args:
+        count: numbers of pairs.
+        before, after: means of the first and of the second values.
+        squares: sums of squared deviations from the mean: of the first values, the second values
+            and the differences.
     """
     from scipy.special import stdtrit  # noqa: PLC0415  slow to import
 

@@ -37,8 +37,13 @@ def write_recording(
 ) -> list[Path]:
     """Writes STEM.parquet with all columns and STEM.csv, as far as wanted; returns the files.
 
-    columns: patterns of the columns of the CSV file.
-    about: facts of the run, texts or JSON values; metadata of the Parquet file.
+    Args:
+        recording: what to write.
+        folder: where to write it.
+        stem: name of the files without suffix.
+        formats: which of "parquet" and "csv" to write.
+        columns: patterns of the columns of the CSV file.
+        about: facts of the run, texts or JSON values; metadata of the Parquet file.
     """
     files = [folder / f"{stem}.{kind}" for kind in formats]
     for path in files:

@@ -59,13 +59,15 @@ def simulate(
 ) -> Result:
     """Runs a scenario and returns its recording, metrics and facts.
 
-    fmu: the plant; by default it is exported for the scenario's robot.
-    gains: of the compliant control; by default they are designed for the robot.
-    progress: called now and then with the simulated time [s].
-    begin: called once the run can start, before the first step.
-
     Raises HexapodError for anything that keeps the run from starting. A run that has started always
     returns; `Result.outcome` tells how it ended.
+
+    Args:
+        scenario: what to run.
+        fmu: the plant; by default it is exported for the scenario's robot.
+        gains: of the compliant control; by default they are designed for the robot.
+        progress: called now and then with the simulated time [s].
+        begin: called once the run can start, before the first step.
     """
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
@@ -75,17 +77,7 @@ def simulate(
     with open_plant(scenario, fmu) as plant:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
-        recorder = Recorder(
-            signals,
-            plan.schedule.times,
-            plan.schedule.rows,
-            extra=diagnostic_columns(controller),
-            every=scenario.every,
-            judged=metric_columns(bristles=True),
-        )
-        # an unknown column is refused before the run
-        csv = scenario.outputs.csv
-        chosen_columns(recorder.names, csv, where=f"{scenario.where}: outputs.csv")
+        recorder = _make_recorder(plan, signals, controller)
         if begin is not None:
             begin()
         outcome = run(
@@ -99,6 +91,21 @@ def simulate(
         )
         facts = describe(setup.robot, plant, setup.gait.period)
     return make_result(plan, outcome, parameters, facts | {"warnings": controller.warnings})
+
+
+def _make_recorder(plan: Plan, signals: Signals, controller: Controller) -> Recorder:
+    """Returns the recorder of a run. Raises ScenarioError for unknown columns in outputs.csv."""
+    scenario = plan.scenario
+    recorder = Recorder(
+        signals,
+        plan.schedule.times,
+        plan.schedule.rows,
+        extra=diagnostic_columns(controller),
+        every=scenario.every,
+        judged=metric_columns(bristles=True),
+    )
+    chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")
+    return recorder
 
 
 @dataclass(frozen=True, kw_only=True)
