@@ -23,11 +23,11 @@ export function footfallPanel(
   if (!host || !recording.has(...legs.map((leg) => `${leg}.contact`))) return [];
   const feet = `--${run.label}`;
   const draw = (plot: uPlot): void => {
-    const brush = plot.ctx;
-    brush.save();
-    brush.beginPath();
-    brush.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
-    brush.clip();
+    const context = plot.ctx;
+    context.save();
+    context.beginPath();
+    context.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
+    context.clip();
     legs.forEach((leg, row) => {
       if (recording.has(`${leg}.swing`))
         bars(
@@ -40,7 +40,7 @@ export function footfallPanel(
         );
       bars(plot, recording.time, recording.column(`${leg}.contact`), row, BAR, property(feet));
     });
-    brush.restore();
+    context.restore();
   };
   const down = (time: number): number =>
     legs.filter((leg) => recording.column(`${leg}.contact`)[recording.place(time).row] > 0.5)

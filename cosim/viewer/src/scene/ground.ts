@@ -71,20 +71,20 @@ export class Floor extends Group {
 function gridTexture(surface: string, line: string): CanvasTexture {
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = PIXELS;
-  const brush = canvas.getContext("2d")!;
-  brush.fillStyle = surface;
-  brush.fillRect(0, 0, PIXELS, PIXELS);
-  brush.strokeStyle = line;
+  const context = canvas.getContext("2d")!;
+  context.fillStyle = surface;
+  context.fillRect(0, 0, PIXELS, PIXELS);
+  context.strokeStyle = line;
   for (let k = 0; k <= CELLS; k++) {
     const at = (k * PIXELS) / CELLS;
-    brush.lineWidth = k % CELLS === 0 ? 7 : 2.5;
-    brush.globalAlpha = k % CELLS === 0 ? 1 : 0.7;
-    brush.beginPath();
-    brush.moveTo(at, 0);
-    brush.lineTo(at, PIXELS);
-    brush.moveTo(0, at);
-    brush.lineTo(PIXELS, at);
-    brush.stroke();
+    context.lineWidth = k % CELLS === 0 ? 7 : 2.5;
+    context.globalAlpha = k % CELLS === 0 ? 1 : 0.7;
+    context.beginPath();
+    context.moveTo(at, 0);
+    context.lineTo(at, PIXELS);
+    context.moveTo(0, at);
+    context.lineTo(PIXELS, at);
+    context.stroke();
   }
   const texture = new CanvasTexture(canvas);
   texture.wrapS = texture.wrapT = RepeatWrapping;
