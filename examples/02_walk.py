@@ -4,7 +4,7 @@ usage: python examples/02_walk.py
 """
 
 from hexapod_cosim.cosim.results.metrics import METRICS
-from hexapod_cosim.cosim.run.run import simulate
+from hexapod_cosim.cosim.run import simulate
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 
 

@@ -152,7 +152,7 @@ def digest() -> str:
         VIEWER / "package.json",
         VIEWER / "package-lock.json",
     ]
-    files = [*described, *sorted((VIEWER / "src").glob("*.ts"))]
+    files = [*described, *sorted((VIEWER / "src").rglob("*.ts"))]
     return hashlib.sha256(b"\0".join(path.read_bytes() for path in files)).hexdigest()
 
 

@@ -1,7 +1,7 @@
-"""The `hexapod` command: parse, call one function, exit code. 0 only on success; an error is one
-paragraph on stderr, and with --json an object on stdout as well.
+"""The `hexapod` command.
 
-Nothing slow is imported before `main` guards it, so Ctrl-C at any time ends in one line.
+The exit code is 0 only on success. An error is one paragraph on stderr and, with --json, an object
+on stdout as well. Slow imports happen inside `main`, so that Ctrl-C at any time ends in one line.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-from hexapod_cosim.cosim.cli.failures import FAILURE, INTERRUPT, SUCCESS, USAGE, tell_failure
+from hexapod_cosim.cosim.cli.failures import FAILURE, INTERRUPT, SUCCESS, USAGE, report_failure
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command line. Returns the exit code."""
+    """Runs the command line and returns the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = _run(given)
@@ -25,67 +25,59 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if "--debug" in given:
             raise
         text = f"unexpected {type(error).__name__}: {error}; run `hexapod --debug ...` to see where"
-        return tell_failure(text, FAILURE, as_json=_wants_json(given))
-    return (
-        tell_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
-        if code == INTERRUPT
-        else code
-    )
+        return report_failure(text, FAILURE, as_json=_wants_json(given))
+    if code == INTERRUPT:
+        return report_failure("interrupted", INTERRUPT, as_json=_wants_json(given))
+    return code
 
 
 def _wants_json(given: Sequence[str]) -> bool:
-    """Whether --json was typed, also on a command line that cannot be parsed."""
+    """Whether --json was typed, even on a command line that cannot be parsed."""
     return "--json" in given
 
 
 def _run(given: list[str]) -> int:
-    import typer  # noqa: PLC0415  a second of imports, in which Ctrl-C may come
+    import typer  # noqa: PLC0415  imports for a second, in which Ctrl-C may come
 
     from hexapod_cosim.cosim.cli.app import app  # noqa: PLC0415
     from hexapod_cosim.cosim.master.interrupts import termination_as_interrupt  # noqa: PLC0415
     from hexapod_cosim.models import HexapodError  # noqa: PLC0415
 
-    usage_error: Any = typer.BadParameter.__mro__[1]  # which typer does not export
+    usage_error: Any = typer.BadParameter.__mro__[1]  # typer does not export it
     try:
         with termination_as_interrupt():
             code = app(args=given, prog_name="hexapod", standalone_mode=False)
     except usage_error as error:
         return _usage(error, given)
-    except SystemExit as stop:  # typer ends so when it answers a shell
-        return (
-            SUCCESS if stop.code is None else stop.code if isinstance(stop.code, int) else FAILURE
-        )
+    except SystemExit as stop:  # how typer ends after it has answered a shell's completion
+        if stop.code is None:
+            return SUCCESS
+        return stop.code if isinstance(stop.code, int) else FAILURE
     except HexapodError as error:
-        tell_failure(str(error), FAILURE, error=error, as_json=_wants_json(given))
+        report_failure(str(error), FAILURE, error=error, as_json=_wants_json(given))
         if "--debug" in given:
             traceback.print_exception(error)
         return FAILURE
-    return (
-        code if isinstance(code, int) else SUCCESS
-    )  # after Ctrl-C too: typer keeps KeyboardInterrupt to itself
+    # typer turns KeyboardInterrupt into an exit code
+    return code if isinstance(code, int) else SUCCESS
 
 
 def _usage(error: Any, given: Sequence[str]) -> int:
-    """One paragraph for words that are no command of ours; help where there are none at all.
-    Returns the exit code.
-    """
+    """Reports words that are no command, or shows the help. Returns the exit code."""
     from hexapod_cosim.models import HexapodError  # noqa: PLC0415
 
     if not given:
         print(error.format_message(), file=sys.stderr)
         return USAGE
     context = error.ctx  # None for an option without its value
-    path, usage = (
-        (context.command_path, context.command.get_usage(context)) if context else ("hexapod", "")
-    )
-    said, expected = (
-        " ".join(text.split())
-        for text in (error.format_message().rstrip("."), usage.removeprefix("Usage: "))
-    )
-    told = HexapodError(
+    path, usage = "hexapod", ""
+    if context:
+        path, usage = context.command_path, context.command.get_usage(context)
+    expected = " ".join(usage.removeprefix("Usage: ").split())
+    failure = HexapodError(
         "not understood",
-        got=said,
+        got=" ".join(error.format_message().rstrip(".").split()),
         expected=expected or "a value after it",
         fix=f"`{path} --help` explains it",
     )
-    return tell_failure(str(told), USAGE, error=told, as_json=_wants_json(given))
+    return report_failure(str(failure), USAGE, error=failure, as_json=_wants_json(given))

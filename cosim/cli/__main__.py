@@ -1,4 +1,4 @@
-"""`python -m hexapod_cosim.cosim.cli`: the hexapod command without its script."""
+"""Runs the hexapod command without its script: `python -m hexapod_cosim.cosim.cli`."""
 
 import sys
 

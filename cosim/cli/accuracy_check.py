@@ -1,6 +1,4 @@
-"""--check-accuracy of `hexapod simulate` and `compare`: walks once more, twice, and says what
-that changes.
-"""
+"""Option --check-accuracy of `hexapod simulate` and `compare`: two more runs of each walk."""
 
 from __future__ import annotations
 
@@ -14,7 +12,12 @@ import typer
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.cli.terminal import Count, counting_bar, show_table, show_text, warn
 from hexapod_cosim.cosim.report.accuracy import Metrics, Rows, about_accuracy, effect_rows
-from hexapod_cosim.cosim.results.accuracy import Accuracy, finer, halved, judge_accuracy
+from hexapod_cosim.cosim.results.accuracy import (
+    Accuracy,
+    compare_accuracy,
+    halved_scenario,
+    reference_scenario,
+)
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -23,7 +26,10 @@ CheckAccuracy = Annotated[
     bool,
     typer.Option(
         "--check-accuracy",
-        help="Walk again at a hundredth of the solver's tolerance, and again with half the macro-step: an error beside every metric.",
+        help=(
+            "Walk again at a hundredth of the solver's tolerance, "
+            "and again with half the macro-step: an error beside every metric."
+        ),
     ),
 ]
 
@@ -38,25 +44,41 @@ def check_accuracy(
     given: Gains | None,
     engine: str,
 ) -> Accuracy:
-    """Of the runs that these plans came to on an engine, all of one control, whose results are in a
-    folder already.
+    """Returns the accuracy of runs of one control, whose results are in a folder already.
 
-    used: the gains of the runs. given: those that the user gave, which half the macro-step keeps;
-    else it has gains of its own.
+    Args:
+        plans: the scenarios of the runs.
+        runs: their summaries.
+        folder: where their results are, for the message after an interrupt.
+        fmu: the plant; None: exported for the robot.
+        used: the gains of the runs.
+        engine: the engine of the runs, which runs them again.
+        given: the user's gains, which half the macro-step keeps; without them it designs its own.
     """
-    fine, half = [finer(plan) for plan in plans], [halved(plan) for plan in plans]
+    fine = [reference_scenario(plan) for plan in plans]
+    half = [halved_scenario(plan) for plan in plans]
     try:
-        with counting_bar("accuracy", len(fine) + len(half)) as tell:
-            references = list(_run(fine, fmu=fmu, gains=used, engine=engine, tell=tell, done=0))
+        with counting_bar("accuracy", len(fine) + len(half)) as report_count:
+            references = list(
+                _run(fine, fmu=fmu, gains=used, engine=engine, report_count=report_count, done=0)
+            )
             halves = list(
-                _run(half, fmu=fmu, gains=given, engine=engine, tell=tell, done=len(fine))
+                _run(
+                    half,
+                    fmu=fmu,
+                    gains=given,
+                    engine=engine,
+                    report_count=report_count,
+                    done=len(fine),
+                )
             )
     except KeyboardInterrupt:
         warn(
-            f"the results in {folder} are whole, their accuracy was not checked; `hexapod report {folder}` draws their figures"
+            f"the results in {folder} are complete, their accuracy was not checked; "
+            f"`hexapod report {folder}` draws their figures"
         )
         raise
-    found = judge_accuracy(plans[0], runs, references, halves)
+    found = compare_accuracy(plans[0], runs, references, halves)
     for text in found.notes:
         warn(f"accuracy: {text}")
     return found
@@ -68,19 +90,21 @@ def _run(
     fmu: Path | None,
     gains: Gains | None,
     engine: str,
-    tell: Count,
+    report_count: Count,
     done: int,
 ) -> Iterator[Summary]:
+    """Runs the plans; `done` is the number of runs before them."""
     with closing(run_batch(plans, fmu=fmu, gains=gains, compiled=engine == "compiled")) as batch:
-        tell(done)
+        report_count(done)
         for count, summary in enumerate(batch, start=done + 1):
-            tell(count)
+            report_count(count)
             yield summary
 
 
 def show_accuracy(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> None:
-    """Prints what the errors in the main table are, whose rows are given, and what half the
-    macro-step changes, by control.
+    """Prints an explanation of the errors in the main table and the effects of half the macro-step.
+
+    rows: those of the main table; accuracies, metrics: by control.
     """
     if not accuracies:
         return

@@ -1,4 +1,4 @@
-"""The commands of `hexapod`, put together."""
+"""The `hexapod` application with all its commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`hexapod compare`: one walk under both controls, over several seeds."""
+"""The command `hexapod compare`: one walk under both controls, over several seeds."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ from hexapod_cosim.cosim.cli.terminal import (
 )
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
 from hexapod_cosim.cosim.common.toml_text import to_toml
-from hexapod_cosim.cosim.master.interrupts import held_interrupts
+from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, about, comparison_rows, write_report
-from hexapod_cosim.cosim.results.accuracy import Accuracy, halved
+from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import (
     SEEDS,
     SEEDS_PARTIAL,
@@ -57,10 +57,10 @@ from hexapod_cosim.cosim.results.results import (
     ACCURACY,
     METRICS_FILE,
     SCENARIO,
-    Folder,
+    ResultsFolder,
     read_scenario,
     results_folder,
-    stored,
+    stored_result,
 )
 from hexapod_cosim.cosim.results.summary import Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -71,8 +71,9 @@ from hexapod_cosim.cosim.scenario.variation import STANDARD
 from hexapod_cosim.models import ScenarioError
 
 EPILOG = (
-    f"Exit code {FELL} when the robot did not walk to the end of every run, under either control: the report is written all the same, "
-    "says how many did, and compares the seeds on which both walked."
+    f"Exit code {FELL} when the robot did not walk to the end of every run, under either control: "
+    "the report is written all the same, says how many did, "
+    "and compares the seeds on which both walked."
 )
 MAX_SEEDS = 10_000
 Seeds = Annotated[
@@ -99,9 +100,9 @@ def compare(
     """Run a walk under kinematic and under compliant control; report."""
     plan = _plan(scenario, settings or [], seeds)
     if accuracy:
-        halved(plan)  # refused before anything is run
+        halved_scenario(plan)  # raises errors before anything is run
     given, walks = given_gains(gains), checked_engine(engine, runs=seeds)
-    ready = chosen_gains(replace(plan, control="compliant"), given)
+    used = chosen_gains(replace(plan, control="compliant"), given)
     command = command_line(
         "compare",
         scenario,
@@ -113,26 +114,25 @@ def compare(
         accuracy=accuracy,
     )
     with results_folder(output or default_folder(scenario)) as folder:
-        results, files = _first_seed(plan, folder, command, fmu=fmu, gains=ready, engine=walks)
+        results, files = _first_seed(plan, folder, command, fmu=fmu, gains=used, engine=walks)
         comparison = _all_seeds(
-            plan, results, seeds, folder.path, fmu=fmu, gains=ready, engine=walks
+            plan, results, seeds, folder.path, fmu=fmu, gains=used, engine=walks
         )
         files += _store(plan, comparison, folder.path, command)
         checked: dict[str, Accuracy] = {}
         if accuracy:
             checked = _accuracies(
-                plan, comparison, folder.path, fmu=fmu, used=ready, given=given, engine=walks
+                plan, comparison, folder.path, fmu=fmu, used=used, given=given, engine=walks
             )
             write_json(folder.path / METRICS_FILE, _table(comparison, checked))
         with drawing(folder.path):
-            runs = {control: stored(result) for control, result in results.items()}
-            scenario_text = read_scenario(folder.path)
+            runs = {control: stored_result(result) for control, result in results.items()}
             files += write_report(
                 runs,
                 folder.path,
-                tell=warn,
+                warn=warn,
                 comparison=comparison,
-                scenario=scenario_text,
+                scenario=read_scenario(folder.path),
                 command=command,
                 accuracies=checked,
             )
@@ -149,7 +149,7 @@ def compare(
 
 
 def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
-    """The scenario; what runs of several seeds differ by is the standard, where it does not say."""
+    """Reads the scenario; several seeds get the standard variation unless it gives its own."""
     if not 1 <= seeds <= MAX_SEEDS:
         raise ScenarioError(
             "not a number of runs",
@@ -164,14 +164,14 @@ def _plan(scenario: str, settings: Sequence[str], seeds: int) -> Scenario:
 
 def _first_seed(
     plan: Scenario,
-    folder: Folder,
+    folder: ResultsFolder,
     command: str,
     *,
     fmu: Path | None,
     gains: Gains | None,
     engine: str,
 ) -> tuple[dict[str, Result], list[Path]]:
-    """The runs whose recordings are kept."""
+    """Runs the first seed under both controls and keeps the recordings."""
     results: dict[str, Result] = {}
     files: list[Path] = []
     for control in CONTROLS:
@@ -194,7 +194,7 @@ def _all_seeds(
     gains: Gains | None,
     engine: str,
 ) -> Comparison:
-    """Runs the other seeds too; an interrupt keeps what came to its end, under another name."""
+    """Runs the other seeds; an interrupt or error keeps the completed runs in SEEDS_PARTIAL."""
     scenarios = [
         replace(plan, control=control, seed=seed)
         for seed in range(plan.seed + 1, plan.seed + seeds)
@@ -203,15 +203,15 @@ def _all_seeds(
     done: list[Summary] = [summarise(results[control]) for control in CONTROLS]
     try:
         batch = run_batch(scenarios, fmu=fmu, gains=gains, compiled=engine == "compiled")
-        with counting_bar("seeds", 2 * seeds) as tell, closing(batch) as runs:
-            tell(len(done))
+        with counting_bar("seeds", 2 * seeds) as report_count, closing(batch) as runs:
+            report_count(len(done))
             for run in runs:
                 done.append(run)
-                tell(len(done))
+                report_count(len(done))
     except BaseException:
-        with held_interrupts():
+        with deferred_interrupts():
             write_seeds(folder / SEEDS_PARTIAL, done)
-            warn(f"the runs that came to their end are in {folder / SEEDS_PARTIAL}")
+            warn(f"the completed runs are in {folder / SEEDS_PARTIAL}")
         raise
     write_seeds(folder / SEEDS, done)
     comparison = compare_runs(
@@ -232,7 +232,7 @@ def _accuracies(
     given: Gains | None,
     engine: str,
 ) -> dict[str, Accuracy]:
-    """By control, of the means over the seeds that are compared."""
+    """Returns the accuracies, by control, of the means over the compared seeds."""
     found = {}
     for control, runs in zip(CONTROLS, comparison.judged, strict=True):
         plans = [replace(plan, control=control, seed=run.seed) for run in runs]
@@ -243,20 +243,17 @@ def _accuracies(
 
 
 def _table(comparison: Comparison, checked: Mapping[str, Accuracy]) -> dict[str, Any]:
-    """The content of metrics.json."""
-    accuracy = (
-        {ACCURACY: {control: item.as_table() for control, item in checked.items()}}
-        if checked
-        else {}
-    )
-    return comparison.as_table() | accuracy
+    """Returns the content of metrics.json."""
+    table = comparison.as_table()
+    if checked:
+        table[ACCURACY] = {control: item.as_table() for control, item in checked.items()}
+    return table
 
 
 def _store(plan: Scenario, comparison: Comparison, folder: Path, command: str) -> list[Path]:
-    """Writes all but the figures and the report."""
-    text = to_toml(
-        {key: value for key, value in plan.to_table().items() if key != "control"}
-    )  # both were run
+    """Writes scenario, metrics and run.json; returns these files and seeds.csv."""
+    # without the control, since both were run
+    text = to_toml({key: value for key, value in plan.to_table().items() if key != "control"})
     write_text(folder / SCENARIO, text)
     write_json(folder / METRICS_FILE, _table(comparison, {}))
     write_json(

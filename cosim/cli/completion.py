@@ -1,5 +1,6 @@
-"""What a shell offers for a half-typed word: names, and keys of --set with what they mean. Reads
-names only, loads no robot.
+"""Shell completion: names of scenarios, robots and other choices, and keys of --set.
+
+It reads names only and loads no robot.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Complete = Callable[[str], Offers]
 
 
 def _offering(words: Callable[[], Iterable[tuple[str, str]]]) -> Complete:
-    """A completion that offers of some words those that begin as typed."""
+    """Returns a completion function that offers those words that begin as typed."""
 
     def complete(incomplete: str) -> Offers:
         return [(word, meaning) for word, meaning in words() if word.startswith(incomplete)]
@@ -40,7 +41,7 @@ def _toml(path: Path) -> Mapping[str, Any]:
 
 
 def _settings() -> Iterator[tuple[str, str]]:
-    """Keys of a scenario, then parameters of the plant's FMU."""
+    """Yields keys of a scenario, then parameters of the plant's FMU, with their meaning."""
     for name in (*(key for key in KEYS if key not in SECTIONS), *setting_names()):
         yield f"{name}=", "of the scenario"
     for name, column in plant_variables("parameter").items():

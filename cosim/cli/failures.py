@@ -1,7 +1,6 @@
-"""How a command ends: its exit code, a paragraph on stderr where it failed and, with --json, the
-same as an object on stdout.
+"""How a command ends: exit codes, and error messages on stderr and, with --json, on stdout.
 
-Imports nothing slow: `main` needs it before it can hear Ctrl-C.
+Imports nothing slow: `main` needs it before it can handle Ctrl-C.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from hexapod_cosim.cosim.cli.width import fitted
 SUCCESS, FAILURE, USAGE, FELL, INTERRUPT = 0, 1, 2, 3, 130
 EXIT_CODES = {
     SUCCESS: "success",
-    FAILURE: "an error, told on stderr",
+    FAILURE: "an error, with a message on stderr",
     USAGE: "a command line that is not understood",
     FELL: "the robot fell; results are complete and written",
     INTERRUPT: "interrupted",
@@ -28,11 +27,12 @@ EPILOG = (
 OF_ERRORS = ("what", "got", "expected", "fix", "where")  # attributes of a HexapodError
 
 
-def tell_failure(text: str, code: int, *, error: BaseException | None = None, as_json: bool) -> int:
-    """Says on stderr why a command failed, with `as_json` also on stdout; returns the exit code.
+def report_failure(
+    text: str, code: int, *, error: BaseException | None = None, as_json: bool
+) -> int:
+    """Prints why a command failed on stderr and, with `as_json`, on stdout; returns the exit code.
 
-    error: whose attributes go into the object; `found`, where it has one, is what the command has
-    to say besides.
+    error: its attributes go into the JSON object, and so do the entries of its attribute `found`.
     """
     print(fitted(f"hexapod: {text}", sys.stderr), file=sys.stderr)
     if as_json:
@@ -41,9 +41,7 @@ def tell_failure(text: str, code: int, *, error: BaseException | None = None, as
 
 
 def error_object(text: str, code: int, error: BaseException | None = None) -> dict[str, Any]:
-    """What --json prints of a failure: the whole message, its parts (null where there is none)
-    and the exit code.
-    """
+    """Returns the object that --json prints of a failure: message, its parts and the exit code."""
     found = _plain(getattr(error, "found", {}))
     return {
         **found,
@@ -54,7 +52,7 @@ def error_object(text: str, code: int, error: BaseException | None = None) -> di
 
 
 def _plain(value: Any) -> Any:
-    """The value as JSON holds it; what JSON does not know as Python shows it."""
+    """Returns a value that JSON can hold; other objects become their representation."""
     if value is None or isinstance(value, str | bool | int):
         return value
     if isinstance(value, float):

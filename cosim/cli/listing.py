@@ -1,9 +1,10 @@
-"""`hexapod list`: what there is."""
+"""The command `hexapod list`."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -19,7 +20,7 @@ Rows = list[dict[str, Any]]
 
 
 def robots() -> Rows:
-    """The robots that come with the package; mass in kg."""
+    """Returns the bundled robots; mass in kg."""
     loaded = [load_robot(name) for name in list_robots()]
     return [
         {
@@ -32,29 +33,28 @@ def robots() -> Rows:
 
 
 def scenarios() -> Rows:
-    """The scenarios that come with the package."""
-    return [
-        {
-            "name": name,
-            "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")),
-        }
-        for name, path in list_scenarios().items()
-    ]
+    """Returns the bundled scenarios."""
+    return _titles(list_scenarios())
 
 
 def studies() -> Rows:
-    """The studies that come with the package."""
+    """Returns the bundled studies."""
+    return _titles(list_studies())
+
+
+def _titles(files: Mapping[str, Path]) -> Rows:
+    """Returns the titles of TOML files, by name."""
     return [
         {
             "name": name,
             "about": str(tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")),
         }
-        for name, path in list_studies().items()
+        for name, path in files.items()
     ]
 
 
 def gaits() -> Rows:
-    """The gaits with their natural duty factor and the phase of each leg."""
+    """Returns the gaits with their natural duty factor and the phase of each leg."""
     return [
         {"name": name, "duty": gait.duty, **dict(zip(LEG_NAMES, gait.offsets, strict=True))}
         for name, gait in PATTERNS.items()
@@ -62,12 +62,12 @@ def gaits() -> Rows:
 
 
 def terrains() -> Rows:
-    """The kinds of ground."""
+    """Returns the kinds of ground."""
     return _choices("TerrainKind")
 
 
 def laws() -> Rows:
-    """The laws of the normal and the tangential contact force."""
+    """Returns the laws of the normal and the tangential contact force."""
     kinds = {"ContactLaw": "contact.law", "FrictionLaw": "friction.law"}
     return [{"key": key} | row for kind, key in kinds.items() for row in _choices(kind)]
 

@@ -1,7 +1,8 @@
-"""`hexapod simulate` and `report`."""
+"""The commands `hexapod simulate` and `hexapod report`."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,7 +31,7 @@ from hexapod_cosim.cosim.cli.terminal import Json, show_files, show_json, warn
 from hexapod_cosim.cosim.common.files import STUDY
 from hexapod_cosim.cosim.report.accuracy import with_errors
 from hexapod_cosim.cosim.report.report import REPORT, metric_rows, write_report
-from hexapod_cosim.cosim.results.accuracy import Accuracy, halved
+from hexapod_cosim.cosim.results.accuracy import Accuracy, halved_scenario
 from hexapod_cosim.cosim.results.comparison import SEEDS, compare_runs, read_seeds
 from hexapod_cosim.cosim.results.metrics import has_net_slip
 from hexapod_cosim.cosim.results.result import Result
@@ -41,7 +42,7 @@ from hexapod_cosim.cosim.results.results import (
     read_result,
     read_scenario,
     results_folder,
-    stored,
+    stored_result,
     write_accuracy,
 )
 from hexapod_cosim.cosim.results.summary import summarise
@@ -75,26 +76,25 @@ def simulate(
     json: Json = False,
 ) -> int:
     """Run one co-simulation: results, metrics, plots."""
-    plan = load_scenario(
-        scenario, overrides=[*(settings or []), *([f"control={control}"] if control else [])]
-    )
+    controls = [f"control={control}"] if control else []
+    plan = load_scenario(scenario, overrides=[*(settings or []), *controls])
     plan = titled(plan, settings or [])
     given, walks = given_gains(gains), checked_engine(engine, runs=1)
     if accuracy:
-        halved(plan)  # refused before anything is run
-    ready = chosen_gains(plan, given) if accuracy else given
+        halved_scenario(plan)  # raises errors before anything is run
+    used = chosen_gains(plan, given) if accuracy else given
+    command = command_line(
+        "simulate",
+        scenario,
+        control=control,
+        settings=settings,
+        engine=engine,
+        fmu=fmu,
+        gains=gains,
+        accuracy=accuracy,
+    )
     with results_folder(output or default_folder(scenario)) as folder:
-        command = command_line(
-            "simulate",
-            scenario,
-            control=control,
-            settings=settings,
-            engine=engine,
-            fmu=fmu,
-            gains=gains,
-            accuracy=accuracy,
-        )
-        result, files = run_into(plan, [folder], command, fmu=fmu, gains=ready, engine=walks)
+        result, files = run_into(plan, [folder], command, fmu=fmu, gains=used, engine=walks)
         checked: dict[str, Accuracy] = {}
         if accuracy:
             checked[plan.control] = check_accuracy(
@@ -102,19 +102,17 @@ def simulate(
                 [summarise(result)],
                 folder.path,
                 fmu=fmu,
-                used=ready,
+                used=used,
                 given=given,
                 engine=walks,
             )
             write_accuracy(folder.path, result.metrics, checked[plan.control].as_table())
         if plan.outputs.plots:
             with drawing(folder.path):
-                files += write_report(
-                    {plan.control: stored(result)}, folder.path, tell=warn, accuracies=checked
-                )
+                runs = {plan.control: stored_result(result)}
+                files += write_report(runs, folder.path, warn=warn, accuracies=checked)
     if json:
-        told = {ACCURACY: checked[plan.control].as_table()} if accuracy else {}
-        show_json(_summary(result, folder.path, files) | told)
+        show_json(_summary(result, folder.path, files, checked))
     else:
         metrics = {plan.control: result.metrics}
         rows = metric_rows(metrics, net_slip=has_net_slip(result.parameters))
@@ -136,45 +134,50 @@ def report(
     """Make the plots and the report of a run, a comparison or a study again."""
     facts = read_facts(folder)
     if facts.get("kind") == STUDY:
-        # slow to import
+        # imported only here because it is slow
         from hexapod_cosim.cosim.cli.studying import report_on, warn_of  # noqa: PLC0415
 
         found, files = report_on(folder)
         warn_of(found)
     elif facts.get("kind") == "compare":
-        runs = {control: read_result(folder / control) for control in CONTROLS}
-        comparison = compare_runs(
-            *(read_seeds(folder / SEEDS).get(control, []) for control in CONTROLS)
-        )
-        files = write_report(
-            runs,
-            folder,
-            tell=warn,
-            comparison=comparison,
-            scenario=read_scenario(folder),
-            command=facts.get("command", ""),
-            accuracies=read_accuracies(folder),
-        )
+        files = _report_comparison(folder, facts)
     else:
         run = read_result(folder)
         control = run.facts["control"]
-        files = write_report(
-            {control: run},
-            folder,
-            tell=warn,
-            accuracies={control: run.accuracy} if run.accuracy else {},
-        )
+        accuracies = {control: run.accuracy} if run.accuracy else {}
+        files = write_report({control: run}, folder, warn=warn, accuracies=accuracies)
     if json:
         show_json({"report": str(folder / REPORT), "files": [str(file) for file in files]})
         return
     show_files(files)
 
 
-def _summary(result: Result, folder: Path, files: list[Path]) -> dict[str, Any]:
+def _report_comparison(folder: Path, facts: Mapping[str, Any]) -> list[Path]:
+    """Writes the report of a comparison's folder again; `facts` are those of its run.json."""
+    seeds = read_seeds(folder / SEEDS)
+    return write_report(
+        {control: read_result(folder / control) for control in CONTROLS},
+        folder,
+        warn=warn,
+        comparison=compare_runs(*(seeds.get(control, []) for control in CONTROLS)),
+        scenario=read_scenario(folder),
+        command=facts.get("command", ""),
+        accuracies=read_accuracies(folder),
+    )
+
+
+def _summary(
+    result: Result, folder: Path, files: list[Path], checked: Mapping[str, Accuracy]
+) -> dict[str, Any]:
+    """Returns what --json prints of a run; `checked` is its accuracy by control, if checked."""
     names = {
         "control": result.scenario.control,
         "directory": str(folder),
         "files": [str(file) for file in files],
     }
     shown = {key: result.facts[key] for key in ("robot", "walk", "warnings")}
-    return {"metrics": dict(result.metrics), **names, **shown, "status": result.outcome.status}
+    status = {"status": result.outcome.status}
+    summary = {"metrics": dict(result.metrics), **names, **shown, **status}
+    if checked:
+        summary[ACCURACY] = checked[result.scenario.control].as_table()
+    return summary

@@ -1,6 +1,4 @@
-"""What `hexapod simulate` and `compare` share: their options, a run into a folder, tables of
-metrics.
-"""
+"""Parts shared by `hexapod simulate` and `compare`: options, runs into folders, metric tables."""
 
 from __future__ import annotations
 
@@ -16,10 +14,10 @@ import typer
 from hexapod_cosim.controller import Gains, load_gains
 from hexapod_cosim.cosim.cli import completion
 from hexapod_cosim.cosim.cli.terminal import progress_bar, show_table, waiting, warn
-from hexapod_cosim.cosim.master.interrupts import held_interrupts
+from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.results import Folder, write_result
+from hexapod_cosim.cosim.results.results import ResultsFolder, write_result
 from hexapod_cosim.cosim.run.run import simulate as run_scenario
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -66,15 +64,15 @@ Engine = Annotated[
     typer.Option(
         "--engine",
         metavar="|".join(ENGINES),
-        help="The controller and the loop that walk; default python for one run, compiled for many.",
+        help="Controller and loop; by default python for one run, compiled for many.",
     ),
 ]
 
-UNTITLED = ("control=", "seed=", "outputs.", "duration=")  # settings that make no other walk
+UNTITLED = ("control=", "seed=", "outputs.", "duration=")  # settings that keep the title
 
 
 class RunError(HexapodError):
-    """A run that started and did not complete."""
+    """A run started and did not complete."""
 
 
 def command_line(
@@ -87,7 +85,7 @@ def command_line(
     accuracy: bool = False,
     **more: str | int | None,
 ) -> str:
-    """The command that does the same again."""
+    """Returns the command that repeats a run."""
     options = [("--set", text) for text in settings or []]
     given: dict[str, object] = {**more, "fmu": fmu, "gains": gains}
     options += [(f"--{key}", str(value)) for key, value in given.items() if value is not None]
@@ -109,41 +107,38 @@ def checked_engine(name: str | None, *, runs: int) -> str:
 
 
 def titled(plan: Scenario, settings: Sequence[str]) -> Scenario:
-    """The scenario with a title that tells what was set, so that no report of another walk bears
-    the plain one's name.
-    """
+    """Returns the scenario with the settings that distinguish its walk added to its title."""
     if any(text.startswith("title") for text in settings):
         return plan
-    told = [text.replace(" ", "") for text in settings if not text.startswith(UNTITLED)]
-    return replace(plan, title=f"{plan.title}, {', '.join(told)}") if told else plan
+    shown = [text.replace(" ", "") for text in settings if not text.startswith(UNTITLED)]
+    return replace(plan, title=f"{plan.title}, {', '.join(shown)}") if shown else plan
 
 
 def run_into(
     plan: Scenario,
-    folders: Sequence[Folder],
+    folders: Sequence[ResultsFolder],
     command: str,
     *,
     fmu: Path | None,
     gains: Gains | None,
     engine: str,
 ) -> tuple[Result, list[Path]]:
-    """Runs on one of ENGINES, and writes into the last folder.
+    """Runs a scenario on one of ENGINES and writes its results into the last of the folders.
 
-    All folders are cleared once the run begins; an interrupt waits for what is being written.
-
-    Raises RunError, or KeyboardInterrupt, with what was recorded on disk when the run does not
-    complete.
+    All folders are cleared once the run begins. An interrupt ends the run, but waits until the
+    files are written. Raises RunError or KeyboardInterrupt when the run does not complete; its
+    recording until then is written.
     """
-    with ExitStack() as whole:
+    with ExitStack() as stack:
 
         def begin() -> None:
-            whole.enter_context(held_interrupts())
+            stack.enter_context(deferred_interrupts())
             for folder in folders:
                 folder.begin()
 
         with progress_bar(plan.control, plan.duration) as progress:
             if engine == "compiled":
-                walker = whole.enter_context(Walker(everything=True))
+                walker = stack.enter_context(Walker(everything=True))
                 result = walker.simulate(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
             else:
                 result = run_scenario(plan, fmu=fmu, gains=gains, progress=progress, begin=begin)
@@ -156,42 +151,38 @@ def run_into(
         warn(f"stopped at {outcome.simulated:.3f} s; recorded so far: {files[1]}")
         raise KeyboardInterrupt
     if not result.completed:
-        what = (
-            f"the run ended at {outcome.simulated:.3f} s of {plan.duration:g} s: {outcome.reason}"
-        )
-        raise RunError(
-            what, fix=f"what was recorded until then is in {files[1]}"
-        ) from outcome.cause
+        what = f"the run ended at {outcome.simulated:.3f} s of {plan.duration:g} s"
+        fix = f"what was recorded until then is in {files[1]}"
+        raise RunError(f"{what}: {outcome.reason}", fix=fix) from outcome.cause
     return result, files
 
 
 @contextmanager
 def drawing(folder: Path) -> Iterator[None]:
-    """Says that figures are drawn, on a terminal, and on an interrupt what is there and what is
-    not.
-    """
+    """Shows on a terminal that figures are drawn; after an interrupt, warns of what is missing."""
     try:
         with waiting("drawing figures and report"):
             yield
     except KeyboardInterrupt:
         warn(
-            f"the results in {folder} are whole, the figures are not: `hexapod report {folder}` draws them"
+            f"the results in {folder} are complete, the figures are not: "
+            f"`hexapod report {folder}` draws them"
         )
         raise
 
 
 def given_gains(path: Path | None) -> Gains | None:
-    """Those of a file, if any. Raises GainsError."""
+    """Reads the gains of a file, if one is given. Raises GainsError."""
     return None if path is None else load_gains(path)
 
 
 def default_folder(scenario: str) -> Path:
-    """Where results go without -o."""
+    """Returns the folder for results without -o."""
     return Path("out") / Path(scenario).stem
 
 
 def show_rows(rows: Sequence[Mapping[str, Any]], controls: Sequence[str]) -> None:
-    """Prints a report's rows; columns in which nothing stands are left out."""
+    """Prints the rows of a report's table without its empty columns."""
     columns = {"metric": [row["name"] for row in rows], "unit": [row["unit"] for row in rows]}
     columns |= {control: [row["values"][k] for row in rows] for k, control in enumerate(controls)}
     columns |= {

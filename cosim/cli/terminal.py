@@ -1,4 +1,4 @@
-"""What people see: progress and tables on a terminal, plain lines elsewhere, JSON for machines."""
+"""Output of commands: progress bars and tables on a terminal, plain lines elsewhere, or JSON."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from hexapod_cosim.cosim.cli.width import columns_of, fitted
 from hexapod_cosim.cosim.common.files import to_json
 from hexapod_cosim.cosim.master import loop as master
 
-PIPE = 160  # columns of tables where there is no terminal
-GAP = 2  # between columns
-NARROWEST = 20  # of a column of text that is broken into lines
-EVERY = 30.0  # s    between lines of progress in a log
+PIPE = 160  # width of tables where there is no terminal, in characters
+GAP = 2  # between columns, in characters
+NARROWEST = 20  # width of a column of text that is broken into lines, in characters
+EVERY = 30.0  # s    between two lines of progress in a log
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")]
 
@@ -40,30 +40,27 @@ def show_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
 
 
 def show_files(files: Iterable[Path]) -> None:
-    """Says what was written, a folder's many files in one line."""
+    """Prints which files were written, one line per folder."""
     folders: dict[Path, list[str]] = {}
     for file in files:
         folders.setdefault(file.parent, []).append(file.name)
     for folder, names in folders.items():
-        show_text(
-            f"wrote {folder}/"
-            + (names[0] if len(names) == 1 else "{" + ", ".join(sorted(names)) + "}")
-        )
+        shown = names[0] if len(names) == 1 else "{" + ", ".join(sorted(names)) + "}"
+        show_text(f"wrote {folder}/{shown}")
 
 
 def show_text(text: str) -> None:
-    """Prints sentences, broken between words on a terminal."""
+    """Prints sentences, wrapped between words on a terminal."""
     print(fitted(text, sys.stdout))
 
 
 def show_table(
     columns: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()
 ) -> None:
-    """Prints an aligned table; `right` are the columns of numbers.
+    """Prints an aligned table; `right` are the indices of right-aligned columns.
 
-    On a terminal too narrow for it the last column is broken into lines where it is text, else
-    columns stand closer together, else those for which there is no room follow in a table of their
-    own, below the same first column.
+    On a terminal that is too narrow, the last column is wrapped if it is text, or the gaps between
+    columns shrink, or the remaining columns follow in another table below the first column.
     """
     texts, width = [list(row) for row in rows], columns_of(sys.stdout)
     widths = [max(map(len, column)) for column in zip(columns, *texts, strict=True)]
@@ -87,10 +84,9 @@ def show_table(
 
 
 def _layout(widths: Sequence[int], width: int, *, broken: bool) -> tuple[int, list[list[int]]]:
-    """The gap between columns, and which of them stand side by side, for a table in a terminal of
-    that width.
+    """Returns the gap between columns and the columns of each table, for a terminal's width.
 
-    broken: whether the last column may be broken into lines.
+    broken: whether the last column may be wrapped.
     """
     whole = list(range(len(widths)))
     least = [*widths[:-1], min(widths[-1], NARROWEST)] if broken else widths
@@ -99,23 +95,21 @@ def _layout(widths: Sequence[int], width: int, *, broken: bool) -> tuple[int, li
             return gap, [whole]
     blocks = [[0]]
     for k in whole[1:]:
-        if (
-            len(blocks[-1]) > 1
-            and sum(least[place] + GAP for place in blocks[-1]) + least[k] > width
-        ):
+        used = sum(least[place] + GAP for place in blocks[-1])
+        if len(blocks[-1]) > 1 and used + least[k] > width:
             blocks.append([0])
         blocks[-1].append(k)
     return GAP, blocks
 
 
 def warn(text: str) -> None:
-    """A doubt, on stderr."""
+    """Prints a warning on stderr."""
     print(fitted(f"warning: {text}", sys.stderr), file=sys.stderr)
 
 
 @contextmanager
 def waiting(label: str | None) -> Iterator[None]:
-    """Says what takes a while, as long as it does, on a terminal."""
+    """Shows a label on a terminal while the block runs."""
     if label is None or not sys.stderr.isatty():
         yield
         return
@@ -124,15 +118,16 @@ def waiting(label: str | None) -> Iterator[None]:
 
 
 class _Simulated(ProgressColumn):
-    """Simulated time, and how it compares with the clock on the wall since the first step."""
+    """Simulated time and its ratio to wall time since the first step."""
 
     def render(self, task: Task) -> Text:
         return Text(f"{task.completed:5.1f} of {task.total:g} s  {_rate(task):4.0f} x real time")
 
 
 class _Counted(ProgressColumn):
-    """How many of how many runs, how many a minute since the count began, `already` being there
-    then, and how many failed.
+    """Number of completed runs, runs per minute since the count began, and failed runs.
+
+    The task's field `already` is the number of runs before the count began.
     """
 
     def render(self, task: Task) -> Text:
@@ -142,7 +137,7 @@ class _Counted(ProgressColumn):
 
 
 class _Left(ProgressColumn):
-    """What is left of the wait; in the end how long it took."""
+    """Estimated remaining time; at the end, the time taken."""
 
     max_refresh = 0.5
 
@@ -154,7 +149,7 @@ class _Left(ProgressColumn):
 
 
 def _rate(task: Task) -> float:
-    """What was done since the task was started, a second; 0 as long as that is not known."""
+    """Progress per second since the task was started; 0 while that is unknown."""
     elapsed = task.finished_time or task.elapsed
     return (task.completed - float(task.fields["already"])) / elapsed if elapsed else 0.0
 
@@ -166,74 +161,74 @@ def _clock(seconds: float) -> str:
 
 
 def _whole() -> Column:
-    """A column of a progress bar that is not broken into lines: the bar gives way instead."""
+    """Returns a column of a progress bar that is never wrapped: the bar shrinks instead."""
     return Column(no_wrap=True)
 
 
 @contextmanager
 def _bar(label: str, total: float, shown: ProgressColumn) -> Iterator[Callable[..., None]]:
-    """A progress bar that moves to and fro until it is told for the first time how much is done,
-    and counts from there.
-    """
+    """Shows a progress bar that pulses until the first report of progress and counts from there."""
     columns = (TextColumn("{task.description:<12}"), BarColumn(), shown, _Left(_whole()))
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(label, total=total, start=False, already=0.0)
 
-        def tell(done: float, failed: int = 0) -> None:
+        def report(done: float, failed: int = 0) -> None:
             if bar.tasks[0].start_time is None:
                 bar.start_task(task)
                 bar.update(task, already=done)
             bar.update(task, completed=done, failed=failed)
 
-        yield tell
+        yield report
 
 
 @contextmanager
 def progress_bar(label: str, duration: float) -> Iterator[master.Progress | None]:
-    """A progress bar over `duration` [s] on a terminal; None elsewhere."""
+    """Shows a progress bar over `duration` [s] on a terminal; yields None elsewhere."""
     if not sys.stderr.isatty():
         yield None
         return
-    with _bar(label, duration, _Simulated(_whole())) as tell:
-        yield tell
+    with _bar(label, duration, _Simulated(_whole())) as report:
+        yield report
 
 
 class Count(Protocol):
-    """Told how many runs are done, and how many of them, since it was first told, failed."""
+    """Reports how many runs are done, and how many failed since the first report."""
 
     def __call__(self, done: int, failed: int = 0) -> None: ...
 
 
 @contextmanager
 def counting_bar(label: str, total: int, *, plain: bool = False) -> Iterator[Count]:
-    """A progress bar over a number of runs; where there is no terminal nothing, or a line now
-    and then when `plain`.
+    """Shows a progress bar over a number of runs.
+
+    Without a terminal it prints nothing, or a line now and then if `plain`.
     """
     if not sys.stderr.isatty():
         yield _PlainCount(label, total) if plain else lambda done, failed=0: None
         return
-    with _bar(label, total, _Counted(_whole())) as tell:
-        yield tell
+    with _bar(label, total, _Counted(_whole())) as report:
+        yield report
 
 
 class _PlainCount:
-    """Lines for a log."""
+    """Prints progress as lines for a log, one every EVERY seconds at most."""
 
     def __init__(self, label: str, total: int) -> None:
         self._label, self._total = label, total
-        self._begun = self._told = monotonic()
+        self._begun = self._printed = monotonic()
         self._already: int | None = None
 
     def __call__(self, done: int, failed: int = 0) -> None:
         now = monotonic()
         if self._already is None:
-            self._already, self._begun, self._told = done, now, now
-        elif now - self._told >= EVERY:
-            self._told = now
+            self._already, self._begun, self._printed = done, now, now
+        elif now - self._printed >= EVERY:
+            self._printed = now
             rate = (done - self._already) / (now - self._begun)
             left = f", {_clock((self._total - done) / rate)} left" if rate else ""
+            counted = f"{done} of {self._total}, {60.0 * rate:.0f} a minute"
             print(
-                f"{self._label}: {done} of {self._total}, {60.0 * rate:.0f} a minute{left}, {failed} failed",
+                f"{self._label}: {counted}{left}, {failed} failed",
                 file=sys.stderr,
                 flush=True,
             )

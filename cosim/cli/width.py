@@ -1,6 +1,4 @@
-"""Lines that fit a terminal: broken between words there, and left as they are in files and
-pipes.
-"""
+"""Wraps lines to the width of a terminal; files and pipes get them unchanged."""
 
 from __future__ import annotations
 
@@ -8,28 +6,26 @@ import os
 import textwrap
 from typing import TextIO
 
-USUAL = 80  # columns
+USUAL = 80  # characters; where the width is unknown
 LEAST = 20
-INDENT = "  "  # of what a broken line goes on with
+INDENT = "  "  # of the continuation of a wrapped line
 
 
 def columns_of(stream: TextIO) -> int | None:
-    """Width of the terminal behind a stream, which COLUMNS overrules; None where there is no
-    terminal.
-    """
+    """Returns the width of a stream's terminal, or None if it is none; COLUMNS overrides it."""
     if not stream.isatty():
         return None
-    told = os.environ.get("COLUMNS", "")
-    if told.isdecimal() and int(told):
-        return max(int(told), LEAST)
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given):
+        return max(int(given), LEAST)
     try:
         return max(os.get_terminal_size(stream.fileno()).columns, LEAST)
-    except (OSError, ValueError):  # a stand-in for one
+    except (OSError, ValueError):  # no real terminal
         return USUAL
 
 
 def fitted(text: str, stream: TextIO) -> str:
-    """A line, or more of them, for this stream. Words, such as paths, stay whole."""
+    """Returns text wrapped for this stream; words, such as paths, stay whole."""
     width = columns_of(stream)
     if width is None:
         return text

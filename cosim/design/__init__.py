@@ -1,1 +1,4 @@
-"""Linearises the plant FMU and designs controller gains for it. Imports `common` to `export`."""
+"""Linearises the plant FMU and designs controller gains for it.
+
+Imports `common` to `export`.
+"""

@@ -1,4 +1,4 @@
-"""Gains for a robot from its own FMU: exported, linearised in all its stances, designed for."""
+"""Designs gains for a robot from its own FMU, linearised in all its stances."""
 
 from __future__ import annotations
 
@@ -31,10 +31,8 @@ LOADS = (0.1, OWN_WEIGHT, 2.0)  # 1    mean load of the standing legs, in thirds
 
 
 def design_for(robot: Robot, period: float, requirements: Requirements | None = None) -> Gains:
-    """Gains of a robot for a controller period [s]. Raises GainsError, FmuError."""
-    with threadpool_limits(
-        1
-    ):  # its matrices are small: threads would wait for each other longer than they compute
+    """Designs gains of a robot for a controller period [s]. Raises GainsError, FmuError."""
+    with threadpool_limits(1):  # for small matrices, threads cost more time than they save
         plants, left_out = examine_stances(robot, period)
         return design_gains(
             robot, period, plants=plants, requirements=requirements, left_out=left_out
@@ -42,20 +40,48 @@ def design_for(robot: Robot, period: float, requirements: Requirements | None = 
 
 
 def standing_plants(robot: Robot, period: float) -> dict[str, StandingPlant]:
-    """The plants of `examine_stances`."""
+    """Returns the plants of `examine_stances`."""
     return examine_stances(robot, period)[0]
 
 
 def examine_stances(
     robot: Robot, period: float
 ) -> tuple[dict[str, StandingPlant], tuple[str, ...]]:
-    """The robot's FMU on level ground, linearised in its stances, under light and heavy loads, with
-    its gears' friction and without.
+    """Linearises the robot's FMU on level ground in its stances, under light and heavy loads.
 
-    A gear's friction is a strong damper at standstill and none at walking speed. Stances and loads
-    in which the robot does not stand are left out; the texts say which and why. Raises GainsError
-    for a robot that stands in none, and for one or a period that no gains can be designed for.
+    Each is linearised with the friction of its gears and without: that friction is a strong damper
+    at standstill and none at walking speed. Stances and loads in which the robot does not stand are
+    left out; the returned texts name them, with the reason. Raises GainsError for a robot that
+    stands in no stance, and for a robot or a period that no gains can be designed for.
     """
+    _check_can_design(robot, period)
+    plants: dict[str, StandingPlant] = {}
+    failures: dict[str, StanceError] = {}
+    frictions = {"gears stick": robot.servo.coulomb_friction, "gears slip": 0.0}
+    with level_fmu(robot) as fmu:
+        for stance, standing in STANCES.items():
+            for load, (motion, inputs) in _rests(fmu, robot, stance, standing, failures).items():
+                for gears, friction in frictions.items():
+                    plants[f"{stance}, load {load:g}, {gears}"] = linearise(
+                        fmu, robot, motion, inputs, period=period, coulomb_friction=friction
+                    )
+    if not plants:
+        first = failures[next(iter(STANCES))]
+        raise GainsError(
+            "the robot does not stand",
+            got=f"{first.what}: {first.got}",
+            expected="rest on six legs or on one of its tripods",
+            fix=first.fix,
+            where=robot.name,
+        )
+    return plants, tuple(
+        f"{name}: {error.what} (got {error.got}, expected {error.expected})"
+        for name, error in failures.items()
+    )
+
+
+def _check_can_design(robot: Robot, period: float) -> None:
+    """Raises GainsError for a period that is not positive and for feet without friction."""
     if not period > 0.0:
         raise GainsError(
             "impossible controller period",
@@ -71,50 +97,22 @@ def examine_stances(
             fix="give the file the friction of ordinary ground, and a scenario friction.mu = 0",
             where=robot.name,
         )
-    plants: dict[str, StandingPlant] = {}
-    failures: dict[str, StanceError] = {}
-    with level_fmu(robot) as fmu:
-        for stance, standing in STANCES.items():
-            for load, (motion, inputs) in _rests(fmu, robot, stance, standing, failures).items():
-                for gears, friction in (
-                    ("gears stick", robot.servo.coulomb_friction),
-                    ("gears slip", 0.0),
-                ):
-                    plant = linearise(
-                        fmu, robot, motion, inputs, period=period, coulomb_friction=friction
-                    )
-                    plants[f"{stance}, load {load:g}, {gears}"] = plant
-    if not plants:
-        first = failures[next(iter(STANCES))]
-        expected = "rest on six legs or on one of its tripods"
-        raise GainsError(
-            "the robot does not stand",
-            got=f"{first.what}: {first.got}",
-            expected=expected,
-            fix=first.fix,
-            where=robot.name,
-        )
-    return plants, tuple(
-        f"{name}: {error.what} (got {error.got}, expected {error.expected})"
-        for name, error in failures.items()
-    )
 
 
 def _rests(
     fmu: Fmu, robot: Robot, stance: str, standing: Sequence[str], failures: dict[str, StanceError]
 ) -> dict[float, tuple[Motion, Array]]:
-    """How the robot stands under each load that it stands under.
+    """Returns the robot at rest under each load that it can stand under, with its inputs.
 
-    None where it does not under its own weight. Notes in `failures` why it does not.
+    Returns {} when it cannot stand under its own weight. Adds the reasons to `failures`.
     """
     found: dict[float, tuple[Motion, Array]] = {}
     for load in sorted(LOADS, key=lambda load: load != OWN_WEIGHT):
         try:
             found[load] = rest(fmu, robot, standing=standing, load=load)
         except StanceError as error:
-            failures[
-                stance if load == OWN_WEIGHT else f"{stance} under {load:g} times its weight"
-            ] = error
+            name = stance if load == OWN_WEIGHT else f"{stance} under {load:g} times its weight"
+            failures[name] = error
             if load == OWN_WEIGHT:
                 return {}
     return {load: found[load] for load in LOADS if load in found}
@@ -122,8 +120,9 @@ def _rests(
 
 @contextmanager
 def level_fmu(robot: Robot) -> Iterator[Fmu]:
-    """The robot's FMU on level ground at height 0, exported for the occasion. Raises GainsError
-    for a robot without position servos.
+    """Exports the robot's FMU on level ground at height 0 and opens it.
+
+    Raises GainsError for a robot without position servos.
     """
     if robot.servo.mode != "position" or robot.servo.kp <= 0.0:
         raise GainsError(
@@ -132,11 +131,8 @@ def level_fmu(robot: Robot) -> Iterator[Fmu]:
             expected="servo mode position with kp > 0",
             fix="use position servos, or kinematic control",
         )
-    down = (
-        0.0,
-        0.0,
-        -float(np.linalg.norm(robot.gravity)),
-    )  # level ground is what gravity is normal to
+    # level ground is normal to gravity
+    down = (0.0, 0.0, -float(np.linalg.norm(robot.gravity)))
     level = replace(robot, gravity=down, terrain=replace(robot.terrain, kind="flat", height=0.0))
     with (
         TemporaryDirectory(prefix="hexapod-") as folder,
@@ -146,9 +142,9 @@ def level_fmu(robot: Robot) -> Iterator[Fmu]:
 
 
 def read_requirements(settings: Sequence[str], robot: Robot) -> Requirements:
-    """A robot's requirements, with those of settings `NAME=VALUE` in their place.
+    """Returns a robot's requirements with settings `NAME=VALUE` applied.
 
-    Raises GainsError: the setting, what is wrong with it.
+    Raises GainsError, which names the setting.
     """
     names, values = [entry.name for entry in fields(Requirements)], {}
     for setting in settings:

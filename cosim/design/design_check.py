@@ -1,6 +1,4 @@
-"""A design tried on the FMU itself: a small squeeze in the non-linear closed loop, beside what
-the linear one predicts.
-"""
+"""Checks a design on the FMU: the response to a small squeeze against the linear prediction."""
 
 from __future__ import annotations
 
@@ -24,14 +22,13 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.models import Robot
 from hexapod_cosim.models.records import Array
 
-DURATION = 0.6  # s    by the robot's size
+DURATION = 0.6  # s    for a robot of the usual size
 SQUEEZE = 0.03  # 1    of a third of the weight
-LEAST = 1e-6  # N    below it no foot carries anything
 
 
 @dataclass(frozen=True, kw_only=True)
 class DesignCheck:
-    """The squeezing force that is left over time, of 1."""
+    """The squeezing force that remains over time, relative to the initial one."""
 
     time: Array  # s    (steps,)
     predicted: Array  # 1    (steps,) by the linear closed loop
@@ -39,31 +36,26 @@ class DesignCheck:
 
     @property
     def error(self) -> float:
-        """1    largest difference, of the largest force predicted"""
+        """Largest difference over the largest predicted force [1]."""
         return float(np.abs(self.simulated - self.predicted).max() / np.abs(self.predicted).max())
 
 
 class FeetLaws:
-    """Both laws of the standing feet as they run: present loads, present angles, old forces."""
+    """Both control laws of the standing feet, with present loads and angles and delayed forces."""
 
     def __init__(self, robot: Robot, laws: Laws, standing: Places, force: Array) -> None:
-        """standing: which legs, (n,); force: (n, 3) at rest [N]."""
-        self._legs, self._kp, self._share, self._standing = (
-            LegSolver(robot),
-            robot.servo.kp,
-            weight_share(robot),
-            standing,
-        )
+        """standing: indices of the standing legs (n,); force: at rest (n, 3) [N]."""
+        self._legs, self._kp = LegSolver(robot), robot.servo.kp
+        self._share, self._standing = weight_share(robot), standing
         self._rest, (self._pid, self._spring) = force[:, 2], laws.systems
         self._forces = deque([force] * (laws.delays + 1), maxlen=laws.delays + 1)
-        self._slip, self._bounce = (
-            np.zeros((self._pid.nstates, 2 * len(standing))),
-            np.zeros((self._spring.nstates, len(standing))),
-        )
+        self._slip = np.zeros((self._pid.nstates, 2 * len(standing)))
+        self._bounce = np.zeros((self._spring.nstates, len(standing)))
 
     def step(self, force: Array, angle: Array) -> Array:
-        """N    (n, 3) that the servos are relieved of, after forces (n, 3) [N] at joint angles
-        (6, 3)
+        """Returns by how much the servos are relieved (n, 3) [N].
+
+        force: (n, 3) [N] of the standing feet; angle: (6, 3) [rad] of the joints.
         """
         self._forces.append(force)
         late = self._forces[0]
@@ -81,11 +73,11 @@ class FeetLaws:
         return np.column_stack([load[:, None] * answer.reshape(-1, 2), lift[0] / vertical])
 
     def jacobian(self, angle: Array) -> Array:
-        """(n, 3, 3) of the standing legs"""
+        """Returns the Jacobians of the standing legs (n, 3, 3)."""
         return np.asarray(self._legs.jacobian(angle)[self._standing])
 
-    def told(self, relief: Array, angle: Array) -> Array:
-        """rad    (6, 3) that the joints are told for a relief (n, 3) [N]"""
+    def shift(self, relief: Array, angle: Array) -> Array:
+        """Returns the shift of the joint commands (6, 3) [rad] for a relief (n, 3) [N]."""
         shift = np.zeros_like(angle)
         shift[self._standing] = np.einsum("lji,lj->li", self.jacobian(angle), relief) / self._kp
         return shift
@@ -94,10 +86,10 @@ class FeetLaws:
 def check_design(
     robot: Robot, gains: Gains, *, stance: str | None = None, squeeze: float | None = None
 ) -> DesignCheck:
-    """Legs that stand start to splay by a force, which both laws take away.
+    """Simulates how both control laws remove a squeeze, in the FMU and in the linear closed loop.
 
-    In the FMU and in the linear closed loop. stance: by default the first in which the robot
-    stands;  squeeze [N]: by default SQUEEZE of a third of the weight.
+    A force makes the standing legs splay. stance: by default the first in which the robot stands;
+    squeeze [N]: by default SQUEEZE times a third of the weight.
     """
     period = gains.period
     laws = Laws(
@@ -120,19 +112,14 @@ def check_design(
         )
         bench.start(motion, inputs)
         feet = FeetLaws(robot, laws, places, plant.force[places])
-        simulated = _run(
-            bench,
-            feet,
-            inputs,
-            np.outer(force * rising(time), push).reshape(len(time), -1, 3),
-            places,
-        )
+        disturbance = np.outer(force * rising(time), push).reshape(len(time), -1, 3)
+        simulated = _run(bench, feet, inputs, disturbance, places)
     seen = (simulated - simulated[0]).reshape(len(time), -1) @ push / -force
     return DesignCheck(time=time, predicted=-push @ forces, simulated=seen)
 
 
 def _rest(fmu: Fmu, robot: Robot, stance: str | None) -> tuple[Motion, Array]:
-    """At rest in a stance, or in the first possible. Raises StanceError."""
+    """Returns the robot at rest in a stance, or in the first possible one. Raises StanceError."""
     *others, last = STANCES if stance is None else [stance]
     for name in others:
         with suppress(StanceError):
@@ -141,13 +128,13 @@ def _rest(fmu: Fmu, robot: Robot, stance: str | None) -> tuple[Motion, Array]:
 
 
 def _run(bench: Bench, feet: FeetLaws, inputs: Array, disturbance: Array, places: Places) -> Array:
-    """N    (steps, n, 3) forces on the standing feet in the closed loop"""
-    told, found = inputs.copy(), []
+    """Returns the forces on the standing feet in the closed loop (steps, n, 3) [N]."""
+    commanded, found = inputs.copy(), []
     for k, extra in enumerate(disturbance):
         force, angle = bench.force().reshape(6, 3)[places], bench.motion().angle
         found.append(force)
-        shift = feet.told(feet.step(force, angle) + extra, angle)
-        told[:ANGLES] = inputs[:ANGLES] + shift.reshape(-1)
-        bench.tell(told)
+        shift = feet.shift(feet.step(force, angle) + extra, angle)
+        commanded[:ANGLES] = inputs[:ANGLES] + shift.reshape(-1)
+        bench.set_inputs(commanded)
         bench.step(k)
     return np.array(found)

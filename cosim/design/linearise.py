@@ -1,20 +1,20 @@
-"""The plant FMU itself, linearised about the standing robot by central differences.
+"""Linearises the plant FMU about the standing robot by central differences.
 
     x(k+1) = A x(k) + B u(k)        y(k) = C x(k)
 
 x: torso's position and small rotation, joint angles, and the velocities of all these. One period of
-the FMU from x with the inputs u held is the exact sampled system, so nothing is approximated but
-the differences. Each column takes two fresh starts from the `initial` parameters, one on either
-side; those of angle_ref and speed_ref are kp and kd times torque_ref's, by eq. 12.
+the FMU from x with the inputs u held is the exact sampled system, so that only the differences are
+approximate. Each column takes two starts from the `initial` parameters, one on either side; the
+columns of angle_ref and speed_ref are kp and kd times those of torque_ref, by eq. 12.
 
-Sizes of the differences. They must be small against what bends: the foot's depth in the ground (0.1
-mm and more), the slip speed at which friction saturates (10 mm/s), the joint speed at which the
-gear's friction does (50 mrad/s); and large against the round-off of a start, 1e-15 m in a contact
-of 5e4 N/m.
+The differences must be small against the scales of the non-linearities: the foot's depth in the
+ground (0.1 mm and more), the slip speed at which friction saturates (10 mm/s), the joint speed at
+which the gear's friction saturates (50 mrad/s); and large against the round-off of a start, 1e-15 m
+in a contact of 5e4 N/m.
 
-Left out are the servos' torque limits, which no small motion sees but a heavy load does, and the
-error control, whose choice of steps would be noise: steps are fixed, and short against the times in
-which a foot swings on the ground.
+Two things are left out: the servos' torque limits, which small motions do not reach but a heavy
+load does, and the error control, whose choice of steps would be noise. Steps are fixed, and short
+against the times in which a foot swings on the ground.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from hexapod_cosim.models.records import Array
 ANGLES = LEGS * JOINTS
 POSES = 6 + ANGLES  # of torso and joints; the states are these and their velocities
 STATES = 2 * POSES
-CHANGE, RATE = 1e-6, 1e-5  # m and rad, m/s and rad/s    of the differences, by the robot's size
-TORQUE = 1e-4  # N m    the same, of servos of STIFFNESS, otherwise by theirs
+CHANGE, RATE = 1e-6, 1e-5  # m and rad, m/s and rad/s    differences, for the usual size of robot
+TORQUE = 1e-4  # N m    difference, for servos of STIFFNESS; scales with the stiffness
 STIFFNESS = 40.0  # N m/rad
-LONGEST_STEP = 5e-4  # s    of the integration, by the robot's size
+LONGEST_STEP = 5e-4  # s    of the integration, for the usual size of robot
 UNLIMITED = 1e6  # N m
-LATEST = 600.0  # s    no start is stepped beyond it
+LATEST = 600.0  # s    end of the longest simulation
 TORSO = [f"torso.{name}[{k}]" for name in ("position", "rotation") for k in (1, 2, 3)]
 TORSO_RATES = [*vector_names("torso.velocity"), *MEASURED["angular_velocity"]]
 STATE_NAMES = [*TORSO, *MEASURED["angle"], *TORSO_RATES, *MEASURED["speed"]]
@@ -53,17 +53,17 @@ OUTPUT_NAMES = [*MEASURED["foot_force"], *MEASURED["angle"], *TORSO, *TORSO_RATE
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Where the torso and the joints are and how they move: what an FMU starts from."""
+    """Position and velocity of torso and joints, from which an FMU starts."""
 
     values: Array  # (49,) position, quaternion, angles, velocity, angular velocity, joint speeds
 
     @property
     def angle(self) -> Array:
-        """rad    (6, 3)"""
+        """Joint angles (6, 3) [rad]."""
         return self.values[7 : 7 + ANGLES].reshape(LEGS, JOINTS)
 
     def moved(self, state: Array) -> Motion:
-        """The same after small changes (48,)."""
+        """Returns the motion after small changes (48,)."""
         new = self.values.copy()
         new[:3] += state[:3]
         new[3:7] = quaternion_product(np.array([1.0, *(0.5 * state[3:6])]), self.values[3:7])
@@ -71,7 +71,7 @@ class Motion:
         return Motion(values=new)
 
     def less(self, other: Motion) -> Array:
-        """(48,) small changes that lead here from another."""
+        """Returns the small changes (48,) that lead from another motion to this one."""
         w, x, y, z = other.values[3:7]
         turn = quaternion_product(self.values[3:7], np.array([w, -x, -y, -z]))
         return np.concatenate(
@@ -84,15 +84,16 @@ class Motion:
 
 
 class Bench:
-    """An FMU that is started over and over again. Inputs (60,): angle_ref, speed_ref, torque_ref
-    of all joints, push force and torque.
+    """Starts one FMU again and again.
+
+    Inputs are (60,): angle_ref, speed_ref and torque_ref of all joints, push force and torque.
     """
 
     def __init__(
         self, plant: Fmu, robot: Robot, *, coulomb_friction: float, slope: float, period: float
     ) -> None:
-        """robot: the FMU's; coulomb_friction: of the gears [N m]; slope: of the feet's friction
-        [s/m]; period [s].
+        """robot: the FMU's; coulomb_friction [N m]: of the gears; slope [s/m]: of the feet's
+        friction; period [s].
         """
         size = size_of(robot)
         self.plant, self.period = plant, period
@@ -102,67 +103,65 @@ class Bench:
             ["servo.coulomb_friction", "servo.torque_max", "friction.slope", "solver.step"]
         )
         self._settings.values[:] = coulomb_friction, UNLIMITED, slope, step
-        pose, rates = (
-            [*vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"]],
-            [*TORSO_RATES, *MEASURED["speed"]],
-        )
-        seen = [*pose, *rates]
+        seen = [
+            *vector_names("torso.position"), *MEASURED["quaternion"], *MEASURED["angle"],
+            *TORSO_RATES, *MEASURED["speed"],
+        ]  # fmt: skip
         self._seen = plant.block(seen)
         self._initial = plant.block([f"initial.{name.removeprefix('torso.')}" for name in seen])
         self._inputs = plant.block([*INPUT_NAMES, *PUSH])
         self._forces = plant.block(MEASURED["foot_force"])
 
     def start(self, motion: Motion, inputs: Array) -> None:
-        """Ready to step at time 0."""
+        """Starts the FMU at time 0 from a motion, with inputs (60,)."""
         self.plant.reset()
         self._settings.set()
         self._initial.values[:] = motion.values
         self._initial.set()
         self.plant.initialise(0.0, LATEST)
-        self.tell(inputs)
+        self.set_inputs(inputs)
 
-    def tell(self, inputs: Array) -> None:
+    def set_inputs(self, inputs: Array) -> None:
         """Sets the inputs (60,)."""
         self._inputs.values[:] = inputs
         self._inputs.set()
 
     def step(self, k: int = 0) -> None:
-        """The period after k of them."""
+        """Steps over period number k."""
         self.plant.step(k * self.period, self.period)
 
     def motion(self) -> Motion:
-        """How the FMU moves now."""
+        """Returns the present motion."""
         self._seen.get()
         return Motion(values=self._seen.values.copy())
 
     def force(self) -> Array:
-        """N    (18,) ground on feet now"""
+        """Returns the present forces of the ground on the feet (18,) [N]."""
         self._forces.get()
         return np.array(self._forces.values)
 
     def differences(
         self, motion: Motion, inputs: Array, *, scale: float = 1.0
     ) -> tuple[Array, Array, Array]:
-        """A (48, 48), B (48, 18) of the joints' torques and C (18, 48) of the feet's forces
-        about a motion; scale: of the differences.
+        """Returns A (48, 48), B (48, 18) of the joint torques and C (18, 48) of the foot forces.
+
+        scale: factor on all differences.
         """
         a, b, c = np.zeros((STATES, STATES)), np.zeros((STATES, ANGLES)), np.zeros((ANGLES, STATES))
         for k, change in enumerate(scale * np.diag(self._sizes)):
             ahead, behind = (
                 self._step_from(motion.moved(way), inputs) for way in (change, -change)
             )
-            c[:, k], a[:, k] = (
-                (ahead[0] - behind[0]) / (2.0 * change[k]),
-                ahead[1].less(behind[1]) / (2.0 * change[k]),
-            )
-        for k, change in enumerate(
-            scale * self._torque * np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]
-        ):
+            c[:, k] = (ahead[0] - behind[0]) / (2.0 * change[k])
+            a[:, k] = ahead[1].less(behind[1]) / (2.0 * change[k])
+        torques = np.eye(len(inputs))[2 * ANGLES : 3 * ANGLES]
+        for k, change in enumerate(scale * self._torque * torques):
             ahead, behind = (self._step_from(motion, inputs + way) for way in (change, -change))
             b[:, k] = ahead[1].less(behind[1]) / (2.0 * scale * self._torque)
         return a, b, c
 
     def _step_from(self, motion: Motion, inputs: Array) -> tuple[Array, Motion]:
+        """Returns the foot forces at a motion and the motion one period later."""
         self.start(motion, inputs)
         force = self.force()
         self.step()
@@ -170,7 +169,7 @@ class Bench:
 
 
 def difference_sizes(size: Size) -> Array:
-    """(48,) of the differences of states: torso's way, all angles, and the rates of both."""
+    """Returns the differences of the states (48,), for a robot's size."""
     sizes = np.repeat([CHANGE, RATE], POSES)
     sizes[:3] *= size.length
     sizes[POSES : POSES + 3] *= size.speed
@@ -188,10 +187,10 @@ def linearise(
     coulomb_friction: float,
     scale: float = 1.0,
 ) -> StandingPlant:
-    """The FMU of a robot about a motion at rest, sampled with a period [s] over which the inputs
-    are held.
+    """Linearises a robot's FMU about a motion at rest, sampled with a period [s].
 
-    coulomb_friction: of the gears [N m]; scale: of the differences.
+    The inputs are held over a period. coulomb_friction [N m]: of the gears; scale: factor on all
+    differences.
     """
     bench = Bench(
         plant, robot, coulomb_friction=coulomb_friction, slope=robot.friction.slope, period=period
@@ -215,5 +214,5 @@ def linearise(
 
 
 def _plain(names: Sequence[str]) -> list[str]:
-    # python-control takes no dots
+    """Returns names without dots, which python-control does not accept."""
     return [name.replace(".", "_") for name in names]

@@ -1,6 +1,6 @@
-"""The robot put to rest on some of its legs, under a light or a heavy load.
+"""Puts the robot to rest on some of its legs, under a light or a heavy load.
 
-This is where it is linearised, and where it shows whether it stands on these legs at all.
+There it is linearised; a robot that cannot stand on these legs is reported.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from hexapod_cosim.models.records import Array
 # lengths, times and speeds here are for robots of the usual size (size.py)
 LIFT = 0.04  # m    of the feet that do not stand
 LIFTS = (1.0, 0.5, 0.25)  # 1    parts of it that are tried, as far as the legs reach
-SETTLING, SETTLING_STEP = 2.0, 0.05  # s    before the robot is looked at; between two steps
-LOOKED = 10  # steps between two looks
-PATIENCE = 10.0  # 1    times SETTLING and the feet's creep: who does not rest then will not
+SETTLING, SETTLING_STEP = 2.0, 0.05  # s    before the first check for rest; macro-step
+LOOKED = 10  # steps between two checks
+PATIENCE = 10.0  # 1    limit of the settling time, in multiples of SETTLING plus the feet's creep
 SETTLING_SLOPE = 0.1  # 1    of the friction's: feet get to the same pose as much faster
 REST = 1e-3  # m/s or rad/s
 KEPT = 0.5  # 1    of its share of the load that a foot keeps, wherever the torso is pushed
@@ -38,15 +38,15 @@ BALANCED = 1e-9  # 1    of the load: feet that miss the balance by more cannot h
 
 
 class StanceError(FmuError):
-    """Legs that do not hold the robot."""
+    """The legs do not hold the robot."""
 
 
 def rest(plant: Fmu, robot: Robot, *, standing: Sequence[str], load: float) -> tuple[Motion, Array]:
-    """How the robot stands on the named legs, and the inputs (60,) under which it does.
+    """Returns the robot at rest on the named legs, and the inputs (60,) that keep it there.
 
-    load: mean of the standing legs', in thirds of the weight; the torso is pushed down or up to
-    have it. The servos are told the torques that carry it. Raises StanceError when it does not
-    stand there: why.
+    load: mean of the standing legs', in thirds of the weight; a push on the torso, up or down,
+    makes up the difference. The inputs hold the torques that carry the load. Raises StanceError
+    when the robot does not stand there.
     """
     angle, stands = lifted_stance(robot, standing), _mask(standing)
     share, push = loads(robot, angle, standing, load=load)
@@ -68,9 +68,9 @@ def rest(plant: Fmu, robot: Robot, *, standing: Sequence[str], load: float) -> t
 def settle(
     plant: Fmu, robot: Robot, motion: Motion, inputs: Array, standing: Mask, *, creep: float
 ) -> Motion:  # fmt: skip
-    """Where it comes to rest on its standing (6,) feet, which creep in a time [s].
+    """Returns the motion at rest on the `standing` (6,) feet, which creep in a time [s].
 
-    Raises StanceError when it does not.
+    Raises StanceError when the robot does not come to rest.
     """
     size, first = size_of(robot), round(SETTLING / SETTLING_STEP)
     step = SETTLING_STEP * size.time
@@ -111,9 +111,9 @@ def _not_standing(robot: Robot, *, got: str, expected: str, fix: str) -> StanceE
 
 
 def creep_time(robot: Robot, angle: Array, share: Array) -> float:
-    """s    in which the servos draw a loaded foot over the ground, the slowest
+    """Returns the time [s] in which the servos draw the slowest loaded foot over the ground.
 
-    That is friction's damping times the leg's horizontal compliance.
+    That is the damping of friction times the leg's horizontal compliance.
     """
     jacobian = LegSolver(robot).jacobian(angle)[:, :2]
     squares = np.linalg.eigvalsh(jacobian @ jacobian.transpose(0, 2, 1))
@@ -122,9 +122,9 @@ def creep_time(robot: Robot, angle: Array, share: Array) -> float:
 
 
 def lifted_stance(robot: Robot, standing: Sequence[str]) -> Array:
-    """(6, 3) joint angles [rad] of the stance, the feet of the other legs lifted.
+    """Returns the joint angles (6, 3) [rad] of the stance with the feet of the other legs lifted.
 
-    Raises StanceError for legs that cannot be.
+    Raises StanceError where a leg cannot be lifted.
     """
     legs, lift = LegSolver(robot), LIFT * size_of(robot).length
     feet, up = legs.forward(robot.stance), np.outer(~_mask(standing), [0.0, 0.0, 1.0])
@@ -145,11 +145,11 @@ def lifted_stance(robot: Robot, standing: Sequence[str]) -> Array:
 def loads(
     robot: Robot, angle: Array, standing: Sequence[str], *, load: float
 ) -> tuple[Array, Array]:  # fmt: skip
-    """N    (6,) least vertical forces on the standing feet that hold the torso level.
+    """Returns the least vertical forces on the standing feet (6,) [N] that hold the torso level.
 
-    And the push on it (6,) [N, N m] under which they do. The torso is pushed at its centre of
-    mass, or only as far towards the whole robot's as it takes to leave each foot its share.
-    Raises StanceError for feet that cannot hold the robot.
+    The second value is the push on the torso (6,) [N, N m] under which they do. It acts at the
+    torso's centre of mass, or only as far towards the whole robot's as each foot needs to keep its
+    share. Raises StanceError for feet that cannot hold the robot.
     """
     feet, stands = LegSolver(robot).forward(angle) - np.array(robot.torso.com), _mask(standing)
     rows = np.array([np.ones(LEGS), feet[:, 0], feet[:, 1]]) * stands
@@ -172,9 +172,9 @@ def loads(
 
 
 def weight_moment(robot: Robot, angle: Array) -> Array:
-    """N m    (2,) weight of the level robot times its arms along x and y
+    """Returns the weight of the level robot times its arms along x and y (2,) [N m].
 
-    They are counted from the torso's centre of mass.
+    The arms begin at the torso's centre of mass.
     """
     level, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     body = body_states(robot, still, level, still, still, angle, np.zeros((LEGS, JOINTS)))

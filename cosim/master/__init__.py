@@ -1,3 +1,4 @@
-"""The co-simulation master: FMUs, signals, sensors and the loop, in Python and in C. Imports
-`common` to `scenario`.
+"""The co-simulation master: FMUs, signals, sensors and the loop, in Python and in C.
+
+Imports `common`, `interface` and `scenario`.
 """

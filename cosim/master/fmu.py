@@ -1,7 +1,6 @@
-"""A co-simulation FMU opened through fmpy: parameters by name, variables in blocks whose arrays are
-made once.
+"""Opens a co-simulation FMU through fmpy and reads and writes its variables in blocks.
 
-The master needs only what protocols.py says of a plant.
+The master itself only needs the smaller interface in protocols.py.
 """
 
 from __future__ import annotations
@@ -28,17 +27,18 @@ from hexapod_cosim.cosim.master.fmu_log import STATUS, WARNING, FmuLog
 from hexapod_cosim.models.errors import FmuError, nearest_name, unknown_name
 
 LAST_SUCCESSFUL_TIME = 2  # fmi2StatusKind
-SUFFIX = {
+SUFFIX = {  # of fmi2Get... and fmi2Set... for each FMI type
     "Real": "Real",
     "Integer": "Integer",
     "Enumeration": "Integer",
     "Boolean": "Boolean",
-}  # of fmi2Get..., fmi2Set...
+}
 
 
 class StepError(FmuError):
-    """A step that the FMU discarded or refused; `reached` is the last time it vouches for [s],
-    NaN when it does not say.
+    """The FMU discarded or refused a step.
+
+    `reached` is the last time [s] for which the FMU's state is valid; NaN when it does not say.
     """
 
     def __init__(self, what: str, *, reached: float, **facts: Any) -> None:
@@ -47,11 +47,12 @@ class StepError(FmuError):
 
 
 class FmuBlock:
-    """A block of an FMU. The arguments of its calls are made once, as C has them, so that a call
-    converts and allocates nothing.
+    """Variables of one type that are read or written in one call.
 
-    `buffer`: a contiguous array for the values, float64 for Reals, int32 else; without one the
-    block makes its own.
+    The arguments of the C calls are converted once, here, so that a call allocates nothing.
+
+    `buffer`: a contiguous array for the values, float64 for Reals and int32 for all other types;
+    without one, the block allocates its own.
     """
 
     def __init__(
@@ -73,38 +74,35 @@ class FmuBlock:
             )
         self.names, self.values = tuple(names), values
         self._fmu = fmu
-        numbers, size, address = (
-            (ctypes.c_uint * len(names))(*references),
-            ctypes.c_size_t(len(names)),
-            ctypes.c_void_p(values.ctypes.data),
-        )
-        self._get, self._set = (
-            fmu.bind(f"fmi2{verb}{SUFFIX[kind]}", numbers, size, address) for verb in ("Get", "Set")
-        )
+        numbers = (ctypes.c_uint * len(names))(*references)
+        size, address = ctypes.c_size_t(len(names)), ctypes.c_void_p(values.ctypes.data)
+        self._get = fmu.bind(f"fmi2Get{SUFFIX[kind]}", numbers, size, address)
+        self._set = fmu.bind(f"fmi2Set{SUFFIX[kind]}", numbers, size, address)
 
     def get(self) -> None:
         """Reads all values from the FMU. Raises FmuError."""
-        self._fmu.forget()
+        self._fmu.clear_log()
         status = self._get()
         if status > WARNING:
             raise self._fmu.failure("the FMU does not give its outputs", status)
 
-    def put(self) -> int:
-        """Hands all values to the FMU. Returns its status."""
-        self._fmu.forget()
+    def try_set(self) -> int:
+        """Writes all values to the FMU and returns the FMI status."""
+        self._fmu.clear_log()
         return self._set()
 
     def set(self) -> None:
-        """Hands all values to the FMU. Raises FmuError."""
-        self._fmu.forget()
+        """Writes all values to the FMU. Raises FmuError."""
+        self._fmu.clear_log()
         status = self._set()
         if status > WARNING:
             raise self._fmu.failure("the FMU does not take its inputs", status)
 
 
 class Fmu:
-    """One instance of an FMI 2.0 co-simulation FMU; a context manager that frees it. Raises
-    FmuError when it is none.
+    """One instance of an FMI 2.0 co-simulation FMU; a context manager that frees it.
+
+    Raises FmuError when the file cannot be loaded as such an FMU.
     """
 
     def __init__(self, path: str | Path, *, name: str = "plant") -> None:
@@ -113,19 +111,17 @@ class Fmu:
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self._logged = FmuLog()
         self._log = self._logged.messages
-        self.forget = self._log.clear  # what the FMU said before a call is of no interest after it
+        self.clear_log = self._log.clear  # called before each call: errors quote new messages only
         self._directory = TemporaryDirectory(prefix="hexapod-fmu-")
         self._slave: Any = None
         try:
             self._instantiate(name)
         except Exception as error:
             self.close()
-            raise self._not_loaded(error) from error
+            raise self._load_error(error) from error
 
     def _instantiate(self, name: str) -> None:
-        """Unpacks, loads the binary and makes the instance, every message of which lands in our
-        log.
-        """
+        """Unpacks the FMU, loads its binary and creates the instance, which logs to our FmuLog."""
         extract(self.path, self._directory.name)
         identifier = self.description.coSimulation.modelIdentifier
         library = packed_binary(self._directory.name, identifier)
@@ -134,9 +130,7 @@ class Fmu:
             "modelIdentifier": identifier,
             "unzipDirectory": self._directory.name,
         }
-        with chdir(
-            Path.cwd()
-        ):  # fmpy leaves the working folder changed when the library does not load
+        with chdir(Path.cwd()):  # fmpy does not restore the folder when the library fails to load
             slave = FMU2Slave(instanceName=name, libraryPath=library, **facts)
         try:
             slave.instantiate(callbacks=self._logged.callbacks, loggingOn=True)
@@ -146,53 +140,47 @@ class Fmu:
         self._slave = slave
         self._begin, self._length = ctypes.c_double(), ctypes.c_double()
         self._reset = self.bind("fmi2Reset")
-        self._do_step = self.bind(
-            "fmi2DoStep", self._begin, self._length, ctypes.c_int(1)
-        )  # 1: nothing before is needed again
+        no_state_prior = ctypes.c_int(1)  # noSetFMUStatePriorToCurrentPoint = true
+        self._do_step = self.bind("fmi2DoStep", self._begin, self._length, no_state_prior)
 
-    def _not_loaded(self, error: Exception) -> FmuError:
-        said = self._log[-1] if self._log else str(error)
+    def _load_error(self, error: Exception) -> FmuError:
+        message = self._log[-1] if self._log else str(error)
         fix = "export it again on this machine with `hexapod export`"
-        return FmuError("the FMU cannot be loaded", got=said, fix=fix, where=str(self.path))
+        return FmuError("the FMU cannot be loaded", got=message, fix=fix, where=str(self.path))
 
     @cached_property
     def sha256(self) -> str:
-        """Of the file, in hex."""
+        """SHA-256 of the FMU file, in hex."""
         return hashlib.sha256(self.path.read_bytes()).hexdigest()
 
     @property
     def component(self) -> int:
-        """The instance, as C has it."""
+        """Pointer to the instance (fmi2Component) as an integer."""
         return int(self._slave.component)
 
     def address(self, name: str) -> int:
-        """Where a C function of the FMU is."""
+        """Returns the address of a C function of the FMU."""
         return int(ctypes.cast(getattr(self._slave.dll, name), ctypes.c_void_p).value or 0)
 
     def bind(self, name: str, *arguments: Any) -> Callable[[], int]:
-        """A C function of the FMU with its arguments, as C has them, in place: called, it returns
-        the status.
+        """Returns a call of a C function of the FMU with fixed arguments; it returns the status.
 
-        The arguments are of the types that fmpy declares, so its function goes without the
-        conversion it would make at every call.
+        The arguments must have the types that fmpy declares: the call skips fmpy's conversion.
         """
         function = getattr(self._slave.dll, name)
         unchecked = ctypes.cast(function, ctypes.CFUNCTYPE(function.restype))
         return partial(unchecked, ctypes.c_void_p(self._slave.component), *arguments)
 
     def failure(self, what: str, status: int) -> FmuError:
-        """The error for a call that came back with `status`, in the FMU's own words where it
-        gave any.
-        """
-        return FmuError(what, got=self._said(status), where=self.path.name)
+        """Returns the error for a call that returned `status`, with the FMU's last message."""
+        return FmuError(what, got=self._last_message(status), where=self.path.name)
 
-    def _said(self, status: int) -> str:
+    def _last_message(self, status: int) -> str:
+        """Returns the FMU's last message, or the status where it gave none."""
         return self._log[-1] if self._log else f"status {STATUS[status]} without a message"
 
     def names(self, causality: str, kind: str = "Real") -> list[str]:
-        """Names of all variables of a causality and an FMI type, in the order of the model
-        description.
-        """
+        """Names of all variables of a causality and FMI type, in model description order."""
         return [
             name
             for name, variable in self.variables.items()
@@ -207,8 +195,9 @@ class Fmu:
         return [self.variables[name].valueReference for name in names]
 
     def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> FmuBlock:
-        """The named variables, all of one type, as a block, its values in `buffer` if given.
-        Raises FmuError for a name the FMU lacks.
+        """Returns a block of the named variables, which must all have one type.
+
+        The values stand in `buffer` if one is given. Raises FmuError for an unknown name.
         """
         references = self.references(names)
         kinds = {self.variables[name].type for name in names} or {"Real"}
@@ -219,9 +208,7 @@ class Fmu:
         return FmuBlock(self, names, kinds.pop(), references, buffer)
 
     def parameters(self) -> dict[str, float]:
-        """All parameters with the values that hold now; an enumeration's is the number of its
-        item.
-        """
+        """Returns the present values of all parameters; enumerations as the number of the item."""
         found: dict[str, float] = {}
         for block in self._parameter_blocks:
             block.get()
@@ -236,14 +223,16 @@ class Fmu:
         return [self.block(some) for some in names if some]
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Sets parameters by name, enumerations by the name of their item. Before `initialise`.
-        Raises FmuError, naming the parameter.
+        """Sets parameters by name, enumerations by the name of their item, before `initialise`.
+
+        Raises FmuError, which names the parameter.
         """
         self.set_blocks(self.parameter_blocks(values))
 
     def parameter_blocks(self, values: Mapping[str, Any]) -> list[FmuBlock]:
-        """Blocks that hold these parameters, to be set again and again. Raises FmuError for what
-        is no parameter or no value of it.
+        """Returns blocks that hold these parameter values and can be set repeatedly.
+
+        Raises FmuError for a name that is no parameter or a value that it cannot take.
         """
         kinds: dict[str, dict[str, float]] = {}
         for name, value in values.items():
@@ -255,41 +244,38 @@ class Fmu:
         return blocks
 
     def set_blocks(self, blocks: Sequence[FmuBlock]) -> None:
-        """Sets parameters. Before `initialise`. Raises FmuError, naming the parameter."""
-        for whole in blocks:
-            if whole.put() > WARNING:
-                self._set_one_by_one(dict(zip(whole.names, whole.values.tolist(), strict=True)))
+        """Sets blocks of parameters, before `initialise`. Raises FmuError, naming the parameter."""
+        for block in blocks:
+            if block.try_set() > WARNING:
+                self._set_one_by_one(dict(zip(block.names, block.values.tolist(), strict=True)))
 
     def _set_one_by_one(self, numbers: Mapping[str, float]) -> None:
-        """To name the one that is refused."""
+        """Sets parameters one at a time, so that the error names the one that is refused."""
         for name, value in numbers.items():
             block = self.block([name])
             block.values[0] = value
-            status = block.put()
-            if status > WARNING and self._log:
-                raise FmuError(
-                    self._said(status), where=self.path.name
-                )  # its sentence has name, value and range
+            status = block.try_set()
+            if status > WARNING and self._log:  # the message has name, value and range
+                raise FmuError(self._last_message(status), where=self.path.name)
             if status > WARNING:
                 raise FmuError(
                     f"{name}: the FMU refuses the value", got=value, where=self.path.name
                 )
 
     def _parameter(self, name: str) -> str:
+        """Returns the name of a parameter. Raises FmuError when the name is none."""
         if name not in self.variables:
-            raise self._unknown(
-                name,
-                [
-                    known
-                    for known, variable in self.variables.items()
-                    if variable.causality == "parameter"
-                ],
-            )
+            parameters = [
+                known
+                for known, variable in self.variables.items()
+                if variable.causality == "parameter"
+            ]
+            raise self._unknown(name, parameters)
         kind = self.variables[name].causality
         if kind != "parameter":
-            fix = (
-                "[[events]] push the torso" if name.startswith("torso.push") else "set a parameter"
-            )
+            fix = "set a parameter"
+            if name.startswith("torso.push"):
+                fix = "[[events]] push the torso"
             raise FmuError(
                 "not a parameter",
                 got=name,
@@ -300,13 +286,11 @@ class Fmu:
         return name
 
     def _number(self, name: str, value: Any) -> float:
-        """The value as the FMU takes it."""
+        """Converts a value to the number that the FMU takes."""
         variable = self.variables[name]
-        items = (
-            {item.name: item.value for item in variable.declaredType.items}
-            if variable.type == "Enumeration"
-            else {}
-        )
+        items = {}
+        if variable.type == "Enumeration":
+            items = {item.name: item.value for item in variable.declaredType.items}
         if isinstance(value, str) and items:
             if value not in items:
                 raise unknown_name(f"choice for {name}", value, items, error=FmuError)
@@ -326,7 +310,8 @@ class Fmu:
         return FmuError("the FMU has no such variable", got=name, fix=fix, where=str(self.path))
 
     def initialise(self, start: float, stop: float) -> None:
-        """Compiles the parameters and puts the robot into its initial state at time `start` [s].
+        """Initialises the FMU with its parameters and initial state at time `start` [s].
+
         Raises FmuError.
         """
         calls = (
@@ -335,37 +320,37 @@ class Fmu:
             self._slave.exitInitializationMode,
         )
         for call in calls:
-            self.forget()
+            self.clear_log()
             try:
                 call()
             except Exception as error:
-                said = self._log[-1] if self._log else str(error)
+                message = self._log[-1] if self._log else str(error)
                 raise FmuError(
-                    "the FMU cannot be initialised", got=said, where=str(self.path)
+                    "the FMU cannot be initialised", got=message, where=str(self.path)
                 ) from error
 
     def reset(self) -> None:
-        """Back to how it was made: start values, not initialised. Raises FmuError."""
-        self.forget()
+        """Resets the instance to its start values, not initialised. Raises FmuError."""
+        self.clear_log()
         status = self._reset()
         if status > WARNING:
             raise self.failure("the FMU cannot be reset", status)
 
     def step(self, t: float, h: float) -> None:
         """Steps from t to t + h [s]. Raises StepError."""
-        self.forget()
+        self.clear_log()
         self._begin.value, self._length.value = t, h
         status = self._do_step()
         if status > WARNING:
             raise self.step_failure(t, status)
 
     def step_failure(self, t: float, status: int) -> StepError:
-        """The error for a step from t [s] that came back with `status`."""
-        said, reached = self._said(status), self._reached(status)
+        """Returns the error for a step from t [s] that returned `status`."""
+        message, reached = self._last_message(status), self._reached(status)
         return StepError(
             f"the FMU {STATUS[status]}s the step from {t:.6g} s",
             reached=reached,
-            got=said,
+            got=message,
             where=self.path.name,
         )
 
@@ -374,11 +359,11 @@ class Fmu:
             return math.nan
         try:
             return float(self._slave.getRealStatus(LAST_SUCCESSFUL_TIME))
-        except Exception:  # fmpy's own error type: the FMU does not say
+        except Exception:  # fmpy's own error type: the FMU does not tell the time
             return math.nan
 
     def close(self) -> None:
-        """Frees the instance and what was unpacked; harmless when called twice."""
+        """Frees the instance and deletes the unpacked files; may be called twice."""
         slave, self._slave = self._slave, None
         if slave is not None:
             slave.fmiCallLogger = None

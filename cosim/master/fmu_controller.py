@@ -1,6 +1,4 @@
-"""A controller FMU in the place of the Python controller: the master steps it as it steps
-`Controller`.
-"""
+"""Drives a controller FMU through the interface of the Python `Controller`."""
 
 from __future__ import annotations
 
@@ -17,12 +15,12 @@ from hexapod_cosim.models import LEG_NAMES
 
 LEGS = len(LEG_NAMES)
 COMMANDS = [f"command.{item.name}" for item in fields(BodyCommand)]
-SENSED = ("angle", "foot_force", "quaternion")  # of the measurement
+SENSED = ("angle", "foot_force", "quaternion")  # fields of the measurement that the FMU reads
 FLAGS = ("swinging", "unreachable", "fallback")
 
 
 class FmuController:
-    """Drives an initialised controller FMU. The period [s] is the length of its steps."""
+    """Steps an initialised controller FMU; `period` [s] is the length of its steps."""
 
     def __init__(self, fmu: Fmu, *, period: float) -> None:
         self._fmu, self._period = fmu, period
@@ -41,7 +39,9 @@ class FmuController:
         self._out = JointCommand(*(part.reshape(LEGS, 3) for part in (angle, speed, torque)))
         if acceleration_names:
             self._out.acceleration_ref = acceleration.reshape(LEGS, 3)
-        swinging, unreachable, fallback = self._shown = np.zeros((len(FLAGS), LEGS), dtype=np.bool_)
+        swinging, unreachable, fallback = self._flag_values = np.zeros(
+            (len(FLAGS), LEGS), dtype=np.bool_
+        )
         self.diagnostics = Diagnostics(
             swinging,
             feet.reshape(LEGS, 3),
@@ -52,17 +52,18 @@ class FmuController:
         )
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """The joint commands for [t, t + period). The result's arrays are reused by the next
-        step. Raises FmuError.
+        """Returns the joint commands for [t, t + period). Raises FmuError.
+
+        The next step reuses the arrays of the result.
         """
-        self._sense(command, measurement)
-        self._inputs.set()
+        self._write_inputs(command, measurement)
         self._outputs.get()
         self._flags.get()
-        self._shown[...] = self._flags.values.reshape(self._shown.shape)
+        self._flag_values[...] = self._flags.values.reshape(self._flag_values.shape)
         self._fmu.step(t, self._period)
         return self._out
 
-    def _sense(self, command: BodyCommand, measurement: Measurement) -> None:
+    def _write_inputs(self, command: BodyCommand, measurement: Measurement) -> None:
         parts: list[NDArray[np.float64]] = [getattr(measurement, key).ravel() for key in SENSED]
         np.concatenate([astuple(command), *parts], out=self._inputs.values)
+        self._inputs.set()

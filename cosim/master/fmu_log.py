@@ -1,5 +1,6 @@
-"""What FMUs say, each to its own log: fmpy's formatter of messages knows one Python function in
-a process, so all instances share ours.
+"""Collects the log messages of FMU instances, one log for each instance.
+
+fmpy's message formatter accepts one Python callback per process, so all instances share one.
 """
 
 from __future__ import annotations
@@ -13,21 +14,20 @@ from fmpy.logging import addLoggerProxy
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 WARNING = STATUS.index("warning")
-KEPT = 20  # messages
+MAX_MESSAGES = 20
 
-_logs: dict[
-    int, deque[str]
-] = {}  # by the environment that an instance hands back with its messages
+_logs: dict[int, deque[str]] = {}  # by componentEnvironment, which the FMU returns with a message
 _environments = count(1)
 
 
 class FmuLog:
-    """Warnings and errors of one instance, the newest last; `callbacks` are what it is made
-    with.
+    """Warnings and errors of one instance, the newest last.
+
+    `callbacks` is the structure to instantiate the FMU with.
     """
 
     def __init__(self) -> None:
-        self.messages: deque[str] = deque(maxlen=KEPT)
+        self.messages: deque[str] = deque(maxlen=MAX_MESSAGES)
         self._environment = next(_environments)
         _logs[self._environment] = self.messages
         self.callbacks = fmi2CallbackFunctions()
@@ -38,7 +38,7 @@ class FmuLog:
         addLoggerProxy(ctypes.byref(self.callbacks))  # formats the variadic message in C
 
     def close(self) -> None:
-        """Nothing is kept from here on; harmless when called twice."""
+        """Stops collecting messages; may be called twice."""
         _logs.pop(self._environment, None)
 
 
@@ -50,6 +50,4 @@ def _write(
         log.append(message.decode("utf-8", errors="replace"))
 
 
-_logger = fmi2CallbackLoggerTYPE(
-    _write
-)  # lives as long as the process: the formatter keeps its address
+_logger = fmi2CallbackLoggerTYPE(_write)  # never freed: the formatter keeps its address

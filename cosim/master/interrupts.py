@@ -1,4 +1,4 @@
-"""When Ctrl-C and SIGTERM may strike: not while what was recorded is on its way to the disk."""
+"""Controls where Ctrl-C and SIGTERM may interrupt: not while a recording is being written."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from types import FrameType
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-class _Hold:
-    """A signal handler that only remembers."""
+class _DeferredSignal:
+    """A signal handler that only records that a signal arrived."""
 
     pending = False
 
@@ -21,48 +21,51 @@ class _Hold:
 
 
 @contextmanager
-def held_interrupts() -> Iterator[None]:
-    """Keeps an interrupt back until the block has ended well; only Python's main thread receives
-    any. Raises KeyboardInterrupt then.
+def deferred_interrupts() -> Iterator[None]:
+    """Defers interrupts until the block has ended, and then raises KeyboardInterrupt.
+
+    Has no effect outside Python's main thread, which alone receives signals.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    hold = _Hold()
-    before = {number: signal.signal(number, hold) for number in SIGNALS}
+    deferred = _DeferredSignal()
+    before = {number: signal.signal(number, deferred) for number in SIGNALS}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    if hold.pending:
+    if deferred.pending:
         raise KeyboardInterrupt
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """A part within `held_interrupts` that an interrupt does end, one that was kept back before
-    it too. Raises KeyboardInterrupt.
+    """Allows interrupts again within `deferred_interrupts`.
+
+    Raises KeyboardInterrupt for an interrupt in the block and for one deferred before it.
     """
-    hold = signal.getsignal(signal.SIGINT)
-    if not isinstance(hold, _Hold):
+    deferred = signal.getsignal(signal.SIGINT)
+    if not isinstance(deferred, _DeferredSignal):
         yield
         return
     try:
         for number in SIGNALS:
             signal.signal(number, signal.default_int_handler)
-        if hold.pending:
+        if deferred.pending:
             raise KeyboardInterrupt
         yield
     finally:
         for number in SIGNALS:
-            signal.signal(number, hold)
+            signal.signal(number, deferred)
 
 
 @contextmanager
-def deaf_to_interrupts() -> Iterator[None]:
-    """Processes begun within the block never hear Ctrl-C, which a terminal sends to all of them;
-    this one hears it when the block ends.
+def blocked_interrupts() -> Iterator[None]:
+    """Blocks Ctrl-C in processes started within the block, although the terminal sends it to all.
+
+    This process receives a Ctrl-C that came during the block when the block ends.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -76,7 +79,7 @@ def deaf_to_interrupts() -> Iterator[None]:
 
 @contextmanager
 def termination_as_interrupt() -> Iterator[None]:
-    """SIGTERM does what Ctrl-C does."""
+    """Makes SIGTERM raise KeyboardInterrupt, as Ctrl-C does."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,5 +1,7 @@
-"""The co-simulation loop: at t_k = start + k h read outputs -> controller -> set inputs ->
-record -> step to t_k + h.
+"""The co-simulation loop in Python.
+
+At each macro-step t_k = start + k h: read outputs -> controller -> set inputs -> record -> step
+the plant to t_k + h.
 """
 
 from __future__ import annotations
@@ -28,34 +30,33 @@ Progress = Callable[[float], None]  # simulated time since the start [s]
 
 
 class JointController(Protocol):
-    """What the master asks of a controller."""
+    """What the master needs of a controller."""
 
-    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand: ...
+    def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
+        """Returns the joint commands that hold from t [s] for one macro-step."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended. A run that did not complete keeps what it recorded up to then."""
+    """How a run ended. A run that did not complete keeps the rows recorded until then."""
 
     status: str  # COMPLETED, FAILED or INTERRUPTED
-    reason: str  # in words, "" when completed
+    reason: str  # a sentence; "" when completed
     simulated: float  # s
-    wall: float  # s, the whole loop
+    wall: float  # s, of the whole loop
     recording: Recording
     cause: Exception | None = None  # of a failure
-    every_step: Recording | None = (
-        None  # what is judged, of every macro-step; None: the recording has them all
-    )
+    every_step: Recording | None = None  # metric columns of all steps; None: recording has them
     finished: datetime = field(default_factory=lambda: datetime.now(UTC), compare=False)
 
     @property
     def judged(self) -> Recording:
-        """What figures are made of: a row per macro-step."""
+        """The recording that metrics are computed from: one row per macro-step."""
         return self.recording if self.every_step is None else self.every_step
 
     @property
     def realtime_factor(self) -> float:
-        """Simulated over wall time."""
+        """Simulated time over wall time."""
         return self.simulated / self.wall if self.wall > 0.0 else 0.0
 
 
@@ -71,8 +72,8 @@ def run(
 ) -> Outcome:
     """Runs an initialised plant under a controller over the whole schedule in macro-steps of h [s].
 
-    A step that the plant refuses, whatever a controller raises and an interrupt end the run; the
-    outcome says which.
+    A refused step, any exception of the controller and an interrupt end the run; the outcome
+    tells which.
     """
     status, reason, begin, cause = COMPLETED, "", perf_counter(), None
     try:
@@ -80,33 +81,37 @@ def run(
             _loop(plant, signals, controller, schedule, recorder, h=h, progress=progress)
     except KeyboardInterrupt:
         status, reason = INTERRUPTED, "interrupted"
-    except Exception as error:  # a controller may raise anything: the rows before it are kept
-        status, reason, cause = (
-            FAILED,
-            str(error) if isinstance(error, HexapodError) else f"{type(error).__name__}: {error}",
-            error,
-        )
+    except Exception as error:  # a controller may raise anything; the recorded rows are kept
+        status, cause = FAILED, error
+        reason = str(error)
+        if not isinstance(error, HexapodError):
+            reason = f"{type(error).__name__}: {error}"
     wall, judged = perf_counter() - begin, recorder.judged
     simulated = float(judged.time[-1] - schedule.times[0]) if len(judged.time) else 0.0
     return Outcome(status, reason, simulated, wall, recorder.recording, cause, judged)
 
 
-def insides(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
-    """What the controller shows of itself, if it is ours: planned swing, legs that could not
-    follow, corrections of the feet [m].
+def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDArray[Any]]:
+    """Returns the arrays of the controller's diagnostics by the names of their columns.
+
+    Returns {} for a controller whose `diagnostics` are not ours. Corrections are in m.
     """
     shown = getattr(controller, "diagnostics", None)
     if not isinstance(shown, Diagnostics):
         return {}
-    six = {key: getattr(shown, key) for key in ("swinging", "unreachable", "lift", "fallback")}
-    shift = tuple(
-        name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.shift", 2)
-    )  # x + i y in memory is x, y
-    planned = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
-    told = {
-        tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): value for key, value in six.items()
+    columns: dict[tuple[str, ...], NDArray[Any]] = {
+        tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): getattr(shown, key)
+        for key in ("swinging", "unreachable", "lift", "fallback")
     }
-    return told | {shift: shown.shift.view(float), planned: shown.planned}
+    columns[_leg_vectors("shift", 2)] = shown.shift.view(float)  # x + i y in memory is x, y
+    columns[_leg_vectors("planned", 3)] = shown.planned
+    return columns
+
+
+def _leg_vectors(quantity: str, size: int) -> tuple[str, ...]:
+    """Column names of a vector quantity of the controller, leg by leg."""
+    stems = [f"controller.{leg}.{quantity}" for leg in LEG_NAMES]
+    return tuple(name for stem in stems for name in vector_names(stem, size))
 
 
 def _loop(
@@ -119,13 +124,10 @@ def _loop(
     h: float,
     progress: Progress | None,
 ) -> None:
-    read, control, write, record, advance = (
-        signals.read,
-        controller.step,
-        signals.write,
-        recorder.record,
-        plant.step,
-    )
+    """Runs all macro-steps; the last row, at the end of the run, is followed by no step."""
+    # bound methods are looked up once: this loop is the hot path
+    read, control, write = signals.read, controller.step, signals.write
+    record, advance = recorder.record, plant.step
     pushes, measurement = schedule.pushes, signals.measurement
     read()
     for k, (t, command) in enumerate(zip(schedule.times.tolist(), schedule.commands, strict=False)):

@@ -1,9 +1,8 @@
-"""The master's loop in C (master/src/master.c): the same walk as `master.run` with an
-`FmuController`, without Python between macro-steps.
+"""Runs the master's loop in C (master/src/master.c) on a plant FMU and a controller FMU.
 
-The FMUs are loaded, initialised and freed by `Fmu`, in Python; the loop gets their functions and
-references and drives them through FMI alone. It runs for some macro-steps at a time without the
-interpreter's lock: interrupts are heard in between, other threads go on.
+It computes the same walk as `loop.run` with an `FmuController`. Python loads, initialises and
+frees the FMUs; the C loop drives them through FMI functions alone, for some macro-steps at a time
+and without the interpreter's lock. Interrupts are handled between these calls.
 """
 
 from __future__ import annotations
@@ -30,17 +29,17 @@ from hexapod_cosim.cosim.master.signals import (
     COMMANDED,
     MEASURED,
     PUSH,
-    refuse_foreign,
+    check_plant_variables,
 )
 from hexapod_cosim.cosim.scenario.schedule import Schedule
 from hexapod_cosim.models import LEG_NAMES, FmuError
 
-STEPS_AT_ONCE = 500  # macro-steps between two looks at interrupts: some 10 ms
+STEPS_PER_CALL = 500  # macro-steps between two checks for interrupts, about 10 ms
 FORCE = MEASURED["foot_force"]
 JOINT_COMMANDS = [name for names in COMMANDED.values() for name in names]
 SHIFT = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.shift", 2)]
 PLANNED = [name for leg in LEG_NAMES for name in vector_names(f"{leg}.planned")]
-INSIDES = [*SHIFT, *(f"{leg}.lift" for leg in LEG_NAMES), *PLANNED]
+DIAGNOSTICS = [*SHIFT, *(f"{leg}.lift" for leg in LEG_NAMES), *PLANNED]
 CONTROLLER_FLAGS = [f"{leg}.{flag}" for flag in FLAGS for leg in LEG_NAMES]
 
 _Size = ct.c_size_t
@@ -48,7 +47,7 @@ _Pointer = ct.c_void_p
 
 
 class _Fmu(ct.Structure):
-    """hxMasterFmu"""
+    """hxMasterFmu in C."""
 
     _fields_ = [
         (name, _Pointer) for name in ("instance", "get_real", "get_boolean", "set_real", "do_step")
@@ -56,13 +55,13 @@ class _Fmu(ct.Structure):
 
 
 class _Block(ct.Structure):
-    """hxMasterBlock"""
+    """hxMasterBlock in C."""
 
     _fields_ = [("reference", _Pointer), ("count", _Size), ("place", _Size)]
 
 
 class _Sensor(ct.Structure):
-    """hxMasterSensor"""
+    """hxMasterSensor in C."""
 
     _fields_ = [(name, _Pointer) for name in ("factor", "fault", "memory")] + [
         (name, _Size) for name in ("delay", "feet", "forces", "place", "reading")
@@ -70,7 +69,7 @@ class _Sensor(ct.Structure):
 
 
 class _Table(ct.Structure):
-    """hxMasterTable"""
+    """hxMasterTable in C."""
 
     _fields_ = [
         ("column", _Pointer),
@@ -82,7 +81,7 @@ class _Table(ct.Structure):
 
 
 class _Peaks(ct.Structure):
-    """hxMasterPeaks"""
+    """hxMasterPeaks in C."""
 
     _fields_ = [
         ("place", _Pointer), ("places", _Size), ("count", _Pointer), ("counts", _Size),
@@ -91,7 +90,7 @@ class _Peaks(ct.Structure):
 
 
 class _Master(ct.Structure):
-    """hxMaster"""
+    """hxMaster in C."""
 
     _fields_ = [
         *((name, _Fmu) for name in ("plant", "controller")),
@@ -123,7 +122,7 @@ class _Master(ct.Structure):
     ]
 
 
-# hxMasterCall, from 1: which FMU, and what the message says; a step's says more
+# hxMasterCall, from 1: the FMU and the message; "" for a step, whose message is made by the FMU
 CALLS = (
     ("plant", "the FMU does not give its outputs"),
     ("plant", "the FMU does not take its inputs"),
@@ -136,8 +135,9 @@ CALLS = (
 
 @cache
 def _library() -> ct.CDLL:
-    """The loop, its functions' types declared. Raises FmuError when it is missing or another
-    version's.
+    """Loads the C loop and declares its functions' types.
+
+    Raises FmuError when the library is missing or has another version.
     """
     path = shared_library(LOOP)
     library = ct.CDLL(str(path))
@@ -151,11 +151,11 @@ def _library() -> ct.CDLL:
 
 
 class NativeMaster:
-    """A plant FMU wired to a controller FMU, for any number of runs one after the other. Of all
-    signals `columns` are recorded; None: all.
+    """A plant FMU connected to a controller FMU, for any number of successive runs.
 
-    Where not every macro-step is recorded, all of them are of `judged`. Raises FmuError when either
-    is not what `hexapod export` makes.
+    `columns`: the signals to record; None for all. `judged`: the signals to keep for every
+    macro-step where `columns` are kept for fewer. Raises FmuError when an FMU lacks variables that
+    every FMU of `hexapod export` has.
     """
 
     def __init__(
@@ -167,54 +167,59 @@ class NativeMaster:
         judged: Sequence[str] = (),
     ) -> None:
         self._library, self._fmus = _library(), {"plant": plant, "controller": controller}
-        seen, flagged = plant.names("output"), plant.names("output", "Boolean")
-        refuse_foreign(seen, plant.names("input"), flagged)
-        shown = {"insides": INSIDES, "flags": CONTROLLER_FLAGS}  # of the controller
-        if columns is not None:  # what nobody looks at is not read
+        outputs, flags = plant.names("output"), plant.names("output", "Boolean")
+        check_plant_variables(outputs, plant.names("input"), flags)
+        shown = {"diagnostics": DIAGNOSTICS, "flags": CONTROLLER_FLAGS}  # of the controller
+        if columns is not None:  # read only what is recorded or needed by the controller
             wanted = {*columns, *(name for key in SENSED for name in MEASURED[key])}
-            seen, flagged = (
-                [name for name in names if name in wanted] for names in (seen, flagged)
-            )
+            outputs = [name for name in outputs if name in wanted]
+            flags = [name for name in flags if name in wanted]
             shown = {
                 key: [name for name in names if f"controller.{name}" in wanted]
                 for key, names in shown.items()
             }
-        told = (f"controller.{name}" for names in shown.values() for name in names)
+        shown_names = (f"controller.{name}" for names in shown.values() for name in names)
         both = set(plant.names("input")) & set(controller.names("output"))
         self._commands = [*JOINT_COMMANDS, *(ACCELERATION if set(ACCELERATION) <= both else [])]
         self._places = {
             name: place
-            for place, name in enumerate((*seen, *flagged, *PUSH, *self._commands, *told))
+            for place, name in enumerate((*outputs, *flags, *PUSH, *self._commands, *shown_names))
         }
-        self._reading = len(self._places)  # the sensors' readings come last, and are not recorded
+        self._reading = len(self._places)  # the sensors' readings come last and are not recorded
         self._value = np.zeros(self._reading + len(FORCE))
         self.columns = tuple(self._places if columns is None else columns)
         self._judged = tuple(name for name in self.columns if name in set(judged))
-        self._keep: list[NDArray[Any]] = []  # what the structure points to
-        self._master = self._wire(seen, flagged, **shown)
+        self._arrays: list[NDArray[Any]] = []  # keeps alive what the structure points to
+        self._master = self._make_master(outputs, flags, **shown)
 
-    def _wire(
-        self, seen: list[str], flagged: list[str], *, insides: list[str], flags: list[str]
+    def _make_master(
+        self,
+        outputs: list[str],
+        plant_flags: list[str],
+        *,
+        diagnostics: list[str],
+        flags: list[str],
     ) -> _Master:
-        """What is the same in all runs."""
+        """Fills the part of the structure that is the same in all runs."""
         plant, controller = self._fmus["plant"], self._fmus["controller"]
         sensed = [name for key in SENSED for name in MEASURED[key]]
         peaks = Peaks(tuple(self._places))
-        room = {
-            name: self._hold(np.zeros(len(peaks.places))) for name in ("largest", "seen", "kept")
+        peak_memory = {
+            name: self._keep(np.zeros(len(peaks.places))) for name in ("largest", "seen", "kept")
         }
+        flag_count = max(len(plant_flags), len(CONTROLLER_FLAGS))
         return _Master(
             plant=_functions(plant),
             controller=_functions(controller),
-            plant_output=self._block(plant, seen),
-            plant_flag=self._block(plant, flagged),
+            plant_output=self._block(plant, outputs),
+            plant_flag=self._block(plant, plant_flags),
             plant_input=self._block(plant, [*PUSH, *self._commands]),
-            controller_output=self._block(controller, [*self._commands, *insides]),
+            controller_output=self._block(controller, [*self._commands, *diagnostics]),
             controller_flag=self._block(controller, flags, self._reading - len(flags)),
-            flag=self._hold(np.zeros(max(len(flagged), len(CONTROLLER_FLAGS)), dtype=np.int32)),
+            flag=self._keep(np.zeros(flag_count, dtype=np.int32)),
             value=self._value.ctypes.data,
             controller_input=self._references(controller, [*COMMANDS, *sensed]),
-            controller_value=self._hold(np.zeros(len(COMMANDS) + len(sensed))),
+            controller_value=self._keep(np.zeros(len(COMMANDS) + len(sensed))),
             command_count=len(COMMANDS),
             sensed_count=len(sensed),
             push_count=len(PUSH),
@@ -230,20 +235,20 @@ class NativeMaster:
                 len(peaks.places),
                 self._indices(peaks.counts),
                 len(peaks.counts),
-                **room,
+                **peak_memory,
             ),
         )
 
-    def _hold(self, array: NDArray[Any]) -> int:
-        """The address of an array that lives as long as this."""
-        self._keep.append(array)
+    def _keep(self, array: NDArray[Any]) -> int:
+        """Returns the address of an array and keeps the array alive as long as this object."""
+        self._arrays.append(array)
         return int(array.ctypes.data)
 
     def _indices(self, places: Sequence[int]) -> int:
-        return self._hold(np.array(places, dtype=np.uintp))
+        return self._keep(np.array(places, dtype=np.uintp))
 
     def _references(self, fmu: Fmu, names: Sequence[str]) -> int:
-        return self._hold(np.array(fmu.references(names), dtype=np.uint32))
+        return self._keep(np.array(fmu.references(names), dtype=np.uint32))
 
     def _block(self, fmu: Fmu, names: Sequence[str], place: int | None = None) -> _Block:
         return _Block(
@@ -261,29 +266,34 @@ class NativeMaster:
         sensor: SensorSettings | None = None,
         progress: Progress | None = None,
     ) -> Outcome:
-        """Runs both FMUs, just initialised, over the whole schedule in macro-steps of h [s], of
-        which one of `every` is recorded; as `master.run`, but that it never raises.
+        """Runs both initialised FMUs over the whole schedule in macro-steps of h [s].
+
+        One of `every` macro-steps is recorded. Works as `loop.run`, but never raises.
         """
         master = self._master
-        kept = _laid_out(master.kept, self.columns, schedule, every)
-        judged = _laid_out(master.judged, self._judged, schedule, 1) if every > 1 else None
+        kept = _allocate_rows(master.kept, self.columns, schedule, every)
+        judged = _allocate_rows(master.judged, self._judged, schedule, 1) if every > 1 else None
         if judged is None:
             master.judged.row = None
         self._value[:] = 0.0
-        arrays = self._lay_in(schedule, sensor)
+        arrays = self._point_to_run(schedule, sensor)
         master.h, master.every = h, every
         for fmu in self._fmus.values():
-            fmu.forget()
+            fmu.clear_log()
         begin = perf_counter()
-        status, reason, cause = self._drive(schedule.times, h, progress)
-        wall, recording = perf_counter() - begin, _recorded(self.columns, kept, master.kept)
-        every_step = recording if judged is None else _recorded(self._judged, judged, master.judged)
-        del arrays  # until here the loop needed them
+        status, reason, cause = self._run_steps(schedule.times, h, progress)
+        wall, recording = perf_counter() - begin, _recording(self.columns, kept, master.kept)
+        every_step = recording
+        if judged is not None:
+            every_step = _recording(self._judged, judged, master.judged)
+        del arrays  # the C loop needs them until here
         simulated = float(every_step.time[-1] - schedule.times[0]) if len(every_step.time) else 0.0
         return Outcome(status, reason, simulated, wall, recording, cause, every_step)
 
-    def _lay_in(self, schedule: Schedule, sensor: SensorSettings | None) -> list[NDArray[Any]]:
-        """Points the structure to what is this run's own, and returns that."""
+    def _point_to_run(
+        self, schedule: Schedule, sensor: SensorSettings | None
+    ) -> list[NDArray[Any]]:
+        """Points the structure to the arrays of this run and returns them to be kept alive."""
         master, count = self._master, len(schedule.rows)
         arrays: dict[str, NDArray[Any] | None] = {
             "time": schedule.times,
@@ -321,16 +331,16 @@ class NativeMaster:
         master.sensed = where.ctypes.data
         return [array for array in (*reals.values(), *parts.values(), where) if array is not None]
 
-    def _drive(
+    def _run_steps(
         self, times: NDArray[np.float64], h: float, progress: Progress | None
     ) -> tuple[str, str, Exception | None]:
-        """All macro-steps: status, reason and cause of the outcome."""
+        """Runs all macro-steps; returns status, reason and cause of the outcome."""
         master, library, steps = self._master, self._library, len(times) - 1
         try:
             with interruptible():
                 going = library.hx_master_begin(master)
                 while going and master.step < steps:
-                    going = library.hx_master_run(master, min(master.step + STEPS_AT_ONCE, steps))
+                    going = library.hx_master_run(master, min(master.step + STEPS_PER_CALL, steps))
                     if progress is not None and going:
                         progress(master.step * h)
                 if going:
@@ -338,20 +348,20 @@ class NativeMaster:
                     return COMPLETED, "", None
         except KeyboardInterrupt:
             return INTERRUPTED, "interrupted", None
-        error = self._refusal(float(times[master.step]))
+        error = self._error(float(times[master.step]))
         return FAILED, str(error), error
 
-    def _refusal(self, t: float) -> FmuError:
-        """What the loop ended with in the macro-step at t [s], as the Python master says it."""
+    def _error(self, t: float) -> FmuError:
+        """Returns the error that ended the macro-step at t [s], worded as the Python master's."""
         which, what = CALLS[self._master.call - 1]
         fmu, status = self._fmus[which], self._master.status
         return fmu.failure(what, status) if what else fmu.step_failure(t, status)
 
 
-def _laid_out(
+def _allocate_rows(
     table: _Table, columns: Sequence[str], schedule: Schedule, every: int
 ) -> NDArray[np.float64]:
-    """Room for a table's rows, with times and commands, to which the table then points."""
+    """Allocates the rows of a table, fills times and commands, and points the table to them."""
     moments = kept_moments(len(schedule.rows), every)
     data = np.empty((len(moments), 1 + len(columns) + len(COMMAND_COLUMNS)))
     data[:, 0], data[:, 1 + len(columns) :] = schedule.times[moments], schedule.rows[moments]
@@ -359,7 +369,7 @@ def _laid_out(
     return data
 
 
-def _recorded(columns: Sequence[str], data: NDArray[np.float64], table: _Table) -> Recording:
+def _recording(columns: Sequence[str], data: NDArray[np.float64], table: _Table) -> Recording:
     return Recording(("time", *columns, *COMMAND_COLUMNS), data[: table.rows])
 
 

@@ -1,6 +1,4 @@
-"""What the master asks of a plant, so that anything that can do the same may stand in for an
-FMU.
-"""
+"""The interface of a plant that the master needs, which an FMU or a replacement implements."""
 
 from __future__ import annotations
 
@@ -11,24 +9,40 @@ from numpy.typing import NDArray
 
 
 class Block(Protocol):
-    """Variables of one type, moved in one call."""
+    """Variables of one type that are read or written in one call."""
 
     @property
-    def names(self) -> tuple[str, ...]: ...
+    def names(self) -> tuple[str, ...]:
+        """Names of the variables."""
+
     @property
-    def values(
-        self,
-    ) -> NDArray[Any]: ...  # (n,) float64 or int32: the buffer the calls fill and read
-    def get(self) -> None: ...
-    def set(self) -> None: ...
+    def values(self) -> NDArray[Any]:
+        """Buffer (n,) that get() fills and set() reads: float64 for Reals, else int32."""
+
+    def get(self) -> None:
+        """Reads all values from the plant. Raises FmuError."""
+
+    def set(self) -> None:
+        """Writes all values to the plant. Raises FmuError."""
 
 
 class Plant(Protocol):
-    """What the master asks of a plant. Times in s."""
+    """What the master needs of a plant. Times are in s."""
 
-    def names(self, causality: str, kind: str = "Real") -> list[str]: ...
-    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> Block: ...
-    def parameters(self) -> dict[str, float]: ...
-    def set_parameters(self, values: Mapping[str, Any]) -> None: ...
-    def initialise(self, start: float, stop: float) -> None: ...
-    def step(self, t: float, h: float) -> None: ...
+    def names(self, causality: str, kind: str = "Real") -> list[str]:
+        """Returns the names of all variables of a causality and FMI type."""
+
+    def block(self, names: Sequence[str], buffer: NDArray[Any] | None = None) -> Block:
+        """Returns a block of the named variables, with its values in `buffer` if given."""
+
+    def parameters(self) -> dict[str, float]:
+        """Returns the present values of all parameters."""
+
+    def set_parameters(self, values: Mapping[str, Any]) -> None:
+        """Sets parameters by name, before `initialise`."""
+
+    def initialise(self, start: float, stop: float) -> None:
+        """Initialises the plant at time `start` [s]."""
+
+    def step(self, t: float, h: float) -> None:
+        """Steps from t to t + h [s]. Raises StepError."""

@@ -1,4 +1,4 @@
-"""What a run leaves: rows of macro-steps in columns made beforehand."""
+"""Records the rows of a run, one per macro-step or fewer, into arrays allocated beforehand."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hexapod_cosim.cosim.master.signals import Signals
 from hexapod_cosim.models import HexapodError, ScenarioError, nearest_name
 
 Array = NDArray[np.float64]
-PEAKS = ("peak_force", "peak_force_rate")  # of a foot within the last communication step
+PEAKS = ("peak_force", "peak_force_rate")  # of a foot, within the last communication step
 LANDING_RATE, LANDINGS = "landing_rate", "landings"
 COMMAND_COLUMNS = (
     "command.vx",
@@ -37,13 +37,14 @@ COMMAND_COLUMNS = (
 
 
 class ColumnError(HexapodError):
-    """A variable that was not recorded."""
+    """A variable was asked for that was not recorded."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Rows of a run. Row k: outputs read at time[k], and the inputs set then, which hold until
-    time[k + 1].
+    """Rows of a run.
+
+    Row k holds the outputs read at time[k] and the inputs set then, which hold until time[k + 1].
     """
 
     names: tuple[str, ...]  # the first is "time" [s]
@@ -55,49 +56,48 @@ class Recording:
 
     @property
     def time(self) -> Array:
-        """(rows,) [s]"""
+        """Times (rows,) [s]."""
         return self.data[:, 0]
 
     def column(self, name: str) -> Array:
-        """(rows,) one variable. Raises HexapodError when it was not recorded."""
+        """Returns one variable (rows,). Raises ColumnError when it was not recorded."""
         return self.columns([name])[:, 0]
 
     def columns(self, names: Sequence[str]) -> Array:
-        """(rows, names) several variables. Raises HexapodError when one was not recorded."""
+        """Returns several variables (rows, names). Raises ColumnError for one not recorded."""
         for name in names:
             if name not in self._index:
                 near = nearest_name(name, self.names)
-                fix = (
-                    f"did you mean {near!r}?"
-                    if near
-                    else "record it: outputs.csv names the columns that are kept"
-                )
+                fix = "record it: outputs.csv names the columns that are kept"
+                if near:
+                    fix = f"did you mean {near!r}?"
                 raise ColumnError("no such column in the recording", got=name, fix=fix)
         return self.data[:, [self._index[name] for name in names]]
 
     def joints(self, quantity: str) -> Array:
-        """(rows, 6, 3) a quantity of all joints."""
+        """Returns a quantity of all joints (rows, 6, 3)."""
         return self.columns(joint_names(quantity)).reshape(-1, LEGS, JOINTS)
 
     def feet(self, quantity: str) -> Array:
-        """(rows, 6) a scalar quantity of all feet."""
+        """Returns a scalar quantity of all feet (rows, 6)."""
         return self.columns(foot_names(quantity))
 
     def foot_vectors(self, quantity: str) -> Array:
-        """(rows, 6, 3) a vector quantity of all feet, world axes."""
+        """Returns a vector quantity of all feet (rows, 6, 3), world axes."""
         return self.columns(foot_vector_names(quantity)).reshape(-1, LEGS, 3)
 
     def vector(self, stem: str, size: int = 3) -> Array:
-        """(rows, size) a vector variable."""
+        """Returns a vector variable (rows, size)."""
         return self.columns(vector_names(stem, size))
 
     def rows(self, chosen: slice) -> Recording:
-        """The same columns of fewer rows, not copied."""
+        """Returns the same columns of fewer rows, without copying."""
         return Recording(self.names, self.data[chosen])
 
     def chosen(self, patterns: Sequence[str]) -> Recording:
-        """Time and the columns that match a pattern (`*` any text). Raises ScenarioError when a
-        pattern matches nothing.
+        """Returns time and the columns that match a pattern (`*` matches any text).
+
+        Raises ScenarioError when a pattern matches nothing.
         """
         keep = chosen_columns(self.names, patterns)
         if len(keep) == len(self.names):
@@ -108,8 +108,9 @@ class Recording:
 def chosen_columns(
     names: Sequence[str], patterns: Sequence[str], *, where: str = "outputs.csv"
 ) -> list[int]:
-    """Places of time and of the names that match a pattern (`*` any text). Raises ScenarioError
-    when a pattern matches nothing.
+    """Returns the indices of time and of the names that match a pattern (`*` matches any text).
+
+    Raises ScenarioError when a pattern matches nothing.
     """
     for pattern in patterns:
         if not any(_matches(name, pattern) for name in names):
@@ -128,13 +129,12 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 class Recorder:
-    """Fills rows of a run; times (rows,) and body commands (rows, 6) are known beforehand, so a row
-    copies the plant's values and no more.
+    """Records one row per macro-step; times (rows,) and body commands (rows, 6) are known before.
 
-    `extra` holds further things to record: an array, seen afresh at every row, under the names of
-    its entries in memory order. With `every` > 1 only one of so many rows is kept, the last one
-    always; then `judged` names what all rows are kept of, and in the rows kept the plant's peaks
-    are the largest since the row before.
+    `extra`: further arrays to record, by the names of their entries in memory order; each row reads
+    them again. With `every` > 1 only the first, every `every`-th and the last row are kept; then
+    `judged` names the columns that are kept of all rows, and the plant's peaks in a kept row are
+    the largest since the kept row before.
     """
 
     def __init__(
@@ -152,11 +152,10 @@ class Recorder:
         }
         self.names = ("time", *(name for names in sources for name in names), *COMMAND_COLUMNS)
         ends = np.cumsum([1, *map(len, sources)]).tolist()
-        self._thinned = None if every == 1 else Thinned(self.names, judged, len(times), every)
-        rows = len(times) if every == 1 else 1  # of which one is filled again and again
-        self._data = np.full(
-            (rows, len(self.names)), np.nan
-        )  # filled, so that no row is the first to touch its memory
+        self._thinned = None if every == 1 else ThinnedRows(self.names, judged, len(times), every)
+        rows = len(times) if every == 1 else 1  # thinned: one row is filled again and again
+        # filling touches all memory now rather than during the run
+        self._data = np.full((rows, len(self.names)), np.nan)
         self._times, self._commands = self._data[:, 0], self._data[:, ends[-1] :]
         self._known = times, commands
         if every == 1:
@@ -168,7 +167,7 @@ class Recorder:
         self._count = 0
 
     def record(self) -> None:
-        """Adds a row: everything as it stands."""
+        """Adds a row with the present values."""
         k = self._count
         row = k if self._thinned is None else 0
         for target, source in self._copies:
@@ -176,26 +175,27 @@ class Recorder:
         if self._thinned is not None:
             self._times[0], self._commands[0] = self._known[0][k], self._known[1][k]
             self._thinned.add(self._data[0])
-        self._count = k + 1  # last: an interrupt before it loses the row, not its integrity
+        self._count = k + 1  # last, so that an interrupted row is not counted
 
     @property
     def recording(self) -> Recording:
-        """The rows so far that are kept."""
+        """The rows kept so far."""
         if self._thinned is not None:
             return Recording(self.names, self._thinned.rows)
         return Recording(self.names, self._data[: self._count])
 
     @property
     def judged(self) -> Recording:
-        """Every row so far, of what is judged at least."""
+        """All rows so far, with the `judged` columns at least."""
         if self._thinned is not None:
             return Recording(self._thinned.names, self._thinned.judged[: self._count])
         return self.recording
 
 
-class Thinned:
-    """Rows of which one of `every` is kept, and the last; of all of them what is judged. For
-    `rows` rows at most.
+class ThinnedRows:
+    """Keeps one of `every` rows and the last one; of all rows it keeps the `judged` columns.
+
+    `rows` is the largest number of rows.
     """
 
     def __init__(self, names: Sequence[str], judged: Sequence[str], rows: int, every: int) -> None:
@@ -205,36 +205,37 @@ class Thinned:
         self.judged: Array = np.full((rows, len(self._places)), np.nan)
         moments = kept_moments(rows, every)
         self._kept = np.full((len(moments), len(names)), np.nan)
-        self._due, self._count, self._full = set(moments.tolist()), 0, 0
+        self._due = set(moments.tolist())
+        self._count = self._kept_count = 0
         self._peaks = Peaks(names)
 
     def add(self, row: Array) -> None:
-        """The next row (names,)."""
+        """Adds a row (names,)."""
         k = self._count
         self.judged[k] = row[self._places]
-        self._peaks.see(row)
+        self._peaks.update(row)
         if k in self._due:
-            self._kept[self._full] = row
-            self._peaks.show(self._kept[self._full])
-            self._full += 1
+            self._kept[self._kept_count] = row
+            self._peaks.write(self._kept[self._kept_count])
+            self._kept_count += 1
         self._count = k + 1
 
     @property
     def rows(self) -> Array:
-        """(rows, names) those kept so far."""
-        return self._kept[: self._full]
+        """The kept rows so far (rows, names)."""
+        return self._kept[: self._kept_count]
 
 
 def kept_moments(rows: int, every: int) -> NDArray[np.intp]:
-    """Which of so many rows are kept: the first, every `every`-th after it, and the last."""
+    """Returns the indices of the kept rows: the first, every `every`-th after it, and the last."""
     return np.unique(np.append(np.arange(0, rows, every), rows - 1))
 
 
 class Peaks:
-    """Columns of peaks, folded: the largest value since the row that was kept last.
+    """Tracks the largest value of each peak column since the last kept row.
 
-    A landing's rate begins anew at a touch-down; so does its largest, at the first touch-down since
-    then.
+    The plant restarts `landing_rate` at a touch-down; its largest value restarts at the first
+    touch-down since the last kept row.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -243,25 +244,21 @@ class Peaks:
         restarted = [name for name in foot_names(LANDING_RATE) if name in place]
         counts = [name.removesuffix(LANDING_RATE) + LANDINGS for name in restarted]
         self.places = [place[name] for name in (*plain, *restarted)]
-        self.counts = [place[name] for name in counts]  # of the last ones of these places
+        self.counts = [place[name] for name in counts]  # for the last ones of `places`
         self._fresh = np.zeros(len(self.places), dtype=np.bool_)
-        self._largest, self._seen, self._kept = (
-            np.zeros(len(self.places)),
-            np.zeros(len(counts)),
-            np.zeros(len(counts)),
-        )
+        self._largest = np.zeros(len(self.places))
+        self._seen, self._kept = np.zeros(len(counts)), np.zeros(len(counts))
 
-    def see(self, row: Array) -> None:
-        """Takes a row's peaks in."""
+    def update(self, row: Array) -> None:
+        """Takes the peaks of a row into account."""
         counts = row[self.counts]
-        self._fresh[len(self.places) - len(counts) :] = (counts != self._seen) & (
-            self._seen == self._kept
-        )
+        landed = (counts != self._seen) & (self._seen == self._kept)
+        self._fresh[len(self.places) - len(counts) :] = landed
         values = row[self.places]
         self._largest = np.where(self._fresh, values, np.maximum(self._largest, values))
         self._seen = counts
 
-    def show(self, row: Array) -> None:
-        """Puts them into the row that is kept, and begins anew."""
+    def write(self, row: Array) -> None:
+        """Writes the largest values into the row to keep and restarts."""
         row[self.places] = self._largest
         self._largest, self._kept = np.zeros(len(self.places)), self._seen

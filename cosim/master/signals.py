@@ -1,9 +1,8 @@
-"""Which variable is what: the plant's outputs seen as arrays (leg, joint, axis), its inputs as
-arrays to write. No copies: all are views.
+"""Maps the plant's variables to arrays by leg, joint and axis, without copying.
 
-All values stand in one row, outputs, flags, inputs, which the FMU fills and reads and which a
-recorder copies in one piece. The outputs a controller needs come first, so that each is one
-contiguous piece of it.
+All values stand in one row: outputs, Boolean outputs (flags), inputs. The FMU fills and reads the
+row and a recorder copies it in one piece. The outputs that a controller needs come first, so that
+each quantity is contiguous.
 """
 
 from __future__ import annotations
@@ -37,53 +36,53 @@ MEASURED = {
 COMMANDED = {
     quantity: joint_names(quantity) for quantity in ("angle_ref", "speed_ref", "torque_ref")
 }
-ACCELERATION = joint_names("acceleration_ref")  # which plants made before have not
+ACCELERATION = joint_names("acceleration_ref")  # FMUs of earlier versions lack these
 PUSH = [*vector_names("torso.push_force"), *vector_names("torso.push_torque")]
 CONTACT = foot_names("contact")
 
 
 class Signals:
-    """The plant's blocks and the views on them. `sensor` stands between the feet and the
-    measurement; None: what is measured is true.
+    """The plant's blocks of variables and array views of them.
 
-    Attributes: names, values: of the whole row, flags as 0 and 1;  outputs, flags, inputs: its
-    blocks;  measurement: what a robot senses; push: (6,) force [N] and torque [N m] on the torso,
-    world axes, to be written.
+    `sensor` models the feet's force sensors; None means ideal ones.
+
+    Attributes: `names` and `values` of the whole row, flags as 0 and 1; its blocks `outputs`,
+    `flags` and `inputs`; `measurement`, which the controller reads; `push` (6,), which the loop
+    writes: force [N] and torque [N m] on the torso, world axes.
     """
 
     def __init__(self, plant: Plant, *, sensor: ForceSensor | None = None) -> None:
-        outputs, inputs, flags = (
-            plant.names("output"),
-            plant.names("input"),
-            plant.names("output", "Boolean"),
-        )
-        refuse_foreign(outputs, inputs, flags)
-        seen = _first([name for names in MEASURED.values() for name in names], outputs)
-        flagged = _first(CONTACT, flags)
+        outputs, inputs = plant.names("output"), plant.names("input")
+        flags = plant.names("output", "Boolean")
+        check_plant_variables(outputs, inputs, flags)
+        output_names = _move_first([name for names in MEASURED.values() for name in names], outputs)
+        flag_names = _move_first(CONTACT, flags)
         planned = ACCELERATION if set(ACCELERATION) <= set(inputs) else []
-        written = [*(name for names in COMMANDED.values() for name in names), *PUSH, *planned]
-        self.names = (*seen, *flagged, *written)
+        commanded = [name for names in COMMANDED.values() for name in names]
+        input_names = [*commanded, *PUSH, *planned]
+        self.names = (*output_names, *flag_names, *input_names)
         self.values: NDArray[np.float64] = np.zeros(len(self.names))
         output_row, self._flag_row, input_row = np.split(
-            self.values, np.cumsum([len(seen), len(flagged)])
+            self.values, np.cumsum([len(output_names), len(flag_names)])
         )
-        self.outputs, self.inputs = plant.block(seen, output_row), plant.block(written, input_row)
-        self.flags = plant.block(flagged)
-        self._angle_ref, self._speed_ref, self._torque_ref = input_row[: 3 * LEGS * JOINTS].reshape(
-            3, LEGS, JOINTS
+        self.outputs = plant.block(output_names, output_row)
+        self.inputs = plant.block(input_names, input_row)
+        self.flags = plant.block(flag_names)
+        commands, self.push, accelerations = np.split(
+            input_row, np.cumsum([len(commanded), len(PUSH)])
         )
-        self.push: NDArray[np.float64] = input_row[3 * LEGS * JOINTS : len(written) - len(planned)]
-        self._acceleration_ref = input_row[len(written) - len(planned) :].reshape(-1, LEGS, JOINTS)
+        self._angle_ref, self._speed_ref, self._torque_ref = commands.reshape(-1, LEGS, JOINTS)
+        self._acceleration_ref = accelerations.reshape(-1, LEGS, JOINTS)
         self._contact = np.zeros(LEGS, dtype=bool)
         self._touching = self.flags.values[:LEGS]
         self._sensor = sensor
         self.measurement = self._make_measurement()
 
     def _make_measurement(self) -> Measurement:
-        views, at = {}, 0
+        views, begin = {}, 0
         for key, names in MEASURED.items():
-            views[key] = self.outputs.values[at : at + len(names)]
-            at += len(names)
+            views[key] = self.outputs.values[begin : begin + len(names)]
+            begin += len(names)
         self._force = views["foot_force"].reshape(LEGS, len(AXES))
         return Measurement(
             angle=views["angle"].reshape(LEGS, JOINTS),
@@ -95,7 +94,7 @@ class Signals:
         )
 
     def read(self) -> None:
-        """Brings outputs and measurement up to date."""
+        """Reads the plant's outputs and updates the measurement."""
         self.outputs.get()
         self.flags.get()
         self._contact[...] = self._touching
@@ -104,7 +103,7 @@ class Signals:
             self._sensor.read(self._force, self._touching)
 
     def write(self, command: JointCommand) -> None:
-        """Hands a joint command, and the push as it stands, to the plant."""
+        """Writes a joint command and the present push to the plant's inputs."""
         self._angle_ref[...] = command.angle_ref
         self._speed_ref[...] = command.speed_ref
         self._torque_ref[...] = command.torque_ref
@@ -112,12 +111,14 @@ class Signals:
         self.inputs.set()
 
 
-def _first(names: Sequence[str], among: Sequence[str]) -> list[str]:
-    """All names `among` which these are, these first."""
+def _move_first(names: Sequence[str], among: Sequence[str]) -> list[str]:
+    """Returns all names `among`, with `names` moved to the front."""
     return [*names, *(name for name in among if name not in set(names))]
 
 
-def refuse_foreign(outputs: Sequence[str], inputs: Sequence[str], flags: Sequence[str]) -> None:
+def check_plant_variables(
+    outputs: Sequence[str], inputs: Sequence[str], flags: Sequence[str]
+) -> None:
     """Raises FmuError when the plant lacks a variable that every hexapod FMU has."""
     have = {*outputs, *inputs, *flags}
     need = [

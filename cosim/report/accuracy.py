@@ -1,4 +1,4 @@
-"""Accuracy in tables: an error beside every value, and what half the macro-step changes."""
+"""Adds accuracies to tables: an error beside every value, and the effect of half the macro-step."""
 
 from __future__ import annotations
 
@@ -9,30 +9,29 @@ from typing import Any
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS
 
-SHOWN = 0.0005  # relative: less is 0.0 %
+SHOWN = 0.0005  # relative; a smaller effect would be shown as 0.0 %
 
 Rows = list[dict[str, Any]]
 Metrics = Mapping[str, Mapping[str, float | None]]
 
 
 def with_errors(rows: Rows, accuracies: Mapping[str, Accuracy]) -> Rows:
-    """The rows of a report's table with the solver's error beside each value, in the order of
-    the controls.
+    """Returns the rows of a report's table with the solver's error beside each value.
+
+    The accuracies are by control, in the order of the values.
     """
-    return (
-        [
-            row
-            | {
-                "values": [
-                    _with_error(row["name"], *pair)
-                    for pair in zip(row["values"], accuracies.values(), strict=True)
-                ]
-            }
-            for row in rows
-        ]
-        if accuracies
-        else rows
-    )
+    if not accuracies:
+        return rows
+    return [
+        row
+        | {
+            "values": [
+                _with_error(row["name"], *pair)
+                for pair in zip(row["values"], accuracies.values(), strict=True)
+            ]
+        }
+        for row in rows
+    ]
 
 
 def _with_error(name: str, text: str, accuracy: Accuracy) -> str:
@@ -41,8 +40,9 @@ def _with_error(name: str, text: str, accuracy: Accuracy) -> str:
 
 
 def effect_rows(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics) -> Rows:
-    """Of the rows of a report's table, those that half the macro-step may change: name, unit,
-    and by control by how much it does.
+    """Returns the effects of half the macro-step, in rows like those of a report's table.
+
+    metrics: the values by control, for relative effects.
     """
     return [
         {
@@ -59,24 +59,24 @@ def effect_rows(rows: Rows, accuracies: Mapping[str, Accuracy], metrics: Metrics
 
 
 def _effect(name: str, effect: float, value: float | None) -> str:
+    """Returns an effect with its sign and, where the value allows, its share of the value."""
     if not math.isfinite(effect):
         return "-"
     text = _short(name, effect)
-    share = (
-        effect / value if value is not None and abs(value) > FLOORS.get(name, 0.0) else 0.0
-    )  # relative to next to nothing is none
-    return f"{'' if text == '0' or effect < 0.0 else '+'}{text}" + (
-        f" ({100.0 * share:+.1f} %)" if abs(share) >= SHOWN else ""
-    )
+    sign = "" if text == "0" or effect < 0.0 else "+"
+    known = value is not None and abs(value) > FLOORS.get(name, 0.0)
+    share = effect / value if value is not None and known else 0.0
+    relative = f" ({100.0 * share:+.1f} %)" if abs(share) >= SHOWN else ""
+    return f"{sign}{text}{relative}"
 
 
 def _short(name: str, value: float) -> str:
-    """Two digits; what is less than round-off of the metric is 0."""
+    """Returns a value with two digits, or 0 where it is below the metric's round-off."""
     return "0" if abs(value) < DUST * FLOORS.get(name, 0.0) or value == 0.0 else f"{value:.2g}"
 
 
 def about_accuracy(accuracies: Mapping[str, Accuracy]) -> str:
-    """What the numbers are, in sentences; "" where accuracy was not checked."""
+    """Explains the numbers in sentences; returns "" where accuracy was not checked."""
     if not accuracies:
         return ""
     first = next(iter(accuracies.values()))
@@ -87,7 +87,8 @@ def about_accuracy(accuracies: Mapping[str, Accuracy]) -> str:
         else ""
     )
     return (
-        f"± is the solver's error: by so much a value differs from that of the same walk at {first.reference}, with the same commands and "
-        f"control period.{means} Half the macro-step, {first.macro_step:g} s, in which the controller acts and outputs are read twice as "
-        "often, changes:"
+        "± is the solver's error: by so much a value differs from that of the same walk at "
+        f"{first.reference}, with the same commands and control period.{means} "
+        f"Half the macro-step, {first.macro_step:g} s, in which the controller acts and outputs "
+        "are read twice as often, changes:"
     )

@@ -1,6 +1,6 @@
-"""What of a recording goes into a report, in the units that people read, and how many of its rows.
+"""Chooses the columns and rows of a recording that go into a report, in units for readers.
 
-A recording that lacks what a column is made of goes without that column.
+A column is left out if the recording lacks a variable that it is made of.
 """
 
 from __future__ import annotations
@@ -27,42 +27,39 @@ from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
-MOST_ROWS = (
-    20_000  # of a run: 100 s at 5 ms as they are; more would only make the page slow to open
-)
+MOST_ROWS = 20_000  # of a run: all rows of 100 s at 5 ms; more rows would open slowly
 ENERGIES = ("actuator_work", "dissipated", "potential", "kinetic", "push_work", "residual")
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """Columns of a run, thinned if need be."""
+    """Columns of a run, reduced to fewer rows if necessary."""
 
     time: Array  # (rows,) s
     columns: Columns  # (rows,) each
-    bucket: int  # rows of the recording that two of these stand for; 1: these are all rows
+    bucket: int  # rows of the recording that two of these represent; 1: these are all rows
 
 
 def choose(view: View, *, most_rows: int = MOST_ROWS) -> Chosen:
-    """The columns of a report. Of longer recordings two rows stand for each `bucket` of rows: what
-    is replayed is as it was at their times, what is drawn as a curve holds the bucket's least and
-    largest value, in the order in which they came, so that no peak is lost.
+    """Returns the columns of a report.
+
+    In a longer recording, two rows represent each `bucket` of rows. Columns of the replay keep the
+    values at the times of these rows; columns of curves hold the least and the largest value of the
+    bucket, in the order of their times, so that no peak is lost.
     """
-    replayed, drawn = _gathered(view, REPLAYED), _gathered(view, DRAWN)
+    replayed, drawn = _gather(view, REPLAYED), _gather(view, DRAWN)
     time = view.recording.time
     if len(time) <= most_rows:
         return Chosen(time, replayed | drawn, 1)
     bucket = -(-2 * len(time) // most_rows)
-    rows = _two_of_each(len(time), bucket)
-    envelopes = {name: envelope(values, bucket) for name, values in drawn.items()}
-    return Chosen(
-        time[rows], {name: values[rows] for name, values in replayed.items()} | envelopes, bucket
-    )
+    rows = _two_per_bucket(len(time), bucket)
+    columns = {name: values[rows] for name, values in replayed.items()}
+    columns |= {name: envelope(values, bucket) for name, values in drawn.items()}
+    return Chosen(time[rows], columns, bucket)
 
 
-def _two_of_each(rows: int, bucket: int) -> NDArray[np.intp]:
-    """First and middle row of each bucket, the recording's last row instead of the last one's
-    middle.
-    """
+def _two_per_bucket(rows: int, bucket: int) -> NDArray[np.intp]:
+    """Returns the first and middle row of each bucket; in the last bucket, its last row."""
     first = np.arange(0, rows, bucket)
     chosen = np.column_stack([first, np.minimum(first + bucket // 2, rows - 1)]).reshape(-1)
     chosen[-1] = rows - 1
@@ -70,9 +67,7 @@ def _two_of_each(rows: int, bucket: int) -> NDArray[np.intp]:
 
 
 def envelope(values: Array, bucket: int) -> Array:
-    """(2 x buckets,) least and largest value of each bucket of rows, in the order in which they
-    came.
-    """
+    """Returns the least and largest value of each bucket (2 x buckets,), in order of time."""
     short = -len(values) % bucket
     table = np.concatenate([values, np.repeat(values[-1:], short)]).reshape(-1, bucket)
     places = np.sort(np.column_stack([table.argmin(axis=1), table.argmax(axis=1)]), axis=1)
@@ -82,7 +77,8 @@ def envelope(values: Array, bucket: int) -> Array:
 Maker = Callable[[View], Iterator[tuple[str, Array]]]
 
 
-def _gathered(view: View, makers: Mapping[str, Maker]) -> Columns:
+def _gather(view: View, makers: Mapping[str, Maker]) -> Columns:
+    """Returns the columns of all makers whose variables were recorded."""
     columns: Columns = {}
     for make in makers.values():
         try:
@@ -93,9 +89,7 @@ def _gathered(view: View, makers: Mapping[str, Maker]) -> Columns:
 
 
 def _pose(view: View) -> Iterator[tuple[str, Array]]:
-    """Position [m] and attitude of the torso, angles of the joints [rad]: what the viewer's
-    kinematics starts from.
-    """
+    """Yields torso position [m], attitude and joint angles [rad], for the viewer's kinematics."""
     yield from _split(("torso.x", "torso.y", "torso.z"), view.recording.vector("torso.position"))
     yield from _split(
         ("torso.qw", "torso.qx", "torso.qy", "torso.qz"),
@@ -106,7 +100,7 @@ def _pose(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _forces(view: View) -> Iterator[tuple[str, Array]]:
-    """Forces on the feet in body weights, world axes."""
+    """Yields the forces on the feet in body weights, world axes."""
     force = view.recording.foot_vectors("force") / robot_weight(view.parameters)
     yield from _split(
         [f"{leg}.force.{axis}" for leg in LEG_NAMES for axis in "xyz"],
@@ -115,19 +109,18 @@ def _forces(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _contacts(view: View) -> Iterator[tuple[str, Array]]:
+    """Yields the contact flags of the feet."""
     yield from _split([f"{leg}.contact" for leg in LEG_NAMES], view.recording.feet("contact"))
 
 
 def _swings(view: View) -> Iterator[tuple[str, Array]]:
-    """When the gait plans a leg to swing."""
+    """Yields when the gait plans a leg to swing."""
     names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
     yield from _split([f"{leg}.swing" for leg in LEG_NAMES], view.recording.columns(names))
 
 
 def _slipped(view: View) -> Iterator[tuple[str, Array]]:
-    """Way [m] that each foot has slipped since the start, world x and y: what its velocity under
-    load sums up to.
-    """
+    """Yields how far each foot has slipped under load since the start [m], world x and y."""
     time = view.recording.time
     loaded = bearing_load(view.recording, view.parameters)
     velocity = np.where(loaded[:, :, None], view.recording.foot_vectors("velocity"), 0.0)[:, :, :2]
@@ -136,11 +129,12 @@ def _slipped(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _commanded(view: View) -> Iterator[tuple[str, Array]]:
+    """Yields the path of the body command [m], world x and y."""
     yield from _split(("command.x", "command.y"), commanded_path(view.recording))
 
 
 def _normal_forces(view: View) -> Iterator[tuple[str, Array]]:
-    """In body weights."""
+    """Yields the normal forces of the feet in body weights."""
     yield from _split(
         [f"{leg}.load" for leg in LEG_NAMES],
         view.recording.feet("normal_force") / robot_weight(view.parameters),
@@ -148,17 +142,16 @@ def _normal_forces(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _slip(view: View) -> Iterator[tuple[str, Array]]:
-    """Speed of loaded feet along the ground [mm/s], and the way [mm] slipped by all feet since
-    the start.
-    """
+    """Yields the slip speed of loaded feet [mm/s] and the total slip of all feet [mm]."""
     speed = 1e3 * slip_under_load(view.recording, view.parameters)
     yield from _split([f"{leg}.slip" for leg in LEG_NAMES], speed)
     yield "slip.way", running_integral(view.recording.time, speed.sum(axis=1))
 
 
 def _feet(view: View) -> Iterator[tuple[str, Array]]:
-    """Distance of each foot's centre from where the command plans it, torso frame [mm]; nothing
-    when the controller does not tell.
+    """Yields the distance of each foot's centre from its planned position [mm], torso frame.
+
+    Yields nothing when the controller does not report its plan.
     """
     errors = foot_errors(view.recording, view.parameters)
     if len(errors):
@@ -168,16 +161,18 @@ def _feet(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _height(view: View) -> Iterator[tuple[str, Array]]:
-    yield "height", 1e3 * body_height(view.recording, view.parameters)  # mm
+    """Yields the height of the torso above the ground [mm]."""
+    yield "height", 1e3 * body_height(view.recording, view.parameters)
 
 
 def _attitude(view: View) -> Iterator[tuple[str, Array]]:
+    """Yields roll, pitch and yaw [deg]."""
     for name in ("roll", "pitch", "yaw"):
         yield name, np.degrees(np.unwrap(view.recording.column(f"torso.{name}")))
 
 
 def _torques(view: View) -> Iterator[tuple[str, Array]]:
-    """Largest absolute torque [N m] among the six legs, joint by joint."""
+    """Yields the largest absolute torque [N m] of the six legs, by joint."""
     yield from _split(
         [f"{joint}.torque" for joint in JOINT_NAMES],
         np.abs(view.recording.joints("torque")).max(axis=1),
@@ -185,7 +180,7 @@ def _torques(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def _energies(view: View) -> Iterator[tuple[str, Array]]:
-    """Since the start [J], the residual [mJ]."""
+    """Yields energies since the start [J], and the residual [mJ]."""
     for name in ENERGIES:
         values = view.recording.column(f"energy.{name}")
         yield f"energy.{name}", (values - values[:1]) * (1e3 if name == "residual" else 1.0)

@@ -1,6 +1,4 @@
-"""What the viewer draws: the robot and the ground of a run, as its FMU's parameters describe
-them.
-"""
+"""Describes the robot and the ground of a run for the viewer, from the FMU's parameters."""
 
 from __future__ import annotations
 
@@ -13,18 +11,18 @@ import numpy as np
 
 from hexapod_cosim.cosim.export.portrait import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
-from hexapod_cosim.cosim.results.results import Stored
+from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.walk import FLAT
 from hexapod_cosim.models import JOINT_NAMES, LEG_NAMES, HexapodError, load_robot
 
 Parameters = Mapping[str, float]
 
-FLATNESS = 0.25  # height of a torso of which no one knows the size, of its width between the hips
-SAME = 1e-6  # m    of a hip's place: the robot file is still the robot that walked
+FLATNESS = 0.25  # height of a torso of unknown size, relative to the width between its hips
+SAME = 1e-6  # m    tolerance of hip positions by which a robot file is recognised
 
 
-def describe_robot(run: Stored) -> dict[str, Any]:
-    """Torso, feet and legs [m, rad]; colours and thicknesses as in the FMU's picture."""
+def describe_robot(run: StoredResult) -> dict[str, Any]:
+    """Returns torso, feet and legs [m, rad], with colours and thicknesses of the FMU's picture."""
     parameters = run.view.parameters
     return {
         "torso": {"com": _vector(parameters, "torso.com"), "size": torso_size(run)},
@@ -56,9 +54,10 @@ def _leg(parameters: Parameters, leg: str) -> dict[str, Any]:
     }
 
 
-def torso_size(run: Stored) -> list[float]:
-    """Edges of the torso [m]: the robot file's where it is at hand and still the same robot,
-    else what spans the hips.
+def torso_size(run: StoredResult) -> list[float]:
+    """Returns the edges of the torso [m], from the robot file or else from the hips.
+
+    The robot file counts if it can be read and still has the same hips.
     """
     parameters = run.view.parameters
     hips = np.array([_vector(parameters, f"{leg}.hip_position") for leg in LEG_NAMES])
@@ -66,16 +65,16 @@ def torso_size(run: Stored) -> list[float]:
         robot = load_robot(tomllib.loads(run.scenario)["robot"])
     except (HexapodError, KeyError, TypeError, tomllib.TOMLDecodeError):
         robot = None
-    if robot is not None and np.allclose(
-        hips, [leg.hip_position for leg in robot.legs], rtol=0.0, atol=SAME
-    ):
-        return [float(edge) for edge in robot.torso.size]
+    if robot is not None:
+        own = [leg.hip_position for leg in robot.legs]
+        if np.allclose(hips, own, rtol=0.0, atol=SAME):
+            return [float(edge) for edge in robot.torso.size]
     length, width = np.ptp(hips[:, :2], axis=0).tolist()
     return [length, width, FLATNESS * width]
 
 
 def describe_ground(parameters: Parameters) -> dict[str, float]:
-    """Height [m] at the origin, its rise per metre and the heading [rad] along which it rises."""
+    """Returns height [m] at the origin, rise per metre and heading [rad] of the rise."""
     flat = parameters.get("terrain.kind", FLAT) == FLAT
     return {
         "height": parameters.get("terrain.height", 0.0),

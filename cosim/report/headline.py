@@ -1,6 +1,4 @@
-"""What a report says first: what compliant control changes, in a sentence and on cards; of a
-single run, what it was.
-"""
+"""The headline of a report: what compliant control changes, or what a single run was."""
 
 from __future__ import annotations
 
@@ -13,9 +11,9 @@ from hexapod_cosim.cosim.results.comparison import BETTER, WORSE, Change, Compar
 from hexapod_cosim.cosim.results.metrics import METRICS, PER_RADIAN
 from hexapod_cosim.cosim.results.walk import TANH
 
-# metric -> its name on a card, and what there is less or more of in the sentence: first what
-# depends on no assumed slope of friction, slip last
-TOLD = {
+# metric -> its name on a card and its name in the sentence, where "less" or "more" precedes it.
+# Metrics that depend on no assumed slope of friction come first, slip last.
+SHOWN = {
     "height_rms": ("height, RMS", "bobbing"),
     "roll_rms": ("roll, RMS", "rolling"),
     "foot_error_stance": ("feet from their plan, stance", "error of the standing feet"),
@@ -25,28 +23,29 @@ TOLD = {
     "servo_load_max": ("hottest servo, of its rating", "torque on the hottest servo"),
     "slip_per_metre": ("slip per metre", "slip"),
 }
-TURNED = {
+TURNED = {  # the same for a robot that turns on the spot
     "cost_of_transport": ("work per radian", "motor work per radian"),
     "electrical_cost": ("electrical cost per radian", "electrical energy per radian"),
     "slip_per_metre": ("slip per radian", "slip"),
-}  # the same of a robot that turns on the spot
+}
 CREEP = (
-    "Under the tanh friction law a foot under load always creeps, at a rate that friction.slope assumes: most of the slip is that. "
+    "Under the tanh friction law a foot under load always creeps, "
+    "at a rate that friction.slope assumes: most of the slip is that. "
     "Walk with friction.law=bristle to see what slips on ground that holds a foot."
 )
-MILLI = {
+MILLI = {  # unit -> factor and unit on a card
     "m": (1e3, "mm"),
     "rad": (1e3, "mrad"),
     "m/m": (1e3, "mm/m"),
     "m/rad": (1e3, "mm/rad"),
     "1": (1.0, ""),
-}  # units that people read on a card
+}
 MOST_GAINS = 4  # in the sentence
 
 
 @dataclass(frozen=True)
 class Part:
-    """A piece of the sentence; with a verdict it stands out."""
+    """A piece of the sentence; one with a verdict is highlighted."""
 
     text: str
     verdict: str = ""
@@ -54,7 +53,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Card:
-    """A figure to see first."""
+    """A metric at the top of the report, as texts."""
 
     name: str
     change: str
@@ -64,24 +63,23 @@ class Card:
 
 
 def headline(comparison: Comparison) -> list[Part]:
-    """Who did not walk to the end; then what the second control gains and what it costs, as far
-    as the runs are sure of it.
+    """Returns the headline of a comparison.
+
+    It tells which runs did not walk to the end, and then the significant gains and losses of the
+    second control.
     """
     first, second = comparison.labels
     falls = _falls(comparison)
-    if falls and not any(
-        a.walked and b.walked for a, b in zip(comparison.first, comparison.second, strict=True)
-    ):
+    pairs = zip(comparison.first, comparison.second, strict=True)
+    if falls and not any(a.walked and b.walked for a, b in pairs):
         return [*falls, Part(". No pair of walks can be compared.")]
-    begin = (
-        f"Where both walked, against {first} control, {second}"
-        if falls
-        else f"Against {first} control, {second}"
-    )
+    begin = f"Against {first} control, {second}"
+    if falls:
+        begin = f"Where both walked, against {first} control, {second}"
     stop = [*falls, Part(". ")] if falls else []
-    gains, losses = _of(comparison, BETTER), _of(comparison, WORSE)
+    gains, losses = _changes(comparison, BETTER), _changes(comparison, WORSE)
     if not gains and not losses:
-        return [*stop, Part(_nothing(comparison, begin))]
+        return [*stop, Part(_no_change(comparison, begin))]
     parts = [
         *stop,
         Part(begin),
@@ -93,57 +91,53 @@ def headline(comparison: Comparison) -> list[Part]:
     return [*parts, Part(".")]
 
 
-def _told(comparison: Comparison) -> dict[str, tuple[str, str]]:
-    """TOLD, with what is per radian where that is what the runs have."""
-    told: dict[str, tuple[str, str]] = {}
-    for name, text in TOLD.items():
+def _shown(comparison: Comparison) -> dict[str, tuple[str, str]]:
+    """Returns SHOWN, with metrics per radian where the runs have those instead."""
+    shown: dict[str, tuple[str, str]] = {}
+    for name, text in SHOWN.items():
         twin = PER_RADIAN.get(name, name)
         turned = (
             name in TURNED and comparison.changes[twin].pairs and not comparison.changes[name].pairs
         )
-        told[twin if turned else name] = TURNED[name] if turned else text
-    return told
+        shown[twin if turned else name] = TURNED[name] if turned else text
+    return shown
 
 
 def creep_note(parameters: Mapping[str, Any]) -> str:
-    """What to know of slip under a run's friction law, "" when nothing."""
+    """Returns a note on slip under a run's friction law, "" if there is none."""
     return CREEP if parameters.get("friction.law", TANH) == TANH else ""
 
 
 def _falls(comparison: Comparison) -> list[Part]:
-    """How many of whose runs did not come to their end with the robot on its feet; nothing when
-    all did.
-    """
+    """Tells how many runs did not complete with the robot upright; returns [] when all did."""
     count, walked = len(comparison.seeds), comparison.walked
     lost = {label: count - number for label, number in walked.items()}
     if not any(lost.values()):
         return []
     first, second = comparison.labels
-    verdicts = (
-        ("", "")
-        if lost[first] == lost[second]
-        else (WORSE, BETTER)
-        if lost[first] > lost[second]
-        else (BETTER, WORSE)
-    )
-    told = [
+    verdicts = ("", "")
+    if lost[first] != lost[second]:
+        verdicts = (WORSE, BETTER) if lost[first] > lost[second] else (BETTER, WORSE)
+    counts = [
         Part(f"{label} in {lost[label]} of {count}", verdict)
         for label, verdict in zip(comparison.labels, verdicts, strict=True)
     ]
     return [
         Part("The robot did not walk to the end under "),
-        told[0],
+        counts[0],
         Part(" and under "),
-        told[1],
+        counts[1],
         Part(" runs"),
     ]
 
 
-def _nothing(comparison: Comparison, begin: str) -> str:
-    """Where no main figure differs: that there is none, that others do, or that none does."""
-    told = _told(comparison)
-    if not any(comparison.changes[name].pairs for name in told):
-        return "The walk was too short to measure: figures are of whole gait cycles after the first two."
+def _no_change(comparison: Comparison, begin: str) -> str:
+    """Returns the sentence for runs that differ in no main metric."""
+    if not any(comparison.changes[name].pairs for name in _shown(comparison)):
+        return (
+            "The walk was too short to measure: "
+            "figures are of whole gait cycles after the first two."
+        )
     others = [
         name for name, change in comparison.changes.items() if change.verdict in {BETTER, WORSE}
     ]
@@ -152,8 +146,9 @@ def _nothing(comparison: Comparison, begin: str) -> str:
     return f"{begin} control changes nothing that these runs could tell."
 
 
-def _of(comparison: Comparison, verdict: str) -> list[Part]:
-    found = [(what, comparison.changes[name]) for name, (_, what) in _told(comparison).items()]
+def _changes(comparison: Comparison, verdict: str) -> list[Part]:
+    """Returns the changes with a verdict, as parts of the sentence."""
+    found = [(what, comparison.changes[name]) for name, (_, what) in _shown(comparison).items()]
     return [
         Part(_less_or_more(what, change), verdict)
         for what, change in found
@@ -162,17 +157,14 @@ def _of(comparison: Comparison, verdict: str) -> list[Part]:
 
 
 def _less_or_more(what: str, change: Change) -> str:
-    share = abs(change.relative)
-    size = (
-        f"{1.0 + share:.1f} times the"
-        if change.relative >= 1.0
-        else f"{100.0 * share:.0f} % {'less' if change.relative < 0.0 else 'more'}"
-    )
-    return f"{size} {what}"
+    if change.relative >= 1.0:
+        return f"{1.0 + change.relative:.1f} times the {what}"
+    direction = "less" if change.relative < 0.0 else "more"
+    return f"{100.0 * abs(change.relative):.0f} % {direction} {what}"
 
 
 def _listed(parts: list[Part]) -> list[Part]:
-    """With commas between them and "and" before the last."""
+    """Joins parts with commas and "and"."""
     between = [Part(", ")] * (len(parts) - 2) + [Part(" and ")] * (len(parts) > 1)
     return [
         piece
@@ -183,13 +175,12 @@ def _listed(parts: list[Part]) -> list[Part]:
 
 
 def cards(comparison: Comparison) -> list[Card]:
-    """The figures of TOLD, as far as the runs have them."""
-    told = {
-        name: text
-        for name, (text, _) in _told(comparison).items()
+    """Returns the cards of the metrics in SHOWN that the runs have."""
+    return [
+        _card(text, METRICS[name][0], comparison.changes[name])
+        for name, (text, _) in _shown(comparison).items()
         if comparison.changes[name].pairs
-    }
-    return [_card(text, METRICS[name][0], comparison.changes[name]) for name, text in told.items()]
+    ]
 
 
 def _card(name: str, unit: str, change: Change) -> Card:
@@ -208,28 +199,24 @@ def _card(name: str, unit: str, change: Change) -> Card:
 
 
 def _digits(value: float) -> str:
-    """Three of them, never as a power of ten."""
+    """Returns a value with three digits, never as a power of ten."""
     places = 2 - math.floor(math.log10(abs(value))) if value else 0
     return f"{value:.{min(max(places, 0), 3)}f}"
 
 
 def _share(value: float) -> str:
-    """Per cent with its sign, to three digits."""
+    """Returns a share in per cent with its sign and up to three digits."""
     return f"{100.0 * value:+.{1 if abs(value) < 1.0 else 0}f} %".replace("-", "−")
 
 
 def plain_headline(metrics: Mapping[str, float | None], facts: Mapping[str, Any]) -> list[Part]:
-    """Of one run: how long and how fast it walked, how far its feet were from their plan, and
-    what it took.
-    """
+    """Returns the headline of one run: duration, speed, error of the feet, cost of transport."""
     speed = (facts.get("walk") or {}).get("mean_speed")
     begin = f"{facts['control'].capitalize()} control, {facts['simulated']:.4g} s"
     error, cost = metrics.get("foot_error_stance"), metrics.get("cost_of_transport")
-    told = [f"{1e3 * speed:.3g} mm/s"] if speed is not None and math.isfinite(speed) else []
-    told += (
-        [f"standing feet {1e3 * error:.3g} mm from their plan"]
-        if error is not None and math.isfinite(error)
-        else []
-    )
-    told += [f"cost of transport {cost:.3g}"] if cost is not None and math.isfinite(cost) else []
-    return [Part(f"{begin}: {', '.join(told)}." if told else f"{begin}.")]
+    parts = [f"{1e3 * speed:.3g} mm/s"] if speed is not None and math.isfinite(speed) else []
+    if error is not None and math.isfinite(error):
+        parts.append(f"standing feet {1e3 * error:.3g} mm from their plan")
+    if cost is not None and math.isfinite(cost):
+        parts.append(f"cost of transport {cost:.3g}")
+    return [Part(f"{begin}: {', '.join(parts)}." if parts else f"{begin}.")]

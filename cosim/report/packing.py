@@ -1,9 +1,8 @@
-"""Columns of numbers as text small enough for a page: 16-bit steps of each column's own range,
-differences, deflate, base64.
+"""Packs columns of numbers into short texts: 16-bit steps, differences, deflate, base64.
 
-A column of range D comes back within D/131070 (`error_bound`), plus the rounding of the reader's
+A column of range D is reproduced within D/131070 (`error_bound`), plus the rounding of the reader's
 32-bit floats. That is a hundredth of a pixel of a plot 1000 pixels high, and 40 um of a torso that
-walked 5 m. Errors don't add up: the differences are of the steps, exact modulo 2^16.
+walked 5 m. Errors do not accumulate: differences are taken of the steps, exactly modulo 2^16.
 """
 
 from __future__ import annotations
@@ -19,15 +18,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 STEPS = 65535  # of 16 bits
-TICK = 1e-6  # s    of a time, which is stored in 32 bits: 71 minutes from the first row to the last
+TICK = 1e-6  # s    resolution of times, stored in 32 bits: 71 minutes from first to last row
 
 
 def pack(time: Array, columns: Mapping[str, Array]) -> dict[str, Any]:
-    """What the page's viewer unpacks: rows, start and tick of the time [s], names, scales and
-    offsets of the columns, and their data.
+    """Packs times (rows,) [s] and columns (rows,) for the viewer (recording.ts).
 
-    The data hold `time`'s ticks since the start (their low, then their high 16 bits), then each
-    column (rows,) in order. Columns with values that are no numbers are left out.
+    Returns the number of rows, start and tick of the time [s], names, scales and offsets of the
+    columns, and the data: first the ticks since the start (their low, then their high 16 bits),
+    then each column in order. Columns with a value that is not finite are left out.
     """
     tick = max(TICK, (time[-1] - time[0]) / 2**31) if len(time) else TICK
     ticks = np.round((time - time[:1]) / tick).astype(np.uint32)
@@ -45,12 +44,12 @@ def pack(time: Array, columns: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def error_bound(values: Array) -> float:
-    """The most that a column may change on its way [its unit]."""
+    """Returns the largest error of a column by packing, in its unit."""
     return _scale(values)[0] / 2.0
 
 
 def _scale(values: Array) -> tuple[float, float]:
-    """Size of a step and value of step 0; a constant's steps are all 0."""
+    """Returns the size of a step and the value of step 0; all steps of a constant are 0."""
     low, high = (float(np.min(values)), float(np.max(values))) if len(values) else (0.0, 0.0)
     return (high - low) / STEPS, low
 
@@ -60,8 +59,9 @@ def _steps(values: Array, scale: float, offset: float) -> NDArray[np.uint16]:
 
 
 def _deflated(rows: NDArray[np.uint16]) -> str:
-    """Differences along each row, all their low bytes before all their high ones, which are
-    mostly equal and so cost next to nothing.
+    """Deflates the differences along each row, all low bytes before all high bytes.
+
+    High bytes are mostly equal, so they take little space.
     """
     differences = np.diff(rows, axis=1, prepend=np.zeros((len(rows), 1), np.uint16)).astype("<u2")
     planes = differences.reshape(-1).view(np.uint8).reshape(-1, 2).T

@@ -1,4 +1,4 @@
-"""Pages from templates: what all reports share."""
+"""Renders pages from templates, for all kinds of reports."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from hexapod_cosim.cosim.common.plant_files import plant_folders
 
 VIEWER = Path("viewer") / "viewer.js"  # in the plant's folder, where CMake installs it
 NO_VIEWER = (
-    "Replay and plots are left out: this installation was built without the viewer (HX_VIEWER=OFF). "
+    "Replay and plots are left out: "
+    "this installation was built without the viewer (HX_VIEWER=OFF). "
     "`pip install` without that option, then `hexapod report` of this folder, adds them."
 )
 
 
 @cache
 def environment() -> Environment:
-    """Templates of this folder; `base.html.jinja` is what a report extends."""
+    """Returns the templates of this folder; reports extend `base.html.jinja`."""
     return Environment(
         loader=PackageLoader("hexapod_cosim.cosim", "report"),
         autoescape=True,
@@ -31,8 +32,8 @@ def environment() -> Environment:
 
 
 def render(template: str, **content: Any) -> str:
-    """A page in the colours of the figures."""
-    # matplotlib is slow to import
+    """Renders a page with the colours of the figures."""
+    # imported only here because matplotlib is slow to import
     from hexapod_cosim.cosim.report.plots import STYLES  # noqa: PLC0415
 
     colours = {label: style["color"] for label, style in STYLES.items()}
@@ -40,9 +41,7 @@ def render(template: str, **content: Any) -> str:
 
 
 def viewer_script() -> Markup | None:
-    """The viewer's JavaScript, the newest at hand, to stand in a <script>; None where the
-    installation has none.
-    """
+    """Returns the newest installed viewer's JavaScript for a <script>; None if there is none."""
     found = [folder / VIEWER for folder in plant_folders() if (folder / VIEWER).is_file()]
     if not found:
         return None

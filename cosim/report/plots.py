@@ -1,6 +1,4 @@
-"""Static figures of one run or of several laid over each other, whose lines are told apart by
-colours and by dashes.
-"""
+"""Draws static figures of one or several runs; colours and dashes distinguish the runs."""
 
 from __future__ import annotations
 
@@ -35,12 +33,12 @@ STYLES: dict[str, dict[str, Any]] = {
     "kinematic": {"color": "#D55E00", "linestyle": (0, (4, 1.5)), "linewidth": 1.0},
     "compliant": {"color": "#0072B2", "linestyle": "-", "linewidth": 1.0},
 }
-PLAN = "0.7"  # grey of the path that is planned
-PLANNED = "0.85"  # grey of the swing that the gait plans
-LEAST_WIDTH = 2.0  # mm of the sideways axis: less would show round-off as a drift
-STRAIGHT = 0.05  # a commanded path no wider than this share of its length shows its drift enlarged
+PLAN = "0.7"  # grey of planned paths
+PLANNED = "0.85"  # grey of planned swings
+LEAST_WIDTH = 2.0  # mm    of the sideways axis: a smaller one would show round-off as a drift
+STRAIGHT = 0.05  # a commanded path no wider than this share of its length is drawn enlarged
 SIDES, PLACES = {"L": "left", "R": "right"}, {"F": "front", "M": "middle", "R": "rear"}
-BOOKS = {
+ENERGIES = {  # line styles
     "actuator_work": "-",
     "dissipated": (0, (5, 1.2)),
     "potential": (0, (1, 1)),
@@ -52,7 +50,7 @@ Views = Mapping[str, View]  # by control
 
 
 def foot_forces(views: Views) -> Figure:
-    """Normal force of each foot over the last cycles, in body weights."""
+    """Draws the normal force of each foot over the last cycles, in body weights."""
     figure = Figure(figsize=(WIDTH, 3.8))
     axes = figure.subplots(2, 3, sharex=True, sharey=True)
     for label, view in views.items():
@@ -67,18 +65,15 @@ def foot_forces(views: Views) -> Figure:
 
 
 def slip(views: Views) -> Figure:
-    """Way slipped by all feet since the start, and the slip speed of each foot over the last
-    cycles.
-    """
+    """Draws the total slip of all feet, and the slip speed of each foot over the last cycles."""
     figure = Figure(figsize=(WIDTH, 5.0))
     grid = figure.add_gridspec(3, 3)
     top = figure.add_subplot(grid[0, :])
     axes = np.ravel(grid[1:, :].subgridspec(2, 3).subplots(sharex=True, sharey=True))  # type: ignore[arg-type]
     for label, view in views.items():
         time, speed = view.recording.time, slip_under_load(view.recording, view.parameters)
-        top.plot(
-            time, 1e3 * running_integral(time, speed.sum(axis=1)), label=label, **STYLES[label]
-        )
+        total = 1e3 * running_integral(time, speed.sum(axis=1))
+        top.plot(time, total, label=label, **STYLES[label])
         last = slice(-len(view.last_cycles().recording.time), None)
         for leg, axis in enumerate(axes):
             axis.plot(time[last], 1e3 * speed[last, leg], **STYLES[label])
@@ -91,9 +86,7 @@ def slip(views: Views) -> Figure:
 
 
 def feet(views: Views) -> Figure:
-    """Each foot's planned and real path in the torso's frame over the last cycles, seen from the
-    side.
-    """
+    """Draws each foot's planned and actual path over the last cycles from the side, torso frame."""
     figure = Figure(figsize=(WIDTH, 3.8))
     axes = figure.subplots(2, 3, sharey=True)
     for number, (label, view) in enumerate(views.items()):
@@ -111,26 +104,18 @@ def feet(views: Views) -> Figure:
 
 
 def posture(views: Views) -> Figure:
-    """Height, roll, pitch and yaw of the torso."""
+    """Draws height, roll, pitch and yaw of the torso."""
     figure = Figure(figsize=(WIDTH, 5.2))
     axes = figure.subplots(4, 1, sharex=True)
     for label, view in views.items():
         recording = view.recording
-        axes[0].plot(
-            recording.time,
-            1e3 * body_height(recording, view.parameters),
-            label=label,
-            **STYLES[label],
-        )
+        time, height = recording.time, 1e3 * body_height(recording, view.parameters)
+        axes[0].plot(time, height, label=label, **STYLES[label])
         for axis, name in zip(axes[1:], ("roll", "pitch", "yaw"), strict=True):
-            axis.plot(
-                recording.time,
-                np.degrees(np.unwrap(recording.column(f"torso.{name}"))),
-                **STYLES[label],
-            )
-    for axis, text in zip(
-        axes, ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]"), strict=True
-    ):
+            angle = np.degrees(np.unwrap(recording.column(f"torso.{name}")))
+            axis.plot(time, angle, **STYLES[label])
+    labels = ("height [mm]", "roll [deg]", "pitch [deg]", "yaw [deg]")
+    for axis, text in zip(axes, labels, strict=True):
         axis.set_ylabel(text)
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(axes)
@@ -139,49 +124,39 @@ def posture(views: Views) -> Figure:
 
 
 def path(views: Views) -> Figure:
-    """The torso's way seen from above, with the commanded one."""
+    """Draws the actual and the commanded path of the torso from above."""
     figure = Figure(figsize=(WIDTH, 3.0))
     axis = figure.subplots()
     for label, view in views.items():
-        position = view.recording.vector("torso.position")
-        axis.plot(position[:, 0], 1e3 * position[:, 1], label=label, **STYLES[label])
-        axis.plot(
-            position[-1, 0],
-            1e3 * position[-1, 1],
-            marker="o",
-            markersize=4,
-            clip_on=False,
-            color=STYLES[label]["color"],
-        )
-    commanded = commanded_path(next(iter(views.values())).recording)
-    axis.plot(
-        commanded[:, 0],
-        1e3 * commanded[:, 1],
-        color="0.45",
-        linestyle=":",
-        label="commanded, without its ramps",
-    )
+        x, y, _ = view.recording.vector("torso.position").T
+        axis.plot(x, 1e3 * y, label=label, **STYLES[label])
+        dot: dict[str, Any] = {"marker": "o", "markersize": 4, "clip_on": False}
+        axis.plot(x[-1], 1e3 * y[-1], color=STYLES[label]["color"], **dot)
+    x, y = commanded_path(next(iter(views.values())).recording).T
+    axis.plot(x, 1e3 * y, color="0.45", linestyle=":", label="commanded, without its ramps")
     axis.margins(x=0.02)
     axis.set_xlabel("x [m]")
     axis.set_ylabel("y [mm]")
     _legend(figure, axis)
-    if np.ptp(commanded[:, 1]) > STRAIGHT * np.ptp(commanded[:, 0]):
+    if np.ptp(y) > STRAIGHT * np.ptp(x):
         axis.set_aspect(1e-3, adjustable="datalim")
         axis.set_title("to scale", loc="right", fontsize="small")
         return figure
+    _enlarge(figure, axis)
+    return figure
+
+
+def _enlarge(figure: Figure, axis: Axes) -> None:
+    """Enlarges the sideways axis of a straight path, and tells so in the title."""
     low, high = axis.get_ylim()
     missing = max(LEAST_WIDTH - (high - low), 0.0)
     axis.set_ylim(low - missing / 2, high + missing / 2)
-    figure.draw_without_rendering()  # lays out: the size of the axes is known after it
+    figure.draw_without_rendering()  # computes the size of the axes
     enlarged = _per_pixel(axis.get_xlim(), axis.bbox.width) / (
         1e-3 * _per_pixel(axis.get_ylim(), axis.bbox.height)
     )
-    axis.set_title(
-        f"not to scale: y is drawn about {enlarged:.0f} times larger than x",
-        loc="right",
-        fontsize="small",
-    )
-    return figure
+    title = f"not to scale: y is drawn about {enlarged:.0f} times larger than x"
+    axis.set_title(title, loc="right", fontsize="small")
 
 
 def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
@@ -189,7 +164,7 @@ def _per_pixel(limits: tuple[float, float], pixels: float) -> float:
 
 
 def torques(views: Views) -> Figure:
-    """Largest absolute torque among the six legs, joint by joint, over the last cycles."""
+    """Draws the largest absolute torque of the six legs over the last cycles, by joint."""
     figure = Figure(figsize=(WIDTH, 4.2))
     axes = figure.subplots(3, 1, sharex=True)
     for label, view in views.items():
@@ -199,7 +174,7 @@ def torques(views: Views) -> Figure:
             axis.plot(end.time, largest[:, joint], label=label, **STYLES[label])
             axis.set_ylabel(f"{JOINT_NAMES[joint]} [N m]")
     for axis in axes:
-        axis.set_ylim(bottom=0.0)  # last: it ends the scaling to what is drawn
+        axis.set_ylim(bottom=0.0)  # last, since it stops automatic scaling
     axes[0].set_title("largest |torque| of the six legs", loc="left")
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(axes)
@@ -208,9 +183,7 @@ def torques(views: Views) -> Figure:
 
 
 def energy(views: Views) -> Figure:
-    """The energy audit: what went in, where it is, where it went, and what the books do not
-    explain.
-    """
+    """Draws the energy balance: work, losses, stored energies and the residual."""
     figure = Figure(figsize=(WIDTH, 0.3 + 2.4 * len(views)))
     axes = figure.subplots(len(views), 2, sharex=True, squeeze=False, width_ratios=(3, 2))
     pushed = any(np.ptp(view.recording.column("energy.push_work")) for view in views.values())
@@ -218,9 +191,9 @@ def energy(views: Views) -> Figure:
         recording = view.recording
         residual = recording.column("energy.residual")
         rest.plot(recording.time, 1e3 * (residual - residual[0]), color=PALETTE[-1], linewidth=0.9)
-        rest.set_title(f"{label}: what the books leave over")
+        rest.set_title(f"{label}: residual")
         rest.set_ylabel("residual since the start [mJ]")
-        for color, (name, style) in zip(PALETTE, BOOKS.items(), strict=False):
+        for color, (name, style) in zip(PALETTE, ENERGIES.items(), strict=False):
             if name != "push_work" or pushed:
                 values = recording.column(f"energy.{name}")
                 axis.plot(
@@ -242,9 +215,7 @@ def energy(views: Views) -> Figure:
 
 
 def footfall(views: Views) -> Figure:
-    """Which foot is on the ground when, over the last cycles; a grey band is where the gait
-    wants it in the air.
-    """
+    """Draws when each foot is on the ground over the last cycles; grey bands are planned swings."""
     figure = Figure(figsize=(WIDTH, 0.5 + 1.6 * len(views)))
     axes = np.atleast_1d(figure.subplots(len(views), 1, sharex=True))
     for axis, (label, view) in zip(axes, views.items(), strict=True):
@@ -253,14 +224,8 @@ def footfall(views: Views) -> Figure:
             swinging = f"controller.{name}.swinging"
             if swinging in end.names:
                 _bars(axis, end.time, end.column(swinging) > 0.5, leg, height=0.9, color=PLANNED)
-            _bars(
-                axis,
-                end.time,
-                end.feet("contact")[:, leg] > 0.5,
-                leg,
-                height=0.5,
-                color=STYLES[label]["color"],
-            )
+            contact, color = end.feet("contact")[:, leg] > 0.5, STYLES[label]["color"]
+            _bars(axis, end.time, contact, leg, height=0.5, color=color)
         axis.set_yticks(range(len(LEG_NAMES)), LEG_NAMES)
         axis.invert_yaxis()
         axis.set_title(label)
@@ -275,6 +240,7 @@ def footfall(views: Views) -> Figure:
 
 
 def _bars(axis: Axes, time: Array, on: Any, row: int, *, height: float, color: str) -> None:
+    """Draws a bar in a row for each period in which a flag (rows,) is on."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     last = len(time) - 1
     spans = [
@@ -285,7 +251,7 @@ def _bars(axis: Axes, time: Array, on: Any, row: int, *, height: float, color: s
 
 
 def leg_title(leg: int) -> str:
-    """Where a leg is, and its name."""
+    """Returns the position and name of a leg."""
     name = LEG_NAMES[leg]
     return f"{SIDES[name[0]]} {PLACES[name[1]]} ({name})"
 
@@ -304,7 +270,7 @@ def _legend(figure: Figure, axis: Axes) -> None:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of the report."""
+    """A figure of the report and its texts."""
 
     title: str
     caption: str
@@ -319,7 +285,8 @@ FIGURES: dict[str, Drawing] = {
     ),
     "slip": Drawing(
         "Slip",
-        "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.",
+        "Above, the way all loaded feet have slipped since the start; "
+        "below, the slip speed of each foot.",
         slip,
     ),
     "feet": Drawing(
@@ -344,7 +311,7 @@ FIGURES: dict[str, Drawing] = {
     ),
     "energy": Drawing(
         "Energy audit",
-        "Work, loss and stored energy; on its own axis, the residual that the books leave.",
+        "Work, loss and stored energy; on its own axis, the unexplained residual.",
         energy,
     ),
     "footfall": Drawing(
@@ -356,8 +323,10 @@ FIGURES: dict[str, Drawing] = {
 
 
 def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]]:
-    """Draws FIGURES into a folder, as PNG and SVG. Returns the files, and by name why a figure that
-    lacks its columns is not drawn; one of that name from an earlier report is taken away.
+    """Draws FIGURES into a folder as PNG and SVG.
+
+    Returns the files and, by name, why a figure was not drawn; its file from an earlier report is
+    deleted.
     """
     folder.mkdir(exist_ok=True)
     saved: list[Path] = []
@@ -375,7 +344,6 @@ def save_figures(views: Views, folder: Path) -> tuple[list[Path], dict[str, str]
                 saved.append(folder / f"{name}.{kind}")
                 with atomic_path(saved[-1]) as temporary:
                     figure.savefig(temporary, format=kind, dpi=DPI, metadata=metadata)
-                figure.set_layout_engine(
-                    "none"
-                )  # laid out once is enough: it takes as long as the drawing
+                # one layout is enough: it takes as long as the drawing
+                figure.set_layout_engine("none")
     return saved, skipped

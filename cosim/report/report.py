@@ -1,6 +1,4 @@
-"""The report of a run or a comparison: one HTML file with everything in it, that replays the
-walk and works without a network.
-"""
+"""Writes the report of a run or a comparison: one HTML file with tables, plots and a replay."""
 
 from __future__ import annotations
 
@@ -14,27 +12,31 @@ from markupsafe import Markup
 
 from hexapod_cosim.cosim.common.files import write_text
 from hexapod_cosim.cosim.common.toml_text import to_toml
-from hexapod_cosim.cosim.report.accuracy import about_accuracy, effect_rows, with_errors
+from hexapod_cosim.cosim.report.accuracy import (
+    Metrics,
+    Rows,
+    about_accuracy,
+    effect_rows,
+    with_errors,
+)
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
-from hexapod_cosim.cosim.results.results import Stored
+from hexapod_cosim.cosim.results.results import StoredResult
 
 REPORT, PLOTS = "report.html", "plots"
 
-Rows = list[dict[str, Any]]
-
 
 class Section(NamedTuple):
-    """Plots that belong together."""
+    """A group of plots."""
 
     name: str  # of the static figure that shows the same
     title: str
     caption: str
-    shape: str = ""  # how its plots lie: three in a row, "pairs", or "wide"
+    shape: str = ""  # layout of its plots: three in a row, "pairs", "wide" or "overhead"
 
 
 SECTIONS = (
@@ -42,12 +44,14 @@ SECTIONS = (
     Section(
         "slip",
         "Slip",
-        "Above, the way all loaded feet have slipped since the start; below, the slip speed of each foot.",
+        "Above, the way all loaded feet have slipped since the start; "
+        "below, the slip speed of each foot.",
     ),
     Section(
         "feet",
         "Planned and real feet",
-        "How far each foot's centre is from where the command plans it, in the torso's frame; the figures show both paths.",
+        "How far each foot's centre is from where the command plans it, in the torso's frame; "
+        "the figures show both paths.",
     ),
     Section(
         "posture",
@@ -59,7 +63,7 @@ SECTIONS = (
     Section(
         "energy",
         "Energy audit",
-        "Work, loss and stored energy since the start; beside them what the books do not explain.",
+        "Work, loss and stored energy since the start; beside them the unexplained residual.",
         "pairs",
     ),
     Section(
@@ -71,78 +75,102 @@ SECTIONS = (
     Section(
         "path",
         "Path of the torso",
-        "The torso from above, dots where it is at the replay's time; dotted, where the command leads.",
+        "The torso from above, dots where it is at the replay's time; "
+        "dotted, where the command leads.",
         "overhead",
     ),
 )
 
 
 def write_report(
-    runs: Mapping[str, Stored],
+    runs: Mapping[str, StoredResult],
     folder: Path,
     *,
-    tell: Callable[[str], None],
+    warn: Callable[[str], None],
     comparison: Comparison | None = None,
     scenario: str | None = None,
     command: str | None = None,
     accuracies: Mapping[str, Accuracy] = MappingProxyType({}),
 ) -> list[Path]:
-    """Draws the figures and writes report.html for runs by control. Returns the files, the report
-    last.
+    """Draws the figures and writes report.html; returns the files, the report last.
 
-    `tell` hears what could not be drawn. A comparison, whose figures are over all seeds while the
-    runs are those of the first one, says by what `scenario` (TOML) and `command` it was made; a
-    single run has its own. `accuracies`, by control, are of the figures where they were checked.
+    Args:
+        runs: by control; of a comparison, those of the first seed.
+        folder: where report.html and the folder of figures are written.
+        warn: called with a message for each figure that cannot be drawn.
+        comparison: the metrics over all seeds; without it the report is of a single run.
+        scenario, command: of a comparison; a single run has its own. The scenario is TOML.
+        accuracies: by control, where they were checked.
     """
-    # matplotlib is slow to import
+    # imported only here because matplotlib is slow to import
     from hexapod_cosim.cosim.report.plots import FIGURES, save_figures  # noqa: PLC0415
 
     files, skipped = save_figures({label: run.view for label, run in runs.items()}, folder / PLOTS)
     missing = [f"{FIGURES[name].title} is not drawn: {reason}" for name, reason in skipped.items()]
     for text in missing:
-        tell(text)
+        warn(text)
     first = next(iter(runs.values()))
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
-    metrics = (
-        {label: run.metrics for label, run in runs.items()}
-        if comparison is None
-        else comparison.means
-    )
+    content["warnings"] = [
+        f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
+    ] + content.pop("losses")
+    content["scenario"] = first.scenario if scenario is None else scenario
+    content["command"] = first.facts.get("command", "") if command is None else command
+    metrics = _metrics(runs, comparison)
     page = render(
         "report.html.jinja",
         title=first.facts["title"],
-        labels=list(runs),
-        facts={label: run.facts for label, run in runs.items()},
-        told={label: _told(run.facts) for label, run in runs.items()},
-        walked={label: _walked(run.facts) for label, run in runs.items()},
-        warnings=[
-            f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
-        ]
-        + content.pop("losses"),
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
-        scenario=first.scenario if scenario is None else scenario,
-        command=first.facts.get("command", "") if command is None else command,
         creep=creep_note(first.facts["parameters"]),
-        gains={
-            label: to_toml(run.facts["gains"])
-            for label, run in runs.items()
-            if run.facts.get("gains")
-        },
-        accuracy=about_accuracy(accuracies),
-        effects=effect_rows(content["rows"], accuracies, metrics),
-        notes=[f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
-        **content | {"rows": with_errors(content["rows"], accuracies)},
+        **content | _accuracy(content["rows"], accuracies, metrics),
+        **_facts(runs),
         **_replay(runs),
     )
     write_text(folder / REPORT, page)
     return [*files, folder / REPORT]
 
 
-def _one_run(run: Stored) -> dict[str, Any]:
-    rows = metric_rows(
-        {run.facts["control"]: run.metrics}, net_slip=has_net_slip(run.facts["parameters"])
-    )
+def _metrics(runs: Mapping[str, StoredResult], comparison: Comparison | None) -> Metrics:
+    """Returns the metrics of the table: means of a comparison, or those of a single run."""
+    if comparison is None:
+        return {label: run.metrics for label, run in runs.items()}
+    return comparison.means
+
+
+def _accuracy(
+    rows: Rows,
+    accuracies: Mapping[str, Accuracy],
+    metrics: Metrics,
+) -> dict[str, Any]:
+    """Returns the parts of the page on accuracy, and the rows of the table with errors."""
+    return {
+        "accuracy": about_accuracy(accuracies),
+        "effects": effect_rows(rows, accuracies, metrics),
+        "notes": [f"accuracy: {text}" for item in accuracies.values() for text in item.notes],
+        "rows": with_errors(rows, accuracies),
+    }
+
+
+def _facts(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
+    """Returns the facts of all runs, by control."""
+    return {
+        "labels": list(runs),
+        "facts": {label: run.facts for label, run in runs.items()},
+        "durations": {label: _duration(run.facts) for label, run in runs.items()},
+        "walked": {label: _walked(run.facts) for label, run in runs.items()},
+        "gains": {
+            label: to_toml(run.facts["gains"])
+            for label, run in runs.items()
+            if run.facts.get("gains")
+        },
+    }
+
+
+def _one_run(run: StoredResult) -> dict[str, Any]:
+    """Returns the parts of the page that only a report of a single run has."""
+    metrics = {run.facts["control"]: run.metrics}
+    rows = metric_rows(metrics, net_slip=has_net_slip(run.facts["parameters"]))
     return {
         "headline": plain_headline(run.metrics, run.facts),
         "cards": [],
@@ -154,10 +182,9 @@ def _one_run(run: Stored) -> dict[str, Any]:
 
 
 def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, Any]:
-    rows, notes = (
-        comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"])),
-        about(comparison),
-    )
+    """Returns the parts of the page that only a report of a comparison has."""
+    rows = comparison_rows(comparison, net_slip=has_net_slip(facts["parameters"]))
+    notes = about(comparison)
     means = notes.partition(f"; {METHOD}")[0]
     means = f"{means}; 95 % intervals in brackets." if means else "One run of each control."
     lead = f"Robot {facts['robot']['name']}. {means}"
@@ -171,8 +198,8 @@ def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, A
     }
 
 
-def _replay(runs: Mapping[str, Stored]) -> dict[str, Any]:
-    """Viewer and recordings; where there is no viewer, what to do about it."""
+def _replay(runs: Mapping[str, StoredResult]) -> dict[str, Any]:
+    """Returns the viewer and its data; where it is not installed, a text on how to get it."""
     script = viewer_script()
     if script is None:
         return {"viewer": "", "payload": "", "thinned": [], "no_viewer": NO_VIEWER}
@@ -185,25 +212,28 @@ def _replay(runs: Mapping[str, Stored]) -> dict[str, Any]:
     }
 
 
-def _told(facts: Mapping[str, Any]) -> str:
-    return f"{facts['simulated']:.6g} s simulated in {facts['wall']:.3g} s ({facts['realtime_factor']:.3g} x real time)"
+def _duration(facts: Mapping[str, Any]) -> str:
+    simulated, wall = f"{facts['simulated']:.6g} s", f"{facts['wall']:.3g} s"
+    return f"{simulated} simulated in {wall} ({facts['realtime_factor']:.3g} x real time)"
 
 
 def _walked(facts: Mapping[str, Any]) -> str:
-    """How long and how fast; without a speed when too short a time to tell."""
+    """Returns duration and, if known, mean speed."""
     speed = (facts.get("walk") or {}).get("mean_speed")
-    return f"{facts['simulated']:.6g} s" + (
-        f" at {1e3 * speed:.3g} mm/s" if speed is not None and math.isfinite(speed) else ""
-    )
+    simulated = f"{facts['simulated']:.6g} s"
+    if speed is None or not math.isfinite(speed):
+        return simulated
+    return f"{simulated} at {1e3 * speed:.3g} mm/s"
 
 
 def _robot(facts: Mapping[str, Any]) -> str:
-    return f"Robot {facts['robot']['name']}, {_told(facts)}."
+    return f"Robot {facts['robot']['name']}, {_duration(facts)}."
 
 
-def metric_rows(metrics: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> Rows:
-    """A row per metric that tells something of these runs: name, unit, meaning, and values by
-    control as text.
+def metric_rows(metrics: Metrics, *, net_slip: bool) -> Rows:
+    """Returns a row per metric that the runs have: name, unit, meaning and values as texts.
+
+    metrics: by control.
     """
     empty = {"change": "", "interval": "", "verdict": ""}
     shown = [(name, *METRICS[name]) for name in shown_metrics(metrics, net_slip=net_slip)]
@@ -220,8 +250,9 @@ def metric_rows(metrics: Mapping[str, Mapping[str, float | None]], *, net_slip: 
 
 
 def comparison_rows(comparison: Comparison, *, net_slip: bool = False) -> Rows:
-    """The same of means, with changes from the first control to the second; before them, if of
-    several seeds, how many runs walked.
+    """Returns the rows of the means, with changes from the first control to the second.
+
+    Over several seeds, the first row tells how many runs walked to the end.
     """
     rows = metric_rows(comparison.means, net_slip=net_slip)
     for row in rows:
@@ -245,14 +276,14 @@ def comparison_rows(comparison: Comparison, *, net_slip: bool = False) -> Rows:
 
 
 def about(comparison: Comparison) -> str:
-    """What the table's figures are, in a sentence; "" for a single seed."""
+    """Returns a sentence on what the table's values are; "" for a single seed."""
     seeds, n = comparison.seeds, len(comparison.seeds)
+    if n == 1:
+        return ""
     judged = max(change.pairs for change in comparison.changes.values())
-    told = f" of the {judged} in which both walked to the end" if judged < n else ""
+    part = f" of the {judged} in which both walked to the end" if judged < n else ""
     return (
-        f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){told}, both controls on each; {METHOD}."
-        if n > 1
-        else ""
+        f"Means over {n} seeds ({seeds[0]} to {seeds[-1]}){part}, both controls on each; {METHOD}."
     )
 
 
@@ -261,18 +292,16 @@ def _shown(name: str, value: float | None) -> str:
 
 
 def number(value: float | None, *, dust: float = 0.0) -> str:
-    """A value for people; smaller than `dust` is 0."""
+    """Returns a value as text with four digits; one smaller than `dust` is 0."""
     if value is not None and abs(value) < dust:
         return "0"
     return "-" if value is None or not math.isfinite(value) else f"{value:.4g}"
 
 
 def _change(change: Change) -> str:
-    """Relative, where the first value stands clear of the floor; of a single pair, if it means
-    anything.
-    """
-    told = math.isfinite(change.relative) and (change.pairs > 1 or change.verdict != SAME)
-    return _share(change.relative) if told else ""
+    """Returns the relative change; "" near the floor and for a single pair without a verdict."""
+    known = math.isfinite(change.relative) and (change.pairs > 1 or change.verdict != SAME)
+    return _share(change.relative) if known else ""
 
 
 def _interval(change: Change) -> str:

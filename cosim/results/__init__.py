@@ -1,3 +1,4 @@
-"""What a run leaves: metrics, warnings, recordings, comparisons and result folders. Imports
-`common` to `master`.
+"""Results of runs: metrics, warnings, recordings, comparisons and result folders.
+
+Imports `common` to `master`.
 """

@@ -1,19 +1,16 @@
-"""How exact a run's metrics are: the same walk once more with a finer integration, and once more
-with half the macro-step.
+"""Estimates how exact a run's metrics are, from two more runs of the same walk.
 
-Two numbers stand beside every metric.
+- The solver error is the metric minus that of a reference run: the same scenario, seed, gains,
+  commands and control period with a solver tolerance FINER times smaller or, where the step is
+  fixed, a solver step FINER_STEP times smaller. It includes how the controller reacts to the
+  difference.
+- The effect of the macro-step is the metric with half the macro-step minus the run's own metric.
+  The controller then acts, and outputs are read, twice as often; gains that were designed for the
+  run are designed again for the shorter period, given gains stay. So this is no error of the run,
+  but shows how much its metrics depend on the chosen macro-step.
 
-- The solver's error is the metric less that of a reference: the same scenario, seed, gains,
-  commands and control period, integrated FINER times as exactly in tolerance or, where the step is
-  fixed, with a step FINER_STEP times as short. The controller is in the loop, so what it makes of
-  the difference is part of it.
-- The effect of the macro-step is the metric with half the macro-step less the metric as it is. The
-  controller then acts, and outputs are read, twice as often; gains that were designed for the run
-  are designed anew for the shorter period, given ones stay. So this is no error of the run but says
-  how far its figures hang on the macro-step that the scenario chose.
-
-Metrics are taken as they come, by name; the clock's (TIMED) are left out. Over several seeds both
-numbers are of the means.
+The metrics in TIMED, which depend on the machine, are left out. Over several seeds both numbers are
+differences of means.
 """
 
 from __future__ import annotations
@@ -33,35 +30,31 @@ from hexapod_cosim.cosim.scenario.scenario import scenario_robot
 from hexapod_cosim.models import HexapodError, ScenarioError
 
 FINER, FINER_STEP = 100.0, 10.0
-TIMED = ("realtime_factor",)  # metrics of the clock on the wall, which no solver makes more exact
+TIMED = ("realtime_factor",)  # metrics of wall time, which no solver makes more exact
 STEP, TOLERANCE = "solver.step", "solver.tolerance"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Accuracy:
-    """Of one run's metrics, or of their means over several seeds; NaN where a run has no such
-    metric.
-    """
+    """Accuracy of one run's metrics, or of their means over several seeds; NaN where none."""
 
     reference: str  # the setting of the reference, NAME=VALUE
     macro_step: float  # s    half of the run's
-    runs: int  # in which all three walked, or of which all three have figures where none did
-    solver_error: Mapping[str, float]  # by metric, in its unit: run less reference
-    macro_step_effect: Mapping[
-        str, float
-    ]  # by metric, in its unit: with half the macro-step less run
-    notes: tuple[str, ...]  # where a run that was made for this did not go as the run itself
+    runs: int  # that are used: those in which all three walked; all runs where there are none
+    solver_error: Mapping[str, float]  # by metric, in its unit: run minus reference
+    macro_step_effect: Mapping[str, float]  # by metric: run with half the macro-step minus run
+    notes: tuple[str, ...]  # extra runs that ended differently from the run itself
 
     @property
     def about(self) -> str:
-        """What the numbers compare."""
+        """A sentence on what the two numbers compare."""
         return (
             f"solver error: less the same walk at {self.reference}; "
             f"half the macro-step: the same walk at macro_step={self.macro_step:g} less this one"
         )
 
     def as_table(self) -> dict[str, Any]:
-        """For JSON; `accuracy_of_table` reads it."""
+        """Returns a table for JSON, which `accuracy_from_table` reads."""
         return {
             "about": self.about,
             "reference": self.reference,
@@ -73,8 +66,8 @@ class Accuracy:
         }
 
 
-def accuracy_of_table(table: Any, *, where: str) -> Accuracy:
-    """What `as_table` gave, read from a file. Raises HexapodError when it is damaged."""
+def accuracy_from_table(table: Any, *, where: str) -> Accuracy:
+    """Reads a table that `as_table` returned. Raises HexapodError when it is damaged."""
     try:
         return Accuracy(
             reference=str(table["reference"]),
@@ -99,8 +92,8 @@ def _numbers(values: Mapping[str, float | None]) -> dict[str, float]:
     return {name: math.nan if value is None else float(value) for name, value in values.items()}
 
 
-def finer(scenario: Scenario) -> Scenario:
-    """The reference's scenario."""
+def reference_scenario(scenario: Scenario) -> Scenario:
+    """Returns the scenario of the reference run, with the finer solver setting."""
     name, value = _finer_setting(scenario)
     if name in scenario.parameters:
         return replace(scenario, parameters={**scenario.parameters, name: value})
@@ -109,20 +102,19 @@ def finer(scenario: Scenario) -> Scenario:
 
 
 def _finer_setting(scenario: Scenario) -> tuple[str, float]:
-    """What the reference sets, and to what: the fixed step where there is one, which knows no
-    tolerance, else the tolerance.
-    """
+    """Returns the reference's setting and its value: the solver's fixed step, or its tolerance."""
     solver, given = scenario_robot(scenario).solver, scenario.parameters
     step = float(given.get(STEP, solver.step))
-    return (
-        (STEP, step / FINER_STEP)
-        if step > 0.0
-        else (TOLERANCE, float(given.get(TOLERANCE, solver.tolerance)) / FINER)
-    )
+    if step > 0.0:
+        return STEP, step / FINER_STEP
+    return TOLERANCE, float(given.get(TOLERANCE, solver.tolerance)) / FINER
 
 
-def halved(scenario: Scenario) -> Scenario:
-    """The same with half the macro-step. Raises ScenarioError where that makes too many steps."""
+def halved_scenario(scenario: Scenario) -> Scenario:
+    """Returns the scenario with half the macro-step.
+
+    Raises ScenarioError where that makes too many steps.
+    """
     half = replace(scenario, macro_step=0.5 * scenario.macro_step)
     try:
         check_steps(half)
@@ -137,19 +129,18 @@ def halved(scenario: Scenario) -> Scenario:
     return half
 
 
-def judge_accuracy(
+def compare_accuracy(
     scenario: Scenario,
     runs: Sequence[Summary],
     references: Sequence[Summary],
     halves: Sequence[Summary],
 ) -> Accuracy:
-    """What the same walks, run by run, came to three times: as they are, by `finer` and by `halved`
-    of their scenarios.
+    """Returns the accuracy of runs from their reference runs and their runs with half macro-step.
 
     scenario: of the first run; the others may differ from it by their seed.
     """
     name, value = _finer_setting(scenario)
-    reference, half = f"{name}={value:g}", halved(scenario).macro_step
+    reference, half = f"{name}={value:g}", halved_scenario(scenario).macro_step
     triples = list(zip(runs, references, halves, strict=True))
     judged = [triple for triple in triples if all(run.walked for run in triple)] or triples
     return Accuracy(
@@ -166,7 +157,7 @@ def judge_accuracy(
 
 
 def _mean_differences(pairs: Sequence[tuple[Summary, Summary]]) -> dict[str, float]:
-    """By metric, the mean of first less second over the pairs that both have it."""
+    """Returns, by metric, the mean of first minus second over the pairs that both have it."""
     names = [name for name in pairs[0][0].metrics if name not in TIMED]
     return {
         name: _mean([first.metrics[name] - second.metrics[name] for first, second in pairs])
@@ -180,15 +171,13 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def _notes(where: str, runs: Sequence[Summary], others: Sequence[Summary]) -> list[str]:
-    """Which of the other runs ended otherwise than the runs did."""
+    """Describes the extra runs that did not end as the runs did."""
     found = []
     for run, other in zip(runs, others, strict=True):
         if other.walked == run.walked and other.status == run.status:
             continue
-        how = other.reason or (
-            other.warnings[0]
-            if other.status == COMPLETED and not other.upright and other.warnings
-            else "it walked on"
-        )
-        found.append(f"{run.control}, seed {run.seed}, {where} went another way: {how}")
+        how = other.reason or "it walked to the end"
+        if not other.reason and other.status == COMPLETED and not other.upright and other.warnings:
+            how = other.warnings[0]
+        found.append(f"{run.control}, seed {run.seed}, {where} ended differently: {how}")
     return found

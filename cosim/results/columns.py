@@ -1,5 +1,5 @@
-"""Units and meanings of a recording's columns, from where its variables are defined:
-interface.toml of the plant and of the controller.
+"""Units and descriptions of a recording's columns, read from the interface.toml of plant and
+controller.
 """
 
 from __future__ import annotations
@@ -14,14 +14,12 @@ from hexapod_cosim.cosim.interface.interface import read_table
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
 
 NO_UNIT = "1"
-HEADING = re.compile(
-    r"(?P<name>.*\S) \[(?P<unit>[^\[\]]*)\]"
-)  # an index follows its name without a space
+HEADING = re.compile(r"(?P<name>.*\S) \[(?P<unit>[^\[\]]*)\]")  # no space precedes an index
 
 
 @dataclass(frozen=True)
 class Column:
-    """What a variable is measured in, and what it is."""
+    """Unit and description of a variable."""
 
     unit: str
     description: str
@@ -29,8 +27,9 @@ class Column:
 
 @cache
 def known_columns() -> Mapping[str, Column]:
-    """Everything that a run records, by name: time, the plant's outputs and inputs,
-    `controller.*` and `command.*`.
+    """Returns all columns that a run can record, by name.
+
+    They are time, the plant's outputs and inputs, `controller.*` and `command.*`.
     """
     controller = {
         f"controller.{name}": column for name, column in _variables(CONTROLLER, "output").items()
@@ -50,9 +49,7 @@ def known_columns() -> Mapping[str, Column]:
 
 
 def plant_variables(causality: str) -> dict[str, Column]:
-    """The variables of any plant's FMU of one causality, by name, in the order of its model
-    description.
-    """
+    """Returns the variables of a plant FMU of one causality, in model description order."""
     return _variables(PLANT, causality)
 
 
@@ -68,14 +65,12 @@ def _variables(component: Component, causality: str) -> dict[str, Column]:
 
 
 def heading(name: str) -> str:
-    """A column's name with its unit behind it, "torso.position[1] [m]"; the bare name of what we
-    do not know.
-    """
+    """Returns a column's name and unit, as "torso.position[1] [m]"; only the name if unknown."""
     column = known_columns().get(name)
     return f"{name} [{column.unit}]" if column else name
 
 
 def bare_name(text: str) -> str:
-    """The name in a heading, whether there is a unit behind it or not."""
+    """Returns the name in a heading with or without a unit."""
     found = HEADING.fullmatch(text)
     return found["name"] if found else text

@@ -1,10 +1,9 @@
-"""Figures of merit of a walk over whole gait cycles after the first two.
+"""Metrics of a walk over whole gait cycles after the first two.
 
-Work, heat, slip and peaks are the plant's own integrals and maxima, so they do not depend on how
-often it is read. What is a distribution over time (forces, the friction cone, posture, feet) is of
-the rows given: a run gives one per macro-step, whatever it keeps. A figure that the recording
-cannot give (per metre for a robot that stands, anything for a run shorter than three cycles) is
-NaN.
+Work, heat, slip and peaks are integrals and maxima of the plant itself, so they do not depend on
+how often it is read. Distributions over time (forces, friction cone, posture, feet) use the rows
+given: one per macro-step in a run, whatever it records. A metric that the recording cannot give
+(per metre for a robot that stands, any metric of a run shorter than three cycles) is NaN.
 """
 
 from __future__ import annotations
@@ -39,19 +38,19 @@ from hexapod_cosim.cosim.results.walk import (
 from hexapod_cosim.models import LEG_NAMES, Servo
 from hexapod_cosim.models.contact import sliding_velocity
 
-TANH_LIMIT = 0.999  # atanh beyond it would call sliding a creep
+TANH_LIMIT = 0.999  # limits atanh: a larger share is sliding, not creep
 NEARLY_SLIDING = 0.9  # of the friction cone
-LIFT = 1e-3  # m    the work of lifting the robot by it is the least that books are measured by
+LIFT = 1e-3  # m    lifting the robot by it is the least work that the residual is compared with
 
 
 class Metric(NamedTuple):
-    """What a figure is."""
+    """Definition of a metric."""
 
     unit: str
     less_is_better: bool | None  # None: neither
     meaning: str
-    # The least change, in the unit, that means anything: no one could measure less on the robot (a
-    # tenth of a millimetre, of a milliradian, the resolution of its force and torque sensing)
+    # least change, in the unit, that is meaningful: the resolution of measurements on the robot (a
+    # tenth of a millimetre, of a milliradian, of its force and torque sensing)
     floor: float
 
 
@@ -128,12 +127,12 @@ _TABLE: dict[str, Metric] = {
         "m", False, "least distance of the centre of mass from the support polygon's edge", 1e-4
     ),
     "energy_residual": Metric(
-        "1", None, "what the energy books do not explain, in shares of the motors' work", 0.0
+        "1", None, "energy that the balance does not explain, over the motors' work", 0.0
     ),
     "realtime_factor": Metric("1", None, "simulated over wall time of the whole loop", 0.0),
 }
-OF_THE_RUN = ("energy_residual", "realtime_factor")  # of any run, however short
-# of a robot that turns on the spot, in the place of what is per metre
+OF_THE_RUN = ("energy_residual", "realtime_factor")  # defined for any run, however short
+# metrics of a robot that turns on the spot, which replace those per metre
 PER_RADIAN = {
     "slip_per_metre": "slip_per_radian",
     "path_error": "path_error_per_radian",
@@ -145,14 +144,14 @@ PER_RADIAN = {
 # name -> unit, whether less is better (None: neither), meaning
 METRICS = {name: (each.unit, each.less_is_better, each.meaning) for name, each in _TABLE.items()}
 FLOORS = {name: each.floor for name, each in _TABLE.items()}
-DUST = 1e-6  # of the floor: a value below it is round-off, and is shown as 0
+DUST = 1e-6  # of the floor: a smaller value is round-off and is shown as 0
 
 PLANNED = tuple(name for leg in LEG_NAMES for name in vector_names(f"controller.{leg}.planned"))
 # Time of all feet under load by the share of the friction cone used: bins begin at 0.9 (i/30)^2,
 # the last holds all above 0.9
 CONE_TIMES = tuple(vector_names("feet.cone_time", 31))
 _CONE_EDGES = np.append(NEARLY_SLIDING * (np.arange(31) / 30.0) ** 2, 1.0)
-# what the plant integrates or tracks for the metrics
+# outputs that the plant integrates or tracks for the metrics
 MEASURED_BY_PLANT = (
     *(
         name
@@ -167,7 +166,7 @@ MEASURED_BY_PLANT = (
     *CONE_TIMES,
     "energy.residual",
 )
-# what metrics and the warnings of a run look at; of controllers, those that tell
+# outputs that metrics and warnings use; the controller's only if it has them
 _JUDGED = (
     *vector_names("torso.position"),
     *vector_names("torso.quaternion", 4),
@@ -194,15 +193,13 @@ _JUDGED_BRISTLES = tuple(
 )
 
 
-def judged_columns(*, bristles: bool) -> tuple[str, ...]:
-    """What has to be recorded of a robot for its metrics and warnings; `bristles`: whether its
-    friction has them.
-    """
+def metric_columns(*, bristles: bool) -> tuple[str, ...]:
+    """Returns the columns that metrics and warnings need; `bristles`: of a bristle friction law."""
     return (*_JUDGED, *_JUDGED_BRISTLES) if bristles else _JUDGED
 
 
 def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict[str, float]:
-    """All figures of METRICS. Of the servo, the rating and the motor constant count."""
+    """Computes all METRICS of a run; the servo gives continuous rating and motor constant."""
     walk = view.walk
     of_the_run = {"energy_residual": energy_residual(view), "realtime_factor": realtime_factor}
     if walk is None:
@@ -219,10 +216,9 @@ def compute_metrics(view: View, *, servo: Servo, realtime_factor: float) -> dict
 
 
 def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: bool) -> list[str]:
-    """Metrics for a table of runs: per radian what a run turned on the spot, else per metre.
+    """Returns the metrics for a table of runs: per radian for turns on the spot, else per metre.
 
-    `net_slip`: whether that means anything, which it does not under the tanh law, whose own creep
-    it inverts.
+    `net_slip`: whether to show slip_net_per_metre; see `has_net_slip`.
     """
 
     def given(name: str) -> bool:
@@ -237,14 +233,12 @@ def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: b
 
 
 def has_net_slip(parameters: Mapping[str, float]) -> bool:
-    """Whether slip_net_per_metre says more than that the tanh law is what it is."""
+    """Whether slip_net_per_metre is meaningful: under the tanh law it only inverts that law."""
     return parameters.get("friction.law", TANH) != TANH
 
 
 def energy_residual(view: View) -> float:
-    """Largest |energy.residual| of a run, over the work that its motors did or took; NaN without
-    a row.
-    """
+    """Returns the largest |energy.residual| over the work of the motors; NaN without rows."""
     recording = view.recording
     if not len(recording.time):
         return np.nan
@@ -256,9 +250,7 @@ def energy_residual(view: View) -> float:
 
 
 def _per(walk: Walk, amount: float, name: str) -> dict[str, float]:
-    """An amount per metre, under its name, and its twin per radian; what the robot does not do
-    is NaN.
-    """
+    """Returns an amount per metre and per radian, by the metrics' names; NaN where not defined."""
     return {name: amount / walk.distance, PER_RADIAN[name]: amount / walk.angle}
 
 
@@ -270,8 +262,9 @@ def _slip(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
 
 
 def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6) slip speed less what the friction law makes of sticking: the tanh law's creep, a
-    bristle's stretching and its return.
+    """Returns the slip speed (rows, 6) without the friction law's own motion while sticking.
+
+    That motion is the creep of the tanh law, or the stretch and return of a bristle.
     """
     if parameters.get("friction.law", TANH) == BRISTLE:
         sliding = sliding_velocity(
@@ -288,8 +281,9 @@ def _net_slip(part: Recording, parameters: Mapping[str, float]) -> Array:
 
 
 def cone_use(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6) tangential force in shares of the largest, mu f_n; 0 of feet without load, and
-    without friction.
+    """Returns tangential force over the largest possible, mu f_n (rows, 6).
+
+    It is 0 for feet without load, and without friction.
     """
     largest = parameters["friction.mu"] * part.feet("normal_force")
     loaded = bearing_load(part, parameters) & (largest > 0.0)
@@ -311,12 +305,12 @@ def _cone(walk: Walk, parameters: Mapping[str, float]) -> dict[str, float]:
 
 
 def _spread(walk: Walk) -> Array:
-    """(rows, 6) the time that each row stands for, foot by foot."""
+    """Returns the share of time that each row represents, for each foot (rows, 6)."""
     return np.broadcast_to(walk.weights[:, None], (len(walk.weights), len(LEG_NAMES)))
 
 
 def _percentiles(values: Array, weights: Array, wanted: tuple[float, ...]) -> list[float]:
-    """Of values that hold for shares of time: each sits in the middle of its share."""
+    """Returns weighted percentiles; each value lies in the middle of its weight."""
     order = np.argsort(values, kind="stable")
     reached = np.cumsum(weights[order]) - 0.5 * weights[order]
     places = np.array(wanted) / 100.0 * weights.sum()
@@ -341,8 +335,9 @@ def _rms_of(square: Array, weights: Array) -> float:
 
 
 def foot_errors(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6, 3) real less planned place of each foot's centre, torso frame [m]; no rows when
-    the controller does not tell.
+    """Returns actual minus planned position of each foot's centre [m] (rows, 6, 3), torso frame.
+
+    There are no rows when the controller does not report its plan.
     """
     if not set(PLANNED) <= set(recording.names):
         return np.zeros((0, len(LEG_NAMES), 3))
@@ -350,8 +345,9 @@ def foot_errors(recording: Recording, parameters: Mapping[str, float]) -> Array:
 
 
 def planned_feet(recording: Recording) -> Array:
-    """(rows, 6, 3) each foot's centre as the command plans it, torso frame [m]. Raises
-    ColumnError when the controller does not tell.
+    """Returns each foot's planned centre [m] (rows, 6, 3), torso frame.
+
+    Raises ColumnError when the controller does not report it.
     """
     return recording.columns(PLANNED).reshape(-1, len(LEG_NAMES), 3)
 
@@ -387,11 +383,10 @@ def _force(walk: Walk) -> dict[str, float]:
 
 
 def landing_rates(walk: Walk) -> Array:
-    """(landings,) largest rise of the force over 1 ms [N/s] in the 20 ms after touch-down, of all
-    feet's landings from begin to end.
+    """Returns the largest rise of the force over 1 ms [N/s] in the 20 ms after each landing.
 
-    A foot that touches down again within half a gait cycle has bounced: both are one landing, and
-    the steeper rise counts.
+    Landings of all feet between begin and end count. A foot that touches down again within half a
+    gait cycle has bounced: both are one landing, with the steeper rise.
     """
     found: list[float] = []
     steps = walk.steps()

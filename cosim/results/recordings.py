@@ -1,9 +1,8 @@
-"""Recordings as files: Parquet, which this package reads back, CSV for people and spreadsheets, and
-the commands alone for importers.
+"""Writes and reads recordings: Parquet, CSV for spreadsheets, and the commands alone for importers.
 
-A Parquet file has the variables' names as columns, doubles, with unit and description as metadata
-of each field; what was run is metadata of the schema. A CSV file has "name [unit]" above each
-column. Numbers are the same bits in both.
+A Parquet file has a column of doubles per variable, with unit and description as metadata of each
+field and the run's facts as metadata of the schema. A CSV file has "name [unit]" above each column.
+Both hold the same numbers, bit for bit.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from hexapod_cosim.cosim.scenario.records import FORMATS
 from hexapod_cosim.models import HexapodError
 
 COMMANDS = "commands.csv"
-NONE = ["nan", "NaN", "-nan"]  # how a number that is none is written
+NAN_TEXTS = ["nan", "NaN", "-nan"]  # in CSV files
 
 
 def write_recording(
@@ -36,12 +35,15 @@ def write_recording(
     columns: Sequence[str] = ("*",),
     about: Mapping[str, Any] | None = None,
 ) -> list[Path]:
-    """Writes STEM.parquet, with all columns, and STEM.csv, or those of them that are wanted.
-    Returns the files.
+    """Writes STEM.parquet with all columns and STEM.csv, as far as wanted; returns the files.
 
     Args:
-        columns: patterns of the columns that the CSV file has.
-        about: what was run, texts or what JSON takes; metadata of the Parquet file.
+        recording: what to write.
+        folder: where to write it.
+        stem: name of the files without suffix.
+        formats: which of "parquet" and "csv" to write.
+        columns: patterns of the columns of the CSV file.
+        about: facts of the run, texts or JSON values; metadata of the Parquet file.
     """
     files = [folder / f"{stem}.{kind}" for kind in formats]
     for path in files:
@@ -53,8 +55,9 @@ def write_recording(
 
 
 def write_commands(recording: Recording, path: Path) -> None:
-    """The plant's inputs over time under their bare names, as importers of FMUs take them; each
-    row holds until the next.
+    """Writes the plant's inputs over time under their bare names, as FMU importers read them.
+
+    Each row holds until the next.
     """
     names = set(recording.names)
     inputs = ["time", *(name for name in plant_variables("input") if name in names)]
@@ -62,8 +65,9 @@ def write_commands(recording: Recording, path: Path) -> None:
 
 
 def read_recording(folder: Path, stem: str) -> Recording:
-    """A run's recording from its folder, whichever file is there. Raises HexapodError when there
-    is none.
+    """Reads a run's recording from its folder, in whichever format is there.
+
+    Raises HexapodError when there is none.
     """
     for kind, read in READERS.items():
         if (folder / f"{stem}.{kind}").is_file():
@@ -78,7 +82,7 @@ def read_recording(folder: Path, stem: str) -> Recording:
 
 
 def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any]) -> None:
-    """One column per variable. Appears under `path` whole or not at all."""
+    """Writes one column per variable. A failed write leaves no partial file."""
     import pyarrow as pa  # noqa: PLC0415  slow to import
     import pyarrow.parquet as pq  # noqa: PLC0415
 
@@ -99,15 +103,14 @@ def write_parquet(recording: Recording, path: Path, *, about: Mapping[str, Any])
     columns = [pa.array(values) for values in np.ascontiguousarray(recording.data.T)]
     table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata=facts))
     with atomic_path(path) as temporary:
-        # bytes of the same weight beside each other: half the size of a dictionary's, in a quarter
-        # of its time
+        # byte-stream split halves the size of dictionary encoding, in a quarter of its time
         pq.write_table(
             table, temporary, compression="zstd", use_dictionary=False, use_byte_stream_split=True
         )
 
 
 def read_parquet(path: Path) -> Recording:
-    """A recording from its Parquet file. Raises HexapodError when it is missing or none."""
+    """Reads a recording from a Parquet file. Raises HexapodError for a missing or damaged file."""
     import pyarrow as pa  # noqa: PLC0415  slow to import
     import pyarrow.parquet as pq  # noqa: PLC0415
 
@@ -121,8 +124,9 @@ def read_parquet(path: Path) -> Recording:
 
 
 def write_csv(recording: Recording, path: Path, *, units: bool = False) -> None:
-    """Header of quoted names, then one line per row; every number reads back the same. Appears
-    under `path` whole or not at all.
+    """Writes a header of quoted names and one line per row; numbers read back bit for bit.
+
+    A failed write leaves no partial file.
     """
     import pyarrow as pa  # noqa: PLC0415  slow to import
     from pyarrow.csv import write_csv as write  # noqa: PLC0415
@@ -136,8 +140,9 @@ def write_csv(recording: Recording, path: Path, *, units: bool = False) -> None:
 
 
 def read_csv(path: Path) -> Recording:
-    """A recording from its CSV file, with or without units in the header. Raises HexapodError
-    when it is missing or none.
+    """Reads a recording from a CSV file with or without units in the header.
+
+    Raises HexapodError for a missing or damaged file.
     """
     import pyarrow as pa  # noqa: PLC0415  slow to import
     from pyarrow import csv as arrow  # noqa: PLC0415
@@ -146,7 +151,7 @@ def read_csv(path: Path) -> Recording:
         with path.open(encoding="utf-8", newline="") as file:
             names = next(csv.reader(file))
         convert = arrow.ConvertOptions(
-            column_types={str(k): pa.float64() for k in range(len(names))}, null_values=NONE
+            column_types={str(k): pa.float64() for k in range(len(names))}, null_values=NAN_TEXTS
         )
         read = arrow.ReadOptions(column_names=[str(k) for k in range(len(names))], skip_rows=1)
         table = arrow.read_csv(path, read_options=read, convert_options=convert)
@@ -181,11 +186,11 @@ def _not_a_recording(path: Path, error: Exception, expected: str) -> HexapodErro
             fix=fix,
             where=str(path),
         )
-    said = " ".join(str(error).split()) or "an empty file"
-    return HexapodError("not a recording", got=said, expected=expected, fix=fix, where=str(path))
+    message = " ".join(str(error).split()) or "an empty file"
+    return HexapodError("not a recording", got=message, expected=expected, fix=fix, where=str(path))
 
 
-READERS: Mapping[str, Callable[[Path], Recording]] = {
+READERS: Mapping[str, Callable[[Path], Recording]] = {  # the faster one first
     "parquet": read_parquet,
     "csv": read_csv,
-}  # the faster first
+}

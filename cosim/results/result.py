@@ -1,4 +1,4 @@
-"""What a co-simulation run returns: the outcome with its recording, the metrics and the facts."""
+"""The result of a co-simulation run: the outcome with its recording, the metrics and the facts."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """A run and what came of it."""
+    """A run's scenario, outcome, metrics and facts."""
 
     scenario: Scenario
     outcome: Outcome
     metrics: Mapping[str, float]
-    parameters: Mapping[str, float]  # of the FMU, as run
+    parameters: Mapping[str, float]  # of the FMU during the run
     facts: Mapping[str, Any]  # robot, FMU, versions, warnings
 
     @property
     def completed(self) -> bool:
+        """Whether the run reached its end."""
         return self.outcome.status == COMPLETED

@@ -1,6 +1,4 @@
-"""A run on disk: what is written when it completes, what when it does not, and how it is read
-again.
-"""
+"""Writes a run to a folder and reads it back."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from hexapod_cosim.cosim.common.files import (
 )
 from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED
-from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_of_table
+from hexapod_cosim.cosim.results.accuracy import Accuracy, accuracy_from_table
 from hexapod_cosim.cosim.results.recordings import (
     COMMANDS,
     read_recording,
@@ -32,34 +30,19 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.models import HexapodError
 
-RESULTS, PARTIAL, METRICS_FILE, SCENARIO = (
-    "results",
-    "results.partial",
-    "metrics.json",
-    "scenario.toml",
+RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
+METRICS_FILE, SCENARIO = "metrics.json", "scenario.toml"
+ACCURACY = "accuracy"  # key of metrics.json, where accuracy was checked
+ABOUT = ("title", "control", "robot", "fmu", "versions")  # facts in the Parquet file
+NEEDED = (  # facts that a report needs
+    *("title", "control", "simulated", "wall", "realtime_factor", "finished", "gait_period"),
+    *("parameters", "robot", "fmu", "versions", "platform", "warnings"),
 )
-ACCURACY = "accuracy"  # of metrics.json, where it was checked
-NEEDED = (
-    "title",
-    "control",
-    "simulated",
-    "wall",
-    "realtime_factor",
-    "finished",
-    "gait_period",
-    "parameters",
-    "robot",
-    "fmu",
-    "versions",
-    "platform",
-    "warnings",
-)  # of the facts, for a report
-ABOUT = ("title", "control", "robot", "fmu", "versions")  # of the facts, in Parquet
 
 
 @dataclass(frozen=True)
-class Stored:
-    """A completed run, as a report needs it."""
+class StoredResult:
+    """A completed run with all that a report needs."""
 
     view: View
     metrics: Mapping[str, float | None]
@@ -68,68 +51,62 @@ class Stored:
     accuracy: Accuracy | None = None  # None: not checked
 
 
-class Folder:
-    """A place for results, in which an earlier run's stay until this one has begun."""
+class ResultsFolder:
+    """A folder for results, which keeps those of an earlier run until the new run has begun."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.begun = False
 
     def begin(self) -> None:
-        """Clears the folder, once."""
+        """Clears the folder at the first call."""
         if not self.begun:
             clear_folder(self.path)
             self.begun = True
 
 
 @contextmanager
-def results_folder(path: Path) -> Iterator[Folder]:
-    """A folder whose run.json says so when a run began and the block does not come to its end.
-    Raises HexapodError when it cannot be.
+def results_folder(path: Path) -> Iterator[ResultsFolder]:
+    """Claims a folder for a run; if the block fails once the run has begun, run.json says so.
+
+    Raises HexapodError when the folder cannot be used.
     """
     made = claim_folder(path)
-    folder = Folder(path)
+    folder = ResultsFolder(path)
     try:
         yield folder
     except BaseException as error:
         if folder.begun and read_json(path / RUN_FILE)["status"] == RUNNING:
-            status, reason = (
-                (INTERRUPTED, "interrupted")
-                if isinstance(error, KeyboardInterrupt)
-                else (FAILED, str(error))
-            )
+            status, reason = FAILED, str(error)
+            if isinstance(error, KeyboardInterrupt):
+                status, reason = INTERRUPTED, "interrupted"
             write_json(path / RUN_FILE, {"status": status, "reason": reason})
         raise
     finally:
         for place in () if folder.begun else made:
-            with suppress(OSError):  # not empty any more
+            with suppress(OSError):  # no longer empty
                 place.rmdir()
 
 
 def write_result(result: Result, folder: Path) -> list[Path]:
-    """Writes a run into a prepared folder; one that did not complete leaves `results.partial.*` and
-    no figures. Returns the files, the scenario first and the recording next. Parquet, from which
-    reports are made again, holds all columns; CSV those that outputs.csv names. Commands are
-    written where every macro-step is recorded: they hold from row to row.
+    """Writes a run into a prepared folder and returns the files: scenario, recording, others.
+
+    A run that did not complete leaves `results.partial.*` and no metrics. Parquet, from which
+    reports are made again, holds all columns; CSV holds those that outputs.csv names. Commands are
+    written only where every macro-step is recorded, since they hold from row to row.
     """
-    facts, outputs, scenario = (
-        run_facts(result),
-        result.scenario.outputs,
-        to_toml(result.scenario.to_table()),
-    )
-    whole = result.outcome.recording
+    facts, outputs = run_facts(result), result.scenario.outputs
+    scenario, recording = to_toml(result.scenario.to_table()), result.outcome.recording
     write_text(folder / SCENARIO, scenario)
     about = {key: facts[key] for key in ABOUT} | {"scenario": scenario}
     columns, stem = (outputs.csv, RESULTS) if result.completed else (("*",), PARTIAL)
-    files = [
-        folder / SCENARIO,
-        *write_recording(
-            whole, folder, stem, formats=outputs.formats, columns=columns, about=about
-        ),
-    ]
+    files = [folder / SCENARIO]
+    files += write_recording(
+        recording, folder, stem, formats=outputs.formats, columns=columns, about=about
+    )
     if result.completed and "csv" in outputs.formats and result.scenario.every == 1:
         files.append(folder / COMMANDS)
-        write_commands(whole, files[-1])
+        write_commands(recording, files[-1])
     if result.completed:
         files.append(folder / METRICS_FILE)
         write_json(files[-1], dict(result.metrics))
@@ -138,7 +115,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
 
 
 def run_facts(result: Result) -> dict[str, Any]:
-    """The content of run.json."""
+    """Returns the content of run.json."""
     outcome, scenario = result.outcome, result.scenario
     return {
         "kind": "simulate",
@@ -155,9 +132,10 @@ def run_facts(result: Result) -> dict[str, Any]:
     }
 
 
-def read_result(folder: Path) -> Stored:
-    """A completed run from its folder. Raises HexapodError when there is none, or it did not
-    complete.
+def read_result(folder: Path) -> StoredResult:
+    """Reads a completed run from its folder.
+
+    Raises HexapodError when there is none or it did not complete.
     """
     facts = read_facts(folder)
     if facts["status"] != COMPLETED:
@@ -177,15 +155,16 @@ def read_result(folder: Path) -> Stored:
         raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
     view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
     checked = metrics.pop(ACCURACY, None)
-    accuracy = (
-        None if checked is None else accuracy_of_table(checked, where=str(folder / METRICS_FILE))
-    )
-    return Stored(view, metrics, facts, read_scenario(folder), accuracy)
+    accuracy = None
+    if checked is not None:
+        accuracy = accuracy_from_table(checked, where=str(folder / METRICS_FILE))
+    return StoredResult(view, metrics, facts, read_scenario(folder), accuracy)
 
 
 def read_facts(folder: Path) -> Mapping[str, Any]:
-    """What run.json says, its "status" at least. Raises HexapodError when it is missing, damaged
-    or of something else.
+    """Reads run.json, which has the key "status" at least.
+
+    Raises HexapodError when it is missing, damaged or no such file.
     """
     facts = read_json(folder / RUN_FILE)
     if not isinstance(facts, dict) or not isinstance(facts.get("status"), str):
@@ -194,7 +173,7 @@ def read_facts(folder: Path) -> Mapping[str, Any]:
 
 
 def read_scenario(folder: Path) -> str:
-    """The scenario of a run or a comparison, as TOML. Raises HexapodError when it is missing."""
+    """Reads the TOML text of the scenario of a run or a comparison. Raises HexapodError."""
     try:
         return (folder / SCENARIO).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -211,10 +190,10 @@ def _damaged(path: Path, got: str, expected: str) -> HexapodError:
     )
 
 
-def stored(result: Result) -> Stored:
-    """The same, straight from a run."""
+def stored_result(result: Result) -> StoredResult:
+    """Returns what `read_result` would read after the run is written."""
     facts = run_facts(result)
-    return Stored(
+    return StoredResult(
         View(result.outcome.recording, result.parameters, facts["gait_period"]),
         result.metrics,
         facts,
@@ -223,15 +202,18 @@ def stored(result: Result) -> Stored:
 
 
 def write_accuracy(folder: Path, metrics: Mapping[str, Any], accuracy: Mapping[str, Any]) -> None:
-    """Puts what --check-accuracy found beside a folder's metrics."""
+    """Adds the table of an accuracy check to a folder's metrics."""
     write_json(folder / METRICS_FILE, {**metrics, ACCURACY: accuracy})
 
 
 def read_accuracies(folder: Path) -> dict[str, Accuracy]:
-    """By control, of a comparison's folder; empty where accuracy was not checked. Raises
-    HexapodError.
+    """Reads the accuracies of a comparison's folder, by control; {} where none was checked.
+
+    Raises HexapodError.
     """
     path = folder / METRICS_FILE
     table = read_json(path)
     checked = table.get(ACCURACY, {}) if isinstance(table, dict) else {}
-    return {control: accuracy_of_table(item, where=str(path)) for control, item in checked.items()}
+    return {
+        control: accuracy_from_table(item, where=str(path)) for control, item in checked.items()
+    }

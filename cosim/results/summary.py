@@ -1,4 +1,4 @@
-"""What a run came to, without its recording: small enough to be sent and kept by the thousand."""
+"""Summaries of runs without their recordings, small enough to be sent and kept by the thousand."""
 
 from __future__ import annotations
 
@@ -12,35 +12,32 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
-REFUSED = "refused"  # beside the master's ways to end: the run did not begin
+REFUSED = "refused"  # a status besides those of the master: the run did not start
 NO_FIGURES = dict.fromkeys(METRICS, math.nan)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What a run came to."""
+    """Outcome, warnings and metrics of a run."""
 
     control: str
     seed: int
     status: str  # COMPLETED, FAILED or REFUSED
-    reason: str = ""  # in words, "" when completed
+    reason: str = ""  # a sentence; "" when completed
     upright: bool = False  # to the end
-    fallback: float | None = (
-        # share of time in which the controller fell back to kinematic control; None: it does not
-        # say
-        None
-    )
+    # share of time in which the controller fell back to kinematic control; None: unknown
+    fallback: float | None = None
     warnings: tuple[str, ...] = ()
-    metrics: Mapping[str, float]  # NaN where there is none; all of them unless completed
+    metrics: Mapping[str, float]  # NaN where undefined, and everywhere unless completed
 
     @property
     def walked(self) -> bool:
-        """Whether the run came to its end with the robot on its feet."""
+        """Whether the run completed with the robot upright."""
         return self.status == COMPLETED and self.upright
 
 
 def summarise(result: Result) -> Summary:
-    """A run without its recording."""
+    """Returns the summary of a run."""
     scenario, walk = result.scenario, result.facts["walk"]
     return Summary(
         control=scenario.control,
@@ -54,8 +51,8 @@ def summarise(result: Result) -> Summary:
     )
 
 
-def refused(scenario: Scenario, error: HexapodError) -> Summary:
-    """A run that could not begin, and why."""
+def refused_summary(scenario: Scenario, error: HexapodError) -> Summary:
+    """Returns the summary of a run that could not start."""
     return Summary(
         control=scenario.control,
         seed=scenario.seed,

@@ -1,5 +1,6 @@
-"""How far the robot is from tipping: its centre of mass over the polygon of its standing feet,
-for all rows of a recording at once.
+"""Computes the stability margin: the centre of mass over the support polygon of the standing feet.
+
+All rows of a recording are computed at once.
 """
 
 from __future__ import annotations
@@ -22,15 +23,14 @@ COINCIDENT = 1e-9  # m    feet closer than this make no edge
 
 
 def stability_margins(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows,) distance [m] of the centre of mass' projection along gravity from the support
-    polygon's nearest edge.
+    """Returns the distance [m] of the projected centre of mass from the support polygon's edge.
 
-    Negative outside, and for a line of two feet; NaN with fewer than two feet on the ground.
+    One value per row (rows,); the projection is along gravity. Negative outside the polygon, and
+    for two feet, whose polygon is a line; NaN with fewer than two feet on the ground.
     """
     plane = _plane_axes(np.array([parameters[name] for name in vector_names("gravity")]))
-    feet = np.ascontiguousarray(
-        plane @ recording.foot_vectors("position").transpose(1, 2, 0)
-    )  # (6, 2, rows)
+    positions = recording.foot_vectors("position").transpose(1, 2, 0)
+    feet = np.ascontiguousarray(plane @ positions)  # (6, 2, rows)
     centre = plane @ centre_of_mass(recording, parameters).T
     standing = recording.feet("contact") > 0.5
     parts = [slice(begin, begin + ROWS_AT_ONCE) for begin in range(0, len(standing), ROWS_AT_ONCE)]
@@ -40,27 +40,25 @@ def stability_margins(recording: Recording, parameters: Mapping[str, float]) -> 
 
 
 def _plane_axes(gravity: Array) -> Array:
-    """(2, 3) two axes that make a right-handed frame with the upward direction; x and y where
-    gravity is along -z.
+    """Returns two axes (2, 3) that make a right-handed frame with the upward direction.
+
+    They are x and y where gravity is along -z.
     """
     up = -gravity / np.linalg.norm(gravity) if np.any(gravity) else np.array([0.0, 0.0, 1.0])
-    first = (
-        np.array([1.0, 0.0, 0.0]) - up[0] * up
-        if abs(up[0]) < 0.9
-        else np.array([0.0, 1.0, 0.0]) - up[1] * up
-    )
+    x, y, _ = np.eye(3)
+    first = x - up[0] * up if abs(up[0]) < 0.9 else y - up[1] * up
     first /= np.linalg.norm(first)
     return np.array([first, np.cross(up, first)])
 
 
 def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
-    """(rows,) signed distances of points (2, rows) from the hulls of those feet (6, 2, rows)
-    that stand (rows, 6); positive inside.
+    """Returns the signed distances (rows,) of points (2, rows) from the hulls of standing feet.
+
+    feet: (6, 2, rows) positions; standing: (rows, 6). Positive inside the hull.
     """
     margin = np.full(len(standing), np.nan)
-    patterns, pattern_of = np.unique(
-        standing @ (1 << np.arange(standing.shape[1])), return_inverse=True
-    )
+    codes = standing @ (1 << np.arange(standing.shape[1]))  # one bit per leg
+    patterns, pattern_of = np.unique(codes, return_inverse=True)
     for number, pattern in enumerate(patterns.tolist()):
         legs = [leg for leg in range(standing.shape[1]) if pattern >> leg & 1]
         if len(legs) > 1:
@@ -70,7 +68,7 @@ def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
 
 
 def _hull_margins(feet: Array, centre: Array) -> Array:
-    """(rows,) the same for feet (n, 2, rows) that all stand, and points (2, rows)."""
+    """As polygon_margins, for feet (n, 2, rows) that all stand."""
     first, last = np.array(list(combinations(range(len(feet)), 2))).T
     begin = feet[first]  # (pairs, 2, rows)
     edge = feet[last] - begin
@@ -78,14 +76,14 @@ def _hull_margins(feet: Array, centre: Array) -> Array:
     shown = np.maximum(length, COINCIDENT)
     x, y = -edge[:, 1] / shown, edge[:, 0] / shown  # to the edge's left
     offset = x * begin[:, 0] + y * begin[:, 1]
-    right, left = np.zeros_like(x), np.zeros_like(x)  # how far feet lie to either side of the edge
+    # largest distances of the feet to either side of the edge
+    right, left = np.zeros_like(x), np.zeros_like(x)
     for foot_x, foot_y in feet:
         beside = x * foot_x + y * foot_y - offset
         np.minimum(right, beside, out=right)
         np.maximum(left, beside, out=left)
     inside = x * centre[0] + y * centre[1] - offset
-    # a line is one of the hull's edges, seen from the side where all feet are; for two feet from
-    # both
+    # an edge belongs to the hull, seen from the side where all feet are; for two feet, from both
     margin = np.minimum(
         np.where(right >= -COINCIDENT, inside, np.inf),
         np.where(left <= COINCIDENT, -inside, np.inf),
@@ -95,14 +93,13 @@ def _hull_margins(feet: Array, centre: Array) -> Array:
 
 
 def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 3) centre of mass of the whole robot [m], world axes, from joint angles, torso pose
-    and the FMU's own parameters.
+    """Returns the centre of mass of the whole robot [m] (rows, 3), world axes.
+
+    It follows from joint angles, torso pose and the FMU's parameters.
     """
     angle = np.ascontiguousarray(recording.joints("angle").transpose(2, 1, 0))  # (3, 6, rows)
-    borne, moment = (
-        np.zeros(len(LEG_NAMES)),
-        np.zeros((len(LEG_NAMES), 3, 1)),
-    )  # kg, kg m  of the links from here on, about their joint
+    # mass [kg] and first moment [kg m] of the links from this joint on, about the joint
+    borne, moment = np.zeros(len(LEG_NAMES)), np.zeros((len(LEG_NAMES), 3, 1))
     for k, joint in reversed(list(enumerate(JOINT_NAMES))):
         links = [f"{leg}.{joint}" for leg in LEG_NAMES]
         mass, com, axis = (
@@ -116,22 +113,22 @@ def centre_of_mass(recording: Recording, parameters: Mapping[str, float]) -> Arr
     hips = np.array([_vector(parameters, f"{leg}.hip_position") - offset for leg in LEG_NAMES])
     yaws = _about_z(np.array([parameters[f"{leg}.hip_yaw"] for leg in LEG_NAMES]))
     total = parameters["torso.mass"] + borne.sum()
-    # (3, rows) torso axes, from its centre of mass
-    own = (
-        np.concatenate(yaws, axis=1) @ moment.reshape(3 * len(LEG_NAMES), -1)
-        + (borne @ hips)[:, None]
-    ) / total
+    # (3, rows) torso axes, from the torso's centre of mass
+    first_moment = np.concatenate(yaws, axis=1) @ moment.reshape(3 * len(LEG_NAMES), -1)
+    own = (first_moment + (borne @ hips)[:, None]) / total
     rotation = rotation_matrices(recording.vector("torso.quaternion", 4))
     return np.asarray(recording.vector("torso.position") + np.einsum("ijr,jr->ri", rotation, own))
 
 
 def _of_links(parameters: Mapping[str, float], links: Sequence[str], parts: Sequence[str]) -> Array:
-    """(links, parts)"""
+    """Returns parameters of links as an array (links, parts)."""
     return np.array([[parameters[f"{link}.{part}"] for part in parts] for link in links])
 
 
 def _turned(axis: Array, angle: Array, vector: Array) -> Array:
-    """(legs, 3, rows) vectors turned about axes (legs, 3) by angles (legs, rows): Rodrigues."""
+    """Turns vectors (legs, 3, rows) about axes (legs, 3) by angles (legs, rows), by Rodrigues'
+    formula.
+    """
     x, y, z = (axis / np.linalg.norm(axis, axis=1, keepdims=True)).T
     zero = np.zeros_like(x)
     skew = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
@@ -142,7 +139,7 @@ def _turned(axis: Array, angle: Array, vector: Array) -> Array:
 
 
 def _about_z(angle: Array) -> Array:
-    """(legs, 3, 3) rotations by angles (legs,)."""
+    """Returns the rotations about z by angles (legs,) as matrices (legs, 3, 3)."""
     return np.array(
         [
             [[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]]
@@ -156,7 +153,7 @@ def _vector(parameters: Mapping[str, float], stem: str) -> Array:
 
 
 def rotation_matrices(quaternion: Array) -> Array:
-    """(3, 3, rows) body to world from quaternions (rows, 4) w x y z."""
+    """Returns rotations from body to world (3, 3, rows) from quaternions (rows, 4) [w x y z]."""
     w, x, y, z = np.ascontiguousarray(quaternion.T)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

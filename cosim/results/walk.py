@@ -1,6 +1,4 @@
-"""The part of a run that is judged: whole gait cycles after the first two, and means, paths and
-heights over it.
-"""
+"""Cuts out the part of a run that metrics use: whole gait cycles after the first two."""
 
 from __future__ import annotations
 
@@ -17,21 +15,20 @@ from hexapod_cosim.models import FRICTION_LAWS, TERRAINS
 
 Array = NDArray[np.float64]
 
-SKIPPED_CYCLES = 2  # the start is no walk yet
-CONTACT_SHARE = 0.01  # of the weight: a foot with less does not stand
+SKIPPED_CYCLES = 2  # the start is not yet a steady walk
+CONTACT_SHARE = 0.01  # of the weight: a foot with less load does not stand
 LEAST_DISTANCE = 0.01  # m    less is standing, not walking
 LEAST_TURN = 0.05  # rad    less is standing, not turning
-SHOWN_CYCLES = 3  # in figures of what happens within a gait cycle
+SHOWN_CYCLES = 3  # in plots of what happens within a gait cycle
 ROUND_OFF = 1e-6  # s    of a recorded time
-FLAT = TERRAINS.index("flat") + 1  # the FMU's number of it
-NONE, TANH, BRISTLE = (
-    FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle")
-)  # the same
+# numbers of the FMU's enumerations
+FLAT = TERRAINS.index("flat") + 1
+NONE, TANH, BRISTLE = (FRICTION_LAWS.index(law) + 1 for law in ("none", "tanh", "bristle"))
 
 
 @dataclass(frozen=True)
 class View:
-    """A run, as metrics and figures see it."""
+    """A run as metrics and plots use it."""
 
     recording: Recording
     parameters: Mapping[str, float]  # of the FMU
@@ -43,7 +40,7 @@ class View:
         return _cut_walk(self)
 
     def last_cycles(self) -> View:
-        """The end of the run."""
+        """Returns the last SHOWN_CYCLES gait cycles of the run."""
         time = self.recording.time
         begin = int(np.searchsorted(time, time[-1] - SHOWN_CYCLES * self.period))
         return View(self.recording.rows(slice(begin, None)), self.parameters, self.period)
@@ -51,7 +48,7 @@ class View:
 
 @dataclass(frozen=True)
 class Walk:
-    """The part of a run that is judged, and what it is measured by."""
+    """The part of a run that metrics use, and the quantities that they refer to."""
 
     whole: Recording  # the run
     recording: Recording  # its rows from begin to end, both included
@@ -66,33 +63,33 @@ class Walk:
 
     @cached_property
     def weights(self) -> Array:
-        """(rows,) share of the judged time that each row stands for, by the trapezoidal rule."""
+        """Share of the measured time that each row represents (rows,), by the trapezoidal rule."""
         return time_shares(self.recording.time)
 
     @property
     def duration(self) -> float:
-        """Judged time [s]."""
+        """Measured time [s]."""
         return self.end - self.begin
 
     def gained(self, names: list[str]) -> Array:
-        """(names,) by how much cumulative outputs grew from begin to end, rows there or not."""
+        """Returns the growth of cumulative outputs (names,) from begin to end, interpolated."""
         columns, time = self.whole.columns(names), self.whole.time
         return np.array(
             [np.diff(np.interp([self.begin, self.end], time, each))[0] for each in columns.T]
         )
 
     def rms(self, values: Array) -> float:
-        """Of values (rows,) about their mean over time."""
+        """Returns the RMS deviation of values (rows,) from their mean over time."""
         return float(np.sqrt(self.weights @ (values - self.weights @ values) ** 2))
 
     def steps(self) -> slice:
-        """Rows of the whole run that tell of what happened after begin, up to the end."""
+        """Returns the rows of the whole run after begin, up to end."""
         first, last = np.searchsorted(self.whole.time, np.array([self.begin, self.end]) + ROUND_OFF)
         return slice(int(first), int(last))
 
 
 def time_shares(time: Array) -> Array:
-    """(rows,) weights of the trapezoidal rule, in shares of the whole time."""
+    """Returns the weights of the trapezoidal rule (rows,), as shares of the whole time."""
     steps = np.diff(time)
     weights = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
     return np.asarray(weights / weights.sum())
@@ -110,8 +107,8 @@ def _cut_walk(view: View) -> Walk | None:
     yaw = np.unwrap(part.column("torso.yaw"))
     marks = begin + period * np.arange(cycles - SKIPPED_CYCLES + 1)
     distance, angle = _ways(part, yaw, marks)
-    # the torso's yaw swings within a cycle: the commanded path sets out along its mean over the
-    # first one
+    # the torso's yaw swings within a cycle, so the commanded path starts along its mean over the
+    # first cycle
     first = part.time <= begin + period + ROUND_OFF
     heading = float(time_shares(part.time[first]) @ (yaw - turned)[first])
     weight = robot_weight(view.parameters)
@@ -119,9 +116,7 @@ def _cut_walk(view: View) -> Walk | None:
 
 
 def _between(recording: Recording, begin: float, end: float) -> Recording:
-    """The rows from begin to end; where there is none at these times, one between its
-    neighbours.
-    """
+    """Returns the rows from begin to end, with rows interpolated at these times if needed."""
     time = recording.time
     first, last = np.searchsorted(time, [begin - ROUND_OFF, end + ROUND_OFF])
     ends = [t for t, row in ((begin, first), (end, last - 1)) if abs(time[row] - t) > ROUND_OFF]
@@ -133,7 +128,7 @@ def _between(recording: Recording, begin: float, end: float) -> Recording:
 
 
 def _row_at(recording: Recording, t: float) -> Array:
-    """A row between two: in between, but for commands, which hold from a row to the next."""
+    """Returns a row at time t by interpolation, but commands hold from a row to the next."""
     after = int(np.searchsorted(recording.time, t))
     before, behind = recording.data[after - 1], recording.data[after]
     share = (t - before[0]) / (behind[0] - before[0])
@@ -144,10 +139,10 @@ def _row_at(recording: Recording, t: float) -> Array:
 
 
 def _ways(part: Recording, yaw: Array, marks: Array) -> tuple[float, float]:
-    """Metres walked and radians turned on the spot, from cycle to cycle, so that no bobbing counts.
+    """Returns metres walked and radians turned on the spot, NaN for the one that does not apply.
 
-    A robot that no row tells to walk turns on the spot, whatever way its feet slip meanwhile. NaN
-    is what it does not do.
+    Both are summed from cycle to cycle, so that motion within a cycle does not count. A robot that
+    is never commanded to walk turns on the spot, even if its feet slip.
     """
     places = [np.interp(marks, part.time, each) for each in part.vector("torso.position").T]
     walked = float(np.linalg.norm(np.diff(np.column_stack(places), axis=0), axis=1).sum())
@@ -159,39 +154,37 @@ def _ways(part: Recording, yaw: Array, marks: Array) -> tuple[float, float]:
 
 
 def robot_weight(parameters: Mapping[str, float]) -> float:
-    """Weight [N] of the robot that an FMU's parameters describe."""
+    """Returns the weight [N] of the robot that an FMU's parameters describe."""
     mass = sum(value for name, value in parameters.items() if name.endswith(".mass"))
     return float(mass * np.linalg.norm([parameters[name] for name in vector_names("gravity")]))
 
 
 def held_integral(time: Array, rate: Array) -> Array:
-    """Running integral of a rate that is held from each row to the next."""
+    """Returns the running integral (rows,) of a rate that is held from each row to the next."""
     return np.concatenate([[0.0], np.cumsum(rate[:-1] * np.diff(time))])
 
 
 def running_integral(time: Array, values: Array) -> Array:
-    """Of values (rows, ...) over time, 0 at the first row; the trapezoidal rule."""
+    """Returns the running integral of values (rows, ...) by the trapezoidal rule."""
     steps = 0.5 * (values[1:] + values[:-1])
     width = np.diff(time).reshape(-1, *(1 for _ in values.shape[1:]))
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(steps * width, axis=0)])
 
 
 def bearing_load(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.bool_]:
-    """(rows, 6) whether a foot bears more than CONTACT_SHARE of the weight: only then can it
-    slip.
-    """
+    """Returns whether each foot bears more than CONTACT_SHARE of the weight (rows, 6)."""
     return np.asarray(recording.feet("normal_force") > CONTACT_SHARE * robot_weight(parameters))
 
 
 def slip_under_load(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6) speed along the ground [m/s], 0 of a foot that bears no load."""
+    """Returns the slip speed along the ground [m/s] (rows, 6), 0 for feet without load."""
     return np.where(bearing_load(recording, parameters), recording.feet("slip_speed"), 0.0)
 
 
 def commanded_path(recording: Recording, *, heading: float | None = None) -> Array:
-    """(rows, 2) where the body command leads from the first row's position on, world x and y [m].
+    """Returns the path of the body command from the first row on (rows, 2), world x and y [m].
 
-    `heading` [rad] is the direction it sets out in; by default the torso's own at the first row.
+    `heading` [rad] is its initial direction; by default the torso's own in the first row.
     """
     begin = recording.vector("torso.position")[0, :2]
     heading = float(recording.column("torso.yaw")[0]) if heading is None else heading
@@ -202,7 +195,7 @@ def commanded_path(recording: Recording, *, heading: float | None = None) -> Arr
 
 
 def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows,) height of the torso above the ground along z [m]."""
+    """Returns the height of the torso above the ground along z [m] (rows,)."""
     x, y, z = part.vector("torso.position").T
     heading = parameters.get("terrain.heading", 0.0)
     rise = x * np.cos(heading) + y * np.sin(heading)
@@ -211,22 +204,20 @@ def body_height(part: Recording, parameters: Mapping[str, float]) -> Array:
 
 
 def ground_normal(parameters: Mapping[str, float]) -> Array:
-    """(3,) of the ground, world axes, upwards."""
+    """Returns the ground's upward normal (3,), world axes."""
     heading, incline = parameters.get("terrain.heading", 0.0), _incline(parameters)
     sine = np.sin(incline)
     return np.array([-sine * np.cos(heading), -sine * np.sin(heading), np.cos(incline)])
 
 
 def _incline(parameters: Mapping[str, float]) -> float:
-    """Of the ground [rad]: flat ground has none, whatever is set."""
+    """Returns the incline of the ground [rad], which is 0 for flat ground."""
     flat = parameters.get("terrain.kind", FLAT) == FLAT
     return 0.0 if flat else float(parameters.get("terrain.incline", 0.0))
 
 
 def real_feet(recording: Recording, parameters: Mapping[str, float]) -> Array:
-    """(rows, 6, 3) the feet's centres in the torso's frame [m], from what the plant gives in the
-    world's.
-    """
+    """Returns the centres of the feet in the torso's frame [m] (rows, 6, 3)."""
     w, x, y, z = recording.vector("torso.quaternion", 4).T
     turn = np.array([
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],

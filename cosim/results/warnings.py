@@ -1,15 +1,14 @@
-"""What a reader of a run should know besides its figures.
+"""Warnings about a run: falls, settings without effect, a controller that gave up feedback.
 
-Whether it fell, what it did not use, where its controller gave up. A robot has fallen when
+A robot has fallen when
 
-- its torso leans by UPRIGHT or more against the ground's normal, from the first moment on at which
-  a foot touches the ground; or
-- its torso is lower than SUNK of the height at which it should be, for SUNK_TIME or until the run
-  ends. The height at which it should be is the one at which its feet first touched the ground, and
-  the commanded change of height; or
+- its torso leans by UPRIGHT or more against the ground's normal, at any time after the first foot
+  contact; or
+- its torso is lower than SUNK of the expected height for SUNK_TIME or until the run ends. The
+  expected height is the height at the first foot contact plus the commanded change of height; or
 - its torso is lower than half its own thickness, at any time: then it lies on the ground.
 
-Heights are above the ground. So a robot that begins in the air has not fallen unless it lands
+Heights are above the ground. So a robot that starts in the air has not fallen unless it lands
 badly.
 """
 
@@ -35,51 +34,50 @@ from hexapod_cosim.models.terrain import ground_normal
 
 UPRIGHT = 0.6  # rad
 SUNK = 0.5  # 1
-SUNK_TIME = 0.5  # s    longer than a landing bends the legs
-UNBALANCED = 0.01  # of the motors' work: books that miss more are told
+SUNK_TIME = 0.5  # s    longer than the legs stay bent after a landing
+UNBALANCED = 0.01  # share of the motors' work; a larger energy residual causes a warning
 
 
 def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
-    """Distance [m] and mean speed [m/s] over the judged cycles (NaN when none was walked), whether
-    the robot stayed upright, and the share of time in which the controller fell back to kinematic
-    control, if it tells.
+    """Returns the facts of the walk for run.json.
+
+    They are the distance [m] and mean speed [m/s] over the measured cycles (NaN when there is no
+    walk), whether the robot stayed upright and, if the controller reports it, the share of time
+    in which it fell back to kinematic control.
     """
     walk = view.walk
     distance = walk.distance if walk else math.nan
     lasted = float(walk.recording.time[-1] - walk.recording.time[0]) if walk else math.nan
-    doubted = fallback_columns(view.recording)
-    fallback = {"fallback": float(np.mean(doubted.any(axis=1)))} if len(doubted) else {}
+    fallen_back = fallback_columns(view.recording)
+    fallback = {"fallback": float(np.mean(fallen_back.any(axis=1)))} if len(fallen_back) else {}
     return {
         "distance": distance,
         "mean_speed": distance / lasted,
-        "upright": not fall(view, robot),
+        "upright": not describe_fall(view, robot),
     } | fallback
 
 
 def fallback_columns(recording: Recording) -> NDArray[np.bool_]:
-    """(rows, 6) when each leg walked without feedback; no rows when the controller does not
-    tell.
-    """
+    """Returns when each leg walked without feedback (rows, 6); no rows when not reported."""
     names = [f"controller.{leg}.fallback" for leg in LEG_NAMES]
-    return (
-        recording.columns(names) > 0.5
-        if set(names) <= set(recording.names)
-        else np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
-    )
+    if not set(names) <= set(recording.names):
+        return np.zeros((0, len(LEG_NAMES)), dtype=np.bool_)
+    return recording.columns(names) > 0.5
 
 
-def fallen_back(recording: Recording) -> list[str]:
-    """For how long which legs walked without feedback."""
-    doubted = fallback_columns(recording)
-    if not doubted.any():
+def fallback_warnings(recording: Recording) -> list[str]:
+    """Warns of legs that walked without feedback, with their share of time."""
+    fallen_back = fallback_columns(recording)
+    if not fallen_back.any():
         return []
-    together = float(doubted.all(axis=1).mean())
+    together = float(fallen_back.all(axis=1).mean())
     legs = {
         leg: float(share) - together
-        for leg, share in zip(LEG_NAMES, doubted.mean(axis=0), strict=True)
+        for leg, share in zip(LEG_NAMES, fallen_back.mean(axis=0), strict=True)
     }
     found = [
-        f"leg {leg} walked without feedback for {share:.0%} of the time: its foot's sensor contradicted the plan"
+        f"leg {leg} walked without feedback for {share:.0%} of the time: "
+        "its foot's sensor contradicted the plan"
         for leg, share in legs.items()
         if share
     ]
@@ -90,8 +88,8 @@ def fallen_back(recording: Recording) -> list[str]:
     return [slid, *found] if together else found
 
 
-def fall(view: View, robot: Robot) -> str:
-    """When and how the robot fell, "" when it did not; the module says what a fall is."""
+def describe_fall(view: View, robot: Robot) -> str:
+    """Returns when and how the robot fell, as the module defines a fall; "" when it did not."""
     recording = view.recording
     landed = np.flatnonzero((recording.feet("contact") > 0.5).any(axis=1))
     begin = int(landed[0]) if len(landed) else len(recording.time)
@@ -114,7 +112,7 @@ def fall(view: View, robot: Robot) -> str:
 
 
 def _lasting(time: NDArray[np.float64], low: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(rows,) those of `low` whose spell lasts for SUNK_TIME or until the last row."""
+    """Selects the rows (rows,) of `low` in periods that last SUNK_TIME or until the last row."""
     edges = np.flatnonzero(np.diff(low, prepend=False, append=False)).reshape(-1, 2)
     lasting = np.zeros_like(low)
     for begin, end in edges:
@@ -123,7 +121,7 @@ def _lasting(time: NDArray[np.float64], low: NDArray[np.bool_]) -> NDArray[np.bo
 
 
 def _lean(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.float64]:
-    """(rows,) angle [rad] between the torso's upward axis and the ground's normal."""
+    """Returns the angle [rad] between the torso's upward axis and the ground's normal (rows,)."""
     w, x, y, z = recording.vector("torso.quaternion", 4).T
     up = np.column_stack(
         [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
@@ -132,17 +130,15 @@ def _lean(recording: Recording, parameters: Mapping[str, float]) -> NDArray[np.f
 
 
 def _normal(parameters: Mapping[str, float]) -> NDArray[np.float64]:
-    """(3,) the ground's normal."""
+    """Returns the ground's normal (3,), world axes."""
     kind = TERRAINS[round(parameters.get("terrain.kind", 1.0)) - 1]
-    heading, incline = (
-        parameters.get("terrain.heading", 0.0),
-        parameters.get("terrain.incline", 0.0),
-    )
+    heading = parameters.get("terrain.heading", 0.0)
+    incline = parameters.get("terrain.incline", 0.0)
     return ground_normal(Terrain(kind=kind, height=0.0, incline=incline, heading=heading))
 
 
-def slipping_ground(parameters: Mapping[str, float]) -> list[str]:
-    """Whether friction is too weak for a robot to stay where it is, or to get anywhere."""
+def friction_warnings(parameters: Mapping[str, float]) -> list[str]:
+    """Warns where friction is too weak for the robot to stay in place or to move forward."""
     law = FRICTION_LAWS[round(parameters["friction.law"]) - 1]
     mu = 0.0 if law == "none" else parameters["friction.mu"]
     gravity = np.array([parameters[name] for name in vector_names("gravity")])
@@ -153,24 +149,23 @@ def slipping_ground(parameters: Mapping[str, float]) -> list[str]:
         return [
             f"the robot slides: the ground's slope pulls it downhill at {slide:.3g} m/s2, {why}"
         ]
-    return (
-        ["the ground has no friction: feet cannot push, and the robot does not get ahead"]
-        if max(mu, static) == 0.0
-        else []
-    )
+    if max(mu, static) == 0.0:
+        return ["the ground has no friction: feet cannot push, and the robot does not get ahead"]
+    return []
 
 
-def idle_settings(scenario: Scenario, robot: Robot) -> list[str]:
-    """Settings that this run does not use."""
-    late = [event.time for event in scenario.events if event.time >= scenario.duration]
+def unused_settings(scenario: Scenario, robot: Robot) -> list[str]:
+    """Warns of settings that have no effect on this run."""
+    end = scenario.duration
     found = [
-        f"the event at {time:g} s does nothing: the run ends at {scenario.duration:g} s"
-        for time in late
+        f"the event at {event.time:g} s does nothing: the run ends at {end:g} s"
+        for event in scenario.events
+        if event.time >= end
     ]
-    late = [command.time for command in scenario.commands if command.time >= scenario.duration]
     found += [
-        f"the command at {time:g} s does nothing: the run ends at {scenario.duration:g} s"
-        for time in late
+        f"the command at {command.time:g} s does nothing: the run ends at {end:g} s"
+        for command in scenario.commands
+        if command.time >= end
     ]
     terrain = replace(robot.terrain, **scenario.settings.get("terrain", {}))
     given = {**scenario.settings.get("terrain", {}), **scenario.parameters}
@@ -184,21 +179,22 @@ def idle_settings(scenario: Scenario, robot: Robot) -> list[str]:
     return found
 
 
-def doubts(view: View, robot: Robot) -> list[str]:
-    """What a reader of the results should know: a fall, legs out of reach, servos hotter than
-    they may be for long.
+def walk_warnings(view: View, robot: Robot) -> list[str]:
+    """Warns of a fall, weak friction, legs out of reach, lost feedback, overloaded servos and
+    missing energy.
     """
-    recording, fell = view.recording, fall(view, robot)
-    found = [*([fell] if fell else []), *slipping_ground(view.parameters)]
+    recording, fallen = view.recording, describe_fall(view, robot)
+    found = [*([fallen] if fallen else []), *friction_warnings(view.parameters)]
     unreachable = [f"controller.{leg}.unreachable" for leg in LEG_NAMES]
     if len(recording.time) and set(unreachable) <= set(recording.names):
         share = float(np.mean(recording.columns(unreachable).max(axis=1)))
         found += [f"a foot was out of its leg's reach for {share:.1%} of the time"] if share else []
-    return [*found, *fallen_back(recording), *hot_servo(recording, robot), *unbalanced_books(view)]
+    found += [*fallback_warnings(recording), *servo_warnings(recording, robot)]
+    return [*found, *energy_warnings(view)]
 
 
-def hot_servo(recording: Recording, robot: Robot) -> list[str]:
-    """The servo whose RMS torque over the run is furthest above its continuous rating."""
+def servo_warnings(recording: Recording, robot: Robot) -> list[str]:
+    """Warns of the servo whose RMS torque over the run is furthest above its continuous rating."""
     time, names = recording.time, joint_names("torque_squared")
     if len(time) < 2:
         return []
@@ -206,25 +202,29 @@ def hot_servo(recording: Recording, robot: Robot) -> list[str]:
     torque = np.sqrt((squares[-1] - squares[0]) / (time[-1] - time[0]))
     worst, limit = int(np.argmax(torque)), robot.servo.torque_continuous
     name = names[worst].removesuffix(".torque_squared")
-    text = f"servo {name} works at {torque[worst]:.2f} N m RMS, above the {limit:g} N m it bears for long"
+    text = (
+        f"servo {name} works at {torque[worst]:.2f} N m RMS, "
+        f"above its continuous rating of {limit:g} N m"
+    )
     return [text] if torque[worst] > limit else []
 
 
-def unbalanced_books(view: View) -> list[str]:
-    """That more energy is missing than figures made of it can bear."""
+def energy_warnings(view: View) -> list[str]:
+    """Warns where the energy balance misses more than metrics of energy can tolerate."""
     share = energy_residual(view)
     fix = "tighten solver.tolerance or, with a fixed step, shorten solver.step"
-    text = f"the energy books do not explain {share:.2%} of the motors' work: {fix}"
+    text = f"the energy balance does not explain {share:.2%} of the motors' work: {fix}"
     return [text] if share > UNBALANCED else []
 
 
-def too_short(view: View) -> list[str]:
-    """Why a run has no metrics, and what gives it some."""
+def short_run_warnings(view: View) -> list[str]:
+    """Warns of a run that is too short for metrics, with the duration that it needs."""
     time, needed = view.recording.time, (SKIPPED_CYCLES + 1) * view.period
     if view.walk is not None or not len(time):
         return []
-    lasted, cycles = float(time[-1] - time[0]), f"{SKIPPED_CYCLES + 1} whole gait cycles"
-    reason = f"metrics are of what comes after the first {SKIPPED_CYCLES}, and a cycle takes {view.period:g} s"
+    lasted, cycles = float(time[-1] - time[0]), SKIPPED_CYCLES + 1
     return [
-        f"too short for metrics: got {lasted:.6g} s, expected {needed:.6g} s, which is {cycles} ({reason}); set duration={needed:.6g}"
+        f"too short for metrics: got {lasted:.6g} s, expected {needed:.6g} s, "
+        f"which is {cycles} whole gait cycles (metrics are of what comes after the first "
+        f"{SKIPPED_CYCLES}, and a cycle takes {view.period:g} s); set duration={needed:.6g}"
     ]

@@ -1,3 +1,8 @@
-"""Runs scenarios, one or many, in this process or in worker processes. Imports all rooms above
-but `validate` and `report`.
+"""Runs scenarios, one or many, in this process or in worker processes.
+
+Imports every folder of `cosim` above it but `validate` and `report`.
 """
+
+from hexapod_cosim.cosim.run.run import simulate
+
+__all__ = ["simulate"]

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import INTERRUPTED
-from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import Preparation
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
@@ -82,7 +82,7 @@ def _prepare(number: int, scenario: Scenario, preparation: Preparation) -> _Task
         gains = preparation.gains(scenario)
         return _Task(number, scenario, fmu=preparation.fmu(scenario.robot), gains=gains)
     except HexapodError as error:
-        return _Task(number, scenario, refusal=refused(scenario, error))
+        return _Task(number, scenario, refusal=refused_summary(scenario, error))
 
 
 def _in_order(tasks: Sequence[_Task], executor: TaskExecutor[_Task, Summary]) -> Iterator[Summary]:
@@ -128,7 +128,7 @@ def _run(task: _Task, walker: Walker | None = None) -> Summary:
             simulate(task.scenario, fmu=task.fmu, gains=task.gains, progress=raise_if_stopped)
         )
     except HexapodError as error:
-        return refused(task.scenario, error)
+        return refused_summary(task.scenario, error)
 
 
 def _run_compiled(task: _Task) -> Summary:

@@ -1,4 +1,4 @@
-"""One co-simulation from scenario to figures: robot, plant FMU, controller, master, metrics."""
+"""Runs one co-simulation of a scenario: robot, plant FMU, controller, master and metrics."""
 
 from __future__ import annotations
 
@@ -23,13 +23,18 @@ from hexapod_cosim.cosim.interface.interface import plant_roots
 from hexapod_cosim.cosim.interface.start_values import parameter_values
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.force_sensor import ForceSensor, SensorSettings
-from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, insides, run
+from hexapod_cosim.cosim.master.loop import COMPLETED, Outcome, Progress, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Recorder, chosen_columns
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, judged_columns
+from hexapod_cosim.cosim.results.metrics import MEASURED_BY_PLANT, compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.warnings import describe_walk, doubts, idle_settings, too_short
+from hexapod_cosim.cosim.results.warnings import (
+    describe_walk,
+    short_run_warnings,
+    unused_settings,
+    walk_warnings,
+)
 from hexapod_cosim.cosim.scenario.reach import check_commands
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import scenario_robot
@@ -38,13 +43,10 @@ from hexapod_cosim.cosim.scenario.variation import Drawn, delayed, draw, initial
 from hexapod_cosim.models import LEG_NAMES, FmuError, Robot, Servo, load_robot
 from hexapod_cosim.models.records import Vector3
 
-BODY_PARAMETERS = (
-    "torso.",
-    "foot.",
-    *(f"{leg}." for leg in LEG_NAMES),
-)  # these make the robot; the rest are settings
-WHOLE = 1e-6  # of a macro-step: a delay of no more than this beyond whole ones is round-off
-SAME = 1e-9  # relative, of a parameter printed and read again
+# parameters with these prefixes describe the robot; all others are settings
+BODY_PARAMETERS = ("torso.", "foot.", *(f"{leg}." for leg in LEG_NAMES))
+ROUND_OFF = 1e-6  # of a macro-step, in a delay
+SAME = 1e-9  # relative, of a parameter that was printed and read again
 
 
 def simulate(
@@ -55,12 +57,17 @@ def simulate(
     progress: Progress | None = None,
     begin: Callable[[], None] | None = None,
 ) -> Result:
-    """Runs a scenario on the robot's own FMU, exported for it, or on a given one; compliant gains
-    are designed when not given.
+    """Runs a scenario and returns its recording, metrics and facts.
 
-    `begin` is called once nothing can be refused any more, before the first step. Raises
-    HexapodError for anything that keeps the run from starting; how a run that started ended is in
-    the result.
+    Raises HexapodError for anything that keeps the run from starting. A run that has started always
+    returns; `Result.outcome` tells how it ended.
+
+    Args:
+        scenario: what to run.
+        fmu: the plant; by default it is exported for the scenario's robot.
+        gains: of the compliant control; by default they are designed for the robot.
+        progress: called now and then with the simulated time [s].
+        begin: called once the run can start, before the first step.
     """
     plan = make_plan(scenario, gains=gains)
     setup = plan.controller
@@ -70,17 +77,7 @@ def simulate(
     with open_plant(scenario, fmu) as plant:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
-        recorder = Recorder(
-            signals,
-            plan.schedule.times,
-            plan.schedule.rows,
-            extra=insides(controller),
-            every=scenario.every,
-            judged=judged_columns(bristles=True),
-        )
-        chosen_columns(
-            recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv"
-        )  # told before the run, not after it
+        recorder = _make_recorder(plan, signals, controller)
         if begin is not None:
             begin()
         outcome = run(
@@ -93,23 +90,39 @@ def simulate(
             progress=progress,
         )
         facts = describe(setup.robot, plant, setup.gait.period)
-    return judge(plan, outcome, parameters, facts | {"warnings": controller.warnings})
+    return make_result(plan, outcome, parameters, facts | {"warnings": controller.warnings})
+
+
+def _make_recorder(plan: Plan, signals: Signals, controller: Controller) -> Recorder:
+    """Returns the recorder of a run. Raises ScenarioError for unknown columns in outputs.csv."""
+    scenario = plan.scenario
+    recorder = Recorder(
+        signals,
+        plan.schedule.times,
+        plan.schedule.rows,
+        extra=diagnostic_columns(controller),
+        every=scenario.every,
+        judged=metric_columns(bristles=True),
+    )
+    chosen_columns(recorder.names, scenario.outputs.csv, where=f"{scenario.where}: outputs.csv")
+    return recorder
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is known of a run before there is a plant."""
+    """All parts of a run that do not depend on a plant FMU."""
 
     scenario: Scenario
     robot: Robot  # the plant's
     controller: ControllerSetup
     schedule: Schedule
-    drawn: Drawn | None  # None: nothing varies
+    drawn: Drawn | None  # None: nothing is varied
 
 
 def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
-    """The plan of a scenario. Raises HexapodError for commands that the legs do not reach, and
-    where no gains can be designed.
+    """Returns the plan of a scenario.
+
+    Raises HexapodError for commands that the legs do not reach and where no gains can be designed.
     """
     own = scenario_robot(scenario)
     robot = known_robot(scenario, own)
@@ -123,20 +136,21 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
         parts=scenario.compliance,
     )
     drawn = None if scenario.variation is None else draw(scenario.variation, seed=scenario.seed)
-    schedule = make_schedule(
-        scenario
-        if drawn is None
-        else replace(scenario, commands=delayed(scenario.commands, drawn.command_delay))
+    timed = scenario
+    if drawn is not None:
+        timed = replace(scenario, commands=delayed(scenario.commands, drawn.command_delay))
+    return Plan(
+        scenario=scenario, robot=own, controller=setup, schedule=make_schedule(timed), drawn=drawn
     )
-    return Plan(scenario=scenario, robot=own, controller=setup, schedule=schedule, drawn=drawn)
 
 
 def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
-    """Puts the scenario's parameters and what was drawn over those of its robot; returns all of
-    them, as they hold.
+    """Initialises a plant with the scenario's parameters and the drawn initial values.
+
+    Returns all parameters as they then hold.
     """
     scenario = plan.scenario
-    _refuse_unmeasured(plant)
+    _check_measurements(plant)
     plant.set_parameters(scenario.parameters)
     if plan.drawn is not None:
         plant.set_parameters(initial_values(plan.robot, plant.parameters(), plan.drawn))
@@ -144,14 +158,12 @@ def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
     return plant.parameters()
 
 
-def _refuse_unmeasured(plant: Fmu) -> None:
-    """Raises FmuError when an FMU does not measure what the metrics are made of."""
+def _check_measurements(plant: Fmu) -> None:
+    """Raises FmuError when an FMU lacks the outputs that metrics are made of."""
     missing = sorted(set(MEASURED_BY_PLANT) - set(plant.names("output")))
     if missing:
         fix = "export it again with `hexapod export`"
-        expected = (
-            "the outputs that metrics are made of, which FMUs of earlier versions do not have"
-        )
+        expected = "the outputs that metrics are made of, which FMUs of earlier versions lack"
         raise FmuError(
             "an FMU without measurements",
             got=f"no {missing[0]}",
@@ -161,18 +173,21 @@ def _refuse_unmeasured(plant: Fmu) -> None:
         )
 
 
-def judge(
+def make_result(
     plan: Plan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]
 ) -> Result:
-    """What came of a run; `facts` are those of `describe` and the controller's warnings."""
+    """Returns the result of a run, with its metrics and warnings.
+
+    facts: those of `describe`, and the controller's warnings.
+    """
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
-    short = too_short(view) if outcome.status == COMPLETED else []
+    short = short_run_warnings(view) if outcome.status == COMPLETED else []
     found = {
         "warnings": [
             *facts["warnings"],
-            *idle_settings(scenario, setup.robot),
-            *doubts(view, setup.robot),
+            *unused_settings(scenario, setup.robot),
+            *walk_warnings(view, setup.robot),
             *short,
         ],
         "gains": None if setup.gains is None else asdict(setup.gains),
@@ -190,11 +205,14 @@ def judge(
 
 
 def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None:
-    """The gains a scenario runs with: none under kinematic control, else those given, or
-    designed for its robot and macro-step.
+    """Returns the gains that a scenario runs with, or None under kinematic control.
+
+    They are the given ones, or else designed for its robot and macro-step.
     """
-    if scenario.control == "kinematic" or gains is not None:
-        return None if scenario.control == "kinematic" else gains
+    if scenario.control == "kinematic":
+        return None
+    if gains is not None:
+        return gains
     # python-control takes a second to import
     from hexapod_cosim.cosim.design.design import design_for  # noqa: PLC0415
 
@@ -202,51 +220,49 @@ def chosen_gains(scenario: Scenario, gains: Gains | None = None) -> Gains | None
 
 
 def known_robot(scenario: Scenario, own: Robot | None = None) -> Robot:
-    """The robot as its controller knows it: its own file with the scenario's servos and gravity.
+    """Returns the robot as its controller knows it: the robot file with the scenario's servos and
+    gravity.
 
-    Ground, contact and payload it has to find out.
+    The controller has to find out ground, contact and payload by itself.
 
-    own: the scenario's robot, if it is at hand.
+    own: the scenario's robot, if the caller has it already.
     """
     own = own or scenario_robot(scenario)
-    return _told(load_robot(scenario.robot), own.servo, own.gravity)
+    return _with_servo(load_robot(scenario.robot), own.servo, own.gravity)
 
 
 @lru_cache(maxsize=64)
-def _told(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
-    return (
-        robot
-        if (robot.servo, robot.gravity) == (servo, gravity)
-        else replace(robot, servo=servo, gravity=gravity)
-    )
+def _with_servo(robot: Robot, servo: Servo, gravity: Vector3) -> Robot:
+    if (robot.servo, robot.gravity) == (servo, gravity):
+        return robot
+    return replace(robot, servo=servo, gravity=gravity)
 
 
 def sensor_settings(scenario: Scenario, schedule: Schedule) -> SensorSettings | None:
-    """What is wrong with the feet's force sensors; None when nothing is."""
-    noise, delay = (
-        scenario.sensors.foot_force_noise,
-        math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - WHOLE),
-    )
+    """Returns the errors of the feet's force sensors; None when there are none."""
+    noise = scenario.sensors.foot_force_noise
+    delay = math.ceil(scenario.sensors.foot_force_delay / scenario.macro_step - ROUND_OFF)
     if not noise and not delay and schedule.faults is None:
         return None
     return SensorSettings(noise=noise, seed=scenario.seed, delay=delay, faults=schedule.faults)
 
 
 def make_sensor(scenario: Scenario, schedule: Schedule) -> ForceSensor | None:
-    """The feet's force sensors with all that is wrong with them; None when nothing is."""
+    """Returns the model of the feet's force sensors; None when they have no errors."""
     settings = sensor_settings(scenario, schedule)
     return None if settings is None else ForceSensor(settings)
 
 
 @contextmanager
 def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
-    """The FMU of a scenario, its settings in place: exported for the occasion, or a given one
-    that must hold the same robot.
+    """Opens the FMU of a scenario and sets the scenario's laws and settings.
+
+    The FMU is exported to a temporary folder, or the one at `path`, which must hold the same robot.
     """
     robot = scenario_robot(scenario)
     if path is not None:
         with Fmu(path) as plant:
-            adopt_settings(plant, robot)
+            apply_settings(plant, robot)
             yield plant
         return
     with TemporaryDirectory(prefix="hexapod-") as folder:
@@ -256,16 +272,18 @@ def open_plant(scenario: Scenario, path: Path | None = None) -> Iterator[Fmu]:
             yield plant
 
 
-def adopt_settings(plant: Fmu, robot: Robot) -> None:
-    """Sets the laws and settings of a given FMU to those of the robot. Raises FmuError when the
-    FMU holds another robot.
+def apply_settings(plant: Fmu, robot: Robot) -> None:
+    """Sets the laws and settings of an FMU to those of the robot.
+
+    Raises FmuError when the FMU holds another robot.
     """
-    plant.set_parameters(foreign_settings(plant, robot))
+    plant.set_parameters(different_settings(plant, robot))
 
 
-def foreign_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
-    """The laws and settings of a robot that an FMU does not have. Raises FmuError when the FMU
-    holds another robot.
+def different_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
+    """Returns the robot's laws and settings that differ from those of an FMU.
+
+    Raises FmuError when the FMU holds another robot.
     """
     wanted = parameter_values(PLANT, plant_roots(robot))
     present = plant.parameters()
@@ -276,7 +294,10 @@ def foreign_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
     }
     for name, value in changes.items():
         if name.startswith(BODY_PARAMETERS):
-            fix = "export one of this robot with `hexapod export --robot`, or name the FMU's robot in the scenario"
+            fix = (
+                "export one of this robot with `hexapod export --robot`, "
+                "or name the FMU's robot in the scenario"
+            )
             expected = f"{value:g}, as robot {robot.name!r} has"
             raise FmuError(
                 f"the FMU holds another robot: {name}",
@@ -289,7 +310,7 @@ def foreign_settings(plant: Fmu, robot: Robot) -> dict[str, float]:
 
 
 def describe(robot: Robot, plant: Fmu, period: float) -> dict[str, Any]:
-    """What is needed to say which robot, FMU and software made a run."""
+    """Returns the robot, FMU and software that made a run, for run.json; `period` is the gait's."""
     return {
         "robot": {"name": robot.name, "hash": robot.hash},
         "gait_period": period,

@@ -23,17 +23,17 @@ from hexapod_cosim.cosim.master.fmu import Fmu, FmuBlock
 from hexapod_cosim.cosim.master.loop import Progress
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import COMMAND_COLUMNS, chosen_columns
-from hexapod_cosim.cosim.results.metrics import judged_columns
+from hexapod_cosim.cosim.results.metrics import metric_columns
 from hexapod_cosim.cosim.results.result import Result
-from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import Preparation
 from hexapod_cosim.cosim.run.run import (
     Plan,
     describe,
-    foreign_settings,
+    different_settings,
     initialise_plant,
-    judge,
     make_plan,
+    make_result,
     sensor_settings,
 )
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -108,7 +108,9 @@ class Walker:
         )
         self.loop_time = thread_time() - started
         facts = describe(plan.controller.robot, plant, plan.controller.gait.period)
-        return judge(plan, outcome, parameters, facts | {"warnings": plan.controller.warnings})
+        return make_result(
+            plan, outcome, parameters, facts | {"warnings": plan.controller.warnings}
+        )
 
     def summary(
         self,
@@ -122,7 +124,7 @@ class Walker:
         try:
             return summarise(self.simulate(scenario, fmu=fmu, gains=gains, progress=progress))
         except HexapodError as error:
-            return refused(scenario, error)
+            return refused_summary(scenario, error)
 
     def _plant(self, plan: Plan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
@@ -130,11 +132,11 @@ class Walker:
         bristles = (
             plan.robot.friction.law == "bristle" or "friction.law" in plan.scenario.parameters
         )
-        columns = None if self._everything else judged_columns(bristles=bristles)
+        columns = None if self._everything else metric_columns(bristles=bristles)
         key = path, columns
         if key not in self._masters:
             plant = self._open.enter_context(Fmu(path))
-            judged = judged_columns(bristles=True)
+            judged = metric_columns(bristles=True)
             self._masters[key] = (
                 plant,
                 NativeMaster(plant, controller, columns=columns, judged=judged),
@@ -161,7 +163,7 @@ class Walker:
         if key not in self._settings:
             if len(self._settings) >= MAX_SETTINGS:
                 self._settings.clear()
-            self._settings[key] = foreign_settings(plant, robot)
+            self._settings[key] = different_settings(plant, robot)
         return self._settings[key]
 
     def close(self) -> None:

@@ -23,7 +23,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Generic, Protocol, TypeVar
 
-from hexapod_cosim.cosim.master.interrupts import deaf_to_interrupts
+from hexapod_cosim.cosim.master.interrupts import blocked_interrupts
 
 START_METHOD = "spawn"  # a fork would copy the locks that threads of this process and numpy hold
 TASKS_PER_WORKER = 2  # a worker that finishes a task has the next one already
@@ -109,7 +109,7 @@ class _Worker(Generic[Task, Result]):
     def submit(self, task: Task) -> None:
         """Queues a task; the process starts with the first one."""
         try:
-            with deaf_to_interrupts():  # inherited by the process: only `stop` ends its tasks
+            with blocked_interrupts():  # inherited by the process: only `stop` ends its tasks
                 future = self._process.submit(self._setup.run, task)
         except BrokenProcessPool as error:  # it died meanwhile; finished() handles the death
             future = Future()

@@ -1,1 +1,4 @@
-"""What is run: scenarios read from TOML and checked. Imports `common` and `interface`."""
+"""Scenarios: what is run, read from TOML files and checked.
+
+Imports `common` and `interface`.
+"""

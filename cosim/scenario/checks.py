@@ -1,6 +1,4 @@
-"""What must fit together in a scenario, beyond key by key: steps and duration, names of FMU
-parameters.
-"""
+"""Checks a scenario across its keys: duration against macro-step, names of FMU parameters."""
 
 from __future__ import annotations
 
@@ -22,18 +20,16 @@ from hexapod_cosim.cosim.scenario.records import (
 from hexapod_cosim.models import ScenarioError, load_robot, nearest_name
 from hexapod_cosim.models.schema import specs
 
-WHOLE_STEPS_TOLERANCE = 1e-6  # of a macro-step: round-off of a decimal duration, no more
+WHOLE_STEPS_TOLERANCE = 1e-6  # of a macro-step: allows for the round-off of a decimal duration
 
 
 def check_steps(scenario: Scenario) -> None:
-    """Whole macro-steps, at least one and no more than a recording may have rows. Raises
-    ScenarioError.
+    """Checks that the duration is a whole number of macro-steps from 1 to MAX_STEPS.
+
+    Raises ScenarioError.
     """
-    h, ratio, where = (
-        scenario.macro_step,
-        scenario.duration / scenario.macro_step,
-        f"{scenario.where}: duration",
-    )
+    h, where = scenario.macro_step, f"{scenario.where}: duration"
+    ratio = scenario.duration / h
     if ratio > MAX_STEPS * (1.0 + WHOLE_STEPS_TOLERANCE):
         expected = f"at most {MAX_STEPS} macro-steps, {MAX_STEPS * h:g} s with macro_step = {h:g} s"
         fix = "shorten the duration or lengthen macro_step"
@@ -42,10 +38,8 @@ def check_steps(scenario: Scenario) -> None:
         )
     steps = scenario.steps
     if steps < 1 or abs(ratio - steps) > WHOLE_STEPS_TOLERANCE * steps:
-        expected, fix = (
-            f"a multiple of macro_step = {h:g} s",
-            f"{max(steps, 1) * h:g} is the nearest",
-        )
+        expected = f"a multiple of macro_step = {h:g} s"
+        fix = f"{max(steps, 1) * h:g} is the nearest"
         raise ScenarioError(
             "not a whole number of macro-steps",
             got=scenario.duration,
@@ -56,7 +50,7 @@ def check_steps(scenario: Scenario) -> None:
 
 
 def check_interval(scenario: Scenario) -> None:
-    """Whole macro-steps between two rows of the recording. Raises ScenarioError."""
+    """Checks that `outputs.interval` is a whole number of macro-steps. Raises ScenarioError."""
     h, interval = scenario.macro_step, scenario.outputs.interval
     every = scenario.every
     if interval and abs(interval / h - every) > WHOLE_STEPS_TOLERANCE * every:
@@ -70,8 +64,9 @@ def check_interval(scenario: Scenario) -> None:
 
 
 def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
-    """Names in `parameters` are parameters of the robot's FMU; those in `given` were written as
-    --set. Raises ScenarioError.
+    """Checks that the names in `parameters` are parameters of the robot's FMU.
+
+    `given` are the names set with --set, for the messages. Raises ScenarioError.
     """
     if not scenario.parameters:
         return
@@ -85,41 +80,35 @@ def check_parameters(scenario: Scenario, *, given: Collection[str]) -> None:
     for name, value in scenario.parameters.items():
         if name in known:
             continue
+        where = f"--set {name}" if name in given else f"{scenario.where}: parameters"
         if name in others:
-            where, fix = f"{scenario.where}: parameters", "set a parameter"
-            if name.startswith("torso.push"):
-                fix = "use [[events]]: --set 'events=[{time=1, duration=0.1, force=[0, 40, 0]}]'"
-            expected = f"a parameter of the FMU; this is an {others[name]}"
-            raise ScenarioError(
-                "not a parameter",
-                got=name,
-                expected=expected,
-                fix=fix,
-                where=f"--set {name}" if name in given else where,
-            )
+            raise _not_a_parameter(name, others[name], where)
         if name in given:
-            raise _unknown(
-                "setting",
-                name,
-                [*setting_names(), *known],
-                "a key of the scenario or a parameter",
-                where=f"--set {name}",
-            )
-        where = f"{scenario.where}: parameters"
+            valid = [*setting_names(), *known]
+            expected = "a key of the scenario or a parameter"
+            raise _unknown("setting", name, valid, expected, where=where)
         if isinstance(value, Mapping):
-            fix = 'write names with dots in quotes: "torso.mass" = 2.7'
             raise ScenarioError(
                 "a table where a parameter should be",
                 got=name,
                 expected="NAME = VALUE",
-                fix=fix,
+                fix='write names with dots in quotes: "torso.mass" = 2.7',
                 where=where,
             )
         raise _unknown("parameter", name, known, "a parameter", where=where)
 
 
+def _not_a_parameter(name: str, causality: str, where: str) -> ScenarioError:
+    """Returns the error for an input or output of the FMU under `parameters`."""
+    fix = "set a parameter"
+    if name.startswith("torso.push"):
+        fix = "use [[events]]: --set 'events=[{time=1, duration=0.1, force=[0, 40, 0]}]'"
+    expected = f"a parameter of the FMU; this is an {causality}"
+    return ScenarioError("not a parameter", got=name, expected=expected, fix=fix, where=where)
+
+
 def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: str) -> ScenarioError:
-    """As `unknown_name`, without listing the hundreds that are valid."""
+    """Returns the error for an unknown name, as `unknown_name` but without the long list."""
     near = nearest_name(name, valid)
     fix = f"did you mean {near!r}?" if near else "the FMU's documentation lists the parameters"
     return ScenarioError(
@@ -128,7 +117,7 @@ def _unknown(kind: str, name: str, valid: list[str], expected: str, *, where: st
 
 
 def setting_names() -> list[str]:
-    """The scenario's dotted keys."""
+    """Returns the scenario's dotted keys."""
     records = {"command": Command, "sensors": Sensors, "variation": Variation, **SETTINGS}
     keys = [
         (section, key)

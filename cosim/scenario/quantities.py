@@ -1,5 +1,6 @@
-"""Numbers with units in scenario files: `duration = 10` is SI, `macro_step = "5 ms"` is the same
-with its unit said and checked.
+"""Reads numbers with units in scenario files.
+
+`duration = 10` is in SI units; `macro_step = "5 ms"` names its unit, which is checked.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 from hexapod_cosim.models.errors import ScenarioError
 from hexapod_cosim.models.schema import Number, Spec, Vector
 
-# unit of a key -> what may be written for it, and how much of the SI unit that is
+# SI unit of a key -> units that may be written for it, each with its size in the SI unit
 SCALES: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
@@ -28,8 +29,9 @@ QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)
 
 
 def to_si(value: Any, spec: Spec, where: str) -> Any:
-    """The value with a quantity in a string turned into SI; anything else is left for the spec
-    to judge. Raises ScenarioError.
+    """Converts a quantity in a string, such as "5 ms", to SI; returns any other value unchanged.
+
+    Raises ScenarioError for a wrong unit. `where` names the key in messages.
     """
     if isinstance(spec, Vector) and isinstance(value, list | tuple):
         return [to_si(item, Number(spec.unit), f"{where}[{k}]") for k, item in enumerate(value)]

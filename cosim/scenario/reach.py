@@ -1,4 +1,4 @@
-"""Can the legs walk what a scenario commands? Tried on the controller itself, before the run."""
+"""Checks before a run, by running the controller, that the legs reach what a scenario commands."""
 
 from __future__ import annotations
 
@@ -18,52 +18,38 @@ Array = NDArray[np.float64]
 
 NAMES = tuple(item.name for item in fields(BodyCommand))
 UNITS = ("m/s", "m/s", "rad/s", "m", "rad", "rad")
-MOTION = (
-    1.0,
-    1.0,
-    1.0,
-    0.0,
-    0.0,
-    0.0,
-)  # which of them move the body on; the others are its posture
-TRIED_STEPS = 50  # of the controller in a gait period: enough to see every phase
+MOTION = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)  # selects the velocities; the other entries are posture
+STEPS_PER_CYCLE = 50  # of the controller in a gait period: enough to see every phase
 SETTLING_CYCLES = 2  # one to ramp the command up, one until every foot has landed under it
-RESOLUTION = 0.005  # relative, of the limit that is told
+RESOLUTION = 0.005  # relative, of the limit in the message
 
 
 def check_commands(commands: Sequence[Command], robot: Robot, gait: Gait, *, where: str) -> None:
-    """Raises ScenarioError for a command that needs strides, or a posture, with standing feet
-    beyond their legs' reach.
+    """Checks that standing feet stay within reach under each command's strides and posture.
 
-    A foot beyond reach only in the air shortens the step's arc, not the walk, and is let pass.
+    A foot out of reach in the air only shortens the arc of its step, and is allowed. Raises
+    ScenarioError, which names the largest command that the legs can follow.
     """
     for command in commands:
         wanted = np.array(astuple(command)[1:])
-        if not _walks_once(tuple(wanted.tolist()), robot, gait):
-            raise _refusal(
-                wanted,
-                robot,
-                gait,
-                f"{where} at time = {command.time:g} s" if len(commands) > 1 else where,
-            )
+        if not _walks_cached(tuple(wanted.tolist()), robot, gait):
+            place = f"{where} at time = {command.time:g} s" if len(commands) > 1 else where
+            raise _reach_error(wanted, robot, gait, place)
 
 
 @lru_cache(maxsize=256)
-def _walks_once(values: tuple[float, ...], robot: Robot, gait: Gait) -> bool:
-    """`_walks`, remembered."""
+def _walks_cached(values: tuple[float, ...], robot: Robot, gait: Gait) -> bool:
+    """Returns `_walks` of the same arguments from a cache."""
     return _walks(np.array(values), robot, gait)
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     """Whether all standing feet are within reach throughout a settled cycle of the command (6,)."""
-    count = max(TRIED_STEPS, math.ceil(4.0 / min(gait.duty, 1.0 - gait.duty)))
+    count = max(STEPS_PER_CYCLE, math.ceil(4.0 / min(gait.duty, 1.0 - gait.duty)))
     period = gait.period / count
-    controller, measurement, command = (
-        Controller(robot, period=period, gait=gait),
-        Measurement(),
-        BodyCommand(*values.tolist()),
-    )
+    controller = Controller(robot, period=period, gait=gait)
+    measurement, command = Measurement(), BodyCommand(*values.tolist())
     diagnostics = controller.diagnostics
     for k in range((SETTLING_CYCLES + 1) * count):
         controller.step(k * period, command, measurement)
@@ -72,25 +58,27 @@ def _walks(values: Array, robot: Robot, gait: Gait) -> bool:
     return True
 
 
-def _refusal(wanted: Array, robot: Robot, gait: Gait, where: str) -> ScenarioError:
+def _reach_error(wanted: Array, robot: Robot, gait: Gait, where: str) -> ScenarioError:
+    """Returns the error for a command (6,), with the largest share of it that can be followed."""
     motion = wanted * MOTION
-    if _walks(wanted - motion, robot, gait):
-        limit = wanted - motion + motion * _largest_share(motion, wanted - motion, robot, gait)
+    posture = wanted - motion
+    if _walks(posture, robot, gait):
+        limit = posture + motion * _largest_share(motion, posture, robot, gait)
         what, shown = "the legs do not reach the strides of this command", motion != 0.0
         fix = "slow the command down, or shorten gait.period"
     else:
-        limit = wanted * _largest_share(wanted - motion, np.zeros(6), robot, gait)
-        what, shown, fix = (
-            "the legs do not reach this posture",
-            (wanted - motion) != 0.0,
-            "move the body less",
-        )
-    expected = f"at most {_text(limit, shown)} with gait {gait.name}, period {gait.period:g} s and duty factor {gait.duty:.3g}"
+        limit = wanted * _largest_share(posture, np.zeros(6), robot, gait)
+        what, shown = "the legs do not reach this posture", posture != 0.0
+        fix = "move the body less"
+    expected = (
+        f"at most {_text(limit, shown)} with gait {gait.name}, "
+        f"period {gait.period:g} s and duty factor {gait.duty:.3g}"
+    )
     return ScenarioError(what, got=_text(wanted, shown), expected=expected, fix=fix, where=where)
 
 
 def _largest_share(part: Array, rest: Array, robot: Robot, gait: Gait) -> float:
-    """How much of `part`, on top of `rest`, the legs can follow; rounded down."""
+    """Returns, by bisection, the largest share of `part` that the legs follow on top of `rest`."""
     low, high = 0.0, 1.0
     while high - low > RESOLUTION * high:
         middle = 0.5 * (low + high) if low > 0.0 else 0.1 * high
@@ -102,6 +90,7 @@ def _largest_share(part: Array, rest: Array, robot: Robot, gait: Gait) -> float:
 
 
 def _text(values: Array, shown: Array) -> str:
+    """Returns the selected entries of a command (6,) with names and units."""
     entries = zip(NAMES, values.tolist(), UNITS, shown.tolist(), strict=True)
     return " and ".join(
         f"{name} = {value:.3g} {unit}" for name, value, unit, chosen in entries if chosen

@@ -1,4 +1,4 @@
-"""What a scenario says, as frozen records: fields with units, ranges and defaults."""
+"""The content of a scenario as frozen records: fields with units, ranges and defaults."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ SETTINGS: dict[str, type[Any]] = {
     "solver": Solver,
     "baumgarte": Baumgarte,
 }
-UNUSED = {"gait": ("stride",)}  # the body velocity of the command says it
-GRAVITY = Number("m/s2", above=0.0)  # along -z; three numbers are a vector in world axes
+UNUSED = {"gait": ("stride",)}  # keys of robot files that scenarios replace by the body command
+GRAVITY = Number("m/s2", above=0.0)  # along -z; or three numbers, a vector in world axes
 GRAVITY_VECTOR = Vector("m/s2", 3)
 GRAVITY_NAMES = ("gravity[1]", "gravity[2]", "gravity[3]")  # the FMU's parameters
 ZERO = (0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ MAX_STEPS = 1_000_000  # a row of the recording is about 3 kB, and all rows are 
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """A body command that holds from `time` on, counted from the start of the run."""
+    """A body command that holds from `time` on [s from the start of the run]."""
 
     time: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
     vx: Annotated[float, Number("m/s", default=0.0)] = 0.0
@@ -56,9 +56,7 @@ class Command:
 
 @dataclass(frozen=True, kw_only=True)
 class Push:
-    """A force and torque on the torso, world axes, from `time` (counted from the start of the
-    run) for `duration`.
-    """
+    """A force and torque on the torso, world axes, from `time` [s from the start of the run] on."""
 
     time: Annotated[float, Number("s", at_least=0.0)]
     duration: Annotated[float, Number("s", above=0.0)]
@@ -68,66 +66,59 @@ class Push:
 
 @dataclass(frozen=True, kw_only=True)
 class Fault:
-    """A foot's force sensor that fails at `time`, counted from the start of the run: dead it
-    reads nothing, stuck its last reading.
+    """A fault of a foot's force sensor from `time` [s from the start of the run].
+
+    A dead sensor reads zero, a stuck one repeats its last reading.
     """
 
     time: Annotated[float, Number("s", at_least=0.0)]
     leg: Annotated[str, Choice(LEG_NAMES)]
     fault: Annotated[str, Choice(FAULTS)]
-    duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf  # for good
+    duration: Annotated[float, Number("s", above=0.0, default=math.inf)] = math.inf
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What is wrong with what the controller is told of all feet: forces, and the contacts that
-    are derived from them.
-    """
+    """Errors of all feet's force sensors, and so of the contacts derived from them."""
 
-    foot_force_noise: Annotated[float, Number("1", at_least=0.0, below=1.0, default=0.0)] = (
-        0.0  # standard deviation, share of the force
-    )
-    foot_force_delay: Annotated[float, Number("s", at_least=0.0, at_most=1.0, default=0.0)] = (
-        0.0  # rounded up to whole macro-steps
-    )
+    # standard deviation of the noise, as a share of the force
+    foot_force_noise: Annotated[float, Number("1", at_least=0.0, below=1.0, default=0.0)] = 0.0
+    # delay, rounded up to whole macro-steps
+    foot_force_delay: Annotated[float, Number("s", at_least=0.0, at_most=1.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variation:
-    """Sizes of small changes to a run, drawn from its seed: how far apart runs lie that are
-    meant to be the same.
+    """Sizes of small random changes to a run, drawn from its seed.
+
+    They show how far runs lie apart that are meant to be the same.
     """
 
-    attitude: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = (
-        0.0  # of the torso at the start, deviation per axis
-    )
-    height: Annotated[float, Number("m", at_least=0.0, at_most=0.1, default=0.0)] = (
-        0.0  # it drops from, at most: even from 0 on
-    )
-    joint_angle: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = (
-        0.0  # at the start, standard deviation
-    )
-    command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = (
-        0.0  # of all commands, at most: even from 0 on
-    )
+    # standard deviation, per axis, of the torso's attitude at the start
+    attitude: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = 0.0
+    # largest height from which the robot drops, uniform from 0
+    height: Annotated[float, Number("m", at_least=0.0, at_most=0.1, default=0.0)] = 0.0
+    # standard deviation of the joint angles at the start
+    joint_angle: Annotated[float, Number("rad", at_least=0.0, at_most=0.5, default=0.0)] = 0.0
+    # largest delay of all commands, uniform from 0
+    command_delay: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outputs:
-    """What is written."""
+    """Which files and columns a run writes."""
 
-    csv: tuple[str, ...] = (
-        "*",
-    )  # patterns of variable names: the columns of results.csv; Parquet has all
+    # patterns of variable names, for the columns of results.csv; Parquet has all columns
+    csv: tuple[str, ...] = ("*",)
     formats: tuple[str, ...] = FORMATS
     plots: bool = True
-    # between two rows of the recording; 0: every macro-step. Figures are of all macro-steps
+    # time between two rows of the recording; 0: every macro-step. Metrics use all macro-steps
     interval: Annotated[float, Number("s", at_least=0.0, default=0.0)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """One run, complete but for the robot file it names."""
+    """One run. It is complete but for the robot file that it names."""
 
     title: str = "walk"
     robot: str = "athena"  # a name of `hexapod list robots`, or a path
@@ -137,12 +128,12 @@ class Scenario:
     macro_step: Annotated[float, Number("s", above=0.0, at_most=0.1, default=0.005)] = 0.005
     seed: int = 0
     gravity: tuple[float, float, float] | None = None  # m/s2    None: the robot's own
-    settings: Mapping[str, Mapping[str, Any]]  # what differs from the robot's own, by section
+    settings: Mapping[str, Mapping[str, Any]]  # differences from the robot file, by section
     commands: tuple[Command, ...]  # in order of time
     events: tuple[Push | Fault, ...] = ()
     sensors: Sensors = Sensors()
-    compliance: Parts = ALL_PARTS  # of the compliant control that are at work
-    variation: Variation | None = None  # None: the file says nothing
+    compliance: Parts = ALL_PARTS  # active parts of the compliant control
+    variation: Variation | None = None  # None: the file has no such section
     outputs: Outputs = Outputs()
     parameters: Mapping[str, Any]  # further FMU parameters by name
     where: str = "scenario"
@@ -159,7 +150,7 @@ class Scenario:
 
     @property
     def pushes(self) -> tuple[Push, ...]:
-        """The events that push."""
+        """The events that are pushes."""
         return tuple(event for event in self.events if isinstance(event, Push))
 
     @property
@@ -168,7 +159,7 @@ class Scenario:
         return tuple(event for event in self.events if isinstance(event, Fault))
 
     def to_table(self) -> dict[str, Any]:
-        """The scenario as tables of a file that says the same."""
+        """Returns the scenario as the tables of an equivalent scenario file."""
         plain = {key: getattr(self, key) for key in ("title", "robot", *PLAIN_KEYS, "seed")}
         plain |= {} if self.gravity is None else {"gravity": list(self.gravity)}
         tables = {key: dict(value) for key, value in self.settings.items() if value}
@@ -193,7 +184,7 @@ KEYS = ("title", "robot", *PLAIN_KEYS, "seed", "gravity", "events", *SECTIONS)
 
 
 def _as_table(record: Any) -> dict[str, Any]:
-    """Its fields; an endless duration is what a file says by saying nothing."""
+    """Returns the fields of a record, without an infinite duration, which TOML files omit."""
     return {
         item.name: value
         for item in fields(record)

@@ -1,13 +1,12 @@
-"""What is run: robot, walk, laws, disturbances and outputs, read from a TOML file and judged key by
-key.
+"""Reads scenarios from TOML files and checks them key by key.
 
-A value is a number in SI or a quantity with its unit ("5 ms"). The settings of gait, terrain,
+A value is a number in SI units or a quantity with its unit ("5 ms"). The settings of gait, terrain,
 contact, friction, servo, solver and baumgarte are those of robot files; a scenario gives only what
 differs from the robot's own.
 
-`gravity` is a number, along -z, or a vector in world axes, [m/s2]. Plant and controller both know
-it: the pose of rest, the gains' design, the planned loads and the weight in the metrics follow from
-it. The FMU's parameters gravity[1] to gravity[3] are entries of the same key.
+`gravity` is a number, along -z, or a vector in world axes [m/s2]. Plant and controller both use it:
+the pose of rest, the gains' design, the planned loads and the weight in the metrics follow from it.
+The FMU's parameters gravity[1] to gravity[3] are entries of the same key.
 """
 
 from __future__ import annotations
@@ -60,15 +59,16 @@ NUMBER = Number(GRAVITY.unit)
 
 
 def list_scenarios() -> dict[str, Path]:
-    """The scenarios that come with the package, by name."""
+    """Returns the bundled scenarios by name."""
     return {
         path.stem: path for path in sorted((Path(__file__).parent / "scenarios").glob("*.toml"))
     }
 
 
 def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:
-    """Reads a scenario file, or a bundled one by name, with `overrides` "NAME=VALUE" put over
-    it. Raises ScenarioError.
+    """Reads a scenario file, or a bundled scenario by name, and applies "NAME=VALUE" overrides.
+
+    Raises ScenarioError.
     """
     table, where = read_tables(path_or_name)
     given = [text.partition("=")[0].strip() for text in overrides]
@@ -76,8 +76,9 @@ def load_scenario(path_or_name: str | Path, *, overrides: Sequence[str] = ()) ->
 
 
 def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
-    """The tables of a scenario file, or of a bundled one by name, not yet judged; what messages
-    call it. Raises ScenarioError.
+    """Returns the unchecked tables of a scenario file, or of a bundled one by name.
+
+    The second value is the file's name for messages. Raises ScenarioError.
     """
     path = _scenario_path(path_or_name)
     try:
@@ -95,10 +96,9 @@ def read_tables(path_or_name: str | Path) -> tuple[dict[str, Any], str]:
             fix="correct that line",
             where=str(path),
         ) from error
-    if "robot" in table and (path.parent / str(table["robot"])).is_file():
-        table["robot"] = str(
-            (path.parent / table["robot"]).resolve()
-        )  # a robot file beside the scenario
+    beside = path.parent / str(table.get("robot", ""))
+    if "robot" in table and beside.is_file():  # a robot file beside the scenario
+        table["robot"] = str(beside.resolve())
     return table, path.name if path in list_scenarios().values() else str(path)
 
 
@@ -112,8 +112,9 @@ def _scenario_path(path_or_name: str | Path) -> Path:
 
 
 def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
-    """A copy of the tables with each "NAME=VALUE" set: a scenario's key, or else an FMU
-    parameter. Raises ScenarioError.
+    """Returns a copy of the tables with each "NAME=VALUE" set.
+
+    NAME is a key of the scenario or else an FMU parameter. Raises ScenarioError.
     """
     values: dict[str, Any] = {}
     for text in overrides:
@@ -128,7 +129,10 @@ def with_overrides(table: Mapping[str, Any], overrides: Iterable[str]) -> dict[s
 
 
 def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of the tables with each value set by its name, as --set does. Raises ScenarioError."""
+    """Returns a copy of the tables with each value set by name, as --set does.
+
+    Raises ScenarioError.
+    """
     changed = deepcopy(dict(table))
     for name, value in values.items():
         _set(changed, name, value)
@@ -136,9 +140,7 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str
 
 
 def _parse(value: str) -> Any:
-    """The value as TOML reads it; what TOML does not know is a string, so names and quantities
-    need no quotes.
-    """
+    """Returns the value as TOML reads it; other text is a string, so names need no quotes."""
     try:
         return tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
@@ -146,6 +148,7 @@ def _parse(value: str) -> Any:
 
 
 def _set(table: dict[str, Any], name: str, value: Any) -> None:
+    """Sets a key of the scenario or an FMU parameter by its dotted name, in place."""
     section, dot, key = name.partition(".")
     if dot and section in SECTIONS:
         inner = table.setdefault(section, {})
@@ -170,16 +173,14 @@ def _set(table: dict[str, Any], name: str, value: Any) -> None:
 def scenario_from_table(
     table: Mapping[str, Any], *, where: str, given: Collection[str] = ()
 ) -> Scenario:
-    """A checked scenario from the tables of a file; `where` names the file in messages, `given`
-    what --set set. Raises ScenarioError.
+    """Returns the checked scenario in the tables of a file.
+
+    `where` names the file in messages; `given` are the names set with --set. Raises ScenarioError.
     """
     with _errors_of(where):
         refuse_unknown_keys(table, list(KEYS), "")
-        plain = require(
-            Scenario,
-            _read(Scenario, {key: value for key, value in table.items() if key in PLAIN_KEYS}, ""),
-            "",
-        )
+        plain_keys = {key: value for key, value in table.items() if key in PLAIN_KEYS}
+        plain = require(Scenario, _read(Scenario, plain_keys, ""), "")
         scenario = Scenario(
             title=_text(table, "title", Path(where).stem),
             robot=_text(table, "robot", "athena"),
@@ -189,10 +190,7 @@ def scenario_from_table(
                 name: _read_setting(name, table[name], name) for name in SETTINGS if name in table
             },
             commands=_read_commands(table.get("command", {}), "command"),
-            events=tuple(
-                _read_event(entry, f"events[{k}]")
-                for k, entry in enumerate(_list(table.get("events", []), "events"))
-            ),
+            events=_read_events(table.get("events", [])),
             sensors=_record(Sensors, table.get("sensors", {}), "sensors"),
             compliance=_read_parts(table.get("compliance", {}), "compliance"),
             variation=_record(Variation, table["variation"], "variation")
@@ -211,7 +209,7 @@ def scenario_from_table(
 
 
 def _read_gravity(value: Any, where: str) -> tuple[float, float, float]:
-    """A vector in world axes, or a number for gravity along -z [m/s2]."""
+    """Reads a vector in world axes, or a number for gravity along -z [m/s2]."""
     if isinstance(value, list | tuple):
         x, y, z = GRAVITY_VECTOR.read(to_si(value, GRAVITY_VECTOR, where), where)
         return x, y, z
@@ -219,7 +217,7 @@ def _read_gravity(value: Any, where: str) -> tuple[float, float, float]:
 
 
 def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:
-    """The scenario with the FMU's parameters gravity[1] to gravity[3] as entries of its gravity."""
+    """Moves the FMU parameters gravity[1] to gravity[3] of a scenario into its `gravity`."""
     names = [name for name in GRAVITY_NAMES if name in scenario.parameters]
     if not names:
         return scenario
@@ -236,13 +234,11 @@ def _with_gravity_of_parameters(scenario: Scenario) -> Scenario:
 
 @contextmanager
 def _errors_of(file: str) -> Iterator[None]:
-    """The readers name a key, and the shared schema speaks of robots; a scenario's message says
-    "file: key".
-    """
+    """Adds the file's name to errors of the shared readers, and makes them ScenarioErrors."""
     try:
         yield
     except (RobotError, ScenarioError) as error:
-        key = (error.where or "").removeprefix(".")  # of a key in no section
+        key = (error.where or "").removeprefix(".")  # keys in no section begin with a dot
         where = f"{file}: {key}" if key else file
         raise ScenarioError(
             error.what, got=error.got, expected=error.expected, fix=error.fix, where=where
@@ -250,16 +246,13 @@ def _errors_of(file: str) -> Iterator[None]:
 
 
 def _read(record: type[Any], table: Any, where: str) -> dict[str, Any]:
+    """Reads the keys that a table gives of a record, with quantities converted to SI."""
     known = specs(record)
-    table = expect_table(table, where)
-    return read_given(
-        record,
-        {
-            key: to_si(value, known[key], f"{where}.{key}") if key in known else value
-            for key, value in table.items()
-        },
-        where,
-    )
+    values = {
+        key: to_si(value, known[key], f"{where}.{key}") if key in known else value
+        for key, value in expect_table(table, where).items()
+    }
+    return read_given(record, values, where)
 
 
 def _record(record: type[Any], table: Any, where: str) -> Any:
@@ -267,16 +260,15 @@ def _record(record: type[Any], table: Any, where: str) -> Any:
 
 
 def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
+    """Reads a section of settings that robot files have as well."""
     record = SETTINGS[name]
-    refuse_unknown_keys(
-        expect_table(table, where),
-        [key for key in specs(record) if key not in UNUSED.get(name, ())],
-        where,
-    )
+    keys = [key for key in specs(record) if key not in UNUSED.get(name, ())]
+    refuse_unknown_keys(expect_table(table, where), keys, where)
     return _read(record, table, where)
 
 
 def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
+    """Reads one [command] or several [[command]] entries; the robot stands until the first."""
     entries = value if isinstance(value, list | tuple) else [value]
     commands = [
         _record(Command, entry, f"{where}[{k}]" if len(entries) > 1 else where)
@@ -287,15 +279,20 @@ def _read_commands(value: Any, where: str) -> tuple[Command, ...]:
         raise ScenarioError(
             "commands out of order",
             got=times,
-            expected="times that grow",
+            expected="increasing times",
             fix="sort the [[command]] entries by time",
             where=where,
         )
     return tuple(commands) if times and times[0] == 0.0 else (Command(), *commands)
 
 
+def _read_events(value: Any) -> tuple[Push | Fault, ...]:
+    entries = _list(value, "events")
+    return tuple(_read_event(entry, f"events[{k}]") for k, entry in enumerate(entries))
+
+
 def _read_event(table: Any, where: str) -> Push | Fault:
-    """A fault says the leg or the fault, a push neither."""
+    """Reads a fault, which has the key `leg` or `fault`, or else a push."""
     push, fault = list(specs(Push)), list(specs(Fault))
     refuse_unknown_keys(expect_table(table, where), list(dict.fromkeys([*push, *fault])), where)
     event: Push | Fault = _record(Fault if {"leg", "fault"} & set(table) else Push, table, where)
@@ -303,55 +300,50 @@ def _read_event(table: Any, where: str) -> Push | Fault:
 
 
 def _read_parts(table: Any, where: str) -> Parts:
+    """Reads which parts of the compliant control are active."""
     refuse_unknown_keys(expect_table(table, where), [item.name for item in fields(Parts)], where)
     for key, value in table.items():
-        _truth(value, f"{where}.{key}")
+        _boolean(value, f"{where}.{key}")
     return Parts(**table)
 
 
 def _read_outputs(table: Any, where: str) -> Outputs:
     refuse_unknown_keys(expect_table(table, where), [item.name for item in fields(Outputs)], where)
-    patterns, plots, formats = (
-        table.get("csv", ["*"]),
-        table.get("plots", True),
-        table.get("formats", FORMATS),
+    plain = {key: table[key] for key in specs(Outputs) if key in table}
+    return Outputs(
+        csv=_patterns(table.get("csv", ["*"]), f"{where}.csv"),
+        formats=_formats(table.get("formats", FORMATS), f"{where}.formats"),
+        plots=_boolean(table.get("plots", True), f"{where}.plots"),
+        interval=_record(Outputs, plain, where).interval,
     )
-    if not isinstance(patterns, list | tuple) or not all(
-        isinstance(item, str) for item in patterns
-    ):
-        fix = 'write csv = ["torso.*", "*.foot.normal_force"]'
+
+
+def _patterns(value: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not all(isinstance(item, str) for item in value):
         raise ScenarioError(
             "wrong type",
-            got=patterns,
+            got=value,
             expected="a list of name patterns",
-            fix=fix,
-            where=f"{where}.csv",
+            fix='write csv = ["torso.*", "*.foot.normal_force"]',
+            where=where,
         )
-    if (
-        not isinstance(formats, list | tuple)
-        or not formats
-        or not all(item in FORMATS for item in formats)
-    ):
-        fix, expected = (
-            'write formats = ["parquet"]',
-            "a list of one or both of " + ", ".join(FORMATS),
-        )
+    return tuple(value)
+
+
+def _formats(value: Any, where: str) -> tuple[str, ...]:
+    known = isinstance(value, list | tuple) and all(item in FORMATS for item in value)
+    if not known or not value:
         raise ScenarioError(
-            "value not allowed", got=formats, expected=expected, fix=fix, where=f"{where}.formats"
+            "value not allowed",
+            got=value,
+            expected="a list of one or both of " + ", ".join(FORMATS),
+            fix='write formats = ["parquet"]',
+            where=where,
         )
-    chosen = tuple(item for item in FORMATS if item in formats)
-    interval = _record(
-        Outputs, {key: table[key] for key in specs(Outputs) if key in table}, where
-    ).interval
-    return Outputs(
-        csv=tuple(patterns),
-        formats=chosen,
-        plots=_truth(plots, f"{where}.plots"),
-        interval=interval,
-    )
+    return tuple(item for item in FORMATS if item in value)
 
 
-def _truth(value: Any, where: str) -> bool:
+def _boolean(value: Any, where: str) -> bool:
     if not isinstance(value, bool):
         raise ScenarioError("wrong type", got=value, expected="true or false", where=where)
     return value
@@ -382,10 +374,9 @@ def _seed(value: Any) -> int:
 
 
 def scenario_robot(scenario: Scenario) -> Robot:
-    """The robot with the scenario's settings put over its own, but for the gait, which the
-    controller makes.
+    """Returns the robot with the scenario's settings applied, but for the gait.
 
-    Raises RobotError when they do not fit together.
+    The controller makes the gait. Raises RobotError when the settings do not fit together.
     """
     own = load_robot(scenario.robot)
     changes = {
@@ -397,11 +388,10 @@ def scenario_robot(scenario: Scenario) -> Robot:
     if "mu_static" not in scenario.settings.get("friction", {}) and (
         friction.law not in STATIC_LAWS or friction.mu_static < friction.mu
     ):
-        # the file's belongs to another law, or to less friction
+        # the robot file's mu_static belongs to another law or to a smaller mu
         changes["friction"] = replace(friction, mu_static=0.0)
-    robot = replace(
-        own, **changes, gravity=own.gravity if scenario.gravity is None else scenario.gravity
-    )
+    gravity = own.gravity if scenario.gravity is None else scenario.gravity
+    robot = replace(own, **changes, gravity=gravity)
     if robot == own:
         return own
     if scenario.gravity is not None:
@@ -411,13 +401,13 @@ def scenario_robot(scenario: Scenario) -> Robot:
 
 
 def _check_gravity(robot: Robot, *, where: str) -> None:
-    """Raises ScenarioError for gravity that does not press the robot onto its ground."""
+    """Raises ScenarioError for gravity that does not press the robot onto the ground."""
     if np.array(robot.gravity) @ ground_normal(robot.terrain) < 0.0:
         return
     fix = "write gravity = 1.62, or a vector that points down: [0, 0, -1.62]"
     expected = "gravity that presses the robot onto the ground [m/s2]"
     raise ScenarioError(
-        "nothing stands under this gravity",
+        "the robot cannot stand under this gravity",
         got=list(robot.gravity),
         expected=expected,
         fix=fix,

@@ -1,4 +1,4 @@
-"""Commands, disturbances and faults of a scenario, laid out by macro-step before the run."""
+"""Computes commands, pushes and faults of a scenario for each macro-step, before the run."""
 
 from __future__ import annotations
 
@@ -13,36 +13,32 @@ from hexapod_cosim.controller import BodyCommand
 from hexapod_cosim.cosim.scenario.records import FAULTS, Command, Fault, Push, Scenario
 from hexapod_cosim.models import LEG_NAMES
 
-ROUND_OFF = 5e-10  # s    of a macro-step's time
+ROUND_OFF = 5e-10  # s    of the time of a macro-step
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """What is commanded and what pushes, step by step."""
+    """Commands, pushes and sensor faults of a run, macro-step by macro-step."""
 
-    times: NDArray[np.float64]  # s    (steps + 1,) start + k h, never a running sum
-    rows: NDArray[
-        np.float64
-    ]  # (steps + 1, 6) the same, the last one twice: vx vy yaw_rate height roll pitch
-    pushes: (
-        NDArray[np.float64] | None
-    )  # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: never any
-    faults: (
-        NDArray[np.int8] | None
-        # (steps + 1, 6) of the force sensors: 0 none, else the number in FAULTS, from 1; None:
-        # never any
-    )
+    # (steps + 1,) s    start + k h, never a running sum
+    times: NDArray[np.float64]
+    # (steps + 1, 6) body commands vx vy yaw_rate height roll pitch; the last row repeats
+    rows: NDArray[np.float64]
+    # (steps, 6) force [N] and torque [N m] on the torso, world axes; None: no pushes
+    pushes: NDArray[np.float64] | None
+    # (steps + 1, 6) faults of the force sensors: 0 none, else 1 + index in FAULTS; None: no faults
+    faults: NDArray[np.int8] | None
 
     @cached_property
     def commands(self) -> tuple[BodyCommand, ...]:
-        """(steps,) the rows as commands, equal ones the same object."""
+        """The rows as body commands (steps,); equal rows share one object."""
         rows = list(map(tuple, self.rows[:-1].tolist()))
         distinct = {row: BodyCommand(*row) for row in set(rows)}
         return tuple(distinct[row] for row in rows)
 
 
 def make_schedule(scenario: Scenario) -> Schedule:
-    """Lays a scenario's commands and events out over its macro-steps."""
+    """Returns the schedule of a scenario's commands and events."""
     times = scenario.macro_step * np.arange(scenario.steps + 1, dtype=np.float64)
     begins, h = times[:-1], scenario.macro_step
     rows = command_rows(scenario.commands, begins)
@@ -52,19 +48,20 @@ def make_schedule(scenario: Scenario) -> Schedule:
 
 
 def command_rows(commands: Sequence[Command], times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(steps, 6) the command in force at each time [s] from the start: the last one that has
-    begun, but for round-off.
+    """Returns the command in force at each time (steps, 6); times are in s from the start.
+
+    That is the last command that has begun, allowing for round-off.
     """
     begins = [command.time for command in commands]
     values = np.array([astuple(command)[1:] for command in commands])
-    return np.asarray(
-        values[np.maximum(np.searchsorted(begins, times + ROUND_OFF, side="right") - 1, 0)]
-    )
+    index = np.searchsorted(begins, times + ROUND_OFF, side="right") - 1
+    return np.asarray(values[np.maximum(index, 0)])
 
 
 def push_rows(events: Sequence[Push], times: NDArray[np.float64], h: float) -> NDArray[np.float64]:
-    """(steps, 6) mean push over each step of h [s], so that the impulse is exact even when a
-    push begins within a step.
+    """Returns the mean push over each step of h [s] (steps, 6).
+
+    The mean keeps the impulse exact when a push begins or ends within a step.
     """
     rows = np.zeros((len(times), 6))
     for event in events:
@@ -74,8 +71,9 @@ def push_rows(events: Sequence[Push], times: NDArray[np.float64], h: float) -> N
 
 
 def fault_rows(faults: Sequence[Fault], times: NDArray[np.float64]) -> NDArray[np.int8]:
-    """(times, 6) the fault of each foot's force sensor at each time [s] from the start; of
-    several at once the last one in the list.
+    """Returns the fault of each foot's force sensor at each time [s from the start] (times, 6).
+
+    Where several faults overlap, the last one in the list holds.
     """
     rows = np.zeros((len(times), len(LEG_NAMES)), dtype=np.int8)
     for fault in faults:

@@ -1,6 +1,4 @@
-"""Small changes to a run, drawn from its seed: attitude, height and joint angles at the start,
-and when commands come.
-"""
+"""Draws small changes to a run from its seed: initial pose and delay of the commands."""
 
 from __future__ import annotations
 
@@ -20,27 +18,26 @@ from hexapod_cosim.models.terrain import ground
 
 Array = NDArray[np.float64]
 
-STREAM = 1  # of the seed's random numbers; the noise of sensors has the seed's own
+STREAM = 1  # of random numbers; the noise of the sensors is drawn from the seed alone
 POSITION, QUATERNION = vector_names("initial.position"), vector_names("initial.quaternion", 4)
 ANGLE = [f"initial.{name}" for name in joint_names("angle")]
 
-# what no one sets up better by hand: a tenth of a degree of attitude and of joint angles (a step of
-# the servos' encoders is 1.5 mrad), the height of a sheet of cardboard, and a command that comes
-# when it comes within a tenth of a gait period
+# what no set-up by hand makes exact: a tenth of a degree of attitude and of joint angles (a step of
+# the servos' encoders is 1.5 mrad), 1 mm of height, and a tenth of a second of command delay
 STANDARD = Variation(attitude=2e-3, height=1e-3, joint_angle=2e-3, command_delay=0.1)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """What came out for one seed."""
+    """The changes drawn for one seed."""
 
-    rotation: Array  # (3,) rad    of the torso, small, world axes
-    height: float  # m    from which it drops
-    angle: Array  # (6, 3) rad    added to the joints'
+    rotation: Array  # (3,) rad    rotation vector of the torso, small, world axes
+    height: float  # m    height of the drop
+    angle: Array  # (6, 3) rad    added to the joint angles
     command_delay: float  # s
 
     def as_facts(self) -> dict[str, Any]:
-        """The same as plain numbers."""
+        """Returns the changes as plain numbers and lists, for run.json."""
         return {
             "rotation": self.rotation.tolist(),
             "height": self.height,
@@ -50,8 +47,9 @@ class Drawn:
 
 
 def draw(variation: Variation, *, seed: int) -> Drawn:
-    """The changes of a seed: the same numbers whatever their sizes, so that a size scales what
-    is drawn.
+    """Draws the changes of a seed.
+
+    The random numbers do not depend on the sizes in `variation`, which only scale them.
     """
     generator = np.random.default_rng([seed, STREAM])
     rotation, angle = generator.standard_normal(3), generator.standard_normal((LEGS, JOINTS))
@@ -65,27 +63,26 @@ def draw(variation: Variation, *, seed: int) -> Drawn:
 
 
 def delayed(commands: Sequence[Command], delay: float) -> tuple[Command, ...]:
-    """All commands later by `delay` [s], the first one too: the robot stands until then."""
+    """Returns all commands later by `delay` [s]; the robot stands until then."""
     if not delay:
         return tuple(commands)
     return (Command(), *(replace(command, time=command.time + delay) for command in commands))
 
 
 def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) -> dict[str, float]:
-    """The FMU's parameters initial.*, changed as drawn.
+    """Returns the FMU's parameters initial.* with the drawn changes applied.
 
-    The torso goes up by as much as keeps every foot from being deeper in the ground than it was,
-    and by the height drawn.
+    The torso is raised until no foot is deeper in the ground than before, and then by the height
+    drawn.
     """
     position, quaternion, angle = (
         np.array([parameters[name] for name in names]) for names in (POSITION, QUATERNION, ANGLE)
     )
-    turn = np.array([1.0, *(0.5 * drawn.rotation)])
-    turned = quaternion_product(turn / np.linalg.norm(turn), quaternion)
+    half_turn = np.array([1.0, *(0.5 * drawn.rotation)])
+    turned = quaternion_product(half_turn / np.linalg.norm(half_turn), quaternion)
     bent = angle + drawn.angle.ravel()
-    deeper = _depths(robot, position, turned, bent) - _depths_at_rest(
-        robot, tuple(position), tuple(quaternion), tuple(angle)
-    )
+    before = _depths_cached(robot, tuple(position), tuple(quaternion), tuple(angle))
+    deeper = _depths(robot, position, turned, bent) - before
     raised = position + np.array([0.0, 0.0, max(float(deeper.max()), 0.0) + drawn.height])
     pairs = ((POSITION, raised), (QUATERNION, turned), (ANGLE, bent))
     return {
@@ -96,14 +93,14 @@ def initial_values(robot: Robot, parameters: Mapping[str, float], drawn: Drawn) 
 
 
 @lru_cache(maxsize=64)
-def _depths_at_rest(robot: Robot, *pose: tuple[float, ...]) -> Array:
-    """The same, remembered: runs of one robot begin from one pose."""
+def _depths_cached(robot: Robot, *pose: tuple[float, ...]) -> Array:
+    """Returns `_depths` of a pose from a cache: runs of one robot begin from the same pose."""
     position, quaternion, angle = map(np.array, pose)
     return _depths(robot, position, quaternion, angle)
 
 
 def _depths(robot: Robot, position: Array, quaternion: Array, angle: Array) -> Array:
-    """(6,) penetration of the feet [m], negative above the ground."""
+    """Returns the penetration of the feet [m] (6,), negative above the ground."""
     feet = foot_positions(robot, angle.reshape(LEGS, JOINTS)) - np.array(robot.torso.com)
     centres = position + feet @ rotation_matrix(quaternion / np.linalg.norm(quaternion)).T
     return np.array([robot.foot.radius - ground(robot.terrain, centre)[0] for centre in centres])

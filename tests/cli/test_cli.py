@@ -1,4 +1,4 @@
-"""The hexapod command: shapes of its JSON, exit codes, what it writes."""
+"""The hexapod command: content of its JSON, exit codes, and files."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ RUN = {
     "run.json",
     "scenario.toml",
 }
+# of robots that turn on the spot
 TWINS = {
     "slip_per_radian",
     "path_error_per_radian",
@@ -35,7 +36,7 @@ TWINS = {
     "heat_per_radian",
     "cost_per_radian",
     "electrical_cost_per_radian",
-}  # of robots that turn on the spot
+}
 SHOWN = set(METRICS) - TWINS - {"slip_net_per_metre"}
 FIGURES = {"foot_forces", "slip", "feet", "posture", "path", "torques", "energy", "footfall"}
 
@@ -88,11 +89,11 @@ def test_compare_keeps_the_metrics_of_all_runs_and_the_recordings_of_the_first_s
     runs = read_seeds(folder / "seeds.csv")
     for control in ("kinematic", "compliant"):
         assert [run.seed for run in runs[control]] == [0, 1]
-        told = json.loads((folder / control / "metrics.json").read_text())
+        stored = json.loads((folder / control / "metrics.json").read_text())
         assert {
             name: value for name, value in runs[control][0].metrics.items() if name not in TWINS
-        } == {name: value for name, value in told.items() if name not in TWINS}
-        assert all(told[name] is None for name in TWINS)
+        } == {name: value for name, value in stored.items() if name not in TWINS}
+        assert all(stored[name] is None for name in TWINS)
         slips = [run.metrics["slip_per_metre"] for run in runs[control]]
         assert slips[0] != slips[1]
         assert printed[control]["slip_per_metre"] == pytest.approx(sum(slips) / 2.0)
@@ -222,7 +223,7 @@ def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("duration", "period", "told"),
+    ("duration", "period", "message"),
     [
         (
             "2.3",
@@ -233,16 +234,16 @@ def test_simulate_without_json_prints_a_table_and_the_files(call: Call, tmp_path
     ],
 )
 def test_a_walk_too_short_for_metrics_says_why_and_how_long_is_enough(
-    call: Call, tmp_path: Path, duration: str, period: str, told: str
+    call: Call, tmp_path: Path, duration: str, period: str, message: str
 ) -> None:
     options = ["--set", f"duration={duration}", "--set", f"gait.period={period}"]
     _, out, err = call("simulate", "walk_flat", "-o", tmp_path, *options, "--json")
     printed = json.loads(out)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert told in err
-    assert ("too short" in err, "too short for metrics" in page) == (bool(told), bool(told))
-    assert any("too short" in text for text in printed["warnings"]) == bool(told)
-    assert (printed["metrics"]["slip_per_metre"] is None) == bool(told)
+    assert message in err
+    assert ("too short" in err, "too short for metrics" in page) == (bool(message), bool(message))
+    assert any("too short" in text for text in printed["warnings"]) == bool(message)
+    assert (printed["metrics"]["slip_per_metre"] is None) == bool(message)
 
 
 def test_recorded_columns_can_be_chosen(call: Call, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a shell is offered for half-typed words, asked for as the shells ask."""
+"""Shell completion, requested as the shells request it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHELLS = {"bash": ".bashrc", "zsh": ".zshrc", "fish": ".config/fish/completions/
 
 @pytest.fixture
 def offered(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Ask:
-    """What bash is offered after these words, of which the last is being typed."""
+    """Returns the completions of bash for words of which the last is incomplete."""
 
     def ask(*words: str) -> list[str]:
         monkeypatch.setenv("COMP_WORDS", " ".join(["hexapod", *words]))
@@ -67,14 +67,14 @@ def test_keys_of_set_are_those_of_the_scenario_and_of_the_fmu(offered: Ask) -> N
 
 @pytest.mark.parametrize("typed", ["gait", "command.", "sensors.", "torso.ma", "solver.s"])
 def test_a_key_that_is_offered_is_a_key(offered: Ask, typed: str) -> None:
-    """Known by its name; the value 1 may be refused."""
+    """The key must be known; the value 1 may be refused."""
     keys = offered("simulate", "--set", typed)
     assert keys
     assert not any("unknown" in refusal(f"{key}1") for key in keys)
 
 
 def refusal(setting: str) -> str:
-    """Why a setting cannot be, "" when it can."""
+    """Returns why a setting is refused, "" when it is not."""
     try:
         load_scenario("walk_flat", overrides=[setting])
     except HexapodError as error:
@@ -122,7 +122,10 @@ def test_completion_is_installed_for_every_shell(tmp_path: Path, shell: str, fil
 
 
 def test_completion_imports_nothing_slow() -> None:
-    script = "import sys, hexapod_cosim.cosim.cli.app; print(*{name.partition('.')[0] for name in sys.modules})"
+    script = (
+        "import sys, hexapod_cosim.cosim.cli.app; "
+        "print(*{name.partition('.')[0] for name in sys.modules})"
+    )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )

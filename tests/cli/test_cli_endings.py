@@ -1,6 +1,4 @@
-"""Runs of the hexapod command that do not complete: what was recorded is kept, under another
-name.
-"""
+"""Runs of the hexapod command that do not complete keep their recordings under another name."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from command import COMMAND, QUICK, Call, assert_refused, settings
 from hexapod_cosim.controller import BodyCommand, Controller, JointCommand, Measurement
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_csv, write_commands
-from hexapod_cosim.cosim.results.summary import Summary, refused
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import HexapodError
 
@@ -111,9 +109,8 @@ def test_a_controller_that_raises_keeps_the_recording_and_fails(
         return step(self, t, command, measurement)
 
     monkeypatch.setattr(Controller, "step", broken)
-    monkeypatch.setattr(
-        "hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None
-    )  # it tries the controller out
+    # it tries the controller out
+    monkeypatch.setattr("hexapod_cosim.cosim.run.run.check_commands", lambda *_, **__: None)
     folder = tmp_path / "out"
     code, out, err = call("simulate", "walk_flat", "-o", folder, *QUICK)
     assert (code, out) == (1, "")
@@ -148,9 +145,8 @@ def test_an_interrupt_while_figures_are_drawn_says_what_is_there(
         return []
 
     monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.write_report", struck)
-    before = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # a test run in the background starts with it ignored
+    # a test run in the background starts with it ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     code, _, err = call("simulate", "stand", "-o", tmp_path / "out", "--set", "duration=0.2")
     assert code == 130
@@ -204,7 +200,7 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
         for scenario in scenarios:
             stands = upright[("kinematic", "compliant").index(scenario.control)]
             yield replace(
-                refused(scenario, HexapodError("")),
+                refused_summary(scenario, HexapodError("")),
                 status="completed",
                 upright=stands,
                 warnings=() if stands else ("it fell",),
@@ -231,7 +227,10 @@ def test_a_fall_under_either_control_ends_a_comparison_with_the_code_of_falls(
 def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
     call: Call, tmp_path: Path, modes: list[str], code: int
 ) -> None:
-    text = f'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n[factors]\nservo.mode = {json.dumps(modes)}\n'
+    text = (
+        'scenario = "stand"\ncontrols = ["kinematic"]\n[set]\nduration = 2\n'
+        f"[factors]\nservo.mode = {json.dumps(modes)}\n"
+    )
     (tmp_path / "sinks.toml").write_text(text)
     returned, out, _ = call(
         "study", tmp_path / "sinks.toml", "-o", tmp_path / "out", "--workers", "0", "--json"
@@ -239,7 +238,7 @@ def test_only_a_study_in_which_every_run_failed_ends_with_the_code_of_falls(
     assert returned == code, out
 
 
-def test_the_exit_codes_are_told_by_help(call: Call) -> None:
+def test_the_exit_codes_are_in_the_help(call: Call) -> None:
     said = " ".join(call("--help")[1].split())
     assert "0 success; 1 an error" in said
     assert "3 the robot fell" in said
@@ -247,7 +246,7 @@ def test_the_exit_codes_are_told_by_help(call: Call) -> None:
         assert "xit code 3" in " ".join(call(command, "--help")[1].split())
 
 
-def test_what_has_no_effect_is_told(call: Call, tmp_path: Path) -> None:
+def test_what_has_no_effect_is_warned_of(call: Call, tmp_path: Path) -> None:
     idle = settings("events=[{time=5, duration=0.1, force=[0, 1, 0]}]", "terrain.incline=0.1")
     _, _, err = call("simulate", "stand", "-o", tmp_path / "out", *QUICK, *idle)
     assert "the event at 5 s does nothing" in err

@@ -1,4 +1,4 @@
-"""One clear paragraph of the hexapod command for every mistake."""
+"""The hexapod command answers every mistake with one clear paragraph."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_a_foreign_fmu_is_refused(call: Call, tmp_path: Path, athena_fmu: Path) 
     )
 
 
-def test_an_unknown_option_is_told_and_not_zero(call: Call) -> None:
+def test_an_unknown_option_is_reported_and_not_zero(call: Call) -> None:
     code, out, err = call("simulate", "--speed", "3")
     assert (code, out) == (2, "")
     assert "No such option: --speed" in err
@@ -217,15 +217,16 @@ def test_with_json_an_error_is_an_object_on_stdout_and_the_paragraph_on_stderr(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     returned, out, err = call(*arguments, "--json")
-    told = json.loads(out)
+    printed = json.loads(out)
     assert returned == code
-    assert {"error", "what", "got", "expected", "fix", "where", "exit_code"} <= told.keys()
-    assert told["exit_code"] == code
-    assert err == f"hexapod: {told['error']}\n"
+    assert {"error", "what", "got", "expected", "fix", "where", "exit_code"} <= printed.keys()
+    assert printed["exit_code"] == code
+    assert err == f"hexapod: {printed['error']}\n"
     assert all(
-        part in told["error"] for part in (told["what"], told["expected"] or "", told["fix"] or "")
+        part in printed["error"]
+        for part in (printed["what"], printed["expected"] or "", printed["fix"] or "")
     )
-    assert {key: told[key] for key in expected} == expected
+    assert {key: printed[key] for key in expected} == expected
 
 
 def test_with_json_an_unexpected_error_is_an_object_too(
@@ -236,9 +237,9 @@ def test_with_json_an_unexpected_error_is_an_object_too(
 
     monkeypatch.setattr("hexapod_cosim.cosim.cli.run_commands.load_scenario", burst)
     code, out, _ = call("simulate", "--json")
-    told = json.loads(out)
-    assert (code, told["exit_code"], told["what"]) == (1, 1, None)
-    assert told["error"].startswith("unexpected ZeroDivisionError: by nought")
+    printed = json.loads(out)
+    assert (code, printed["exit_code"], printed["what"]) == (1, 1, None)
+    assert printed["error"].startswith("unexpected ZeroDivisionError: by nought")
 
 
 def test_with_json_an_interrupt_is_an_object_too(
@@ -258,6 +259,6 @@ def test_with_json_an_unsound_fmu_is_one_object_with_its_problems_and_the_error(
 ) -> None:
     (tmp_path / "plain.fmu").write_text("no archive")
     code, out, _ = call("validate", tmp_path / "plain.fmu", "--json")
-    told = json.loads(out)
-    assert (code, told["valid"], told["exit_code"]) == (1, False, 1)
-    assert told["problems"] == [told["error"]]
+    printed = json.loads(out)
+    assert (code, printed["valid"], printed["exit_code"]) == (1, False, 1)
+    assert printed["problems"] == [printed["error"]]

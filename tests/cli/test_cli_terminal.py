@@ -1,6 +1,4 @@
-"""What is on a terminal and what is not: progress there, nothing but results in pipes, JSON from
-every command.
-"""
+"""Output on terminals and in pipes: progress on terminals only, JSON from every command."""
 
 from __future__ import annotations
 
@@ -25,9 +23,8 @@ from hexapod_cosim.cosim.cli.terminal import counting_bar, progress_bar, waiting
 from hexapod_cosim.cosim.results.results import NEEDED
 
 ESCAPE = "\x1b"
-COMMANDS = {
-    name: command for name, command in get_command(app).commands.items() if not command.hidden
-}  # type: ignore[attr-defined]
+ALL_COMMANDS = get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS = {name: command for name, command in ALL_COMMANDS.items() if not command.hidden}
 
 
 class Terminal(io.StringIO):
@@ -37,8 +34,8 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[[], Terminal]:
-    """Puts one in the place of stderr, from within a test: pytest's own takes its place again
-    before.
+    """Replaces stderr by a terminal from within a test, because pytest replaces it before each
+    test.
     """
 
     def install() -> Terminal:
@@ -109,7 +106,7 @@ def _read(descriptor: int) -> bytes:
 
 
 def test_pipes_get_results_and_nothing_else(plant_build: Path, tmp_path: Path) -> None:
-    """Even where the environment asks for colours."""
+    """This holds even where the environment asks for colours."""
     environment = os.environ | {"FORCE_COLOR": "1", "TERM": "xterm-256color"}
     command = [*COMMAND, "simulate", "walk_flat", "-o", str(tmp_path / "out"), *QUICK]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
@@ -159,7 +156,7 @@ def test_columns_of_a_table_are_aligned(call: Call) -> None:
 
 @pytest.fixture
 def narrow(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Terminal]:
-    """Puts a terminal of 60 columns in the place of a stream, from within a test."""
+    """Replaces a stream by a terminal of 60 columns, from within a test."""
 
     def install(name: str) -> Terminal:
         terminal = Terminal()
@@ -171,7 +168,7 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Terminal]:
 
 
 def plain(text: str) -> list[str]:
-    """Its lines without colours and trailing blanks."""
+    """Returns the lines of a terminal without colours and trailing blanks."""
     return [line.rstrip() for line in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text).splitlines()]
 
 
@@ -214,7 +211,10 @@ def test_sentences_are_broken_between_words_on_a_terminal_and_not_in_a_pipe(
     narrow: Callable[[str], Terminal],
     say: Callable[[str], None],
 ) -> None:
-    text = "kinematic: servo LM.femur works at 1.24 N m RMS, above the limit; see /a/path/that/no/one/may/break/for/it/is/one/word/and/long"
+    text = (
+        "kinematic: servo LM.femur works at 1.24 N m RMS, above the limit; "
+        "see /a/path/that/no/one/may/break/for/it/is/one/word/and/long"
+    )
     say(text)
     piped = "".join(capsys.readouterr())
     assert piped.count("\n") == 1
@@ -341,7 +341,7 @@ def test_json_is_all_that_is_printed(
         (["export", "--robot", "file"], ["not a TOML file"]),
     ],
 )
-def test_a_misuse_is_told_in_one_paragraph_of_what_got_expected_and_fix(
+def test_a_misuse_is_reported_in_one_paragraph_of_what_got_expected_and_fix(
     call: Call,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,15 +26,14 @@ def make(parts: Parts | None = None, **changes: float) -> Hold:
     return Hold(replace(HOLD, **changes), Parts() if parts is None else parts, period=PERIOD)
 
 
-def sight(**changes: object) -> Sight:
+def sight(**changes: Any) -> Sight:
     """At rest, as planned."""
     still = Sight(HOME, LEVEL, HOME, LEVEL, LOADS, np.zeros(2), 0.0, 0j, 0.0)
-    return still._replace(
-        **{
-            name: np.array(value) if isinstance(value, list | tuple) else value
-            for name, value in changes.items()
-        }
-    )  # type: ignore[arg-type]
+    values = {
+        name: np.array(value) if isinstance(value, list | tuple) else value
+        for name, value in changes.items()
+    }
+    return still._replace(**values)
 
 
 def seen_heights(low: float, roll: float, pitch: float) -> np.ndarray:

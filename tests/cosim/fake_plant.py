@@ -1,5 +1,5 @@
-"""A plant without physics that can do what the master asks of one: joints follow at once, the
-torso glides along x.
+"""A plant without physics for tests of the master: joints follow their commands at once, and the
+torso moves along x.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SPEED = 0.08  # m/s of the torso
 
 
 class FakeBlock:
-    """A view on some of the plant's values."""
+    """Variables of the plant, read and written as a block."""
 
     def __init__(self, plant: FakePlant, names: Sequence[str], buffer: NDArray[Any]) -> None:
         self._plant = plant
@@ -36,8 +36,10 @@ class FakeBlock:
 
 
 class FakePlant:
-    """All variables of the default robot's FMU; refuses the step that begins at `refuse_at`, or
-    raises `interrupt` there.
+    """A plant with all variables of the default robot's FMU.
+
+    It refuses the step that begins at `refuse_at`, or raises KeyboardInterrupt there if
+    `interrupt`.
     """
 
     def __init__(
@@ -100,7 +102,7 @@ class FakePlant:
 
 
 class FakeController:
-    """Commands the sum of what it has measured: whatever it is told shows in the recording."""
+    """A controller that commands what it has measured, so that the recording shows it."""
 
     def __init__(self, log: list[str] | None = None) -> None:
         self.log = [] if log is None else log

@@ -27,21 +27,23 @@ def run(name: str, *overrides: str) -> Result:
 
 
 @pytest.mark.parametrize("friction", ["friction.mu=0", "friction.law=none"])
-def test_a_robot_on_ice_walks_on_the_spot_and_is_told_why(plant_build: Path, friction: str) -> None:
+def test_a_robot_on_ice_walks_on_the_spot_and_is_warned_why(
+    plant_build: Path, friction: str
+) -> None:
     result = run("walk_flat", friction, "duration=2")
     position = result.outcome.recording.vector("torso.position")
-    assert (
-        float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01
-    )  # m: of 0.12 commanded; its legs swing its torso to and fro
+    # m: of 0.12 commanded; its legs swing its torso to and fro
+    assert float(np.abs(position[:, :2] - position[0, :2]).max()) < 0.01
     assert NO_PUSH in result.facts["warnings"]
     assert result.facts["walk"]["upright"]
 
 
-def test_a_robot_on_an_icy_slope_slides_at_the_gravity_along_it_and_is_told(
+def test_a_robot_on_an_icy_slope_slides_at_the_gravity_along_it_and_is_warned(
     plant_build: Path,
 ) -> None:
-    """From rest 1/2 g sin(a) t^2 along the slope, a = 0.1 rad: 0.4897 m in a second, whatever
-    the legs do.
+    """From rest, the way along the slope is 1/2 g sin(a) t^2 with a = 0.1 rad.
+
+    That is 0.4897 m in a second, whatever the legs do.
     """
     result = run(
         "stand", "terrain.kind=slope", "terrain.incline=0.1", "friction.mu=0", "duration=1"
@@ -72,9 +74,8 @@ def test_a_robot_dropped_from_a_metre_lands_on_its_feet_and_has_not_fallen(
     assert result.facts["walk"]["upright"]
     recording = result.outcome.recording
     landed = recording.time[np.argmax((recording.feet("contact") > 0.5).any(axis=1))]
-    assert landed == pytest.approx(
-        (2.0 * (1.0 - 0.132) / 9.81) ** 0.5, abs=0.006
-    )  # s    to a macro-step; it stands at 0.132 m
+    # s    to a macro-step; it stands at 0.132 m
+    assert landed == pytest.approx((2.0 * (1.0 - 0.132) / 9.81) ** 0.5, abs=0.006)
     assert recording.column("torso.position[3]")[-1] == pytest.approx(0.1317, abs=1e-3)
 
 
@@ -92,15 +93,16 @@ def test_a_robot_dropped_on_its_side_has_fallen(plant_build: Path) -> None:
 def test_a_kinematic_drive_follows_the_walk_within_a_third_of_a_milliradian(
     plant_build: Path,
 ) -> None:
-    """At the macro-steps' ends; told no acceleration_ref it lags by 20 mrad, the acceleration
-    over beta^2.
+    """The error is measured at the ends of macro-steps.
+
+    Without acceleration_ref the lag would be 20 mrad, the acceleration over beta^2.
     """
     recording = run("walk_flat", "servo.mode=kinematic", "duration=4").outcome.recording
-    angle, wanted, told = (
+    angle, wanted, acceleration = (
         recording.joints(name)[400:-1] for name in ("angle", "angle_ref", "acceleration_ref")
     )
     assert float(np.abs(angle - wanted).max()) < 3.3e-4  # rad
-    assert float(np.abs(told).max()) / 2500.0 > 0.015  # rad    beta = 50/s
+    assert float(np.abs(acceleration).max()) / 2500.0 > 0.015  # rad    beta = 50/s
 
 
 WORLDS = {"moon": 1.62, "mars": 3.71}
@@ -109,8 +111,9 @@ WORLDS = {"moon": 1.62, "mars": 3.71}
 @pytest.mark.parametrize("world", WORLDS)
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
 def test_the_robot_walks_under_other_gravities(plant_build: Path, world: str, control: str) -> None:
-    """The default gait's Froude number v^2/(g h) is 0.03 on the moon: it needs no scaling. The
-    start is settled, the weight is m g.
+    """The default gait's Froude number v^2/(g h) is 0.03 on the moon, so it needs no scaling.
+
+    The start is settled, and the weight is m g.
     """
     result = run(world, f"control={control}", "duration=4")
     recording, walk = result.outcome.recording, result.facts["walk"]
@@ -131,16 +134,17 @@ def test_the_robot_walks_under_other_gravities(plant_build: Path, world: str, co
         assert result.metrics["peak_force"] < 0.7
 
 
-def test_the_controllers_fmu_is_told_the_scenarios_gravity() -> None:
+def test_the_controllers_fmu_gets_the_scenarios_gravity() -> None:
     setup = make_plan(load_scenario("moon")).controller
-    told = controller_parameters(setup)
-    assert [told[f"gravity[{k}]"] for k in (1, 2, 3)] == [0.0, 0.0, -1.62]
+    parameters = controller_parameters(setup)
+    assert [parameters[f"gravity[{k}]"] for k in (1, 2, 3)] == [0.0, 0.0, -1.62]
 
 
 @pytest.mark.parametrize("name", ["plant.gravity[3]", "controller.gravity[3]"])
 def test_a_packages_gravity_is_not_that_of_one_component(name: str) -> None:
     with pytest.raises(
         HexapodError,
-        match=r"gravity of one component alone: .* write gravity = \[0, 0, -1\.62\] into the robot's file",
+        match=r"gravity of one component alone: .* "
+        r"write gravity = \[0, 0, -1\.62\] into the robot's file",
     ):
         read_values([f"{name}=-1.62"])

@@ -1,4 +1,4 @@
-"""Walks under hand-made gains, through the FMU: what the compliant control is for."""
+"""Walks with gains chosen by hand, through the FMU: effects of the compliant control."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SLIP_LEFT = 0.2  # of that under kinematic control, at most
 
 @cache
 def walk(robot: str, control: str, *overrides: str, duration: float = 4.0) -> Result:
-    """A straight walk."""
+    """Runs a straight walk."""
     scenario = load_scenario(
         "walk_flat",
         overrides=[f"robot={robot}", f"control={control}", f"duration={duration}", *overrides],
@@ -30,7 +30,7 @@ def walk(robot: str, control: str, *overrides: str, duration: float = 4.0) -> Re
 
 
 def outputs(result: Result) -> np.ndarray:
-    """What the FMU said."""
+    """Returns the outputs of the FMU."""
     recording = result.outcome.recording
     return recording.columns(
         [name for name in recording.names if not name.startswith("controller.")]
@@ -109,7 +109,7 @@ FIGURES = ("slip_per_metre", "height_rms", "roll_rms", "pitch_rms", "peak_force"
 
 @pytest.mark.usefixtures("plant_build")
 @pytest.mark.parametrize("error", ["contact.stiffness=1.07e4", "torso.mass=10"])
-def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_than_kinematic_control(
+def test_on_ground_100_times_softer_or_with_2_3_times_the_weight_it_is_no_worse_than_kinematic(
     error: str,
 ) -> None:
     kinematic, compliant = (
@@ -136,6 +136,6 @@ def test_with_three_times_the_weight_it_is_kinematic_control() -> None:
 
 @pytest.mark.usefixtures("plant_build")
 def test_turning_on_the_spot_asks_no_pitch_of_the_torso() -> None:
-    """A slip PID that answered to the feet's common twist would fight the turn: 0.6 mrad."""
+    """A slip PID that reacted to the feet's common twist would oppose the turn: 0.6 mrad."""
     turning = walk("athena", "compliant", "command={yaw_rate=0.3}", duration=6.0)
     assert turning.metrics["pitch_rms"] < 1e-4

@@ -1,4 +1,4 @@
-"""Several FMUs in one process: each one's errors carry its own words."""
+"""Errors of each of several FMUs in one process carry the messages of that FMU."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hexapod_cosim.cosim.master.fmu import Fmu, StepError
 LONG = (1.5, 2.5)  # s    steps over the end
 
 
-def test_each_fmu_is_heard_by_itself_and_after_another_is_gone(athena_fmu: Path) -> None:
+def test_each_fmu_reports_its_own_errors_alone_and_after_another_is_gone(athena_fmu: Path) -> None:
     with Fmu(athena_fmu) as first:
         with Fmu(athena_fmu) as second:
             for fmu, h in zip((first, second), LONG, strict=True):

@@ -1,6 +1,4 @@
-"""Force sensors that are late or broken: what the controller is told, against what is true, on a
-plant whose forces are known.
-"""
+"""Readings of delayed or broken force sensors, compared with the true forces of a fake plant."""
 
 from __future__ import annotations
 
@@ -23,8 +21,9 @@ LF, RM = LEG_NAMES.index("LF"), LEG_NAMES.index("RM")
 
 
 class CountingPlant(FakePlant):
-    """Every foot's vertical force is the number of steps done, plus one; a foot is in contact
-    after an even number.
+    """A plant whose vertical foot forces are the number of steps done, plus one.
+
+    A foot is in contact after an even number of steps.
     """
 
     def step(self, t: float, h: float) -> None:
@@ -38,7 +37,7 @@ class CountingPlant(FakePlant):
 
 
 class Listener(FakeController):
-    """Remembers contacts too."""
+    """A controller that records measured contacts as well."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -49,9 +48,9 @@ class Listener(FakeController):
         return super().step(t, command, measurement)
 
 
-def told(*settings: str) -> tuple[Readings, NDArray[np.bool_], Recording]:
-    """(steps, 6) vertical forces and contacts the controller was told in 10 steps of 5 ms, and
-    what was recorded.
+def measured(*settings: str) -> tuple[Readings, NDArray[np.bool_], Recording]:
+    """Returns the measured vertical forces and contacts (steps, 6) of 10 steps of 5 ms, and the
+    recording.
     """
     scenario = load_scenario("walk_flat", overrides=["duration=0.05", *settings])
     plant, listener, schedule = CountingPlant(), Listener(), make_schedule(scenario)
@@ -79,7 +78,7 @@ TRUE = np.arange(1.0, 11.0)
 def test_readings_are_late_by_whole_steps_and_the_first_holds_until_they_come(
     delay: str, steps: int
 ) -> None:
-    forces, contacts, _ = told(f"sensors.foot_force_delay={delay}")
+    forces, contacts, _ = measured(f"sensors.foot_force_delay={delay}")
     late = np.maximum(TRUE - steps, 1.0)
     for leg in range(6):
         np.testing.assert_array_equal(forces[:, leg], late)
@@ -87,7 +86,7 @@ def test_readings_are_late_by_whole_steps_and_the_first_holds_until_they_come(
 
 
 def test_a_dead_sensor_reads_nothing_while_the_others_go_on() -> None:
-    forces, contacts, _ = told("events=[{time=0.015, leg='LF', fault='dead', duration=0.01}]")
+    forces, contacts, _ = measured("events=[{time=0.015, leg='LF', fault='dead', duration=0.01}]")
     gone = (np.arange(10) == 3) | (np.arange(10) == 4)
     np.testing.assert_array_equal(forces[:, LF], np.where(gone, 0.0, TRUE))
     np.testing.assert_array_equal(contacts[:, LF], ~gone & (TRUE % 2 == 1))
@@ -95,37 +94,37 @@ def test_a_dead_sensor_reads_nothing_while_the_others_go_on() -> None:
 
 
 def test_a_stuck_sensor_keeps_its_last_reading_for_good() -> None:
-    forces, contacts, _ = told("events=[{time=0.015, leg='RM', fault='stuck'}]")
+    forces, contacts, _ = measured("events=[{time=0.015, leg='RM', fault='stuck'}]")
     np.testing.assert_array_equal(forces[:, RM], np.minimum(TRUE, 3.0))
     np.testing.assert_array_equal(contacts[:, RM], np.minimum(TRUE, 3.0) % 2 == 1)
     np.testing.assert_array_equal(forces[:, LF], TRUE)
 
 
 def test_a_sensor_stuck_from_the_start_keeps_its_first_reading() -> None:
-    forces, contacts, _ = told("events=[{time=0, leg='RM', fault='stuck'}]")
+    forces, contacts, _ = measured("events=[{time=0, leg='RM', fault='stuck'}]")
     assert (forces[:, RM] == 1.0).all()
     assert contacts[:, RM].all()
 
 
-def test_a_late_sensor_sticks_at_what_it_last_told_and_not_at_what_was_true() -> None:
-    forces, _, _ = told(
+def test_a_late_sensor_sticks_at_what_it_last_read_and_not_at_what_was_true() -> None:
+    forces, _, _ = measured(
         "sensors.foot_force_delay=10 ms", "events=[{time=0.025, leg='LF', fault='stuck'}]"
     )
     np.testing.assert_array_equal(forces[:, LF], [1, 1, 1, 2, 3, 3, 3, 3, 3, 3])
 
 
-def test_what_is_recorded_is_true_whatever_is_told() -> None:
+def test_what_is_recorded_is_true_whatever_is_measured() -> None:
     settings = (
         "sensors.foot_force_noise=0.05",
         "sensors.foot_force_delay=10 ms",
         "events=[{time=0, leg='LF', fault='dead'}]",
     )
-    _, _, recording = told(*settings)
+    _, _, recording = measured(*settings)
     np.testing.assert_array_equal(recording.column("LF.foot.force[3]"), np.arange(1.0, 12.0))
     np.testing.assert_array_equal(recording.columns(CONTACT)[:, 0], np.arange(11) % 2 == 0)
 
 
-def test_a_delay_changes_when_noise_is_told_and_not_what_it_is() -> None:
-    early, _, _ = told("sensors.foot_force_noise=0.05")
-    late, _, _ = told("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=10 ms")
+def test_a_delay_changes_when_noise_is_measured_and_not_what_it_is() -> None:
+    early, _, _ = measured("sensors.foot_force_noise=0.05")
+    late, _, _ = measured("sensors.foot_force_noise=0.05", "sensors.foot_force_delay=10 ms")
     np.testing.assert_array_equal(late[2:], early[:-2])

@@ -1,6 +1,4 @@
-"""The co-simulation loop: order, times, what is recorded, and how a run ends that does not
-complete.
-"""
+"""The co-simulation loop: order of calls, times, recorded rows, and runs that do not complete."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from hexapod_cosim.cosim.master.loop import (
     INTERRUPTED,
     JointController,
     Outcome,
-    insides,
+    diagnostic_columns,
     run,
 )
 from hexapod_cosim.cosim.master.recorder import Recorder, Recording
@@ -30,7 +28,7 @@ from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import describe_walk
-from hexapod_cosim.cosim.run.run import adopt_settings, make_sensor, simulate
+from hexapod_cosim.cosim.run.run import apply_settings, make_sensor, simulate
 from hexapod_cosim.cosim.scenario.records import Push, Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario, scenario_robot
 from hexapod_cosim.cosim.scenario.schedule import make_schedule, push_rows
@@ -155,7 +153,7 @@ def test_any_error_of_a_controller_ends_the_run_and_keeps_its_rows() -> None:
 
 
 class Cautious(FakeController):
-    """Does not believe one foot's sensor in the last quarter of 0.1 s."""
+    """A controller that rejects one foot's sensor in the last quarter of 0.1 s."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -175,21 +173,23 @@ class Cautious(FakeController):
         return super().step(t, command, measurement)
 
 
-def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_told() -> None:
+def test_the_share_of_time_in_which_a_controller_fell_back_is_recorded_and_reported() -> None:
     scenario, controller = scenario_of("duration=0.1"), Cautious()
     signals, schedule = Signals(FakePlant()), make_schedule(scenario)
-    recorder = Recorder(signals, schedule.times, schedule.rows, extra=insides(controller))
+    recorder = Recorder(
+        signals, schedule.times, schedule.rows, extra=diagnostic_columns(controller)
+    )
     recording = run(
         FakePlant(), signals, controller, schedule, recorder, h=scenario.macro_step
     ).recording
     assert recording.column("controller.RM.fallback").tolist() == [0.0] * 15 + [1.0] * 6
     assert not recording.column("controller.LM.fallback").any()
-    told = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
-    assert told["fallback"] == pytest.approx(6 / 21)
+    measured = describe_walk(View(recording, FakePlant().parameters(), 1.0), load_robot("athena"))
+    assert measured["fallback"] == pytest.approx(6 / 21)
 
 
 def test_progress_reaches_the_whole_duration() -> None:
-    told: list[float] = []
+    measured: list[float] = []
     plant = FakePlant()
     signals, schedule = Signals(plant), make_schedule(scenario_of("duration=1"))
     run(
@@ -199,10 +199,10 @@ def test_progress_reaches_the_whole_duration() -> None:
         schedule,
         Recorder(signals, schedule.times, schedule.rows),
         h=0.005,
-        progress=told.append,
+        progress=measured.append,
     )
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(1.0)
+    assert measured == sorted(measured)
+    assert measured[-1] == pytest.approx(1.0)
 
 
 def test_a_command_holds_from_its_time_on() -> None:
@@ -236,7 +236,7 @@ def test_a_push_reaches_the_plant_only_while_it_lasts() -> None:
     np.testing.assert_allclose(np.delete(pushed, range(4, 10), axis=0), 0.0)
 
 
-def forces_told(seed: int, noise: float) -> np.ndarray:
+def measured_forces(seed: int, noise: float) -> np.ndarray:
     plant, controller = FakePlant(), FakeController()
     plant.values["LF.foot.force[3]"] = 10.0
     run_fake(
@@ -248,13 +248,13 @@ def forces_told(seed: int, noise: float) -> np.ndarray:
 
 
 def test_force_noise_is_seeded_unbiased_and_of_the_size_asked_for() -> None:
-    told = forces_told(1, 0.05)
-    np.testing.assert_array_equal(told, forces_told(1, 0.05))
-    assert not np.array_equal(told, forces_told(2, 0.05))
-    vertical = told[:, 0, 2]
+    measured = measured_forces(1, 0.05)
+    np.testing.assert_array_equal(measured, measured_forces(1, 0.05))
+    assert not np.array_equal(measured, measured_forces(2, 0.05))
+    vertical = measured[:, 0, 2]
     assert vertical.std() == pytest.approx(0.5, rel=0.15)  # 400 samples: 3.5 % standard error
     assert vertical.mean() == pytest.approx(10.0, abs=0.1)
-    assert not told[:, 1:].any()
+    assert not measured[:, 1:].any()
 
 
 def test_a_plant_that_lacks_a_variable_is_refused_by_its_name() -> None:
@@ -370,7 +370,7 @@ def test_a_given_fmu_of_the_robot_walks_like_the_exported_one(
 def test_settings_reach_a_given_fmu(athena_fmu: Path) -> None:
     robot = scenario_robot(scenario_of("friction.mu=0.4", "contact.law=flores", "servo.kp=50"))
     with Fmu(athena_fmu) as plant:
-        adopt_settings(plant, robot)
+        apply_settings(plant, robot)
         parameters = plant.parameters()
     assert (parameters["friction.mu"], parameters["contact.law"], parameters["servo.kp"]) == (
         0.4,
@@ -386,7 +386,7 @@ def test_the_fmu_of_another_robot_is_refused(athena_fmu: Path) -> None:
             FmuError, match=r"the FMU holds another robot: torso\.mass: got 2\.6, expected 1\.52"
         ),
     ):
-        adopt_settings(plant, load_robot("phantomx_mk4"))
+        apply_settings(plant, load_robot("phantomx_mk4"))
 
 
 def test_a_parameter_of_the_fmu_can_be_set_by_name(plant_build: Path) -> None:
@@ -425,7 +425,7 @@ def test_a_wrong_parameter_is_refused_by_name(
 
 
 @pytest.mark.parametrize("h", [-0.005, float("nan")])
-def test_an_impossible_step_is_refused_with_the_fmus_words(athena_fmu: Path, h: float) -> None:
+def test_an_impossible_step_is_refused_with_the_fmus_message(athena_fmu: Path, h: float) -> None:
     with Fmu(athena_fmu) as plant:
         plant.initialise(0.0, 1.0)
         with pytest.raises(StepError, match=r"the step from 0 s: got '.+'"):

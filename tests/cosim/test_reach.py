@@ -1,4 +1,4 @@
-"""Commands that the legs cannot walk are refused before the run, with the most that they can."""
+"""Commands that the legs cannot follow are refused before the run, with the largest possible."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_every_bundled_walk_is_within_reach(name: str) -> None:
         ({"roll": 1.5, "vx": 0.1}, "tripod"),
     ],
 )
-def test_the_limit_told_can_be_walked_and_a_little_more_cannot(
+def test_the_reported_limit_can_be_walked_and_a_little_more_cannot(
     wanted: dict[str, float], gait: str
 ) -> None:
     limit = {
@@ -64,9 +64,7 @@ def test_the_limit_told_can_be_walked_and_a_little_more_cannot(
 
 
 def unreachable(speed: float) -> tuple[bool, bool]:
-    """Whether a standing foot, and any foot, is beyond reach from 2 s to 6 s of a tripod walk
-    with the master's default step.
-    """
+    """Whether a standing foot, and any foot, is out of reach from 2 s to 6 s of a tripod walk."""
     period, measurement = 0.005, Measurement()
     controller = Controller(ROBOT, period=period, gait=make_gait(ROBOT, "tripod"))
     shown, standing, anyone = controller.diagnostics, False, False
@@ -98,12 +96,12 @@ def test_the_limit_shrinks_with_the_time_a_foot_stands() -> None:
     assert wave < 0.5 * tripod
 
 
-def test_a_stride_and_a_posture_out_of_reach_are_told_apart() -> None:
+def test_a_stride_and_a_posture_out_of_reach_have_different_messages() -> None:
     assert "strides" in refusal(Command(vx=10.0, height=0.01)).what
     assert "posture" in refusal(Command(vx=0.1, height=0.5)).what
 
 
-def test_the_one_impossible_command_among_several_is_told_by_its_time() -> None:
+def test_the_one_impossible_command_among_several_is_reported_by_its_time() -> None:
     assert (
         refusal(Command(vx=0.08), Command(time=2.5, vx=3.0)).where
         == "mine.toml: command at time = 2.5 s"

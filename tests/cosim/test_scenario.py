@@ -1,5 +1,5 @@
-"""Scenario files: what they may say, what --set does, and that every mistake is told by file,
-key, what was got and what is allowed.
+"""Scenario files and --set: valid content, and messages with file, key, what was got and what is
+allowed.
 """
 
 from __future__ import annotations
@@ -141,7 +141,8 @@ def test_a_scenario_that_says_no_gravity_has_the_robots() -> None:
     [
         (
             "gravity=-1.62",
-            r"walk_flat\.toml: gravity: value not allowed: got -1\.62, expected a finite number > 0 \[m/s2\]",
+            r"walk_flat\.toml: gravity: value not allowed: got -1\.62, "
+            r"expected a finite number > 0 \[m/s2\]",
         ),
         ("gravity=0", r"gravity: value not allowed: got 0, expected a finite number > 0"),
         (
@@ -163,12 +164,13 @@ def test_impossible_gravity_is_refused(override: str, message: str) -> None:
 def test_gravity_that_does_not_press_the_robot_onto_the_ground_is_refused(override: str) -> None:
     scenario = load_scenario("walk_flat", overrides=[override])
     with pytest.raises(
-        ScenarioError, match=r"gravity: nothing stands under this gravity: .* write gravity = 1\.62"
+        ScenarioError,
+        match=r"gravity: the robot cannot stand under this gravity: .* write gravity = 1\.62",
     ):
         scenario_robot(scenario)
 
 
-def test_static_friction_is_the_kinetic_one_unless_said() -> None:
+def test_static_friction_is_the_kinetic_one_unless_set() -> None:
     robot = scenario_robot(load_scenario("walk_flat", overrides=["friction.mu=0.9"]))
     assert (robot.friction.mu, robot.friction.mu_static) == (0.9, 0.0)
 
@@ -178,16 +180,18 @@ def test_static_friction_is_refused_where_it_has_no_effect(law: str) -> None:
     scenario = load_scenario(
         "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.8"]
     )
-    message = rf"friction\.mu_static: static friction that has no effect: got '0\.8 with the law {law}', expected friction\.law = bristle"
+    message = (
+        r"friction\.mu_static: static friction that has no effect: "
+        rf"got '0\.8 with the law {law}', expected friction\.law = bristle"
+    )
     with pytest.raises(RobotError, match=message):
         scenario_robot(scenario)
     sticks = load_scenario(
         "walk_flat", overrides=["friction.law=bristle", "friction.mu_static=0.8"]
     )
     assert scenario_robot(sticks).friction.mu_static == 0.8
-    same = load_scenario(
-        "walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"]
-    )  # the kinetic one's
+    # the kinetic one's
+    same = load_scenario("walk_flat", overrides=[f"friction.law={law}", "friction.mu_static=0.7"])
     assert scenario_robot(same).friction.mu_static == 0.7
 
 
@@ -206,7 +210,8 @@ def test_a_robot_file_is_found_beside_its_scenario(tmp_path: Path) -> None:
 
 
 EVERYTHING = [
-    "events=[{time=1, leg='LM', fault='stuck'}, {time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
+    "events=[{time=1, leg='LM', fault='stuck'}, "
+    "{time=2, leg='RF', fault='dead', duration='20 ms'}, {time=3, duration=1, force=[1, 2, 3]}]",
     "sensors.foot_force_delay=7 ms",
     "compliance.slip_pid=false",
     "variation.attitude=1 deg",
@@ -326,7 +331,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("setting", MISTAKES)
-def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -> None:
+def test_a_mistake_is_reported_with_what_was_got_and_what_is_allowed(setting: str) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario("walk_flat", overrides=[setting])
     message = str(caught.value)
@@ -356,7 +361,7 @@ def test_a_mistake_is_told_with_what_was_got_and_what_is_allowed(setting: str) -
         ("parameters = {torso.mass = 1}", "parameters"),
     ],
 )
-def test_a_mistake_in_a_file_is_told_by_file_then_key(
+def test_a_mistake_in_a_file_is_reported_by_file_then_key(
     tmp_path: Path, text: str, place: str
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -366,7 +371,7 @@ def test_a_mistake_in_a_file_is_told_by_file_then_key(
     assert caught.value.where == f"{path}: {place}"
 
 
-def test_an_unknown_parameter_of_a_file_is_told_with_the_nearest_and_a_name_without_quotes_with_them(
+def test_the_message_for_an_unknown_parameter_of_a_file_names_the_nearest_and_asks_for_quotes(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "mine.toml"
@@ -384,7 +389,7 @@ def test_the_longest_run_allowed_is_allowed() -> None:
     )
 
 
-def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
+def test_an_unknown_scenario_or_robot_is_reported_with_the_nearest_name() -> None:
     with pytest.raises(ScenarioError, match="did you mean 'walk_flat'"):
         load_scenario("walk_flt")
     with pytest.raises(RobotError, match="did you mean 'athena'"):
@@ -399,7 +404,7 @@ def test_an_unknown_scenario_or_robot_is_told_with_the_nearest_name() -> None:
         ("\udc80", "not a TOML file"),
     ],
 )
-def test_a_bad_file_is_told_by_its_name(tmp_path: Path, text: str, message: str) -> None:
+def test_a_bad_file_is_reported_by_its_name(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "mine.toml"
     path.write_bytes(text.encode("utf-8", errors="surrogateescape"))
     with pytest.raises(ScenarioError, match=message) as caught:

@@ -1,6 +1,4 @@
-"""Small variations: seeded, of the size asked for, nothing without being asked, and no foot
-driven into the ground.
-"""
+"""Small variations are seeded, have the requested sizes, and drive no foot into the ground."""
 
 from __future__ import annotations
 
@@ -124,8 +122,7 @@ def test_a_varied_run_begins_as_drawn_and_settles(athena_fmu: Path) -> None:
     )
     heights = [result.outcome.recording.column("torso.position[3]") for result in (plain, varied)]
     assert heights[1][0] - heights[0][0] > draw(STANDARD, seed=2).height
-    assert heights[1][-1] == pytest.approx(
-        heights[0][-1], abs=2e-4
-    )  # m: feet creep on towards rest
+    # m: feet creep on towards rest
+    assert heights[1][-1] == pytest.approx(heights[0][-1], abs=2e-4)
     assert varied.facts["drawn"]["height"] == draw(STANDARD, seed=2).height
     assert plain.facts["drawn"] is None

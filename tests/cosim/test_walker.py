@@ -18,7 +18,14 @@ from hexapod_cosim.cosim.export.export import export_fmu
 from hexapod_cosim.cosim.master import native_loop as native_master
 from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.fmu_controller import FmuController
-from hexapod_cosim.cosim.master.loop import COMPLETED, FAILED, INTERRUPTED, Outcome, insides, run
+from hexapod_cosim.cosim.master.loop import (
+    COMPLETED,
+    FAILED,
+    INTERRUPTED,
+    Outcome,
+    diagnostic_columns,
+    run,
+)
 from hexapod_cosim.cosim.master.native_loop import NativeMaster
 from hexapod_cosim.cosim.master.recorder import Recorder
 from hexapod_cosim.cosim.master.signals import Signals
@@ -27,8 +34,8 @@ from hexapod_cosim.cosim.results.summary import REFUSED, Summary, summarise
 from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.run.run import (
     initialise_plant,
-    judge,
     make_plan,
+    make_result,
     make_sensor,
     open_plant,
     simulate,
@@ -75,9 +82,11 @@ def in_python(scenario: Scenario, walker: Walker) -> tuple[Outcome, Result]:
         parameters = initialise_plant(plant, plan)
         signals = Signals(plant, sensor=make_sensor(scenario, plan.schedule))
         ours = FmuController(controller, period=scenario.macro_step)
-        recorder = Recorder(signals, plan.schedule.times, plan.schedule.rows, extra=insides(ours))
+        recorder = Recorder(
+            signals, plan.schedule.times, plan.schedule.rows, extra=diagnostic_columns(ours)
+        )
         outcome = run(plant, signals, ours, plan.schedule, recorder, h=scenario.macro_step)
-    return outcome, judge(plan, outcome, parameters, {"warnings": []})
+    return outcome, make_result(plan, outcome, parameters, {"warnings": []})
 
 
 def steady(summary: Summary) -> Summary:
@@ -218,7 +227,7 @@ def test_a_refused_step_ends_the_walk_as_in_python_and_the_next_one_begins_afres
         ),
     ],
 )
-def test_a_walk_that_cannot_begin_is_refused_in_words(
+def test_a_walk_that_cannot_begin_is_refused_with_a_message(
     walker: Walker, changes: dict[str, object], said: str
 ) -> None:
     good = walker.summary(WALKS[1])

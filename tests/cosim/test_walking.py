@@ -1,5 +1,6 @@
-"""The whole co-simulation: both robots walk for a minute, and its error falls with the
-macro-step as it should.
+"""The whole co-simulation.
+
+Both robots walk for a minute, and the error falls with the macro-step.
 """
 
 from __future__ import annotations
@@ -46,8 +47,9 @@ def test_a_robot_walks_for_a_minute_at_the_commanded_speed_without_falling(
 
 
 def swaying(robot: Robot, ahead: float) -> NDArray[np.void]:
-    """Joint commands that turn and lift the torso once a period, as fmpy's input; what holds at
-    t is the motion's at t + ahead.
+    """Returns joint commands that turn and lift the torso once per period, as input for fmpy.
+
+    The commands at time t are those of the motion at t + ahead.
     """
     time = np.arange(0.0, LOOK + 2e-2, 1e-4)
     phase = 2.0 * np.pi * (time + ahead) / PERIOD
@@ -66,8 +68,9 @@ def swaying(robot: Robot, ahead: float) -> NDArray[np.void]:
 
 
 def torso_at(fmu: Path, h: float, *, middle: bool) -> NDArray[np.float64]:
-    """Torso position and yaw at LOOK after macro-steps of h, the commands sampled at each step's
-    start or middle and held.
+    """Returns torso position and yaw at LOOK after macro-steps of h.
+
+    Commands are sampled at each step's start or middle and held.
     """
     result = fmpy.simulate_fmu(
         str(fmu),
@@ -87,8 +90,9 @@ def torso_at(fmu: Path, h: float, *, middle: bool) -> NDArray[np.float64]:
 def test_the_co_simulation_error_falls_with_the_macro_step(
     athena_fmu: Path, middle: bool, order: int
 ) -> None:
-    """A command held from a step's start lags by h/2: order 1. One sampled at the middle does
-    not: order 2.
+    """A command held from a step's start lags by h/2, which gives order 1.
+
+    One sampled at the step's middle has no lag: order 2.
     """
     exact = torso_at(athena_fmu, 1.25e-4, middle=True)
     errors = [float(np.linalg.norm(torso_at(athena_fmu, h, middle=middle) - exact)) for h in STEPS]

@@ -1,5 +1,5 @@
-"""The design: requirements met by python-control's judgement, kept in a file, told when
-impossible.
+"""The design of gains: requirements verified by python-control, files, and errors for impossible
+ones.
 """
 
 from __future__ import annotations
@@ -119,8 +119,9 @@ def test_the_quick_margins_are_python_controls(gains: Gains) -> None:
 
 
 def test_margins_of_a_loop_known_in_closed_form() -> None:
-    """k / s with a delay T: crossover k, phase margin 90 deg - k T, gain margin pi / (2 k T),
-    delay margin (pi/2)/k - T.
+    """The loop k / s with a delay T has crossover k and phase margin 90 deg - k T.
+
+    Its gain margin is pi / (2 k T) and its delay margin (pi/2)/k - T.
     """
     k, late, omega = 10.0, 0.02, np.geomspace(0.1, 300.0, 600)
     loop = k / (1j * omega) * np.exp(-1j * omega * late)
@@ -132,7 +133,7 @@ def test_margins_of_a_loop_known_in_closed_form() -> None:
 
 
 def test_the_eigenloci_are_the_characteristic_function_of_all_feet(gains: Gains) -> None:
-    """det(1 - l S P W) over all feet is the product of 1 + l locus, whatever l."""
+    """det(1 - l S P W) over all feet is the product of all 1 + l locus, for any l."""
     robot, plant, omega = (
         load_robot(gains.robot),
         plants_of(gains.robot)[NOMINAL],
@@ -179,13 +180,14 @@ def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
         loop = closed_loop(robot, plant, laws)
         assert spectral_radius(loop, feet=feet) < 1.0, name
         held = np.abs(np.linalg.eigvals(loop.A) - 1.0) < AT_ONE
-        assert (
-            held.sum() == PLACES + 2 * feet
-        )  # what nothing holds is exactly 1, and nothing else is
+        # what nothing holds is exactly 1, and nothing else is
+        assert held.sum() == PLACES + 2 * feet
 
 
 def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains) -> None:
-    """Generalised Nyquist against the eigenvalues of the whole loop, the suspension left out."""
+    """Compares the generalised Nyquist criterion with the eigenvalues of the loop without the
+    suspension.
+    """
     robot, name = load_robot(gains.robot), "six legs, load 2, gears slip"
     plant, omega = plants_of(gains.robot)[name], frequencies(PERIOD, FINE)
     critical = (
@@ -208,7 +210,7 @@ def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains)
 
 
 def test_the_design_uses_the_margin_it_has(gains: Gains) -> None:
-    """A tenth more gain breaks the margin that is said to bind."""
+    """A gain larger by a tenth violates the margin that is reported as binding."""
     omega = frequencies(PERIOD, FINE)
     law, needs = laws_of(scaled(gains, 1.1)).responses(omega)[0], gains.requirements
     margin, name = gains.margins.binding.removesuffix(")").split(" (", 1)
@@ -234,8 +236,9 @@ def test_less_delay_or_less_margin_allows_more_integral_action() -> None:
 
 
 def test_the_steady_slip_is_what_a_steady_drag_is_left_with() -> None:
-    """Feet whose targets splay at a constant rate: the force with the law over that without it,
-    after the transients.
+    """The targets of the feet splay at a constant rate.
+
+    The force with the law is compared with that without it, after the transients.
     """
     robot, plant, gains = (
         load_robot("athena"),
@@ -266,13 +269,12 @@ def test_the_laws_closed_form_response_is_its_systems(gains: Gains) -> None:
     )
     slow = np.array([1.0, 3.0])
     s = [slip_law(gains.slip)(1j * w) for w in slow]
-    np.testing.assert_allclose(
-        slip_response(gains.slip, slow, period=PERIOD), s, rtol=1e-3
-    )  # at 1 % of the Nyquist frequency
+    # at 1 % of the Nyquist frequency
+    np.testing.assert_allclose(slip_response(gains.slip, slow, period=PERIOD), s, rtol=1e-3)
 
 
 def test_the_law_is_the_difference_equations_that_run() -> None:
-    """Tustin part by part: filter, integral, derivative, each with its own last value."""
+    """Filter, integral and derivative are discretised by Tustin, each with its own last value."""
     gains, h = replace(designed("athena").slip, kp=0.7, kd=0.003), PERIOD
     force = np.random.default_rng(2).standard_normal(80)
     e, smooth, total, slope, expected = 0.0, 0.0, 0.0, 0.0, []
@@ -372,7 +374,7 @@ def test_a_damaged_gains_file_is_refused(old: str, new: str, message: str, tmp_p
         load_gains(path)
 
 
-def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
+def test_a_missing_file_or_folder_is_reported(gains: Gains, tmp_path: Path) -> None:
     with pytest.raises(GainsError, match="cannot read the gains file"):
         load_gains(tmp_path / "none.toml")
     with pytest.raises(GainsError, match="cannot write the gains file"):
@@ -394,7 +396,7 @@ def test_a_missing_file_or_folder_is_told(gains: Gains, tmp_path: Path) -> None:
         ("phase_margin=steep", "not a number: got 'steep'"),
     ],
 )
-def test_requirements_that_cannot_be_met_are_told_by_name(setting: str, message: str) -> None:
+def test_requirements_that_cannot_be_met_are_reported_by_name(setting: str, message: str) -> None:
     robot = load_robot("athena")
     with pytest.raises(GainsError, match=message):
         design_gains(

@@ -1,4 +1,4 @@
-"""The designed loop on the FMU itself: a small squeeze goes as the linear loop says."""
+"""The designed loop on the FMU: a small squeeze decays as the linear loop predicts."""
 
 from __future__ import annotations
 
@@ -38,13 +38,15 @@ def test_a_squeeze_is_three_per_cent_of_a_third_of_the_weight(gains: Gains) -> N
 
 
 def test_a_large_squeeze_does_not(gains: Gains) -> None:
-    """The FMU's loop is no linear one: friction saturates."""
+    """The FMU's loop is not linear: friction saturates."""
     assert check_design(load_robot("athena"), gains, squeeze=40.0).error > 4.0 * AGREEMENT
 
 
 @pytest.mark.parametrize(("by", "shakes"), [(4.5, False), (9.0, True)])
 def test_the_fmu_shakes_where_the_linear_loop_does(gains: Gains, by: float, shakes: bool) -> None:
-    """The gain margin, 16.5 dB (6.7 times) under a third of the weight a leg, is the FMU's."""
+    """The gain margin of 16.5 dB (6.7 times), under a third of the weight per leg, is also the
+    FMU's.
+    """
     eager = replace(
         gains,
         slip=replace(

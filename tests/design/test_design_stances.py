@@ -1,6 +1,6 @@
-"""Where the design looks at a robot: at rest on six legs and on tripods, or not at all.
+"""The stances in which the design linearises a robot: six legs and tripods.
 
-Whatever its size, and wherever its masses are.
+They are tested for robots of all sizes and distributions of mass.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ def test_a_robot_at_rest_stays_where_it_is(robot: Robot, load: float) -> None:
 def test_a_push_that_makes_a_load_leaves_every_foot_at_least_half_its_share(
     stance: str, load: float
 ) -> None:
-    """Statics: forces, weight and push are in balance about any point.
+    """By statics, forces, weight and push are in balance about any point.
 
-    The share is what the foot has under the weight alone.
+    The share of a foot is its load under the weight alone.
     """
     robot = off_centre(0.12, 0.03, 0.0)
     angle, standing = lifted_stance(robot, STANCES[stance]), STANCES[stance]
@@ -119,7 +119,7 @@ def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> 
         return (legs.forward(lifted_stance(robot, TRIPOD)) - legs.forward(robot.stance))[:, 2]
 
     def bending(most: float) -> Robot:
-        """With tibias that bend by so much beyond the stance [rad]."""
+        """Returns a robot whose tibias can bend by so much beyond the stance [rad]."""
         links = [
             (*leg.links[:2], replace(leg.links[2], angle_max=leg.stance[2] + most))
             for leg in robot.legs
@@ -131,16 +131,18 @@ def test_feet_are_lifted_by_the_robots_size_and_no_further_than_they_reach() -> 
 
     lifted = np.array([0.0, 1.0, 0.0, 1.0, 0.0, 1.0])
     np.testing.assert_allclose(lifts(robot), 0.04 * lifted, atol=1e-12)
+    # legs of 0.16 m
     np.testing.assert_allclose(
         lifts(scaled_robot(robot, 0.5)), 0.04 * 0.16 / 0.22 * lifted, atol=1e-12
-    )  # legs of 0.16 m
+    )
     np.testing.assert_allclose(
         lifts(scaled_robot(robot, 2.0)), 0.04 * 0.64 / 0.44 * lifted, atol=1e-12
     )
     np.testing.assert_allclose(lifts(bending(0.2)), 0.02 * lifted, atol=1e-12)
     with pytest.raises(
         StanceError,
-        match=r"a foot cannot be lifted: got 'leg LM', expected 0.01 m within the joints' limits; widen",
+        match=r"a foot cannot be lifted: got 'leg LM', "
+        r"expected 0.01 m within the joints' limits; widen",
     ):
         lifts(bending(0.01))
 
@@ -158,7 +160,7 @@ def test_servos_however_weak_carry_any_load_while_the_plant_is_looked_at() -> No
 
 
 def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
-    """Tripods have no foot before the centre of mass of a torso so heavy in front; six legs
+    """With a torso so heavy in front, tripods have no foot ahead of the centre of mass; six legs
     have.
     """
     gains = design_for(off_centre(0.3, 0.0, 0.0), PERIOD)
@@ -167,7 +169,8 @@ def test_tripods_that_do_not_stand_are_left_out_and_named() -> None:
         gains.caveats, ("LF LR RM", "LM RF RR"), ("1", "-1"), ("LR", "RR"), strict=False
     ):
         assert text == (
-            f"the design leaves out tripod {stance}: the robot does not stay on its legs (got the centre of mass at (139, {y}) mm, "
+            f"the design leaves out tripod {stance}: the robot does not stay on its legs "
+            f"(got the centre of mass at (139, {y}) mm, "
             f"under which foot {leg} carries nothing, expected between {stance})"
         )
     assert gains.caveats[2].startswith("the design's slip_rejection is 0.")
@@ -192,18 +195,20 @@ def test_loads_under_which_a_soft_robot_finds_no_rest_are_left_out() -> None:
 def test_stances_that_the_servos_do_not_carry_are_left_out_and_a_robot_that_none_carries_is_refused(
     plants: dict[str, StandingPlant],
 ) -> None:
-    """Static torque of the ATHENA-like robot: 3.14 N m on a tripod, 2.20 N m on six legs."""
+    """The static torque of the ATHENA-like robot is 3.14 N m on a tripod, 2.20 N m on six legs."""
     gains = design_gains(strong(3.0), PERIOD, plants=plants)
     limit = "expected at most 2.7 N m, torque_share x servo.torque_max)"
     assert gains.caveats == tuple(
-        f"the design leaves out standing on {legs}: the servos do not carry the robot (got 3.14 N m, {limit}"
+        f"the design leaves out standing on {legs}: "
+        f"the servos do not carry the robot (got 3.14 N m, {limit}"
         for legs in ("LF LR RM", "LM RF RR")
     )
     assert gains.margins.support_torque == pytest.approx(2.2, abs=0.01)
     assert design_gains(strong(3.6), PERIOD, plants=plants).caveats == ()
     with pytest.raises(
         GainsError,
-        match=r"the servos do not carry the robot: got '2.2 N m', expected at most 1.8 N m.*; stronger servos",
+        match=r"the servos do not carry the robot: got '2.2 N m', "
+        r"expected at most 1.8 N m.*; stronger servos",
     ):
         design_gains(strong(2.0), PERIOD, plants=plants)
 
@@ -214,7 +219,7 @@ def plants(plant_build: object) -> dict[str, StandingPlant]:
 
 
 def test_a_robot_that_stands_on_no_legs_is_refused() -> None:
-    """Hips so far back that the torso's weight lies before all feet."""
+    """The hips are so far back that the torso's weight lies ahead of all feet."""
     robot = load_robot("athena")
     legs = tuple(
         replace(leg, hip_position=(leg.hip_position[0] - 0.5, *leg.hip_position[1:]))
@@ -237,9 +242,9 @@ def test_answers_go_with_the_load_up_to_two_thirds_of_the_weight(
 
 
 def test_similar_robots_beyond_the_usual_sizes_get_similar_gains() -> None:
-    """Froude: a robot twice as large, with a period and delays that are sqrt(2) times as long.
+    """By Froude scaling, all times of a robot twice as large are sqrt(2) times as long.
 
-    All its times are sqrt(2) times as long.
+    Its period and delays are scaled likewise.
     """
     period, found = 0.007, []
     for by in (2.0, 4.0):
@@ -289,7 +294,7 @@ def test_figures_are_those_of_the_package_for_legs_of_22_to_44_cm() -> None:
 
 
 def test_the_suspension_of_stiff_servos_yields_at_most_one_and_a_half_times_what_they_do() -> None:
-    """Six feet under a third of the weight each, on servos told nothing of it."""
+    """Six feet bear a third of the weight each, without feed-forward torque of the servos."""
     robot = soft(400.0)
     vertical = (LegSolver(robot).jacobian(robot.stance)[:, 2] ** 2).sum(axis=1) / 400.0  # m/N
     assert requirements_for(robot).deflection == pytest.approx(

@@ -1,4 +1,4 @@
-"""The linearised FMU: it is the FMU for small motions, and obeys the closed forms of a standing
+"""The linearised FMU agrees with the FMU for small motions and with closed forms for a standing
 robot.
 """
 
@@ -28,16 +28,18 @@ ROUNDING = 1e-5  # N/m and the like    of forces of 10 N over 1e-6 m
 # differences
 PREDICTED = 2e-3
 SMALL = 1e-4  # rad    of the inputs' changes there
+# 1    slope of friction and stiffness of the contact, of the robot's own
 STUCK, HARD = (
     300.0,
     100.0,
-)  # 1    slope of friction and stiffness of the contact, of the robot's own
+)
 # 1    what still creeps of a force in 0.3 s, and the contact's compliance beside the leg's
 YIELDED = 0.01
+# rad/s, 1    what the load does to the legs' stiffness by leaning on them
 SLOW, STIFFENED = (
     1e-2,
     0.1,
-)  # rad/s, 1    what the load does to the legs' stiffness by leaning on them
+)
 BALANCE = 1e-4  # 1    of the force: rest is reached to 1e-3 m/s
 pytestmark = pytest.mark.usefixtures("plant_build")
 
@@ -67,9 +69,9 @@ def test_halving_the_differences_changes_little(name: str, stance: str) -> None:
 @pytest.mark.parametrize("stance", ["six legs", "tripod LM RF RR"])
 @pytest.mark.parametrize("friction", [0.05, 0.0])
 def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) -> None:
-    """Angles, speeds and torques at random, each by its own scale; outputs and states."""
+    """Random angles, speeds and torques, each on its own scale, change outputs and states."""
     robot = load_robot("athena")
-    told = (
+    changes = (
         np.random.default_rng(1).standard_normal((30, 3 * ANGLES))
         * np.repeat([1.0, 10.0, 40.0], ANGLES)
         * SMALL
@@ -83,10 +85,10 @@ def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) ->
         bench.start(motion, inputs)
         state, still = np.zeros(STATES), bench.force()
         forces, predicted = [], []
-        for k, change in enumerate(told):
+        for k, change in enumerate(changes):
             forces.append(bench.force() - still)
             predicted.append(plant.system.C[:ANGLES] @ state)
-            bench.tell(inputs + np.concatenate([change, np.zeros(6)]))
+            bench.set_inputs(inputs + np.concatenate([change, np.zeros(6)]))
             bench.step(k)
             state = plant.system.A @ state + plant.system.B @ change
         found = bench.motion().less(motion)
@@ -98,9 +100,7 @@ def test_small_inputs_move_the_fmu_as_predicted(stance: str, friction: float) ->
 
 
 def test_a_stuck_foot_answers_a_relief_with_minus_it() -> None:
-    """In whatever way six legs work against each other: three components of each force, no sum
-    and no moment.
-    """
+    """Six legs work against each other: three components of each force, without sum and moment."""
     robot = load_robot("athena")
     hard = replace(robot.contact, stiffness=HARD * robot.contact.stiffness)
     point = replace(robot.foot, radius=1e-4)  # a round foot rolls, so that its centre gives way
@@ -147,8 +147,9 @@ def test_the_feet_carry_the_load_asked_for_and_do_not_squeeze(stance: str, load:
 
 
 def test_no_relief_carries_less_than_the_weight_for_long() -> None:
-    """Forces of the feet after a constant vertical relief add up to the weight again, and no
-    push along the ground is left.
+    """After a constant vertical relief the foot forces add up to the weight again.
+
+    No force along the ground remains.
     """
     robot = load_robot("athena")
     with level_fmu(robot) as fmu:
@@ -163,8 +164,9 @@ def test_no_relief_carries_less_than_the_weight_for_long() -> None:
 
 
 def test_slow_squeezing_meets_friction_as_a_damper_that_goes_with_the_load() -> None:
-    """f = c x' with c = mu f_n k_t, and x goes with the load too: slow loci are four times as
-    large under twice the load.
+    """f = c x' with c = mu f_n k_t, and x is proportional to the load too.
+
+    So slow loci are four times as large under twice the load.
     """
     robot, loci = load_robot("athena"), []
     with level_fmu(robot) as fmu:
@@ -193,7 +195,8 @@ def test_legs_that_do_not_hold_the_robot_are_refused() -> None:
         level_fmu(robot) as fmu,
         pytest.raises(
             StanceError,
-            match=r"does not stay on its legs: got 'the centre of mass at \(0, 1\) mm', expected between LF LM",
+            match=r"does not stay on its legs: got 'the centre of mass at \(0, 1\) mm', "
+            r"expected between LF LM",
         ),
     ):
         rest(fmu, robot, standing=("LF", "LM"), load=1.0)

@@ -1,6 +1,6 @@
-"""Robots of all sizes are designed for and walk: drawn at random, odd ones, small and large ones.
+"""Gains are designed for robots of all sizes, and all of them walk.
 
-Some here, all 30 with `make test-robots`.
+Some robots are tested here, all 30 with `make test-robots`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 
 @pytest.fixture(scope="module")
 def walks() -> Iterator[dict[str, tuple[Summary, Summary]]]:
-    """By robot, what its walks under kinematic and compliant control came to; told in the end."""
+    """Collects the summaries of the walks by robot, for the printed result."""
     found: dict[str, tuple[Summary, Summary]] = {}
     yield found
     if not found:
@@ -50,13 +50,14 @@ def walks() -> Iterator[dict[str, tuple[Summary, Summary]]]:
     slips = [[one.metrics["slip_per_metre"] for one in pair] for pair in found.values()]
     shares = [compliant / kinematic for kinematic, compliant in slips]
     print(
-        f"\n{sum(compliant.walked for _, compliant in found.values())} of {len(found)} robots walk under compliant control; "
-        f"slip, compliant over kinematic: median {median(shares):.3f}, {min(shares):.3f} to {max(shares):.3f}"
+        f"\n{sum(compliant.walked for _, compliant in found.values())} of {len(found)} robots "
+        "walk under compliant control; slip, compliant over kinematic: "
+        f"median {median(shares):.3f}, {min(shares):.3f} to {max(shares):.3f}"
     )
 
 
 def walk(robot: Robot, scenario: Scenario, walks: dict[str, tuple[Summary, Summary]]) -> Summary:
-    """A robot's design and its walk under compliant control; one under kinematic control beside."""
+    """Designs for a robot and runs it under compliant and, for comparison, kinematic control."""
     gains = design_for(robot, scenario.macro_step)
     with Walker() as walker:
         kinematic, compliant = (
@@ -65,7 +66,8 @@ def walk(robot: Robot, scenario: Scenario, walks: dict[str, tuple[Summary, Summa
         )
     walks[robot.name] = kinematic, compliant
     print(
-        f"\n{robot.name}: {robot.total_mass:.2f} kg, hips {1000.0 * hip_height(robot):.0f} mm high, ki {gains.slip.ki:.3g}/s, "
+        f"\n{robot.name}: {robot.total_mass:.2f} kg, "
+        f"hips {1000.0 * hip_height(robot):.0f} mm high, ki {gains.slip.ki:.3g}/s, "
         + ", ".join(
             f"{name} {kinematic.metrics[key]:.3g} -> {compliant.metrics[key]:.3g}"
             for name, key in (
@@ -103,7 +105,7 @@ def test_a_robot_of_soft_servos_walks(walks: dict[str, tuple[Summary, Summary]])
 
 
 def odd_robots() -> list[Robot]:
-    """Torsos with their mass 15 cm off the centre, to the front and to the side; two more sizes."""
+    """Returns robots with the torso's mass 15 cm off the centre, and of two more sizes."""
     robot = load_robot("athena")
     front, side = (replace(robot.torso, com=com) for com in ((0.15, 0.0, 0.0), (0.0, 0.15, 0.0)))
     odd = [replace(robot, name="heavy_in_front", torso=front), scaled_robot(robot, 0.5)]

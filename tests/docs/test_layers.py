@@ -119,8 +119,8 @@ def test_each_room_says_what_it_is_for_and_what_it_may_import() -> None:
 
 
 def test_no_folder_holds_more_files_than_a_reader_can_survey() -> None:
-    names = ("models", "controller", "cosim", "tests", "benchmarks", "tools", "examples")
-    names += ("fmi", "plant_fmu", "controller_fmu", "master")
+    python = ("models", "controller", "cosim", "tests", "benchmarks", "tools", "examples")
+    names = (*python, "fmi", "plant_fmu", "controller_fmu", "master")
     kinds = {".py", ".c", ".h", ".ts"}
     counts: dict[Path, int] = {}
     for path in (path for name in names for path in (ROOT / name).rglob("*.*")):

@@ -1,4 +1,4 @@
-"""A real browser for the tests: the system's Chromium, driven by Playwright, without a network."""
+"""Drives the system's Chromium by Playwright, without a network, for tests of reports."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from typing import Any
 
 import pytest
 
-REQUIRED = (
-    os.environ.get("HEXAPOD_BROWSER", "") != ""
-)  # a missing browser is a failure, not a reason to skip
+# a missing browser is a failure, not a reason to skip
+REQUIRED = os.environ.get("HEXAPOD_BROWSER", "") != ""
 FULL = os.environ.get("HEXAPOD_BROWSER") == "full"  # the 60 s walk too
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# WebGL without a graphics card
 FLAGS = (
     "--no-sandbox",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
-)  # WebGL without a graphics card
+)
 PATIENCE = (
     120_000  # ms    for a loaded machine without a graphics card; nothing is asserted about it
 )
 
 
 def find_chromium() -> str:
-    """Path of a Chromium; skips the test where there is none, or fails it if HEXAPOD_BROWSER is
-    set.
+    """Returns the path of a Chromium.
+
+    Without one the test is skipped, or fails if HEXAPOD_BROWSER is set.
     """
     found = os.environ.get("HEXAPOD_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
@@ -45,7 +46,7 @@ Launcher = Callable[..., Any]
 
 @contextmanager
 def launcher() -> Iterator[Launcher]:
-    """Starts browsers with flags; Playwright runs once a thread."""
+    """Starts browsers with flags; Playwright runs once per thread."""
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  only where there is a browser
 
     path = find_chromium()
@@ -54,7 +55,7 @@ def launcher() -> Iterator[Launcher]:
 
 
 class Opened:
-    """A report in a page of its own, and all that went wrong in it."""
+    """A report in a browser page, with all its errors and requests."""
 
     def __init__(
         self,
@@ -88,14 +89,15 @@ class Opened:
         self.context.close()
 
     def value(self, expression: str) -> Any:
-        """Of JavaScript in the page; `clock` is the replay's."""
+        """Returns the value of JavaScript in the page; `clock` is the replay's clock."""
         return self.page.evaluate(
             f"(() => {{ const clock = window.hexapod?.clock; return {expression}; }})()"
         )
 
     def wait(self, expression: str) -> None:
-        """Until JavaScript in the page is true; Playwright's own way would need eval, which the
-        page forbids.
+        """Waits until JavaScript in the page is true.
+
+        Playwright's own function would need eval, which the page forbids.
         """
         end = time.monotonic() + PATIENCE / 1e3
         while not self.value(expression):
@@ -103,7 +105,7 @@ class Opened:
             self.page.wait_for_timeout(50)
 
     def seek(self, seconds: float) -> None:
-        """Stops the replay at a time, drawn."""
+        """Stops the replay at a time and waits until it is drawn."""
         self.page.evaluate(
             "time => { window.hexapod.clock.pause(); window.hexapod.clock.seek(time); }", seconds
         )
@@ -112,7 +114,7 @@ class Opened:
         )
 
     def playheads(self) -> list[float]:
-        """Where the cursor stands in each plot, in pixels of it; -1: not in what the plot shows."""
+        """Returns the position of the cursor in each plot in pixels; -1 where it is outside."""
         return list(
             self.page.eval_on_selector_all(
                 ".playhead",

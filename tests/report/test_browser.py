@@ -1,5 +1,6 @@
-"""The report in a real browser, opened from disk without a network. HEXAPOD_BROWSER=full adds a
-walk of a minute.
+"""The report in a real browser, opened from disk without a network.
+
+HEXAPOD_BROWSER=full adds a walk of a minute.
 """
 
 from __future__ import annotations
@@ -26,9 +27,8 @@ PACKED = 2e-4  # m    a foot's place, from a position and angles in steps of 1/6
 PACKED_FORCE = 1e-3
 LEAST_FORCE = 0.01  # body weights that have an arrow
 TICK = 1e-6  # s    of the packed times
-PLOTS = (
-    6 + 7 + 4 + 3 + 4 + 2 + 6
-)  # forces, slip, height and attitude, torques, energies, footfall, feet against their plan
+# forces, slip, height and attitude, torques, energies, footfall, feet against their plan
+PLOTS = 6 + 7 + 4 + 3 + 4 + 2 + 6
 SMALLEST_TEXT = 11  # px
 TALLEST_BAR = 90  # px    on a phone
 BRIGHT, DIM = 200, 60  # of 255
@@ -36,7 +36,7 @@ BRIGHT, DIM = 200, 60  # of 255
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A comparison's results."""
+    """Runs a comparison and returns its folder."""
     find_chromium()
     path = tmp_path_factory.mktemp("browser") / "compare"
     assert (
@@ -70,7 +70,7 @@ def browser(chromium: Launcher) -> Any:
 
 @pytest.fixture(scope="module")
 def report(folder: Path, browser: Any) -> Iterator[Opened]:
-    """The report of a comparison, opened once, standing at 1 s."""
+    """Opens the report of a comparison once, at 1 s."""
     page = Opened(browser, folder / "report.html", address="#t=1")
     yield page
     page.close()
@@ -81,7 +81,8 @@ def test_a_report_opens_from_disk_without_errors_and_asks_for_nothing_else(
 ) -> None:
     size = (folder / "report.html").stat().st_size
     print(
-        f"\n{DURATION:g} s walk: {size / 1e6:.2f} MB, plots after {report.opened:.2f} s, replay after {report.ready:.2f} s"
+        f"\n{DURATION:g} s walk: {size / 1e6:.2f} MB, "
+        f"plots after {report.opened:.2f} s, replay after {report.ready:.2f} s"
     )
     assert report.errors == []
     assert [url.partition("#")[0] for url in report.requests] == [(folder / "report.html").as_uri()]
@@ -117,9 +118,8 @@ def test_the_robots_move(report: Opened) -> None:
             report.value("['kinematic', 'compliant'].map(label => window.hexapod.feet(label))")
         )
     assert pictures[0] != pictures[1]
-    assert (
-        np.abs(np.subtract(places[1], places[0])).max(axis=(1, 2)).min() > 0.005
-    )  # m    both of them
+    # m    both of them
+    assert np.abs(np.subtract(places[1], places[0])).max(axis=(1, 2)).min() > 0.005
 
 
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
@@ -187,13 +187,17 @@ def test_both_views_show_a_robot(report: Opened) -> None:
 COLOURFUL = """async hex => {
   const bytes = Uint8Array.from(hex.match(/../g), pair => parseInt(pair, 16));
   const picture = await createImageBitmap(new Blob([bytes], {type: "image/png"}));
-  const canvas = new OffscreenCanvas(picture.width, picture.height), brush = canvas.getContext("2d");
+  const canvas = new OffscreenCanvas(picture.width, picture.height);
+  const brush = canvas.getContext("2d");
   brush.drawImage(picture, 0, 0);
   const half = Math.floor(picture.width / 2);
   return [0, half].map(left => {
     const {data} = brush.getImageData(left, 0, half, picture.height);
     let count = 0;
-    for (let k = 0; k < data.length; k += 4) count += Math.max(...data.slice(k, k + 3)) - Math.min(...data.slice(k, k + 3)) > 40;
+    for (let k = 0; k < data.length; k += 4) {
+      const colour = data.slice(k, k + 3);
+      count += Math.max(...colour) - Math.min(...colour) > 40;
+    }
     return count / (data.length / 4);
   });
 }"""
@@ -284,12 +288,18 @@ def test_the_keyboard_does_it_all(report: Opened) -> None:
 def test_every_control_has_a_name(report: Opened) -> None:
     controls = report.page.locator("button, input, select, [role=group]")
     assert controls.count() > 8
-    unnamed = "all => all.filter(e => !(e.getAttribute('aria-label') || e.textContent.trim())).map(e => e.outerHTML)"
+    unnamed = (
+        "all => all.filter(e => !(e.getAttribute('aria-label') || e.textContent.trim()))"
+        ".map(e => e.outerHTML)"
+    )
     assert controls.evaluate_all(unnamed) == []
 
 
 def test_there_is_a_light_and_a_dark_theme(report: Opened) -> None:
-    brightness = "getComputedStyle(document.body).backgroundColor.match(/[0-9.]+/g).slice(0, 3).reduce((a, b) => a + Number(b), 0) / 3"
+    brightness = (
+        "getComputedStyle(document.body).backgroundColor.match(/[0-9.]+/g).slice(0, 3)"
+        ".reduce((a, b) => a + Number(b), 0) / 3"
+    )
     report.seek(1.0)
     light = report.value(brightness), report.page.locator("#stage canvas").screenshot()
     report.page.keyboard.press("t")
@@ -314,15 +324,18 @@ def test_a_phone_shows_all_of_it_in_the_systems_theme(folder: Path, browser: Any
     assert phone.value("document.documentElement.scrollWidth") == 360
     assert phone.value("document.getElementById('stage').dataset.layout") == "stacked"
     sizes = (
-        "[...document.querySelectorAll('main *')].filter(e => e.children.length === 0 && e.textContent.trim())"
+        "[...document.querySelectorAll('main *')]"
+        ".filter(e => e.children.length === 0 && e.textContent.trim())"
         ".map(e => parseFloat(getComputedStyle(e).fontSize))"
     )
     assert min(phone.value(sizes)) >= SMALLEST_TEXT
     assert phone.value("getComputedStyle(document.body).colorScheme") == "dark"
-    ends = "[...document.querySelectorAll('tbody td.number')].map(e => e.getBoundingClientRect().right)"
-    assert (
-        max(phone.value(ends)) <= 360
-    )  # both values, the change and its mark without scrolling sideways
+    ends = (
+        "[...document.querySelectorAll('tbody td.number')]"
+        ".map(e => e.getBoundingClientRect().right)"
+    )
+    # both values, the change and its mark are visible without scrolling sideways
+    assert max(phone.value(ends)) <= 360
     assert phone.value("document.querySelector('.bar').offsetHeight") <= TALLEST_BAR
     assert phone.errors == []
     phone.close()

@@ -1,4 +1,4 @@
-"""What a report says first, and what it does without its viewer."""
+"""The headline of a report, its tables, and a report without the viewer."""
 
 from __future__ import annotations
 
@@ -21,9 +21,7 @@ from hexapod_cosim.cosim.results.summary import Summary
 def comparison(
     after: Mapping[str, float], *, seeds: int = 4, before: Mapping[str, float] | None = None
 ) -> Comparison:
-    """Runs whose metrics are 1 under kinematic control, and under compliant control too where
-    `after` says nothing else.
-    """
+    """Returns runs with metrics `before` and `after`, 1 by default."""
     return compare_runs(
         _runs("kinematic", before or {}, seeds),
         _runs("compliant", {**(before or {}), **after}, seeds),
@@ -33,7 +31,7 @@ def comparison(
 def _runs(
     control: str, metrics: Mapping[str, float], seeds: int, fallen: int = 0
 ) -> Sequence[Summary]:
-    """The first `fallen` of them fell."""
+    """Returns runs of which the first `fallen` fell."""
     values = dict.fromkeys(METRICS, 1.0) | dict(metrics)
     return [
         Summary(
@@ -60,7 +58,7 @@ def test_the_headline_tells_gains_and_costs_and_marks_them() -> None:
     ]
 
 
-def test_slip_which_an_assumed_slope_makes_comes_last_and_is_told_to_be_that() -> None:
+def test_slip_which_an_assumed_slope_makes_comes_last_and_with_a_note() -> None:
     assert [card.name for card in cards(comparison({}))][-1] == "slip per metre"
     assert "friction.slope" in creep_note({"friction.law": 1.0})
     assert creep_note({"friction.law": 3.0}) == ""  # bristles hold a foot
@@ -80,7 +78,8 @@ def test_the_headline_of_a_robot_that_turns_on_the_spot_is_per_radian() -> None:
     )
     result = comparison(turned | {"slip_per_radian": 0.25, "cost_per_radian": 2.0}, before=turned)
     assert sentence(result) == (
-        "Against kinematic control, compliant walks with 75 % less slip, and costs 2.0 times the motor work per radian."
+        "Against kinematic control, compliant walks with 75 % less slip, "
+        "and costs 2.0 times the motor work per radian."
     )
     assert ("slip per radian", "1.00 → 0.250 mm/rad") not in [
         (card.name, card.values) for card in cards(result)
@@ -115,7 +114,8 @@ def test_the_headline_tells_falls_before_anything_else(
         _runs("kinematic", {}, 10, fallen[0]), _runs("compliant", better, 10, fallen[1])
     )
     assert sentence(runs).startswith(
-        f"The robot did not walk to the end under kinematic in {fallen[0]} of 10 and under compliant in {fallen[1]} of 10 runs. "
+        f"The robot did not walk to the end under kinematic in {fallen[0]} of 10 "
+        f"and under compliant in {fallen[1]} of 10 runs. "
         "Where both walked, against kinematic control, compliant walks with 90 % less slip"
     )
     assert {
@@ -159,12 +159,12 @@ def test_cards_show_units_that_people_read_and_the_interval() -> None:
     assert all(card.interval == "" for card in cards(comparison({"slip_per_metre": 0.5}, seeds=1)))
 
 
-def test_a_single_run_is_told_in_speed_feet_and_cost() -> None:
+def test_a_single_run_is_described_by_speed_feet_and_cost() -> None:
     facts = {"control": "compliant", "simulated": 10.0, "walk": {"mean_speed": 0.0801}}
     (part,) = plain_headline({"foot_error_stance": 0.00214, "cost_of_transport": 0.4239}, facts)
-    assert (
-        part.text
-        == "Compliant control, 10 s: 80.1 mm/s, standing feet 2.14 mm from their plan, cost of transport 0.424."
+    assert part.text == (
+        "Compliant control, 10 s: 80.1 mm/s, standing feet 2.14 mm from their plan, "
+        "cost of transport 0.424."
     )
     (part,) = plain_headline({"foot_error_stance": None}, facts | {"walk": {}})
     assert part.text == "Compliant control, 10 s."
@@ -179,8 +179,8 @@ def test_without_the_viewer_a_report_has_its_tables_and_says_how_to_get_the_rest
     assert code == 0
     assert "<script" not in page
     assert "HX_VIEWER" in page
-    told = {name for name in METRICS if "_per_radian" not in name} - {"slip_net_per_metre"}
-    assert all(f"<code>{name}</code>" in page for name in told)
+    shown = {name for name in METRICS if "_per_radian" not in name} - {"slip_net_per_metre"}
+    assert all(f"<code>{name}</code>" in page for name in shown)
     assert "_per_radian" not in page  # it did not turn
 
 
@@ -229,7 +229,7 @@ def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "told"),
+    ("name", "content", "message"),
     [
         ("run.json", "[]", "no status"),
         ("run.json", '{"hello": 1}', "no status"),
@@ -239,8 +239,8 @@ def test_a_report_bears_the_name_of_the_walk_that_was_run(call: Call, tmp_path: 
         ("results.parquet", "no such thing", "results.parquet"),
     ],
 )
-def test_a_damaged_folder_is_told_in_a_paragraph_and_left_as_it_is(
-    call: Call, tmp_path: Path, name: str, content: str | None, told: str
+def test_a_damaged_folder_is_reported_in_a_paragraph_and_left_as_it_is(
+    call: Call, tmp_path: Path, name: str, content: str | None, message: str
 ) -> None:
     folder = tmp_path / "out"
     assert (
@@ -262,7 +262,7 @@ def test_a_damaged_folder_is_told_in_a_paragraph_and_left_as_it_is(
     before = sorted(path.name for path in folder.iterdir())
     code, out, err = call("report", folder)
     assert (code, out) == (1, "")
-    assert told in err
+    assert message in err
     assert "unexpected" not in err
     assert len(err.strip().splitlines()) == 1
     assert sorted(path.name for path in folder.iterdir()) == before

@@ -1,4 +1,4 @@
-"""What a report's page holds of a recording: precise enough, small enough, and no peak lost."""
+"""The data in a report's page: precise enough, small enough, and with all peaks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def times(rows: int) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def unpacked(packed: dict[str, Any]) -> dict[str, np.ndarray[Any, Any]]:
-    """Undoes `pack` as its docstring tells, by sums in Python's own integers."""
+    """Unpacks as the docstring of `pack` says, by sums of Python integers."""
     raw = zlib.decompress(base64.b64decode(packed["data"]))
     rows, names = packed["rows"], ["low", "high", *(name for name, _, _ in packed["columns"])]
     size = rows * len(names)
@@ -101,9 +101,8 @@ def test_a_long_recording_is_thinned_to_the_budget_and_its_peaks_stay() -> None:
     assert np.all(np.diff(chosen.time) > 0.0)
     assert chosen.columns["roll"].max() == pytest.approx(np.degrees(peak), rel=ROUND_OFF)
     exact = np.interp(chosen.time, recording.time, recording.column("torso.position[1]"))
-    np.testing.assert_array_equal(
-        chosen.columns["torso.x"], exact
-    )  # what is replayed is as it was, not an extreme
+    # what is replayed is as it was, not an extreme
+    np.testing.assert_array_equal(chosen.columns["torso.x"], exact)
 
 
 def test_a_recording_within_the_budget_is_kept_whole() -> None:
@@ -114,7 +113,7 @@ def test_a_recording_within_the_budget_is_kept_whole() -> None:
 
 
 def long_recording(rows: int) -> tuple[Recording, float]:
-    """A torso that moves and whose roll has a peak of one row, at an odd place."""
+    """Returns a moving torso whose roll has a peak of one row, at an odd index."""
     peak, place = 0.7, 2 * rows // 3 + 1
     names = (
         "time",

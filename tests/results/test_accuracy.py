@@ -1,5 +1,5 @@
-"""The errors beside metrics: those of independent runs, none where nothing changes, smaller
-where the solver is more exact.
+"""Accuracies equal the errors of independent runs, are zero where nothing changes, and shrink with
+a more exact solver.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ from typing import Any
 import pytest
 from command import COMMAND, Call, assert_refused, settings
 
-from hexapod_cosim.cosim.results.accuracy import accuracy_of_table, finer, halved, judge_accuracy
+from hexapod_cosim.cosim.results.accuracy import (
+    accuracy_from_table,
+    compare_accuracy,
+    halved_scenario,
+    reference_scenario,
+)
 from hexapod_cosim.cosim.results.metrics import METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.run.batch import run_batch
@@ -25,12 +30,10 @@ from hexapod_cosim.models import HexapodError
 
 CYCLES = ("duration=2.4", "gait.period=0.8")  # the shortest walk with metrics
 SOLVER_METRICS = [name for name in METRICS if name != "realtime_factor"]
-WALKED = [
-    name for name in SOLVER_METRICS if not name.endswith("_per_radian")
-]  # what a straight walk has
-SHOWN = [
-    name for name in WALKED if name != "slip_net_per_metre"
-]  # which is kept out of tables under the tanh law
+# what a straight walk has
+WALKED = [name for name in SOLVER_METRICS if not name.endswith("_per_radian")]
+# which is kept out of tables under the tanh law
+SHOWN = [name for name in WALKED if name != "slip_net_per_metre"]
 
 
 def walk(*overrides: str) -> Scenario:
@@ -42,7 +45,7 @@ def summaries(*plans: Scenario) -> list[Summary]:
 
 
 def made(value: float, other: float = 0.0, *, seed: int = 0, upright: bool = True) -> Summary:
-    """A run with metrics of any name."""
+    """Returns a run with metrics of any name."""
     return Summary(
         control="kinematic",
         seed=seed,
@@ -68,7 +71,7 @@ def test_the_reference_differs_by_its_tolerance_or_its_fixed_step_alone(
     overrides: tuple[str, ...], section: str, key: str, value: float
 ) -> None:
     plan = walk(*overrides)
-    fine = finer(plan)
+    fine = reference_scenario(plan)
     found = fine.parameters if section == "parameters" else fine.settings["solver"]
     assert found[key] == pytest.approx(value, rel=1e-12)
     assert replace(fine, settings=plan.settings, parameters=plan.parameters) == plan
@@ -77,8 +80,8 @@ def test_the_reference_differs_by_its_tolerance_or_its_fixed_step_alone(
 
 def test_half_the_macro_step_is_all_that_the_other_run_differs_by() -> None:
     plan = walk("macro_step=4 ms")
-    assert halved(plan).macro_step == 0.002
-    assert replace(halved(plan), macro_step=0.004) == plan
+    assert halved_scenario(plan).macro_step == 0.002
+    assert replace(halved_scenario(plan), macro_step=0.004) == plan
 
 
 # laws
@@ -87,7 +90,7 @@ def test_half_the_macro_step_is_all_that_the_other_run_differs_by() -> None:
 def test_where_nothing_changes_every_error_is_zero(plant_build: Path) -> None:
     plan = walk()
     runs, again, once_more = (summaries(plan) for _ in range(3))
-    found = judge_accuracy(plan, runs, again, once_more)
+    found = compare_accuracy(plan, runs, again, once_more)
     assert list(found.solver_error) == SOLVER_METRICS
     assert (
         {found.solver_error[name] for name in WALKED}
@@ -99,14 +102,12 @@ def test_where_nothing_changes_every_error_is_zero(plant_build: Path) -> None:
 def test_a_hundredth_of_the_tolerance_makes_the_errors_smaller_by_a_power_of_ten_at_least(
     plant_build: Path,
 ) -> None:
-    """The sum of all metrics' errors, each relative to its metric, but for the books' residual,
-    which is itself an error.
-    """
+    """Sums the relative errors of all metrics but the energy residual, which is itself an error."""
     sizes = []
     for tolerance in ("1e-2", "1e-4"):
         plan = walk(f"solver.tolerance={tolerance}")
-        (run,), reference = summaries(plan), summaries(finer(plan))
-        found = judge_accuracy(plan, [run], reference, [run])
+        (run,), reference = summaries(plan), summaries(reference_scenario(plan))
+        found = compare_accuracy(plan, [run], reference, [run])
         assert found.reference == f"solver.tolerance={float(tolerance) / 100.0:g}"
         sizes.append(
             sum(
@@ -122,23 +123,23 @@ def test_errors_of_several_runs_are_of_the_means_over_those_that_walked_each_tim
     runs = [made(1.0, 5.0), made(2.0, 6.0, seed=1), made(99.0, seed=2)]
     fine = [made(1.5, math.nan), made(2.1, 6.5, seed=1), made(50.0, seed=2, upright=False)]
     half = [made(0.0, 5.0), made(4.0, 6.0, seed=1), made(70.0, seed=2)]
-    found = judge_accuracy(walk(), runs, fine, half)
+    found = compare_accuracy(walk(), runs, fine, half)
     assert found.runs == 2
     assert found.solver_error == {"way": pytest.approx(-0.3), "heat": pytest.approx(-0.5)}
     assert found.macro_step_effect == {"way": pytest.approx(0.5), "heat": 0.0}
     assert found.notes == (
-        "kinematic, seed 2, at solver.tolerance=1e-06 went another way: it walked on",
+        "kinematic, seed 2, at solver.tolerance=1e-06 ended differently: it walked to the end",
     )
 
 
-def test_a_reference_without_figures_leaves_errors_open_and_is_told() -> None:
+def test_a_reference_without_figures_leaves_errors_open_and_is_reported() -> None:
     failed = replace(
         made(math.nan, math.nan), status="failed", reason="the step is too long", upright=False
     )
-    found = judge_accuracy(walk(), [made(1.0)], [failed], [made(1.0)])
+    found = compare_accuracy(walk(), [made(1.0)], [failed], [made(1.0)])
     assert all(map(math.isnan, found.solver_error.values()))
     assert found.notes == (
-        "kinematic, seed 0, at solver.tolerance=1e-06 went another way: the step is too long",
+        "kinematic, seed 0, at solver.tolerance=1e-06 ended differently: the step is too long",
     )
 
 
@@ -149,7 +150,7 @@ def test_a_reference_without_figures_leaves_errors_open_and_is_told() -> None:
 def checked(
     plant_build: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Mapping[str, Any]]:
-    """A comparison of one seed, its accuracy checked."""
+    """Runs a comparison of one seed with --check-accuracy."""
     folder = tmp_path_factory.mktemp("checked") / "out"
     command = [
         *COMMAND,
@@ -251,7 +252,7 @@ def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_p
     assert list(stored["accuracy"]["solver_error"]) == SOLVER_METRICS
 
 
-def test_without_the_option_nothing_is_walked_again_and_nothing_said(
+def test_without_the_option_nothing_is_walked_again_and_nothing_printed(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr("hexapod_cosim.cosim.cli.accuracy_check.run_batch")
@@ -279,10 +280,8 @@ def test_an_interrupt_of_the_check_leaves_whole_results_without_it(
     quick = settings("duration=0.2", "outputs.plots=false")
     code, _, err = call(*command, "stand", "-o", tmp_path / "out", "--check-accuracy", *quick)
     assert code == 130
-    assert (
-        f"the results in {tmp_path / 'out'} are whole, their accuracy was not checked; `hexapod report"
-        in err
-    )
+    missing = f"the results in {tmp_path / 'out'} are complete, their accuracy was not checked"
+    assert f"{missing}; `hexapod report" in err
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "completed"
     assert "accuracy" not in json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert call("report", tmp_path / "out")[0] == 0
@@ -321,4 +320,4 @@ def test_a_run_too_long_for_half_the_macro_step_is_refused_before_it_begins(
 )
 def test_damaged_errors_are_refused_by_name(table: Any) -> None:
     with pytest.raises(HexapodError, match=r"metrics.json: damaged accuracy.*--check-accuracy"):
-        accuracy_of_table(table, where="metrics.json")
+        accuracy_from_table(table, where="metrics.json")

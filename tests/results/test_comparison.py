@@ -1,6 +1,4 @@
-"""Runs against runs: the statistics against scipy's, verdicts, runs that fell, and the file in
-which all of them stand.
-"""
+"""Comparisons of runs: statistics against scipy's, verdicts, runs that fell, and seeds.csv."""
 
 from __future__ import annotations
 
@@ -33,8 +31,9 @@ ROUNDING = 1e-12
 
 
 def pairs(n: int, *, change: float, noise: float, seed: int = 0) -> list[tuple[float, float]]:
-    """Values around 1 that differ by `change` and noise within a pair, and by much more from
-    pair to pair.
+    """Returns values around 1 that differ by `change` and noise within a pair.
+
+    Between pairs they differ by much more.
     """
     generator = np.random.default_rng(seed)
     before = 1.0 + 0.3 * generator.standard_normal(n)
@@ -48,7 +47,7 @@ def pairs(n: int, *, change: float, noise: float, seed: int = 0) -> list[tuple[f
 
 
 def runs(control: str, values: Sequence[float], name: str = "slip_per_metre") -> list[Summary]:
-    """A completed walk per value of one metric; the rest of them 1."""
+    """Returns a completed walk for each value of one metric; all other metrics are 1."""
     plain = dict.fromkeys(METRICS, 1.0)
     return [
         Summary(
@@ -76,7 +75,7 @@ def test_the_interval_of_the_difference_is_students_for_pairs(n: int) -> None:
 
 @pytest.mark.parametrize("n", [2, 3, 10, 40])
 def test_the_relative_interval_is_that_of_the_ratio_by_its_logarithm(n: int) -> None:
-    """The textbook's first-order variance of ln(mean b / mean a), from numpy's covariance."""
+    """The reference is the first-order variance of ln(mean b / mean a) with numpy's covariance."""
     values = np.array(pairs(n, change=-0.2, noise=0.05))
     (a, b), covariance = values.mean(axis=0), np.cov(values.T)
     width = stats.t.ppf(0.975, n - 1) * math.sqrt(
@@ -102,15 +101,14 @@ def test_the_relative_interval_holds_the_true_ratio_in_95_of_100_cases(
             "slip_per_metre", list(zip(before.tolist(), after.tolist(), strict=True))
         ).interval
         held += low <= ratio - 1.0 <= high
-    assert held / 1000 == pytest.approx(
-        0.95, abs=0.025
-    )  # of 1000 cases: three standard errors, and first order's own error
+    # of 1000 cases: three standard errors, and first order's own error
+    assert held / 1000 == pytest.approx(0.95, abs=0.025)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_no_relative_interval_is_below_minus_a_hundred_per_cent(seed: int) -> None:
-    """Where the first values lie so far apart that the difference's own interval over their mean
-    would be.
+    """The first values scatter so much that the interval of the difference over their mean would
+    be below.
     """
     generator = np.random.default_rng(seed)
     before = np.exp(2.0 * generator.standard_normal(6))
@@ -122,7 +120,7 @@ def test_no_relative_interval_is_below_minus_a_hundred_per_cent(seed: int) -> No
 
 
 def test_what_is_proportional_in_every_pair_has_no_interval_to_speak_of_and_is_sure() -> None:
-    """Though the differences scatter as much as the values, from 0.1 to 10."""
+    """The differences scatter as much as the values, from 0.1 to 10."""
     change = change_of("slip_per_metre", [(value, 0.5 * value) for value in (0.1, 0.3, 10.0)])
     assert change.interval == pytest.approx((-0.5, -0.5), abs=1e-7)
     assert abs(change.difference) < change.half_width
@@ -203,7 +201,7 @@ def test_a_change_from_next_to_nothing_has_no_percentage() -> None:
     ],
 )
 def test_a_change_that_no_one_could_measure_on_the_robot_is_none(name: str, least: float) -> None:
-    """However sure it is: three pairs that agree, on either side of what sensors resolve."""
+    """Three pairs that agree, on either side of what sensors resolve."""
     small, large = [(2.0 * least, (2.0 - share) * least) for share in (0.9, 1.1)]
     assert change_of(name, [small] * 3).verdict == SAME
     assert change_of(name, [large] * 3).verdict == BETTER
@@ -226,7 +224,7 @@ def row_of(rows: list[dict[str, object]], name: str) -> dict[str, object]:
     return next(row for row in rows if row["name"] == name)
 
 
-def test_a_fall_is_counted_and_told_and_its_figures_left_out() -> None:
+def test_a_fall_is_counted_and_reported_and_its_figures_left_out() -> None:
     first, second = runs("kinematic", [1.0, 1.0, 1.0]), runs("compliant", [0.5, 0.6, 90.0])
     second[2] = replace(second[2], upright=False, warnings=("the robot fell at 3 s",))
     comparison = compare_runs(first, second)
@@ -239,7 +237,7 @@ def test_a_fall_is_counted_and_told_and_its_figures_left_out() -> None:
 
 
 @pytest.mark.parametrize("status", [FAILED, REFUSED])
-def test_a_run_without_figures_is_counted_and_told(status: str) -> None:
+def test_a_run_without_figures_is_counted_and_reported(status: str) -> None:
     first, second = runs("kinematic", [1.0, 1.0]), runs("compliant", [0.5, 0.6])
     first[0] = Summary(
         control="kinematic",
@@ -266,9 +264,10 @@ def test_where_no_pair_walked_the_figures_are_of_all_that_have_any() -> None:
 
 def test_a_single_seed_has_changes_and_no_intervals() -> None:
     rows = comparison_rows(compare_runs(runs("kinematic", [0.3]), runs("compliant", [0.1])))
+    # of the tanh law
     assert [row["name"] for row in rows] == [
         name for name in METRICS if name != "slip_net_per_metre"
-    ]  # of the tanh law
+    ]
     slip = row_of(rows, "slip_per_metre")
     assert (slip["change"], slip["interval"], slip["verdict"]) == ("-66.7 %", "", BETTER)
     assert row_of(rows, "yaw_drift")["change"] == ""
@@ -290,9 +289,9 @@ def test_runs_of_other_seeds_are_not_compared() -> None:
 
 
 def test_the_file_of_all_runs_reads_back_bit_for_bit(tmp_path: Path) -> None:
-    told = runs("kinematic", [1.0 / 3.0, math.nan])
-    told[1] = replace(told[1], warnings=("a, b", 'c "d"'), upright=False, fallback=0.1)
-    told += [
+    saved = runs("kinematic", [1.0 / 3.0, math.nan])
+    saved[1] = replace(saved[1], warnings=("a, b", 'c "d"'), upright=False, fallback=0.1)
+    saved += [
         Summary(
             control="compliant",
             seed=0,
@@ -301,10 +300,10 @@ def test_the_file_of_all_runs_reads_back_bit_for_bit(tmp_path: Path) -> None:
             metrics=NO_FIGURES,
         )
     ]
-    write_seeds(tmp_path / "seeds.csv", told)
+    write_seeds(tmp_path / "seeds.csv", saved)
     again = read_seeds(tmp_path / "seeds.csv")
     assert list(again) == ["kinematic", "compliant"]
-    for before, after in zip(told, [*again["kinematic"], *again["compliant"]], strict=True):
+    for before, after in zip(saved, [*again["kinematic"], *again["compliant"]], strict=True):
         np.testing.assert_array_equal(list(before.metrics.values()), list(after.metrics.values()))
         assert replace(before, metrics={}) == replace(after, metrics={})
 
@@ -330,9 +329,9 @@ def test_a_table_for_machines_has_relative_and_plain_figures() -> None:
         floor=0.1,
         verdict=BETTER,
     )
-    told = change.as_table()
-    assert (told["relative"], told["difference"], told["half_width"]) == (-0.5, -1.0, 0.2)
-    assert (told["low"], told["high"]) == (
+    table = change.as_table()
+    assert (table["relative"], table["difference"], table["half_width"]) == (-0.5, -1.0, 0.2)
+    assert (table["low"], table["high"]) == (
         pytest.approx(0.5 / 1.25 - 1.0),
         pytest.approx(0.5 * 1.25 - 1.0),
     )

@@ -1,6 +1,4 @@
-"""What the plant measures against sums over samples of 0.1 ms, made by driving it again: two
-ways to the same figures.
-"""
+"""Integrals and peaks measured by the plant equal sums over samples of 0.1 ms of the same walk."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ import pytest
 from gains import make_gains
 from measured import Samples, driven, integral, landing_rates, sampled, slipped
 
-from hexapod_cosim.cosim.results.metrics import landing_rates as told_rates
+from hexapod_cosim.cosim.results.metrics import landing_rates as plant_rates
 from hexapod_cosim.cosim.results.walk import View, Walk
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.records import CONTROLS
@@ -31,9 +29,9 @@ pytestmark = pytest.mark.usefixtures("plant_build")
 
 @dataclass(frozen=True)
 class Twice:
-    """The judged cycle of a walk, as told and as sampled."""
+    """The measured cycle of a walk: metrics from the plant, and samples."""
 
-    told: dict[str, float]
+    metrics: dict[str, float]
     walk: Walk
     samples: Samples
     before: Samples  # and half a cycle before it
@@ -45,7 +43,7 @@ class Twice:
     params=[(control, tolerance) for control in CONTROLS for tolerance in (DEFAULT, TIGHT)],
 )
 def twice(request: pytest.FixtureRequest, plant_build: Path) -> Twice:
-    """Told by steps of the error control, sampled along steps of 0.1 ms: at a tight tolerance
+    """Runs with the error control's steps and samples along steps of 0.1 ms: at a tight tolerance
     both are the same motion.
     """
     control, tolerance = request.param
@@ -72,45 +70,45 @@ def twice(request: pytest.FixtureRequest, plant_build: Path) -> Twice:
 
 def test_slip_is_the_way_of_loaded_feet_along_the_ground(twice: Twice) -> None:
     slip = slipped(twice.samples, twice.walk.weight) / twice.walk.distance
-    assert twice.told["slip_per_metre"] == pytest.approx(slip, rel=twice.crept)
+    assert twice.metrics["slip_per_metre"] == pytest.approx(slip, rel=twice.crept)
 
 
 def test_cost_of_transport_is_the_positive_power_of_the_motors(twice: Twice) -> None:
-    assert twice.told["cost_of_transport"] == pytest.approx(
+    assert twice.metrics["cost_of_transport"] == pytest.approx(
         driven(twice.samples) / (twice.walk.weight * twice.walk.distance), rel=AGREED
     )
 
 
 def test_torques_are_squared_over_all_time(twice: Twice) -> None:
     squares, servo = integral(twice.samples.torque**2), load_robot("athena").servo
-    assert twice.told["torque_rms"] == pytest.approx(
+    assert twice.metrics["torque_rms"] == pytest.approx(
         np.sqrt(squares.sum() / (18.0 * PERIOD)), rel=AGREED
     )
-    assert twice.told["servo_load_max"] == pytest.approx(
+    assert twice.metrics["servo_load_max"] == pytest.approx(
         np.sqrt(squares.max() / PERIOD) / 1.2, rel=AGREED
     )
-    assert twice.told["heat"] == pytest.approx(squares.sum() / twice.walk.distance, rel=AGREED)
+    assert twice.metrics["heat"] == pytest.approx(squares.sum() / twice.walk.distance, rel=AGREED)
     copper = squares.sum() / servo.motor_constant**2
     paid = (driven(twice.samples) + copper) / (twice.walk.weight * twice.walk.distance)
-    assert twice.told["electrical_cost"] == pytest.approx(paid, rel=AGREED)
+    assert twice.metrics["electrical_cost"] == pytest.approx(paid, rel=AGREED)
 
 
 def test_the_peak_is_the_largest_force_of_all_samples(twice: Twice) -> None:
-    assert twice.told["peak_force"] == pytest.approx(
+    assert twice.metrics["peak_force"] == pytest.approx(
         twice.samples.normal.max() / twice.walk.weight, rel=AGREED
     )
 
 
 def test_landings_are_counted_and_as_steep_as_sampled(twice: Twice) -> None:
-    """Each of them, but for the softest of a walk, 1.5 % off at the default tolerance: it comes
-    after a bounce, whose motion is.
+    """Every landing, except the softest of a walk, which is 1.5 % off at the default tolerance: it
+    comes after a bounce, whose motion differs.
     """
-    told = np.sort(told_rates(twice.walk))
+    measured = np.sort(plant_rates(twice.walk))
     seen = np.sort(landing_rates(twice.before, apart=0.5 * PERIOD, after=2.0 * PERIOD))
-    assert len(told) == len(seen) == 6
-    np.testing.assert_allclose(told[1:], seen[1:], rtol=AGREED)
-    assert told[0] == pytest.approx(seen[0], rel=1.5e-2)
-    assert twice.told["loading_rate"] == pytest.approx(
+    assert len(measured) == len(seen) == 6
+    np.testing.assert_allclose(measured[1:], seen[1:], rtol=AGREED)
+    assert measured[0] == pytest.approx(seen[0], rel=1.5e-2)
+    assert twice.metrics["loading_rate"] == pytest.approx(
         np.percentile(seen, 95) / twice.walk.weight, rel=AGREED
     )
 
@@ -123,6 +121,6 @@ def test_the_use_of_the_friction_cone_is_that_of_the_samples(twice: Twice) -> No
     across = twice.samples.tangential[1][loaded]
     use = across / (0.7 * twice.samples.normal[1][loaded])
     p50, p95 = np.percentile(use, [50.0, 95.0])
-    assert twice.told["cone_use_p50"] == pytest.approx(p50, abs=0.063 * np.sqrt(p50) / 2.0)
-    assert twice.told["cone_use_p95"] == pytest.approx(p95, abs=0.063 * np.sqrt(p95) / 2.0)
-    assert twice.told["cone_use_over_90"] == pytest.approx(float(np.mean(use > 0.9)), abs=1e-3)
+    assert twice.metrics["cone_use_p50"] == pytest.approx(p50, abs=0.063 * np.sqrt(p50) / 2.0)
+    assert twice.metrics["cone_use_p95"] == pytest.approx(p95, abs=0.063 * np.sqrt(p95) / 2.0)
+    assert twice.metrics["cone_use_over_90"] == pytest.approx(float(np.mean(use > 0.9)), abs=1e-3)

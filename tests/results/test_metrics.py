@@ -1,4 +1,4 @@
-"""Every metric on synthetic walks whose figures are known in closed form."""
+"""Every metric on synthetic walks for which it is known in closed form."""
 
 from __future__ import annotations
 
@@ -84,9 +84,7 @@ def test_slip_is_what_the_plant_counted_per_metre_walked() -> None:
 
 @pytest.mark.parametrize("h", [0.005, 0.02, 0.03])  # of 0.03 s no row is at 2 s
 def test_cumulative_figures_depend_on_no_row(h: float) -> None:
-    """What grows steadily grows by the same in the judged time, whether rows are at its ends or
-    not.
-    """
+    """Steady growth gives the same in the measured time, whether or not rows lie at its ends."""
     walk = Walk(h=h)
     walk.grow("LF.foot.slip_distance", 0.010)
     walk.grow("LF.femur.positive_work", 3.0)
@@ -130,8 +128,9 @@ def test_net_slip_is_what_exceeds_the_largest_creep() -> None:
 def test_net_slip_of_bristles_is_what_they_do_not_give_back(
     stretched: float, turn: float, net: float
 ) -> None:
-    """A spring below break-away, sliding when full, elastic again on the way back; the normal
-    velocity is no slip.
+    """A bristle is a spring below break-away, slides when full, and springs back.
+
+    Velocity along the normal is no slip.
     """
     walk = Walk()
     walk.set("LF.foot.normal_force", 0.3 * WEIGHT)
@@ -144,8 +143,9 @@ def test_net_slip_of_bristles_is_what_they_do_not_give_back(
 
 
 def use_cone(walk: Walk, share: float, rate: Array | float = 1.0) -> None:
-    """Feet under load use this share of the cone, so many at a time (rows,). A bin begins at 0.9
-    (i/30)^2.
+    """Adds loaded feet that use this share of the cone, `rate` of them at a time (rows,).
+
+    A bin begins at 0.9 (i/30)^2.
     """
     bins = [0.9 * (i / 30.0) ** 2 for i in range(31)]
     walk.grow(f"feet.cone_time[{sum(share >= begin for begin in bins)}]", rate)
@@ -227,8 +227,9 @@ def test_a_cone_that_is_not_there_is_not_used(ground: dict[str, float]) -> None:
 
 
 def test_feet_are_compared_with_their_plan_in_the_torsos_frame() -> None:
-    """The torso is turned, tilted and away from the origin; each foot 3 mm off its plan while it
-    stands, one 6 mm in the air.
+    """The torso is turned, tilted and away from the origin.
+
+    Each foot is 3 mm off its plan in stance, one is 6 mm off in swing.
     """
     walk = Walk(planned=True)
     yaw, com = 0.9, np.array([0.02, -0.01, 0.03])
@@ -295,8 +296,9 @@ def test_the_commanded_path_sets_out_along_the_robots_own_heading() -> None:
 
 
 def test_the_commanded_path_sets_out_along_the_mean_heading_of_a_cycle() -> None:
-    """A torso that swings by 0.1 rad about its way walks along that way, not where it happens to
-    look in the first row.
+    """A torso that swings by 0.1 rad about its way walks along that way.
+
+    Its yaw in the first row does not matter.
     """
     walk = Walk()
     walk.set("torso.yaw", 0.1 * np.cos(2.0 * np.pi * walk.time / PERIOD + 0.7))
@@ -312,9 +314,8 @@ def test_a_commanded_circle_is_followed_without_error() -> None:
     walk.set("torso.position[1]", SPEED / rate * np.sin(yaw))
     walk.set("torso.position[2]", SPEED / rate * (1.0 - np.cos(yaw)))
     metrics = walk.metrics()
-    assert metrics["path_error"] == pytest.approx(
-        0.0, abs=rate * H
-    )  # the held command turns in steps
+    # the held command turns in steps
+    assert metrics["path_error"] == pytest.approx(0.0, abs=rate * H)
     assert metrics["yaw_drift"] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -360,8 +361,8 @@ def test_height_is_above_the_ground_that_rises() -> None:
 
 @pytest.mark.parametrize("heading", [0.0, 0.6, math.pi / 2.0, -0.6, 2.5])
 def test_height_above_a_slope_is_the_same_wherever_on_it(heading: float) -> None:
-    """A slope that rises by tan(incline) along its heading, through height 0.4 m at the origin;
-    the torso 0.13 m above it.
+    """The ground rises by tan(incline) along its heading and is at 0.4 m at the origin; the torso
+    is 0.13 m above it.
     """
     x, y = np.array([0.0, 1.0, 0.0, -2.0]), np.array([0.0, 0.0, 1.0, 3.0])
     z = 0.4 + math.tan(0.2) * (x * math.cos(heading) + y * math.sin(heading)) + 0.13
@@ -384,18 +385,16 @@ def test_forces_are_in_body_weights_and_the_percentile_is_of_loaded_feet() -> No
     walk = Walk()
     force = np.linspace(0.0, 1.0, len(walk.time))
     walk.set("LF.foot.normal_force", force * WEIGHT)
-    walk.set(
-        "LF.foot.peak_force", np.where(np.abs(walk.time - 5.0) < 0.3 * H, 1.7, 0.0) * WEIGHT
-    )  # between two rows
+    # between two rows
+    walk.set("LF.foot.peak_force", np.where(np.abs(walk.time - 5.0) < 0.3 * H, 1.7, 0.0) * WEIGHT)
     metrics = walk.metrics()
     assert metrics["peak_force"] == pytest.approx(1.7)
-    assert metrics["force_p95"] == pytest.approx(
-        0.2 + 0.95 * 0.8, abs=1e-3
-    )  # of what rises from 0.2 to 1
+    # of what rises from 0.2 to 1
+    assert metrics["force_p95"] == pytest.approx(0.2 + 0.95 * 0.8, abs=1e-3)
 
 
 def test_a_peak_before_the_judged_cycles_does_not_count() -> None:
-    """A row's peak is of the time before it: at 2 s it is of the second cycle."""
+    """The peak in a row belongs to the time before the row: at 2 s, to the second cycle."""
     walk = Walk()
     walk.set("LF.foot.peak_force", np.where(walk.time < 2.0 + 0.3 * H, 3.0, 0.4) * WEIGHT)
     assert walk.metrics()["peak_force"] == pytest.approx(0.4)
@@ -404,7 +403,9 @@ def test_a_peak_before_the_judged_cycles_does_not_count() -> None:
 def landings(
     walk: Walk, leg: str, times: list[float], rates: list[float], *, rising: float = 0.020
 ) -> None:
-    """Touch-downs whose rate grows to its end within `rising` [s], in body weights per second."""
+    """Returns touch-downs whose rate rises to its final value within `rising` [s], in body weights
+    per second.
+    """
     count, rate = np.zeros_like(walk.time), np.zeros_like(walk.time)
     for time, steepest in zip(times, rates, strict=True):
         since = walk.time - time
@@ -416,9 +417,8 @@ def landings(
 
 def test_loading_rate_is_a_percentile_over_landings() -> None:
     walk = Walk()
-    landings(
-        walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)]
-    )  # the first two cycles do not count
+    # the first two cycles do not count
+    landings(walk, "LF", [k + 0.5 for k in range(10)], [1000.0, 1000.0, *range(1, 9)])
     assert walk.metrics()["loading_rate"] == pytest.approx(1.0 + 0.95 * 7.0)
 
 
@@ -432,7 +432,7 @@ def test_a_foot_that_bounces_lands_once_with_the_steeper_rise() -> None:
 def test_touch_downs_more_than_half_a_cycle_apart_are_two_landings(
     apart: float, rate: float
 ) -> None:
-    """The 95th percentile of one landing of 60, or of one of 40 and one of 60."""
+    """The metric is the 95th percentile of one landing of 60, or of one of 40 and one of 60."""
     walk = Walk()
     landings(walk, "LF", [4.0, 4.0 + apart], [40.0, 60.0])
     assert walk.metrics()["loading_rate"] == pytest.approx(rate)
@@ -478,7 +478,7 @@ def test_electrical_cost_adds_the_copper_loss_by_the_motor_constant() -> None:
 
 
 def turning(rate: float = 0.3) -> Walk:
-    """On the spot, while the torso circles by 2 mm: nobody tells it to walk."""
+    """Returns a turn on the spot: the torso moves on a circle of 2 mm, and no walk is commanded."""
     walk = Walk(speed=0.0)
     walk.set("command.vx", 0.0)
     walk.set("command.yaw_rate", rate)
@@ -582,8 +582,9 @@ def test_fewer_than_three_cycles_have_no_figures_but_those_of_the_run(cycles: in
 
 
 def test_a_command_between_two_rows_is_the_one_before_it() -> None:
-    """Rows 30 ms apart: at 2 s, between two of them, 0.2 m/s are in force, though the next row
-    says 0.08.
+    """Rows are 30 ms apart.
+
+    At 2 s, between two of them, 0.2 m/s hold, although the next row has 0.08.
     """
     walk = Walk(h=0.03)
     speed = np.where(np.abs(walk.time - 1.98) < 0.01, 0.2, 0.08)
@@ -644,7 +645,9 @@ def test_the_energy_residual_of_a_robot_at_rest_is_measured_by_a_lift_of_a_milli
 
 
 def test_what_is_too_small_to_be_measured_is_stated_metric_by_metric() -> None:
-    """A tenth of a millimetre and of a milliradian, and what force and torque sensing resolve."""
+    """The limits are a tenth of a millimetre and of a milliradian, and the resolution of force and
+    torque sensing.
+    """
     assert set(FLOORS) == set(METRICS)
     millis = (
         "height_rms",

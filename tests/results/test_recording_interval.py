@@ -1,4 +1,4 @@
-"""Rows further apart than macro-steps: figures stay, peaks are kept, and both masters record the
+"""Recordings with fewer rows than macro-steps: metrics and peaks stay, and both masters record the
 same.
 """
 
@@ -15,10 +15,10 @@ from gains import make_gains
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.master.fmu_controller import FmuController
-from hexapod_cosim.cosim.master.loop import Outcome, insides, run
+from hexapod_cosim.cosim.master.loop import Outcome, diagnostic_columns, run
 from hexapod_cosim.cosim.master.recorder import Peaks, Recorder, Recording, kept_moments
 from hexapod_cosim.cosim.master.signals import Signals
-from hexapod_cosim.cosim.results.metrics import compute_metrics, judged_columns
+from hexapod_cosim.cosim.results.metrics import compute_metrics, metric_columns
 from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.run.run import initialise_plant, make_plan, open_plant, simulate
@@ -67,7 +67,7 @@ def gains_of(scenario: Scenario) -> Gains | None:
 
 @pytest.fixture(scope="module", params=CONTROLS)
 def runs(request: pytest.FixtureRequest, plant_build: Path) -> tuple[Result, Result]:
-    """One walk recorded at every macro-step of 1 ms, and every 20 ms."""
+    """Records one walk at every macro-step of 1 ms, and every 20 ms."""
     plans = [walk_of(request.param, interval) for interval in (0.0, 0.02)]
     every, coarse = (simulate(plan, gains=gains_of(plan)) for plan in plans)
     return every, coarse
@@ -88,7 +88,7 @@ def test_the_figures_of_a_run_do_not_depend_on_the_rows_that_are_kept(
 def test_what_the_plant_measures_can_be_had_from_rows_far_apart(
     runs: tuple[Result, Result],
 ) -> None:
-    """Of the rows that are kept, and no others, within 1 %."""
+    """The kept rows alone give the metrics within 1 %."""
     every, coarse = runs
     view = View(coarse.outcome.recording, coarse.parameters, 0.8)
     found = compute_metrics(view, servo=load_robot("athena").servo, realtime_factor=1.0)
@@ -127,9 +127,9 @@ def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -
     kept = (0, 3, 4, 6)
     for k, (force, rate, count) in enumerate(moments):
         row = np.array([0.0, force, rate, float(count)])
-        peaks.see(row)
+        peaks.update(row)
         if k in kept:
-            peaks.show(row)
+            peaks.write(row)
             shown.append((row[1], row[2]))
     assert shown == [(5.0, 9.0), (7.0, 4.0), (3.0, 4.0), (0.0, 3.0)]
 
@@ -137,14 +137,15 @@ def test_the_rate_of_a_landing_is_that_of_the_touch_downs_since_the_last_row() -
 def test_bounces_between_two_rows_leave_the_steepest_landing() -> None:
     peaks = Peaks(("time", "RM.foot.landing_rate", "RM.foot.landings"))
     row = np.zeros(3)
+    # before them the rate of an older landing was 90
     for rate, count in (
         (80.0, 1),
         (50.0, 2),
         (10.0, 3),
-    ):  # before them the rate of an older landing was 90
+    ):
         row[:] = 0.0, rate, count
-        peaks.see(row)
-    peaks.show(row)
+        peaks.update(row)
+    peaks.write(row)
     assert row[1] == 80.0
 
 
@@ -157,7 +158,7 @@ def test_the_last_row_is_always_kept(rows: int, every: int, kept: list[int]) -> 
 
 
 def in_python(scenario: Scenario, walker: Walker) -> Outcome:
-    """A scenario on the plant FMU under the controller FMU as the Python master runs it."""
+    """Runs a scenario in the Python master with the plant FMU and the controller FMU."""
     plan = make_plan(scenario, gains=gains_of(scenario))
     controller = walker._controller_for(plan)
     controller.initialise(scenario.start, scenario.start + scenario.duration)
@@ -168,9 +169,9 @@ def in_python(scenario: Scenario, walker: Walker) -> Outcome:
             signals,
             plan.schedule.times,
             plan.schedule.rows,
-            extra=insides(ours),
+            extra=diagnostic_columns(ours),
             every=scenario.every,
-            judged=judged_columns(bristles=True),
+            judged=metric_columns(bristles=True),
         )
         return run(plant, signals, ours, plan.schedule, recorder, h=scenario.macro_step)
 
@@ -183,8 +184,9 @@ def same(found: Recording, expected: Recording) -> None:
 
 @pytest.mark.parametrize("control", CONTROLS)
 def test_both_masters_keep_the_same_rows(control: str) -> None:
-    """Bit for bit; 43 macro-steps are no whole number of intervals, so the last row is an extra
-    one.
+    """They agree bit for bit.
+
+    43 macro-steps are no multiple of the interval, so the last row is an extra one.
     """
     plan = load_scenario(
         "walk_flat",

@@ -1,5 +1,5 @@
-"""Recordings as files: the same bits from Parquet and CSV, units of every column, commands that
-importers take.
+"""Recordings as files: the same bits from Parquet and CSV, units of columns, commands for
+importers.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ TABLES = {"csv": read_csv, "parquet": read_parquet}
 
 @pytest.fixture(scope="module")
 def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A short compliant walk as `hexapod simulate` leaves it."""
+    """Runs a short compliant walk with `hexapod simulate`."""
     from hexapod_cosim.cosim.cli import main  # noqa: PLC0415
 
     folder = tmp_path_factory.mktemp("recorded") / "out"
@@ -60,9 +60,8 @@ def folder(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def numbers() -> Recording:
     rng = np.random.default_rng(1)
-    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(
-        np.float64
-    )  # any double there is
+    # any double there is
+    bits = rng.integers(0, 2**64, (1000, 3), dtype=np.uint64).view(np.float64)
     data = np.vstack([np.tile(AWKWARD, (3, 1)).T, np.where(np.isnan(bits), np.nan, bits)])
     return Recording(("time", "torso.position[1]", "LF.foot.contact"), data)
 
@@ -86,11 +85,11 @@ def test_every_column_of_a_run_has_a_unit_and_a_meaning(folder: Path) -> None:
 def test_units_are_those_of_the_fmu(folder: Path, athena_fmu: Path) -> None:
     plant = {one.name: one.unit or "1" for one in read_description(athena_fmu).modelVariables}
     schema = pyarrow.parquet.read_schema(folder / "results.parquet")
-    told = {field.name: field.metadata[b"unit"].decode() for field in schema}
-    shared = set(told) & set(plant) - {"time"}
+    units = {field.name: field.metadata[b"unit"].decode() for field in schema}
+    shared = set(units) & set(plant) - {"time"}
     assert len(shared) > 300
-    assert {name: told[name] for name in shared} == {name: plant[name] for name in shared}
-    assert (told["time"], told["controller.LF.shift[1]"], told["command.yaw_rate"]) == (
+    assert {name: units[name] for name in shared} == {name: plant[name] for name in shared}
+    assert (units["time"], units["controller.LF.shift[1]"], units["command.yaw_rate"]) == (
         "s",
         "m",
         "rad/s",
@@ -117,16 +116,18 @@ def test_both_files_hold_the_same_recording(folder: Path) -> None:
 
 
 def test_the_table_says_what_was_run(folder: Path) -> None:
-    told = pyarrow.parquet.read_schema(folder / "results.parquet").metadata
+    metadata = pyarrow.parquet.read_schema(folder / "results.parquet").metadata
     facts = json.loads((folder / "run.json").read_text())
-    assert told[b"control"] == b"compliant"
-    assert told[b"scenario"].decode() == (folder / "scenario.toml").read_text(encoding="utf-8")
-    assert tomllib.loads(told[b"scenario"].decode())["duration"] == 0.2
-    assert all(json.loads(told[key.encode()]) == facts[key] for key in ("robot", "fmu", "versions"))
+    assert metadata[b"control"] == b"compliant"
+    assert metadata[b"scenario"].decode() == (folder / "scenario.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(metadata[b"scenario"].decode())["duration"] == 0.2
+    assert all(
+        json.loads(metadata[key.encode()]) == facts[key] for key in ("robot", "fmu", "versions")
+    )
 
 
 def test_a_row_of_a_table_is_a_row_of_the_recording(folder: Path) -> None:
-    """As pandas, polars and DuckDB see it: plain columns of doubles without gaps."""
+    """pandas, polars and DuckDB see plain columns of doubles without gaps."""
     table = pyarrow.parquet.read_table(folder / "results.parquet")
     assert {str(field.type) for field in table.schema} == {"double"}
     assert sum(column.null_count for column in table.columns) == 0
@@ -168,7 +169,9 @@ def test_the_commands_are_the_fmus_inputs_under_their_own_names(
     assert np.array_equal(commands.data, read_csv(folder / "results.csv").columns(commands.names))
 
 
-def test_fmpy_told_the_commands_walks_the_recorded_walk(folder: Path, athena_fmu: Path) -> None:
+def test_fmpy_with_the_recorded_commands_walks_the_recorded_walk(
+    folder: Path, athena_fmu: Path
+) -> None:
     walk, height = fmpy_read_csv(folder / "commands.csv"), "torso.position[3]"
     result = fmpy.simulate_fmu(
         str(athena_fmu), stop_time=0.2, output_interval=0.005, input=walk, output=[height]
@@ -255,7 +258,7 @@ def test_formats_can_be_chosen_and_either_is_read_back(
 
 
 def test_a_folder_of_an_earlier_version_makes_a_report(call: Call, tmp_path: Path) -> None:
-    """It holds results.csv with bare names."""
+    """Such a folder holds results.csv with bare names."""
     folder = tmp_path / "out"
     assert call("simulate", "stand", "-o", folder, *QUICK)[0] == 0
     recording = read_recording(folder, RESULTS)

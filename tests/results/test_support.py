@@ -1,4 +1,4 @@
-"""The support polygon's margin and the centre of mass over it."""
+"""The stability margin and the centre of mass."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_the_margin_does_not_depend_on_the_order_of_the_feet() -> None:
 
 
 def poses(robot: Robot, rows: int) -> tuple[Recording, list[Array]]:
-    """Random poses as a recording, and the twin's body states of them."""
+    """Returns random poses as a recording, and the body states of models/ for them."""
     generator = np.random.default_rng(7)
     names = (
         "time",

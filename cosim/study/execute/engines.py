@@ -9,7 +9,7 @@ from typing import Protocol, cast
 
 from hexapod_cosim.controller import Gains
 from hexapod_cosim.cosim.master.loop import Progress
-from hexapod_cosim.cosim.results.summary import Summary, refused, summarise
+from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.run.walker import Walker
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -52,7 +52,7 @@ class PythonEngine:
         try:
             return summarise(simulate(scenario, fmu=self._fmu, gains=gains, progress=progress))
         except HexapodError as error:
-            return refused(scenario, error)
+            return refused_summary(scenario, error)
 
     def close(self) -> None:
         """Implements Engine.close(): there is nothing to free."""

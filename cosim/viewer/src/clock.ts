@@ -1,6 +1,6 @@
-/** The one time that replay and plots share: it plays, stops at the end, and tells all who listen. */
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4] as const;
 
+/** The time that replay and plots share. It plays, stops at the end, and notifies its listeners. */
 export class Clock {
   private now: number;
   private running = false;
@@ -32,27 +32,27 @@ export class Clock {
 
   seek(time: number): void {
     this.now = Math.min(Math.max(time, this.start), this.end);
-    this.tell();
+    this.notify();
   }
 
-  /** Seconds of the viewer's time have gone by. */
+  /** Advances by seconds of real time while playing. */
   advance(seconds: number): void {
     if (!this.running) return;
     this.now = Math.min(this.now + this.rate * seconds, this.end);
     if (this.now >= this.end) this.running = false;
-    this.tell();
+    this.notify();
   }
 
-  /** From the end it plays from the start again. */
+  /** Starts playing; at the end it plays from the start again. */
   play(): void {
     if (this.now >= this.end) this.now = this.start;
     this.running = true;
-    this.tell();
+    this.notify();
   }
 
   pause(): void {
     this.running = false;
-    this.tell();
+    this.notify();
   }
 
   toggle(): void {
@@ -60,7 +60,7 @@ export class Clock {
     else this.play();
   }
 
-  /** The next faster (+1) or slower (-1) of SPEEDS. */
+  /** Changes to the next faster (+1) or slower (-1) of SPEEDS. */
   changeSpeed(direction: number): void {
     const place = SPEEDS.indexOf(this.rate as (typeof SPEEDS)[number]);
     this.setSpeed(SPEEDS[Math.min(Math.max(place + direction, 0), SPEEDS.length - 1)]);
@@ -68,10 +68,10 @@ export class Clock {
 
   setSpeed(speed: number): void {
     this.rate = speed;
-    this.tell();
+    this.notify();
   }
 
-  private tell(): void {
+  private notify(): void {
     for (const listener of this.listeners) listener();
   }
 }

@@ -1,4 +1,4 @@
-/** A new element with a class and a text. */
+/** Returns a new element with a class and a text. */
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   name = "",
@@ -10,7 +10,7 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-/** The page's element with an id; null where the page has none. */
+/** Returns the page's element with an id, or null. */
 export function byId<T extends HTMLElement>(id: string): T | null {
   return document.getElementById(id) as T | null;
 }

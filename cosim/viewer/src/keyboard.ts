@@ -1,15 +1,15 @@
 import type { Clock } from "./clock";
 import { byId } from "./dom";
 
-const STEP = 0.02; // s    of an arrow key
-const LEAP = 0.5; // s    with shift
+const STEP = 0.02; // s    for an arrow key
+const LEAP = 0.5; // s    for an arrow key with shift
 
 export interface Actions {
   follow(): void;
   theme(): void;
 }
 
-/** Keys of the replay; those that a field in focus needs itself are left to it. */
+/** Handles the keys of the replay, except keys that the focused element uses itself. */
 export function listenToKeys(clock: Clock, actions: Actions): void {
   const help = byId<HTMLDialogElement>("help");
   const askHelp = () => (help?.open ? help.close() : help?.showModal());
@@ -40,7 +40,7 @@ export function listenToKeys(clock: Clock, actions: Actions): void {
   });
 }
 
-/** Whether the focused element does something of its own with the key. */
+/** Whether the focused element uses the key itself. */
 function ownsKey(event: KeyboardEvent): boolean {
   const target = event.target as HTMLElement;
   if (document.querySelector("dialog[open]") && event.key !== "?") return true;

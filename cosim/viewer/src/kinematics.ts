@@ -2,15 +2,15 @@ import { Quaternion, Vector3 } from "three";
 import type { Recording } from "./recording";
 import type { Leg, Robot, Vector } from "./types";
 
-/** Where the torso is and how the joints stand. */
+/** Position and attitude of the torso, and the joint angles [rad]. */
 export interface Pose {
   readonly position: Vector3;
   readonly attitude: Quaternion;
-  /** (18) legs slowest */
+  /** (18) joints of the first leg first */
   readonly angles: Float64Array;
 }
 
-/** The recorded pose at a time; between rows linearly, attitudes by the normalised mean. */
+/** Returns the pose at a time, interpolated between rows: attitudes by slerp, the rest linearly. */
 export function poseAt(recording: Recording, robot: Robot, time: number): Pose {
   const at = (name: string) => recording.value(name, time);
   const { row, share } = recording.place(time);
@@ -35,12 +35,15 @@ function attitudeOf(recording: Recording, row: number): Quaternion {
 
 export const toVector3 = (vector: Vector): Vector3 => new Vector3(...vector);
 
-/** The torso's origin, from its centre of mass. */
+/** Returns the torso's origin from the position of its centre of mass. */
 export function torsoOrigin(robot: Robot, pose: Pose): Vector3 {
   return toVector3(robot.torso.com).applyQuaternion(pose.attitude).negate().add(pose.position);
 }
 
-/** Hip, knee, ankle, foot of a leg in the world: each link's tip in its own turned frame, as models/kinematics.py has it. */
+/**
+ * Returns hip, knee, ankle and foot of a leg in the world. As in models/kinematics.py, each link's
+ * tip is given in the link's own frame.
+ */
 export function legPoints(robot: Robot, pose: Pose, index: number): Vector3[] {
   const leg: Leg = robot.legs[index];
   const turn = pose.attitude.clone();
@@ -56,7 +59,7 @@ export function legPoints(robot: Robot, pose: Pose, index: number): Vector3[] {
   return points;
 }
 
-/** Centres of the six feet in the world. */
+/** Returns the centres of the six feet in the world. */
 export function footCentres(robot: Robot, pose: Pose): Vector3[] {
   return robot.legs.map((_, index) => legPoints(robot, pose, index)[3]);
 }

@@ -1,31 +1,32 @@
 import { Color } from "three";
 import plotStyle from "uplot/dist/uPlot.min.css";
-import { Actor } from "./actor";
 import { Clock } from "./clock";
 import { byId, element } from "./dom";
 import { listenToKeys } from "./keyboard";
 import { footCentres, poseAt } from "./kinematics";
-import { drawPath } from "./overhead";
-import type { Panel } from "./panel";
-import { labelTimes, panelMakers, type Run } from "./panels";
+import { drawPath } from "./panels/overhead";
+import type { Panel } from "./panels/panel";
+import { labelTimes, panelMakers } from "./panels/panels";
+import type { Run } from "./panels/run";
+import { Span } from "./panels/span";
 import { unpack } from "./recording";
-import { Span } from "./span";
-import { Stage } from "./stage";
-import { findStances } from "./stances";
+import { Actor } from "./scene/actor";
+import { Stage } from "./scene/stage";
+import { findStances } from "./scene/stances";
+import { enlargement } from "./scene/trails";
 import { property, readColours, Theme } from "./theme";
-import { enlargement } from "./trails";
 import { makeWindowButtons, Transport } from "./transport";
 import type { Payload } from "./types";
 
-const LONGEST_FRAME = 0.1; // s    a tab that slept does not leap
+const LONGEST_FRAME = 0.1; // s    limits the jump after the tab was inactive
 const SHOWN_CYCLES = 3;
 
-/** What whoever asks on the console, or a test, finds as `hexapod`. */
-const offered: Record<string, unknown> = {};
+/** The functions available on the console and to tests as `window.hexapod`. */
+const consoleFunctions: Record<string, unknown> = {};
 
-/** Text and tables first, then plots, then the replay, which has to wait for the graphics driver. */
+/** Shows text and tables first, then plots, then the replay, which needs the graphics driver. */
 async function start(): Promise<void> {
-  await painted();
+  await afterPaint();
   const payload = JSON.parse(byId("recording")!.textContent!) as Payload;
   document.head.append(element("style", "", plotStyle));
   const theme = new Theme(byId<HTMLButtonElement>("theme"));
@@ -36,23 +37,26 @@ async function start(): Promise<void> {
     Math.min(...runs.map(({ recording }) => recording.start)),
     Math.max(...runs.map(({ recording }) => recording.end)),
   );
-  clock.seek(askedTime() ?? clock.start);
+  clock.seek(requestedTime() ?? clock.start);
   const transport = new Transport(clock);
   listenToKeys(clock, { follow: () => transport.toggleFollow(), theme: () => theme.toggle() });
   const panels = await makePanels(runs, clock);
   theme.listen(() => {
     for (const panel of panels) panel.repaint();
   });
-  Object.assign(offered, { clock, feet: (label: string) => feetOf(runs, label, clock) });
-  Object.assign(window, { hexapod: offered });
+  Object.assign(consoleFunctions, {
+    clock,
+    feet: (label: string) => feetOf(runs, label, clock),
+  });
+  Object.assign(window, { hexapod: consoleFunctions });
   document.documentElement.dataset.opened = "true";
-  await painted();
-  await raiseCurtain(runs, clock, theme, transport);
+  await afterPaint();
+  await startReplay(runs, clock, theme, transport);
   document.documentElement.dataset.ready = "true";
 }
 
-/** The stage, and then the walk. */
-async function raiseCurtain(
+/** Makes the 3D view, if possible, and starts the clock. */
+async function startReplay(
   runs: readonly Run[],
   clock: Clock,
   theme: Theme,
@@ -66,26 +70,28 @@ async function raiseCurtain(
     };
     theme.listen(repaint);
     await addTrails(stage);
-    repaint(); // with the trails: they are made whole, showing a time cuts off what is still to come
+    repaint(); // after addTrails: trails are made whole, and show() hides what is still to come
     clock.listen(() => stage.show(clock.time));
     await stage.prepare();
     transport.attach(stage);
-    offered.shown = (label: string) => stage.actors.find(({ run }) => run.label === label)?.shown();
+    consoleFunctions.shown = (label: string) =>
+      stage.actors.find(({ run }) => run.label === label)?.shown();
   }
-  begin(clock);
-  runForever(clock, stage);
+  playUnlessAsked(clock);
+  runFrames(clock, stage);
 }
 
-/** The 3D view; undefined, and a word in its place, where the browser or the recording cannot give it. */
+/** Returns the 3D view; where browser or recording do not allow one, shows why instead. */
 function makeStage(runs: readonly Run[]): Stage | undefined {
   const host = byId("stage");
   const able = runs.filter(({ run, recording }) =>
     recording.has("torso.x", "torso.qw", `${run.robot.legs[0].name}.coxa.angle`),
   );
   if (!host || able.length === 0) {
-    refuse(
+    showReason(
       host,
-      "The replay needs torso.position, torso.quaternion and the joints' angles, which were not recorded (outputs.csv).",
+      "The replay needs torso.position, torso.quaternion and the joints' angles, " +
+        "which were not recorded (outputs.csv).",
     );
     return undefined;
   }
@@ -97,7 +103,7 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
       ),
     );
   } catch {
-    refuse(
+    showReason(
       host,
       "The replay needs WebGL, which this browser does not offer. Plots and tables do without.",
     );
@@ -105,24 +111,26 @@ function makeStage(runs: readonly Run[]): Stage | undefined {
   }
 }
 
-function refuse(host: HTMLElement | null, text: string): void {
+/** Shows in the place of the 3D view why there is none. */
+function showReason(host: HTMLElement | null, text: string): void {
   host?.replaceChildren(element("p", "refusal", text));
   host?.classList.add("refused");
 }
 
-/** A time that the page's address names: #t=2.5 */
-function askedTime(): number | undefined {
-  const asked = /^#t=([\d.]+)$/.exec(location.hash);
-  return asked ? Number(asked[1]) : undefined;
+/** Returns the time in the page's address, as in #t=2.5 */
+function requestedTime(): number | undefined {
+  const found = /^#t=([\d.]+)$/.exec(location.hash);
+  return found ? Number(found[1]) : undefined;
 }
 
-/** Plays at once, unless the reader asks for less motion or for a time. */
-function begin(clock: Clock): void {
-  if (askedTime() === undefined && !matchMedia("(prefers-reduced-motion: reduce)").matches)
+/** Starts playing, unless the reader prefers reduced motion or the address names a time. */
+function playUnlessAsked(clock: Clock): void {
+  if (requestedTime() === undefined && !matchMedia("(prefers-reduced-motion: reduce)").matches)
     clock.play();
 }
 
-function runForever(clock: Clock, stage: Stage | undefined): void {
+/** Advances the clock and draws, once per animation frame. */
+function runFrames(clock: Clock, stage: Stage | undefined): void {
   let last = performance.now();
   const frame = (now: number): void => {
     clock.advance(Math.min((now - last) / 1000, LONGEST_FRAME));
@@ -134,7 +142,7 @@ function runForever(clock: Clock, stage: Stage | undefined): void {
 }
 
 async function addTrails(stage: Stage): Promise<void> {
-  await rest();
+  await nextTask();
   const found = stage.actors.map(({ recording, run }) =>
     findStances(recording, run.robot, run.ground),
   );
@@ -146,7 +154,7 @@ async function addTrails(stage: Stage): Promise<void> {
   if (note) note.textContent = enlarged > 1 ? `slip trails, ${enlarged} × as long` : "slip trails";
 }
 
-/** One plot after the other, with rests in which the replay goes on. */
+/** Makes one plot after the other; between them the browser can handle other tasks. */
 async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> {
   const whole = clock.end - clock.start;
   const cycles = new Span(
@@ -159,7 +167,7 @@ async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> 
   makeWindowButtons(cycles, clock, runs[0].run.period);
   const panels: Panel[] = [];
   for (const make of panelMakers(runs, clock, { cycles, walk })) {
-    await rest();
+    await nextTask();
     panels.push(make());
   }
   labelTimes();
@@ -168,16 +176,17 @@ async function makePanels(runs: readonly Run[], clock: Clock): Promise<Panel[]> 
   return panels;
 }
 
-/** After the browser has shown the page's text and tables. */
-function painted(): Promise<void> {
+/** Waits until the browser has painted. */
+function afterPaint(): Promise<void> {
   return new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
 }
 
-function rest(): Promise<void> {
+/** Lets the browser handle other tasks. */
+function nextTask(): Promise<void> {
   return new Promise((resolve) => setTimeout(resolve));
 }
 
-/** World positions of the feet's centres now, for whoever asks on the console. */
+/** Returns the present world positions of the feet's centres, for the console. */
 function feetOf(runs: readonly Run[], label: string, clock: Clock): number[][] {
   const found = runs.find(({ run }) => run.label === label);
   const pose = found && poseAt(found.recording, found.run.robot, clock.time);
@@ -185,7 +194,7 @@ function feetOf(runs: readonly Run[], label: string, clock: Clock): number[][] {
 }
 
 start().catch((error: unknown) => {
-  refuse(
+  showReason(
     byId("stage"),
     `The replay did not start: ${error instanceof Error ? error.message : String(error)}`,
   );

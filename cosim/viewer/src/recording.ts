@@ -1,6 +1,6 @@
 import type { PackedRun } from "./types";
 
-/** A run's columns by name, unpacked, and where a time lies among its rows. */
+/** The unpacked columns of a run by name, and the search for times among its rows. */
 export class Recording {
   constructor(
     readonly time: Float64Array,
@@ -19,14 +19,14 @@ export class Recording {
     return names.every((name) => this.columns.has(name));
   }
 
-  /** A column; throws when it was not recorded. */
+  /** Returns a column; throws when it was not recorded. */
   column(name: string): Float32Array {
     const found = this.columns.get(name);
     if (!found) throw new Error(`no column ${name} in the recording`);
     return found;
   }
 
-  /** The row at or before a time, and how far the time is on the way to the next row (0 to 1). */
+  /** Returns the row at or before a time, and the share (0 to 1) of the way to the next row. */
   place(time: number): { row: number; share: number } {
     let low = 0;
     let high = this.time.length - 1;
@@ -40,7 +40,7 @@ export class Recording {
     return { row: low, share: Math.min(Math.max(share, 0), 1) };
   }
 
-  /** A column between rows, linearly. */
+  /** Returns the value of a column at a time, interpolated linearly. */
   value(name: string, time: number): number {
     const values = this.column(name);
     const { row, share } = this.place(time);
@@ -49,7 +49,7 @@ export class Recording {
   }
 }
 
-/** Undoes cosim/report/packing.py. */
+/** Unpacks what cosim/report/packing.py has packed. */
 export async function unpack(run: PackedRun): Promise<Recording> {
   const planes = await inflate(run.data);
   const size = run.rows * (run.columns.length + 2);

@@ -1,6 +1,6 @@
 import { Color } from "three";
 
-/** What the page's style sheet says of colours, as the 3D view needs them. */
+/** The colours of the page's style sheet that the 3D view needs. */
 export interface Colours {
   readonly dark: boolean;
   readonly sky: Color;
@@ -12,7 +12,7 @@ export interface Colours {
 
 const KEY = "hexapod-report-theme";
 
-/** A custom property of the page, such as --ink. */
+/** Returns a custom property of the page, such as --ink. */
 export function property(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
@@ -34,14 +34,14 @@ export function isDark(): boolean {
   return chosen ? chosen === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
 }
 
-/** Light and dark: the system's choice until the reader makes one, which is remembered where the browser allows it. */
+/** The light or dark theme: the system's, or the reader's choice, stored if the browser can. */
 export class Theme {
   private readonly listeners: (() => void)[] = [];
 
   constructor(button: HTMLButtonElement | null) {
-    const kept = remembered();
-    if (kept) document.documentElement.dataset.theme = kept;
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.tell());
+    const stored = storedTheme();
+    if (stored) document.documentElement.dataset.theme = stored;
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.notify());
     button?.addEventListener("click", () => this.toggle());
   }
 
@@ -55,17 +55,17 @@ export class Theme {
     try {
       localStorage.setItem(KEY, theme);
     } catch {
-      // a page from disk may have no storage: the choice then lasts as long as the page
+      // a page opened from disk may have no storage: the choice then lasts as long as the page
     }
-    this.tell();
+    this.notify();
   }
 
-  private tell(): void {
+  private notify(): void {
     for (const listener of this.listeners) listener();
   }
 }
 
-function remembered(): string | null {
+function storedTheme(): string | null {
   try {
     return localStorage.getItem(KEY);
   } catch {

@@ -1,15 +1,15 @@
 import { type Clock, SPEEDS } from "./clock";
 import { byId, element } from "./dom";
-import type { Span } from "./span";
-import type { Stage } from "./stage";
+import type { Span } from "./panels/span";
+import type { Stage } from "./scene/stage";
 
-const WINDOWS = [1, 3, 10]; // gait cycles
+const WINDOWS = [1, 3, 10]; // gait cycles shown by the plots
 
-/** The bar under the stage: play, time, speed, follow, the view's home. */
+/** The bar under the 3D view: play, time, speed, follow, and reset of the camera. */
 export class Transport {
   private readonly play = byId<HTMLButtonElement>("play");
   private readonly slider = byId<HTMLInputElement>("time");
-  private readonly told = byId<HTMLElement>("clock");
+  private readonly label = byId<HTMLElement>("clock");
   private readonly speed = byId<HTMLSelectElement>("speed");
   private readonly follow = byId<HTMLButtonElement>("follow");
 
@@ -19,7 +19,7 @@ export class Transport {
     this.prepare();
     this.play?.addEventListener("click", () => clock.toggle());
     this.slider?.addEventListener("input", () => {
-      const asked = Number(this.slider!.value); // pausing shows the time there was
+      const asked = Number(this.slider!.value); // read first, since pausing updates the slider
       clock.pause();
       clock.seek(asked);
     });
@@ -30,7 +30,7 @@ export class Transport {
     this.show();
   }
 
-  /** Gives it the stage whose camera its buttons move. */
+  /** Connects the bar to the stage whose camera its buttons move. */
   attach(stage: Stage): void {
     this.stage = stage;
     for (const button of [this.follow, byId<HTMLButtonElement>("home")])
@@ -67,7 +67,7 @@ export class Transport {
         `${(100 * (time - this.clock.start)) / Math.max(end - this.clock.start, 1e-9)}%`,
       );
     }
-    if (this.told) this.told.textContent = `${time.toFixed(2)} / ${end.toFixed(1)} s`;
+    if (this.label) this.label.textContent = `${time.toFixed(2)} / ${end.toFixed(1)} s`;
     if (this.speed) this.speed.value = String(speed);
     if (this.play?.getAttribute("aria-pressed") !== String(playing)) {
       this.play?.setAttribute("aria-pressed", String(playing));
@@ -76,7 +76,7 @@ export class Transport {
   }
 }
 
-/** Buttons by which the plots show one cycle, three, ten or the whole run. */
+/** Makes the buttons that set how much the plots show: one cycle, three, ten or the whole run. */
 export function makeWindowButtons(span: Span, clock: Clock, period: number): void {
   const host = byId("windows");
   const whole = clock.end - clock.start;

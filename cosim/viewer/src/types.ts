@@ -1,4 +1,7 @@
-/** What the page's payload holds (cosim/report/payload.py). SI units unless a column says otherwise; legs LF LM LR RF RM RR. */
+/**
+ * The content of the page's payload (cosim/report/payload.py). SI units unless a column says
+ * otherwise; legs in the order LF LM LR RF RM RR.
+ */
 
 export type Vector = readonly [number, number, number];
 

@@ -1,19 +1,19 @@
 import uPlot from "uplot";
-import type { Clock } from "./clock";
-import { element } from "./dom";
+import type { Clock } from "../clock";
+import { element } from "../dom";
+import { property } from "../theme";
 import type { Span } from "./span";
-import { property } from "./theme";
 
-const LEAST = 1e-4; // of a curve's size: less of a range is a constant's round-off
+const LEAST = 1e-4; // relative: a curve with a smaller range is a constant with round-off
 
 export interface Curve {
   readonly label: string;
-  /** Custom property of the page that holds the colour. */
+  /** Name of the page's custom property that holds the colour. */
   readonly colour: string;
   readonly dash?: readonly number[];
   readonly time: ArrayLike<number>;
   readonly values: ArrayLike<number>;
-  /** The value at a time, for the heading. */
+  /** Returns the value at a time, for the heading. */
   at(time: number): number;
 }
 
@@ -23,12 +23,12 @@ export interface PanelOptions {
   readonly height: number;
   readonly curves: readonly Curve[];
   readonly host: HTMLElement;
-  /** Least and largest value that it shares with other plots. */
+  /** Least and largest value, for plots that share a scale. */
   readonly limits?: readonly [number, number] | undefined;
   readonly more?: Partial<uPlot.Options>;
 }
 
-/** A plot whose cursor is the replay's time: pressing or dragging anywhere in it moves the replay. */
+/** A plot with a cursor at the replay's time; pressing or dragging in it moves the replay. */
 export class Panel {
   private readonly plot: uPlot;
   private readonly playhead = element("div", "playhead");
@@ -55,14 +55,14 @@ export class Panel {
     clock.listen(() => this.showTime());
   }
 
-  /** Draws anew in the page's present colours. */
+  /** Draws the plot again in the page's present colours. */
   repaint(): void {
     this.plot.redraw(false, true);
   }
 
   private describe(box: HTMLElement): uPlot.Options {
     const [min, max] = this.span.limits;
-    const again = () => queueMicrotask(() => this.showTime()); // uPlot lays out in a microtask of its own
+    const again = () => queueMicrotask(() => this.showTime()); // after uPlot's own layout microtask
     const quiet = {
       stroke: () => property("--muted"),
       grid: { stroke: () => property("--line"), width: 1 },
@@ -150,7 +150,7 @@ function titleOf(options: PanelOptions): HTMLElement {
   return title;
 }
 
-/** A curve's mark and, in the element returned, its value. */
+/** Returns the element of a curve's value, beside which its mark and label stand. */
 function readout(curve: Curve): HTMLElement {
   const item = element("span", "readout");
   const mark = element("i", curve.dash ? "mark dashed" : "mark");
@@ -170,7 +170,7 @@ function seriesOf(curve: Curve): uPlot.Series {
   };
 }
 
-/** Curves that share their times as they are, others joined. */
+/** Returns curves that share their times as they are, and joins others. */
 function dataOf(curves: readonly Curve[]): uPlot.AlignedData {
   const time = curves[0].time;
   if (curves.every((curve) => sameTimes(curve.time, time)))
@@ -186,17 +186,17 @@ function sameTimes(a: ArrayLike<number>, b: ArrayLike<number>): boolean {
   return a.length === b.length;
 }
 
-/** Limits with air above and below; a constant gets a range to lie in. */
+/** Returns limits with a margin above and below, also for a constant. */
 function roomy(from: number, to: number): uPlot.Range.MinMax {
   const size = Math.max(Math.abs(from), Math.abs(to));
-  const air =
+  const margin =
     to - from > LEAST * size
       ? Math.max(0.07 * (to - from), 0.5 * LEAST)
       : Math.max(0.1 * size, 0.5);
-  return [from >= 0 && from < 0.3 * (to - from) ? 0 : from - air, to + air];
+  return [from >= 0 && from < 0.3 * (to - from) ? 0 : from - margin, to + margin];
 }
 
-/** A value of an axis whose values are a step apart: as many digits as the step needs. */
+/** Returns a value of an axis as text with as many digits as the step between values needs. */
 export function tick(value: number, step: number): string {
   const digits =
     [0, 1, 2, 3, 4, 5, 6].find(
@@ -206,7 +206,7 @@ export function tick(value: number, step: number): string {
   return (Number(text) === 0 ? (0).toFixed(digits) : text).replace("-", "−");
 }
 
-/** A value for people. */
+/** Returns a value as text with about three digits. */
 export function figures(value: number): string {
   if (!Number.isFinite(value)) return "–";
   if (Number.isInteger(value)) return String(value).replace("-", "−");

@@ -9,17 +9,17 @@ import {
   Vector3,
 } from "three";
 import { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
-import { legPoints, type Pose, torsoOrigin, toVector3 } from "./kinematics";
-import type { Robot } from "./types";
+import { legPoints, type Pose, torsoOrigin, toVector3 } from "../kinematics";
+import type { Robot } from "../types";
 
-const UP = new Vector3(0, 1, 0); // a capsule's axis as three.js makes it
-const LIT = new Color("#ffd54a"); // a foot on the ground
-const DARK = new Color("#5b626c");
-const STRIPE = 0.16; // of the torso's width: the mark in the control's colour
+const UP = new Vector3(0, 1, 0); // axis of a capsule in three.js
+const LIT = new Color("#ffd54a"); // colour of a foot on the ground
+const DARK = new Color("#5b626c"); // colour of a foot in the air
+const STRIPE = 0.16; // width of the mark in the control's colour, relative to the torso's
 
 type Solid = Mesh<BufferGeometry, MeshLambertMaterial>;
 
-/** The robot as capsules and a box, with feet that light up on the ground. */
+/** The robot, drawn as capsules and a box; feet light up on the ground. */
 export class RobotModel extends Group {
   private readonly torso = new Group();
   private readonly links: Mesh[][];
@@ -36,7 +36,7 @@ export class RobotModel extends Group {
     this.feet = robot.legs.map(() => this.makeFoot());
   }
 
-  /** Puts it into a pose; `touching` says which feet light up. */
+  /** Moves the robot into a pose; `touching` tells which feet light up. */
   place(pose: Pose, touching: readonly boolean[]): void {
     this.torso.position.copy(torsoOrigin(this.robot, pose));
     this.torso.quaternion.copy(pose.attitude);
@@ -52,7 +52,7 @@ export class RobotModel extends Group {
     });
   }
 
-  /** Which feet are lit. */
+  /** Returns which feet are lit. */
   lit(): boolean[] {
     return this.feet.map(({ material }) => material.emissive.getHex() !== 0);
   }

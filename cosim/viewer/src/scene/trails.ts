@@ -12,35 +12,35 @@ import {
   Quaternion,
   Vector3,
 } from "three";
+import type { Recording } from "../recording";
+import type { Ground } from "../types";
 import { groundHeight, groundNormal } from "./ground";
-import type { Recording } from "./recording";
 import { type Stance, slippedBy } from "./stances";
-import type { Ground } from "./types";
 
-const ENLARGED = [1, 2, 5, 10, 20, 50]; // times, at most
-const WISHED = 0.05; // m    of a trail to look at
-const WIDTH = 0.009; // m
-const LEAST = 0.0004; // m    a foot that slipped less left no trail
-const LIFT = 0.0015; // m    above the ground, so that both are seen
-const SCALE = 0.006; // m    of slip for the hottest colour
+const ENLARGED = [1, 2, 5, 10, 20, 50]; // factors by which trails may be drawn longer
+const WISHED = 0.05; // m    largest length of a long trail as drawn
+const WIDTH = 0.009; // m    of a trail
+const LEAST = 0.0004; // m    of slip; a foot that slipped less leaves no trail
+const LIFT = 0.0015; // m    height of trails above the ground, which would hide them
+const SCALE = 0.006; // m    of slip for the colour HOT
 const COOL = new Color("#f7c948");
 const HOT = new Color("#c2185b");
 
-/** By how much trails are drawn longer than they are, the same for all runs, so that the longest are well seen. */
+/** Returns the factor by which all trails are drawn longer, so that the longest are visible. */
 export function enlargement(stances: readonly Stance[]): number {
   const ways = stances.map(slippedBy).sort((a, b) => a - b);
   const long = ways[Math.floor(0.95 * (ways.length - 1))] ?? 0;
   return ENLARGED.filter((times) => times * long <= WISHED).pop() ?? 1;
 }
 
-/** How many footprints and pieces of trails are drawn, and when the latest of them came about [s]. */
+/** Numbers of footprints and pieces of trails that are drawn, and the time of the latest [s]. */
 export interface Shown {
   readonly prints: number;
   readonly pieces: number;
   readonly latest: number | null;
 }
 
-/** Footprints where feet touched down, and from there the way they slipped under load, yellow to red by how far. */
+/** Footprints at touch-downs, and trails of slip under load, yellow to red by distance. */
 export class Trails extends Group {
   private readonly prints: InstancedMesh;
   private readonly ribbon: Mesh<BufferGeometry, MeshBasicMaterial>;
@@ -69,7 +69,7 @@ export class Trails extends Group {
     this.ribbon.geometry.setDrawRange(0, 6 * countUpTo(this.pieceRows, row));
   }
 
-  /** What is drawn, as the graphics card is told it. */
+  /** Returns what is drawn, from the state passed to the graphics card. */
   shown(): Shown {
     const [prints, pieces] = [this.prints.count, this.ribbon.geometry.drawRange.count / 6];
     const rows = [...this.printRows.slice(0, prints), ...this.pieceRows.slice(0, pieces)];
@@ -132,7 +132,7 @@ function piecesOf(stance: Stance, enlarged: number): Piece[] {
   });
 }
 
-/** Two triangles as wide as a trail. */
+/** Returns the corners of two triangles that form a piece of a trail. */
 function corners({ from, to }: Piece): [number, number][] {
   const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
   const length = Math.hypot(dx, dy) || 1;

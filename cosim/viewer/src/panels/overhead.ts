@@ -1,16 +1,17 @@
-import type { Clock } from "./clock";
-import { element } from "./dom";
+import type { Clock } from "../clock";
+import { element } from "../dom";
 import { tick } from "./panel";
-import { hostOf, type Run } from "./panels";
+import { hostOf, type Run } from "./run";
 
 const SVG = "http://www.w3.org/2000/svg";
 const WIDTH = 1000;
 const HEIGHT = 250;
-const EDGE = 14; // of the drawing's units
-const MOST_POINTS = 1500;
-const STRAIGHT = 0.05; // a commanded path no wider than this share of its length shows its drift enlarged
-const LEAST = 0.002; // m    of the sideways axis: less would show round-off as a drift
+const EDGE = 14; // margin, in units of the drawing
+const MOST_POINTS = 1500; // of a path
+const STRAIGHT = 0.05; // a commanded path no wider than this share of its length is drawn enlarged
+const LEAST = 0.002; // m    of the sideways axis: a smaller one would show round-off as a drift
 
+/** A path seen from above [m]. */
 interface Way {
   readonly label: string;
   readonly x: Float32Array;
@@ -18,7 +19,10 @@ interface Way {
   readonly time: Float64Array;
 }
 
-/** The torso's way from above with a dot at the replay's time; pressing a place moves the replay to when the robot was nearest. */
+/**
+ * Draws the torso's path from above, with a dot at the replay's time. Pressing a point moves the
+ * replay to the time at which the robot was nearest.
+ */
 export function drawPath(runs: readonly Run[], clock: Clock): void {
   const host = hostOf("path");
   const ways = runs
@@ -58,7 +62,10 @@ export function drawPath(runs: readonly Run[], clock: Clock): void {
   );
 }
 
-/** Lines and values of both axes; the values beside the drawing, so that they stay as large as text is. */
+/**
+ * Returns the values of both axes, and draws their lines. The values are elements beside the
+ * drawing, so that they keep the size of text.
+ */
 function axes(drawing: SVGElement, frame: Frame): HTMLElement[] {
   const label = (text: string, name: string, place: string, share: number) => {
     const made = element("span", name, text);
@@ -92,7 +99,7 @@ function axes(drawing: SVGElement, frame: Frame): HTMLElement[] {
   return [...across, ...upwards];
 }
 
-/** 1, 2 or 5 times a power of ten, so that about as many steps as wished fit. */
+/** Returns 1, 2 or 5 times a power of ten, such that about as many steps as wished fit. */
 function stepOf([low, high]: readonly [number, number], wished: number): number {
   const power = 10 ** Math.floor(Math.log10((high - low) / wished));
   return power * ([1, 2, 5].find((times) => (high - low) / (times * power) <= wished) ?? 10);
@@ -106,8 +113,9 @@ function multiples([low, high]: readonly [number, number], step: number): number
   );
 }
 
+/** The mapping from positions [m] to the drawing. */
 interface Frame {
-  /** What the drawing holds of x and of y [m]. */
+  /** Limits of x and of y in the drawing [m]. */
   readonly ends: readonly [readonly [number, number], readonly [number, number]];
   across(x: number): number;
   up(y: number): number;
@@ -123,7 +131,10 @@ function wayOf(label: string, recording: Run["recording"], stem: string): Way {
   };
 }
 
-/** To scale for a path that bends; for a straight one the sideways axis is enlarged, and the note says by how much. */
+/**
+ * Returns a frame to scale for a curved path. For a straight one the sideways axis is enlarged, and
+ * the note tells by how much.
+ */
 function frameOf(ways: readonly Way[], planned: Way | undefined): Frame {
   const [left, right] = limits(ways.map((way) => way.x));
   const [low, high] = limits(ways.map((way) => way.y));
@@ -134,9 +145,11 @@ function frameOf(ways: readonly Way[], planned: Way | undefined): Frame {
   const scales = bends ? [Math.min(across, tall), Math.min(across, tall)] : [across, tall];
   const [middle, level] = [0.5 * (left + right), 0.5 * (low + high)];
   const size = `${length.toFixed(2)} m from left to right`;
+  const height = (1e3 * Math.max(high - low, LEAST)).toPrecision(2);
+  const times = Math.round(scales[1] / scales[0]);
   const note = bends
     ? `To scale, ${size}.`
-    : `${size}, ${(1e3 * Math.max(high - low, LEAST)).toPrecision(2)} mm from top to bottom: sideways drawn ${Math.round(scales[1] / scales[0])} times larger.`;
+    : `${size}, ${height} mm from top to bottom: sideways drawn ${times} times larger.`;
   const half = [(0.5 * WIDTH) / scales[0], (0.5 * HEIGHT) / scales[1]];
   const ends = [
     [middle - half[0], middle + half[0]] as const,

@@ -9,19 +9,20 @@ import {
 } from "three";
 
 const UP = new Vector3(0, 1, 0);
-const LENGTH = 0.42; // m    of an arrow of one body weight
-const LEAST = 0.01; // body weights: less is not drawn
-const SHAFT = 0.0042; // m
-const HEAD = 0.0125; // m
+const LENGTH = 0.42; // m    of an arrow for one body weight
+const LEAST = 0.01; // body weights    smaller forces are not drawn
+const SHAFT = 0.0042; // m    radius
+const HEAD = 0.0125; // m    radius
 
-/** The ground's force on each foot, an arrow from where it acts. */
+/** Arrows that show the ground's force on each foot, starting where it acts. */
 export class ForceArrows extends Group {
   private readonly arrows: { shaft: Mesh; head: Mesh }[];
+  // without depth test, so that arrows are visible through the legs
   private readonly material = new MeshBasicMaterial({
     depthTest: false,
     transparent: true,
     opacity: 0.92,
-  }); // seen through the legs;
+  });
 
   constructor(count: number) {
     super();
@@ -38,7 +39,7 @@ export class ForceArrows extends Group {
     this.material.color.copy(colour);
   }
 
-  /** The force that each arrow shows [body weights]; none: no arrow. */
+  /** Returns the force that each arrow shows [body weights]; [] where no arrow is shown. */
   shown(): number[][] {
     return this.arrows.map(({ shaft }) => {
       if (!shaft.visible) return [];
@@ -49,7 +50,7 @@ export class ForceArrows extends Group {
     });
   }
 
-  /** Forces in body weights, at points on the ground. */
+  /** Shows forces [body weights] at points on the ground. */
   show(points: readonly Vector3[], forces: readonly Vector3[]): void {
     this.arrows.forEach(({ shaft, head }, k) => {
       const size = forces[k].length();

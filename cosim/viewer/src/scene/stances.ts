@@ -1,19 +1,22 @@
 import { Vector3 } from "three";
+import { footCentres, poseAt } from "../kinematics";
+import type { Recording } from "../recording";
+import type { Ground, Robot } from "../types";
 import { groundHeight } from "./ground";
-import { footCentres, poseAt } from "./kinematics";
-import type { Recording } from "./recording";
-import type { Ground, Robot } from "./types";
 
 const MOST_POINTS = 60; // of a trail
 
-/** A foot on the ground from touch-down to lift-off: where, and how far it has slipped since, row by row. */
+/**
+ * A foot on the ground from touch-down to lift-off: where, and how far it has slipped since
+ * touch-down, row by row.
+ */
 export interface Stance {
   readonly place: Vector3;
   readonly rows: readonly number[];
   readonly slipped: readonly { readonly x: number; readonly y: number }[];
 }
 
-/** All stances of all feet; empty when the recording does not tell. */
+/** Returns all stances of all feet; [] when the recording lacks the columns. */
 export function findStances(recording: Recording, robot: Robot, ground: Ground): Stance[] {
   return robot.legs.flatMap((leg, index) => {
     const names = [
@@ -36,7 +39,7 @@ export function findStances(recording: Recording, robot: Robot, ground: Ground):
   });
 }
 
-/** First and last row of every time that a flag is up. */
+/** Returns the first and last row of every period in which a flag is on. */
 function spans(flag: Float32Array): [number, number][] {
   const found: [number, number][] = [];
   let begin = -1;
@@ -58,7 +61,7 @@ function sampled(begin: number, end: number): number[] {
   );
 }
 
-/** How far a stance's foot slipped in all [m]. */
+/** Returns how far a stance's foot slipped in total [m]. */
 export function slippedBy(stance: Stance): number {
   const last = stance.slipped[stance.slipped.length - 1];
   return Math.hypot(last.x, last.y);

@@ -1,16 +1,16 @@
 import { PCFShadowMap, PerspectiveCamera, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Colours } from "../theme";
 import type { Actor } from "./actor";
-import type { Colours } from "./theme";
 
-const EYE = new Vector3(0.68, -0.92, 0.52); // m    from the robot: its front and right side
-const LOOK = new Vector3(0, 0, 0.05); // m    above the ground
-const FIELD = 36; // deg
-const WIDE = 1.25; // width over height of a view that holds the robot at FIELD
-const STACKED = 560; // px   narrower: views above each other
-const SHARPEST = 2; // device pixels per pixel
+const EYE = new Vector3(0.68, -0.92, 0.52); // m    of the camera, from the robot: front right
+const LOOK = new Vector3(0, 0, 0.05); // m    target of the camera, above the ground
+const FIELD = 36; // deg    vertical field of view
+const WIDE = 1.25; // width over height; a narrower view needs more than FIELD to show the robot
+const STACKED = 560; // px    width below which views are placed above each other
+const SHARPEST = 2; // largest number of device pixels per pixel
 
-/** The runs side by side, seen by one camera that the reader turns; each view looks at its own robot. */
+/** The 3D views of all runs, side by side, with one camera; each view looks at its own robot. */
 export class Stage {
   private readonly renderer: WebGLRenderer;
   private readonly camera = new PerspectiveCamera(FIELD, 1, 0.02, 60);
@@ -27,7 +27,7 @@ export class Stage {
     readonly actors: readonly Actor[],
   ) {
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "high-performance" });
-    this.renderer.debug.checkShaderErrors = false; // asking would wait for the compiler
+    this.renderer.debug.checkShaderErrors = false; // the check would wait for the compiler
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, SHARPEST));
@@ -64,7 +64,10 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Has the graphics driver compile what draws the scenes, while the page goes on, where it can; nothing is drawn before. */
+  /**
+   * Lets the graphics driver compile the shaders, in the background where it can. Nothing is drawn
+   * before.
+   */
   async prepare(): Promise<void> {
     const aside = this.renderer.extensions.has("KHR_parallel_shader_compile");
     if (aside)
@@ -75,7 +78,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Back to the view it began with. */
+  /** Resets the camera. */
   home(): void {
     this.camera.position.copy(EYE).add(LOOK);
     this.controls.target.copy(LOOK);
@@ -83,7 +86,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Draws, if anything has changed. */
+  /** Draws the views if anything has changed. */
   render(): void {
     if (!this.stale || !this.warm) return;
     this.stale = false;
@@ -116,7 +119,7 @@ export class Stage {
     this.stale = true;
   }
 
-  /** A plain wheel scrolls the page, and so does a finger up and down; what turns the view is dragging. */
+  /** Makes the controls: dragging turns the view; wheel and vertical swipes scroll the page. */
   private makeControls(): OrbitControls {
     const canvas = this.renderer.domElement;
     canvas.addEventListener(
@@ -139,7 +142,7 @@ export class Stage {
   }
 }
 
-/** Vertical angle of view [deg], wide enough that a narrow view still holds the robot. */
+/** Returns the vertical field of view [deg], larger for narrow views so that the robot fits. */
 function fieldOf(aspect: number): number {
   const half = Math.tan((FIELD * Math.PI) / 360) * Math.max(1, WIDE / aspect);
   return (360 * Math.atan(half)) / Math.PI;

@@ -1,4 +1,4 @@
-/** The stretch of time that a group of plots shows; it turns pages with the replay. */
+/** The interval of time that a group of plots shows; it moves on with the replay, page by page. */
 export class Span {
   private low: number;
   private high: number;
@@ -21,13 +21,13 @@ export class Span {
     this.listeners.push(listener);
   }
 
-  /** Turns to the page that holds a time. */
+  /** Moves the interval so that it contains a time. */
   follow(time: number): void {
     if (time >= this.low && time <= this.high) return;
     this.show(time > this.high ? time - 0.1 * this.width : time - 0.5 * this.width, this.width);
   }
 
-  /** Makes it wider (factor above 1) or narrower about a time, which stays where it is. */
+  /** Makes the interval wider (factor above 1) or narrower; `about` is the fixed time. */
   zoom(factor: number, about: number): void {
     const width = Math.min(Math.max(this.width * factor, 0.02), this.end - this.start);
     this.show(about - ((about - this.low) / (this.high - this.low)) * width, width);

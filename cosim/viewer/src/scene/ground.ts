@@ -10,14 +10,14 @@ import {
   SRGBColorSpace,
   Vector3,
 } from "three";
-import type { Ground } from "./types";
+import type { Ground } from "../types";
 
-const SIZE = 24; // m    of what is drawn; fog hides its edge
-const TILE = 0.5; // m    of the grid's picture
-const CELLS = 5; // of a tile: lines every 10 cm
-const PIXELS = 512;
+const SIZE = 24; // m    of the drawn plane; fog hides its edge
+const TILE = 0.5; // m    of the grid's texture
+const CELLS = 5; // per tile: lines every 10 cm
+const PIXELS = 512; // of the grid's texture
 
-/** Unit normal of the ground. */
+/** Returns the unit normal of the ground. */
 export function groundNormal(ground: Ground): Vector3 {
   return new Vector3(
     -ground.rise * Math.cos(ground.heading),
@@ -26,14 +26,14 @@ export function groundNormal(ground: Ground): Vector3 {
   ).normalize();
 }
 
-/** Height of the ground at a place. */
+/** Returns the height of the ground at a position [m]. */
 export function groundHeight(ground: Ground, x: number, y: number): number {
   return (
     ground.height + ground.rise * (x * Math.cos(ground.heading) + y * Math.sin(ground.heading))
   );
 }
 
-/** The plane the robot walks on, with a grid of 10 cm; it moves along by whole tiles. */
+/** The plane that the robot walks on, with a 10 cm grid; it follows the robot by whole tiles. */
 export class Floor extends Group {
   private readonly plane: Mesh<PlaneGeometry, MeshLambertMaterial>;
 
@@ -48,7 +48,7 @@ export class Floor extends Group {
     this.follow(0, 0);
   }
 
-  /** Keeps the middle of the plane near a place. */
+  /** Moves the plane so that its middle is near a position. */
   follow(x: number, y: number): void {
     const place = new Vector3(x, y, groundHeight(this.ground, x, y));
     const origin = new Vector3(0, 0, this.ground.height);
@@ -71,20 +71,20 @@ export class Floor extends Group {
 function gridTexture(surface: string, line: string): CanvasTexture {
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = PIXELS;
-  const brush = canvas.getContext("2d")!;
-  brush.fillStyle = surface;
-  brush.fillRect(0, 0, PIXELS, PIXELS);
-  brush.strokeStyle = line;
+  const context = canvas.getContext("2d")!;
+  context.fillStyle = surface;
+  context.fillRect(0, 0, PIXELS, PIXELS);
+  context.strokeStyle = line;
   for (let k = 0; k <= CELLS; k++) {
     const at = (k * PIXELS) / CELLS;
-    brush.lineWidth = k % CELLS === 0 ? 7 : 2.5;
-    brush.globalAlpha = k % CELLS === 0 ? 1 : 0.7;
-    brush.beginPath();
-    brush.moveTo(at, 0);
-    brush.lineTo(at, PIXELS);
-    brush.moveTo(0, at);
-    brush.lineTo(PIXELS, at);
-    brush.stroke();
+    context.lineWidth = k % CELLS === 0 ? 7 : 2.5;
+    context.globalAlpha = k % CELLS === 0 ? 1 : 0.7;
+    context.beginPath();
+    context.moveTo(at, 0);
+    context.lineTo(at, PIXELS);
+    context.moveTo(0, at);
+    context.lineTo(PIXELS, at);
+    context.stroke();
   }
   const texture = new CanvasTexture(canvas);
   texture.wrapS = texture.wrapT = RepeatWrapping;

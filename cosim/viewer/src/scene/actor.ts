@@ -1,18 +1,18 @@
 import { type Color, DirectionalLight, Fog, HemisphereLight, Scene, Vector3 } from "three";
+import { footCentres, type Pose, poseAt } from "../kinematics";
+import type { Recording } from "../recording";
+import type { Colours } from "../theme";
+import type { PackedRun } from "../types";
 import { ForceArrows } from "./arrows";
 import { Floor, groundHeight, groundNormal } from "./ground";
-import { footCentres, type Pose, poseAt } from "./kinematics";
-import type { Recording } from "./recording";
 import { RobotModel } from "./robot";
 import type { Stance } from "./stances";
-import type { Colours } from "./theme";
 import { type Shown, Trails } from "./trails";
-import type { PackedRun } from "./types";
 
-const LAMP = new Vector3(0.9, 1.3, 2.6); // m    from the robot
-const REACH = 0.55; // m    around the robot in which it casts shadows
+const LAMP = new Vector3(0.9, 1.3, 2.6); // m    position of the lamp relative to the robot
+const REACH = 0.55; // m    distance from the robot within which shadows are cast
 
-/** One run as a scene: the robot, the ground, forces and trails at a time. */
+/** The scene of one run: the robot, the ground, forces and trails at a time. */
 export class Actor {
   readonly scene = new Scene();
   readonly place = new Vector3();
@@ -71,7 +71,7 @@ export class Actor {
     this.trails?.paint(colours.print);
   }
 
-  /** Brings everything to a time; beyond its recording the run stays as it ended. */
+  /** Shows the run at a time; after the end of its recording, the run stays in its last pose. */
   show(time: number): void {
     const pose = this.poseAt(time);
     this.place.set(
@@ -91,7 +91,7 @@ export class Actor {
     return poseAt(this.recording, this.run.robot, time);
   }
 
-  /** What is to be seen now: trails, lit feet, forces [body weights] that arrows show. */
+  /** Returns what is visible now: trails, lit feet, forces [body weights] shown by arrows. */
   shown(): { trails: Shown; lit: boolean[]; arrows: number[][] } {
     return {
       trails: this.trails?.shown() ?? { prints: 0, pieces: 0, latest: null },

@@ -1,17 +1,13 @@
-import type { Clock } from "./clock";
-import { element } from "./dom";
+import type { Clock } from "../clock";
+import { element } from "../dom";
+import type { Recording } from "../recording";
 import { footfallPanel } from "./footfall";
 import { type Curve, Panel, type PanelOptions } from "./panel";
-import type { Recording } from "./recording";
+import { hostOf, type Run } from "./run";
 import type { Span } from "./span";
-import type { PackedRun } from "./types";
 
-export interface Run {
-  readonly run: PackedRun;
-  readonly recording: Recording;
-}
-
-interface Wanted {
+/** A plot that shows one column of all runs. */
+interface ComparedPlot {
   readonly title: string;
   readonly unit: string;
   readonly column: string;
@@ -28,7 +24,7 @@ export interface Spans {
 const DASH = [6, 3];
 const SIDES: Record<string, string> = { L: "left", R: "right" };
 const ENDS: Record<string, string> = { F: "front", M: "middle", R: "rear" };
-const BOOKS = [
+const ENERGIES = [
   ["actuator_work", "work of motors", "--c1", []],
   ["dissipated", "dissipated", "--c2", [9, 3]],
   ["potential", "potential", "--c3", [2, 2]],
@@ -36,7 +32,10 @@ const BOOKS = [
   ["push_work", "work of pushes", "--c5", [5, 5]],
 ] as const;
 
-/** How to make each plot of the page, by the section it belongs to; those whose columns were not recorded are left out. */
+/**
+ * Returns how to make each plot of the page, section by section. Plots whose columns were not
+ * recorded are left out.
+ */
 export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (() => Panel)[] {
   const { robot } = runs[0].run;
   const legs = robot.legs.map(({ name }) => name);
@@ -46,7 +45,7 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
       legs.map((leg) => `${leg}.${kind}`),
     ),
   );
-  const compared: Record<string, Wanted[]> = {
+  const compared: Record<string, ComparedPlot[]> = {
     foot_forces: legs.map((leg) => ({
       title: nameOf(leg),
       unit: "BW",
@@ -78,9 +77,9 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
       column: `${joint}.torque`,
     })),
   };
-  const makers = Object.entries(compared).flatMap(([section, wanted]) =>
-    wanted.flatMap((item) =>
-      comparedPanel(section, item, runs, clock, item.whole ? spans.walk : spans.cycles),
+  const makers = Object.entries(compared).flatMap(([section, plots]) =>
+    plots.flatMap((plot) =>
+      comparedPanel(section, plot, runs, clock, plot.whole ? spans.walk : spans.cycles),
     ),
   );
   makers.push(...runs.flatMap((run) => energyPanels(run, clock, spans.walk)));
@@ -92,7 +91,7 @@ export function panelMakers(runs: readonly Run[], clock: Clock, spans: Spans): (
 
 function comparedPanel(
   section: string,
-  item: Wanted,
+  item: ComparedPlot,
   runs: readonly Run[],
   clock: Clock,
   span: Span,
@@ -115,11 +114,11 @@ function comparedPanel(
 
 function energyPanels({ run, recording }: Run, clock: Clock, span: Span): (() => Panel)[] {
   const host = hostOf("energy");
-  const books = BOOKS.filter(
+  const energies = ENERGIES.filter(
     ([name]) => recording.has(`energy.${name}`) && moves(recording.column(`energy.${name}`)),
   );
-  if (!host || books.length === 0) return [];
-  const curves = books.map(([name, label, colour, dash]) => ({
+  if (!host || energies.length === 0) return [];
+  const curves = energies.map(([name, label, colour, dash]) => ({
     ...columnCurve(recording, `energy.${name}`, label, colour),
     ...(dash.length > 0 ? { dash } : {}),
   }));
@@ -150,7 +149,7 @@ function columnCurve(recording: Recording, column: string, label: string, colour
   };
 }
 
-/** Least and largest value of the columns that there are. */
+/** Returns the least and largest value of those columns that were recorded. */
 function limitsOf(runs: readonly Run[], names: readonly string[]): [number, number] | undefined {
   let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
   for (const { recording } of runs) {
@@ -162,13 +161,13 @@ function limitsOf(runs: readonly Run[], names: readonly string[]): [number, numb
   return low <= high ? [low, high] : undefined;
 }
 
-/** A leg's short name and what it stands for. */
+/** Returns a leg's short name and its meaning, as "LF left front". */
 function nameOf(leg: string): string {
   const [side, end] = [SIDES[leg[0]], ENDS[leg[1]]];
   return leg.length === 2 && side && end ? `${leg} ${side} ${end}` : leg;
 }
 
-/** Says once under each group of plots what lies across. */
+/** Labels the time axis once below each group of plots. */
 export function labelTimes(): void {
   for (const host of document.querySelectorAll<HTMLElement>("[data-panels]")) {
     if (host.querySelector(".playhead")) host.append(element("p", "across", "time [s]"));
@@ -177,8 +176,4 @@ export function labelTimes(): void {
 
 function moves(values: Float32Array): boolean {
   return values.some((value) => value !== values[0]);
-}
-
-export function hostOf(section: string): HTMLElement | null {
-  return document.querySelector<HTMLElement>(`[data-panels="${section}"]`);
 }

@@ -1,7 +1,4 @@
-"""What is a fall and what is none, and what is said of ground that does not hold the robot.
-
-On synthetic recordings, in literal numbers.
-"""
+"""Falls and weak friction, on synthetic recordings with literal numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.warnings import fall, slipping_ground
+from hexapod_cosim.cosim.results.warnings import describe_fall, friction_warnings
 
 Array = NDArray[np.float64]
 STANDING = 0.130  # m
@@ -22,7 +19,7 @@ SLOPE = {"terrain.kind": 2.0, "terrain.incline": 0.5}
 
 
 class Run(Walk):
-    """Ten seconds of a robot that stands, until a test says otherwise."""
+    """Ten seconds of a standing robot, which tests modify."""
 
     def __init__(self) -> None:
         super().__init__(speed=0.0)
@@ -34,7 +31,7 @@ class Run(Walk):
             self.set(name, when)
 
     def lean(self, roll: float, pitch: float, *, when: NDArray[np.bool_] | None = None) -> None:
-        """As the FMU tells it, z-y-x."""
+        """Sets the quaternion from z-y-x angles, as the FMU defines them."""
         a, b = 0.5 * roll, 0.5 * pitch
         leaning = [
             math.cos(a) * math.cos(b),
@@ -60,7 +57,7 @@ class Run(Walk):
         changed = PARAMETERS | {
             name.replace("__", "."): value for name, value in parameters.items()
         }
-        return fall(View(self.recording, changed, PERIOD), ROBOT)
+        return describe_fall(View(self.recording, changed, PERIOD), ROBOT)
 
 
 def test_a_robot_that_stands_has_not_fallen() -> None:
@@ -84,7 +81,7 @@ def test_a_robot_that_stands_has_not_fallen() -> None:
 def test_a_torso_that_leans_by_more_than_six_tenths_of_a_radian_has_fallen(
     roll: float, pitch: float, falls: bool
 ) -> None:
-    """Whatever the direction: 0.41 and 0.41 are 0.57 together, 0.45 and 0.45 are 0.62."""
+    """The direction does not matter: 0.41 and 0.41 are 0.57 together, 0.45 and 0.45 are 0.62."""
     run = Run()
     run.lean(roll, pitch, when=run.time >= 3.0)
     assert run.fall() == (
@@ -100,8 +97,9 @@ def test_a_torso_that_leans_by_more_than_six_tenths_of_a_radian_has_fallen(
 def test_on_a_slope_a_torso_leans_against_the_slope(
     heading: float, roll: float, pitch: float
 ) -> None:
-    """On a slope of 0.5 rad a torso along the slope is upright, a level one leans by 0.5, and
-    0.15 downhill is too much.
+    """On a slope of 0.5 rad a torso along the slope is upright.
+
+    A level one leans by 0.5 rad, and 0.15 rad more downhill is a fall.
     """
     for angle, falls in ((0.5, False), (0.0, False), (-0.15, True), (1.05, False), (1.15, True)):
         run = Run()
@@ -130,8 +128,8 @@ def test_a_torso_that_is_low_when_the_run_ends_has_fallen() -> None:
 
 
 def test_the_height_that_counts_is_the_commanded_one() -> None:
-    """Raised by 60 mm to 190 mm, 90 mm are less than half; lowered by 40 mm to 90 mm, 64 mm are
-    more.
+    """At 190 mm, 60 mm above the start, 90 mm are less than half; at 90 mm, 40 mm below it, 64 mm
+    are more.
     """
     run = Run()
     run.set("command.height", 0.06)
@@ -154,7 +152,7 @@ def test_a_torso_that_lies_on_the_ground_has_fallen_at_once(height: float, falls
 
 
 def dropped() -> Run:
-    """From 1 m; its feet are on the ground from 0.5 s on, it bounces up to 0.2 m and stands."""
+    """Returns a drop from 1 m: the feet land at 0.5 s, the robot bounces up to 0.2 m and stands."""
     run = Run()
     run.touch((run.time >= 0.5) & ((run.time < 0.6) | (run.time >= 0.7)))
     run.set(
@@ -197,8 +195,8 @@ def test_a_robot_that_never_lands_on_its_feet_falls_when_its_torso_meets_the_gro
 
 @pytest.mark.parametrize("along", ["x", "y"])
 def test_heights_are_above_the_ground_of_a_slope(along: str) -> None:
-    """On ground at 0.3 m that rises by tan 0.5 = 0.5463 along the way, the torso is 0.130 m
-    above it when z says so.
+    """On ground at 0.3 m that rises by tan 0.5 = 0.5463 along the way, the torso is kept 0.130 m
+    above it.
     """
     run = Run()
     axis, heading = {"x": (1, 0.0), "y": (2, math.pi / 2.0)}[along]
@@ -216,22 +214,24 @@ def parameters(**changes: float) -> dict[str, float]:
 
 
 def test_ground_that_holds_the_robot_is_not_worth_a_word() -> None:
-    assert slipping_ground(PARAMETERS) == []
-    assert slipping_ground(parameters(**SLOPE)) == []  # tan 0.5 = 0.546 < mu = 0.7
+    assert friction_warnings(PARAMETERS) == []
+    assert friction_warnings(parameters(**SLOPE)) == []  # tan 0.5 = 0.546 < mu = 0.7
 
 
 def test_static_friction_holds_a_robot_where_the_law_has_it() -> None:
-    """tan 0.5 = 0.546 lies between 0.3 and 0.6: bristles hold it, the tanh law does not."""
+    """tan 0.5 = 0.546 lies between 0.3 and 0.6, so the bristle law holds the robot and the tanh
+    law does not.
+    """
     between = {"friction__mu": 0.3, "friction__mu_static": 0.6}
-    assert slipping_ground(parameters(**SLOPE, **between, friction__law=3.0)) == []
-    assert slipping_ground(parameters(**SLOPE, **between, friction__law=1.0)) != []
+    assert friction_warnings(parameters(**SLOPE, **between, friction__law=3.0)) == []
+    assert friction_warnings(parameters(**SLOPE, **between, friction__law=1.0)) != []
 
 
 @pytest.mark.parametrize(
     "changes", [{"friction__mu": 0.0}, {"friction__law": 2.0}], ids=["mu = 0", "none"]
 )
-def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> None:
-    assert slipping_ground(parameters(**changes)) == [
+def test_level_ground_without_friction_is_warned_of(changes: dict[str, float]) -> None:
+    assert friction_warnings(parameters(**changes)) == [
         "the ground has no friction: feet cannot push, and the robot does not get ahead"
     ]
 
@@ -241,15 +241,16 @@ def test_level_ground_without_friction_is_told(changes: dict[str, float]) -> Non
     [
         ({"friction__mu": 0.0}, "at 4.7 m/s2, without friction"),  # g sin 0.5
         ({"friction__law": 2.0}, "at 4.7 m/s2, without friction"),
+        # g (sin 0.5 - 0.3 cos 0.5)
         (
             {"friction__mu": 0.3},
             "at 2.12 m/s2, which friction (mu = 0.3) does not hold",
-        ),  # g (sin 0.5 - 0.3 cos 0.5)
+        ),
     ],
 )
-def test_a_slope_that_friction_does_not_hold_is_told_with_the_acceleration(
+def test_a_slope_that_friction_does_not_hold_is_warned_of_with_the_acceleration(
     changes: dict[str, float], says: str
 ) -> None:
-    assert slipping_ground(parameters(**SLOPE, **changes)) == [
+    assert friction_warnings(parameters(**SLOPE, **changes)) == [
         f"the robot slides: the ground's slope pulls it downhill {says}"
     ]

@@ -1,4 +1,4 @@
-"""The energy books of every shipped scenario, as the metric energy_residual has them."""
+"""The metric energy_residual of every bundled scenario."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ def walker(plant_build: Path) -> Iterator[Walker]:
 
 @pytest.mark.parametrize("name", list_scenarios())
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_the_books_close_on_the_other_robot_too(walker: Walker, name: str, control: str) -> None:
+def test_the_energy_balance_of_the_other_robot_closes_too(
+    walker: Walker, name: str, control: str
+) -> None:
     scenario = load_scenario(name, overrides=[f"control={control}", "robot=phantomx_mk4"])
     missing = walker.simulate(scenario).metrics["energy_residual"]
     assert missing < (3e-3 if (name, control) == STANDING else 1e-4)
@@ -30,8 +32,12 @@ def test_the_books_close_on_the_other_robot_too(walker: Walker, name: str, contr
 
 @pytest.mark.parametrize("name", list_scenarios())
 @pytest.mark.parametrize("control", ["kinematic", "compliant"])
-def test_the_books_of_every_shipped_scenario_close(walker: Walker, name: str, control: str) -> None:
-    """To 1e-4 of the motors' gross work at the default solver, to 1e-3 at the fastest setting."""
+def test_the_energy_balance_of_every_bundled_scenario_closes(
+    walker: Walker, name: str, control: str
+) -> None:
+    """The residual is below 1e-4 of the motors' gross work with the default solver, 1e-3 at the
+    fastest setting.
+    """
     missing = [
         walker.simulate(load_scenario(name, overrides=[f"control={control}", *solver])).metrics[
             "energy_residual"

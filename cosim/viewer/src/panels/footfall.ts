@@ -1,15 +1,18 @@
 import type uPlot from "uplot";
-import type { Clock } from "./clock";
+import type { Clock } from "../clock";
+import { property } from "../theme";
 import { Panel } from "./panel";
-import type { Run } from "./panels";
+import type { Run } from "./run";
 import type { Span } from "./span";
-import { property } from "./theme";
 
-const BAND = 0.84; // of a row: where the gait plans a swing
-const BAR = 0.5; // of a row: where the foot is on the ground
+const BAND = 0.84; // height of the band of a planned swing, relative to a row
+const BAR = 0.5; // height of the bar of a foot on the ground, relative to a row
 const HEIGHT = 170; // px
 
-/** Which foot is on the ground when (bars), over where the gait plans it to swing (bands). */
+/**
+ * Returns how to make the plot of a run's footfall, or [] when contacts were not recorded.
+ * Bars show which feet are on the ground, bands behind them where the gait plans a swing.
+ */
 export function footfallPanel(
   { run, recording }: Run,
   host: HTMLElement | null,
@@ -20,11 +23,11 @@ export function footfallPanel(
   if (!host || !recording.has(...legs.map((leg) => `${leg}.contact`))) return [];
   const feet = `--${run.label}`;
   const draw = (plot: uPlot): void => {
-    const brush = plot.ctx;
-    brush.save();
-    brush.beginPath();
-    brush.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
-    brush.clip();
+    const context = plot.ctx;
+    context.save();
+    context.beginPath();
+    context.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
+    context.clip();
     legs.forEach((leg, row) => {
       if (recording.has(`${leg}.swing`))
         bars(
@@ -37,7 +40,7 @@ export function footfallPanel(
         );
       bars(plot, recording.time, recording.column(`${leg}.contact`), row, BAR, property(feet));
     });
-    brush.restore();
+    context.restore();
   };
   const down = (time: number): number =>
     legs.filter((leg) => recording.column(`${leg}.contact`)[recording.place(time).row] > 0.5)
@@ -78,6 +81,7 @@ export function footfallPanel(
   ];
 }
 
+/** Draws a bar in a row for each period in which a flag is on. */
 function bars(
   plot: uPlot,
   time: Float64Array,
