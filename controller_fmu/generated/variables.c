@@ -504,7 +504,7 @@ const char *const hx_log_category_names[] = {
 const hxStateRow *const hx_states = 0;
 const size_t hx_state_count = 0;
 
-const char hx_default_guid[] = "{e2f241a0-b18c-4bf7-aeee-a747073e6d1d}";
+const char hx_default_guid[] = "{11e97246-ff4f-410d-8126-5fab5a68b507}";
 
 _Static_assert(HX_CONTROL_KINEMATIC == 1, "Control");
 _Static_assert(HX_CONTROL_COMPLIANT == 2, "Control");

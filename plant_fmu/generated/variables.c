@@ -1045,7 +1045,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{a60078f8-2477-4254-b5d4-5e1d97d488ce}";
+const char hx_default_guid[] = "{70595b93-f3da-4987-9da6-224dc53dfe94}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
