@@ -141,7 +141,9 @@ def levels(found: Arrows) -> dict[str, int]:
         if room in path:
             raise ValueError(f"a circle of imports: {' -> '.join((*path, room))}")
         if room not in known:
-            known[room] = 1 + max((level(other, (*path, room)) for other in found[room]), default=-1)
+            known[room] = 1 + max(
+                (level(other, (*path, room)) for other in found[room]), default=-1
+            )
         return known[room]
 
     for room in found:
@@ -170,7 +172,9 @@ def drawn(found: Arrows) -> str:
     return "\n".join([*_head(width, height), *lines, *boxes, "</svg>", ""])
 
 
-def ordered(row: Iterable[str], few: Arrows, places: Mapping[str, tuple[float, float]]) -> list[str]:
+def ordered(
+    row: Iterable[str], few: Arrows, places: Mapping[str, tuple[float, float]]
+) -> list[str]:
     """A row from left to right, each room near the middle of what it imports."""
 
     def middle(room: str) -> tuple[float, str]:

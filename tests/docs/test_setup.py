@@ -12,26 +12,45 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def test_a_missing_compiler_is_said_in_a_line_before_anything_is_made(tmp_path: Path) -> None:
+def make_setup(tmp_path: Path, *programs: str, **stubs: str) -> subprocess.CompletedProcess[str]:
+    """Runs `make setup` where PATH holds these programs and stubs (shell scripts) only."""
     tools = tmp_path / "bin"
     tools.mkdir()
-    for name in ("make", "sh", "python3", "find", "touch", "mkdir"):
+    for name in ("make", "sh", "find", "touch", "mkdir", *programs):
         program = shutil.which(name)
         assert program is not None
         (tools / name).symlink_to(program)
-    venv = tmp_path / "venv"
-    done = subprocess.run(
-        ["make", "setup", f"VENV={venv}"],
+    for name, script in stubs.items():
+        (tools / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tools / name).chmod(0o755)
+    return subprocess.run(
+        ["make", "setup", f"VENV={tmp_path / 'venv'}"],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
         env={"PATH": str(tools)},
     )
+
+
+def test_a_missing_compiler_is_reported_in_a_line_before_anything_is_made(tmp_path: Path) -> None:
+    done = make_setup(tmp_path, "python3")
     assert done.returncode != 0
     assert "no C compiler: looked for cc, gcc and clang, found none; install one" in done.stderr
     assert "Traceback" not in done.stderr + done.stdout
-    assert not venv.exists()
+    assert not (tmp_path / "venv").exists()
+
+
+def test_a_python_without_venv_is_reported_in_a_line_before_anything_is_made(
+    tmp_path: Path,
+) -> None:
+    python = 'if [ "$1" = --version ]; then echo Python 3.11.2; else exit 1; fi'
+    done = make_setup(tmp_path, cc="exit 0", python3=python)
+    assert done.returncode != 0
+    assert "got Python 3.11.2, expected Python 3.11 or later with its venv module" in done.stderr
+    assert "apt-get install python3 python3-venv" in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    assert not (tmp_path / "venv").exists()
 
 
 # the hooks of the build backend, in a process of their own, on a stand-in for scikit-build-core

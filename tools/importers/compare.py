@@ -127,7 +127,7 @@ def verdict(
 def environment() -> Path:
     """Python of the importers' environment, made or brought up to date."""
     folder, requirements = BUILD / "venv", HERE / "requirements.txt"
-    subprocess.run([sys.executable, str(HERE.parent / "make_venv.py"), str(folder)], check=True)
+    subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
     python = folder / "bin" / "python"
     for line in requirements.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):
