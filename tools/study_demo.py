@@ -106,7 +106,8 @@ def finish(folder: Path, name: str, *more: str) -> None:
     )
     summary = json.loads(done.stdout)
     print(
-        f"{name}: {summary['runs']} runs, walked {summary['walked']}, in {time.monotonic() - begin:.0f} s",
+        f"{name}: {summary['runs']} runs, walked {summary['walked']}, in "
+        f"{time.monotonic() - begin:.0f} s",
         flush=True,
     )
 

@@ -28,24 +28,37 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 # the names that other tools rely on; L, J, i and I stand for legs, joints, indices and inertia
 # entries
 CONTRACT = {
-    "input": "L.J.angle_ref L.J.speed_ref L.J.torque_ref torso.push_force[3] torso.push_torque[3] L.J.acceleration_ref",
+    "input": (
+        "L.J.angle_ref L.J.speed_ref L.J.torque_ref torso.push_force[3] torso.push_torque[3] "
+        "L.J.acceleration_ref"
+    ),
     "output": "L.J.angle L.J.speed L.J.torque L.J.reaction_force[3] L.J.reaction_torque[3] "
-    "L.foot.force[3] L.foot.normal_force L.foot.tangential_force L.foot.position[3] L.foot.velocity[3] L.foot.slip_speed "
+    "L.foot.force[3] L.foot.normal_force L.foot.tangential_force L.foot.position[3] "
+    "L.foot.velocity[3] L.foot.slip_speed "
     "L.foot.bristle[3] L.foot.penetration L.foot.contact L.foot.impact_speed "
     "torso.position[3] torso.quaternion[4] torso.roll torso.pitch torso.yaw "
     "torso.velocity[3] torso.angular_velocity[3] imu.specific_force[3] imu.angular_velocity[3] "
-    "energy.kinetic energy.potential energy.actuator_work energy.dissipated energy.residual energy.push_work "
-    "constraint.position_error constraint.velocity_error solver.evaluations solver.steps solver.rejected solver.touchdowns "
-    "L.J.positive_work L.J.negative_work L.J.torque_squared L.foot.slip_distance L.foot.impulse L.foot.peak_force "
-    "L.foot.peak_force_rate L.foot.landing_rate L.foot.landings energy.contact_loss energy.friction_loss energy.gear_loss",
+    "energy.kinetic energy.potential energy.actuator_work energy.dissipated energy.residual "
+    "energy.push_work "
+    "constraint.position_error constraint.velocity_error solver.evaluations solver.steps "
+    "solver.rejected solver.touchdowns "
+    "L.J.positive_work L.J.negative_work L.J.torque_squared L.foot.slip_distance "
+    "L.foot.impulse L.foot.peak_force "
+    "L.foot.peak_force_rate L.foot.landing_rate L.foot.landings energy.contact_loss "
+    "energy.friction_loss energy.gear_loss",
     "parameter": "torso.mass torso.com[3] torso.inertia_I "
     "L.J.mass L.J.length L.J.offset_y L.J.offset_z L.J.com[3] L.J.inertia_I L.J.axis[3] "
-    "L.hip_position[3] L.hip_yaw foot.radius contact.law contact.stiffness contact.restitution contact.damping_factor "
-    "contact.impact_speed_floor friction.law friction.mu friction.slope friction.presliding friction.bristle_damping "
-    "servo.mode servo.kp servo.kd servo.torque_max servo.speed_max servo.rotor_inertia servo.coulomb_friction "
+    "L.hip_position[3] L.hip_yaw foot.radius contact.law contact.stiffness "
+    "contact.restitution contact.damping_factor "
+    "contact.impact_speed_floor friction.law friction.mu friction.slope friction.presliding "
+    "friction.bristle_damping "
+    "servo.mode servo.kp servo.kd servo.torque_max servo.speed_max servo.rotor_inertia "
+    "servo.coulomb_friction "
     "baumgarte.alpha baumgarte.beta gravity[3] solver.method solver.step solver.tolerance "
-    "solver.step_max terrain.kind terrain.height terrain.incline terrain.heading initial.position[3] initial.quaternion[4] "
-    "initial.velocity[3] initial.angular_velocity[3] initial.L.J.angle initial.L.J.speed friction.mu_static friction.stribeck_speed",
+    "solver.step_max terrain.kind terrain.height terrain.incline terrain.heading "
+    "initial.position[3] initial.quaternion[4] "
+    "initial.velocity[3] initial.angular_velocity[3] initial.L.J.angle initial.L.J.speed "
+    "friction.mu_static friction.stribeck_speed",
 }
 
 

@@ -160,7 +160,8 @@ HxOutput = record(
         record(
             "EnergyOutput",
             *reals(
-                "kinetic potential actuator_work push_work dissipated contact_loss friction_loss gear_loss residual"
+                "kinetic potential actuator_work push_work dissipated contact_loss "
+                "friction_loss gear_loss residual"
             ),
         ),
     ),
