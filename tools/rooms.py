@@ -77,9 +77,9 @@ def python_room(parts: tuple[str, ...]) -> str | None:
     """The room of a module from the parts of its name; None for the package above the rooms."""
     if parts[0] != "cosim":
         return parts[0]
-    if len(parts) < 3 or parts[-1] == "__init__":  # noqa: PLR2004  these have no code
+    if len(parts) < 3 or parts[-1] == "__init__":
         return None
-    return f"study/{parts[2]}" if parts[1] == "study" and len(parts) > 3 else parts[1]  # noqa: PLR2004
+    return f"study/{parts[2]}" if parts[1] == "study" and len(parts) > 3 else parts[1]
 
 
 def imported_rooms(path: Path) -> Iterator[str]:

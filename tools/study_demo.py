@@ -1,5 +1,5 @@
-"""`make study-demo`: a study of 500 runs killed twice and completed; the same uninterrupted, and on
-a Dask cluster: the same bytes.
+"""Shows that a study of 500 runs gives the same bytes when it is killed twice and resumed, when it
+runs uninterrupted, and when it runs on a Dask cluster (`make study-demo`).
 
 usage: python -m tools.study_demo FOLDER
 """
@@ -29,11 +29,11 @@ duration = 4.0
 friction.mu = [0.3, 0.45, 0.6, 0.75, 0.9]
 command.vx = { linspace = [4, 12, 5], unit = "cm/s" }
 """
-KILLED_AT = (100, 300)  # runs stored
+KILLED_AT = (100, 300)  # number of stored runs
 
 
 def main() -> int:
-    """Returns 0 when all three are the same."""
+    """Runs the three studies; returns 0 when their results are equal."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2
@@ -60,7 +60,7 @@ def main() -> int:
 
 
 def command(folder: Path, name: str, *more: str) -> list[str]:
-    """A study into a part of the folder."""
+    """Returns the command of a study that writes to folder/name."""
     return [
         sys.executable,
         "-m",
@@ -74,9 +74,7 @@ def command(folder: Path, name: str, *more: str) -> list[str]:
 
 
 def kill_at(folder: Path, least: int) -> None:
-    """Runs until so many runs are stored, then kills the program and its workers, who get no
-    chance to do anything.
-    """
+    """Runs the study until `least` runs are stored, then kills the program and its workers."""
     process = subprocess.Popen(
         command(folder, "killed"),
         start_new_session=True,
@@ -91,7 +89,7 @@ def kill_at(folder: Path, least: int) -> None:
 
 
 def stored(folder: Path) -> int:
-    """Runs in the parts of the study that is killed."""
+    """Returns the number of stored runs of the killed study."""
     return sum(
         pq.ParquetFile(path).metadata.num_rows
         for path in (folder / "killed" / "runs").glob("*.parquet")
@@ -99,7 +97,7 @@ def stored(folder: Path) -> int:
 
 
 def finish(folder: Path, name: str, *more: str) -> None:
-    """Runs a study to its end and says how long it took."""
+    """Runs a study to its end and prints how long it took."""
     begin = time.monotonic()
     done = subprocess.run(
         command(folder, name, "--json", *more), check=True, stdout=subprocess.PIPE
@@ -114,7 +112,7 @@ def finish(folder: Path, name: str, *more: str) -> None:
 
 @contextmanager
 def cluster(folder: Path) -> Iterator[str]:
-    """A Dask scheduler and two worker processes on loopback; the scheduler's address."""
+    """Starts a Dask scheduler and two workers on loopback; yields the scheduler's address."""
     file = (folder / "scheduler.json").resolve()
     common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
     starts = (

@@ -18,8 +18,8 @@ from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_p
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
-from tools.importers import late
-from tools.importers.compare import judged
+from tools.importers import delayed
+from tools.importers.compare import largest_difference
 from tools.importers.package import run
 
 ORDER = (PLANT, CONTROLLER)
@@ -74,8 +74,8 @@ def test_a_package_walks_as_the_python_master_does(
     setup: ControllerSetup, package: Path, plant: Path, is_late: bool
 ) -> None:
     names = [f"{PLANT}.{name}" for name in SEEN]
-    found = run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=not is_late)
-    expected = late.walk(setup, plant, duration=STEPS * PERIOD, overrides=[], late=is_late)
+    found = run(package, names, step=PERIOD, steps=STEPS, order=ORDER, in_order=not is_late)
+    expected = delayed.walk(setup, plant, duration=STEPS * PERIOD, overrides=[], late=is_late)
     scale = np.maximum(np.abs(expected.columns(SEEN)).max(axis=0), 1e-3)
     assert expected.column("LF.foot.contact").min() == 0.0
     assert np.abs(found.columns(names) - expected.columns(SEEN)).max(
@@ -85,11 +85,11 @@ def test_a_package_walks_as_the_python_master_does(
 
 def test_lateness_is_no_round_off(package: Path) -> None:
     names = [f"{PLANT}.{name}" for name in SEEN]
-    prompt, delayed = (
-        run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=once)
+    present, late = (
+        run(package, names, step=PERIOD, steps=STEPS, order=ORDER, in_order=once)
         for once in (True, False)
     )
-    assert judged(prompt, delayed)[0] > 1e3 * SAME
+    assert largest_difference(present, late)[0] > 1e3 * SAME
 
 
 def test_values_reach_the_parameter_sets(

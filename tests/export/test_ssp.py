@@ -157,7 +157,7 @@ def test_the_step_is_where_readers_look_for_it(package: Path) -> None:
 
 
 def test_a_controller_that_answers_at_once_holds_its_law_at_every_point(package: Path) -> None:
-    found = run(package, SEEN, step=STEP, steps=STEPS, order=ORDER, at_once=True)
+    found = run(package, SEEN, step=STEP, steps=STEPS, order=ORDER, in_order=True)
     angle, reference = found.column(SEEN[0]), found.column(SEEN[1])
     late = np.concatenate(
         [[math.nan], angle[:-1]]
@@ -171,7 +171,7 @@ def test_one_step_of_delay_is_seen_by_feedback_alone(fmus: dict[str, Path], tmp_
     def spread(gain: float) -> float:
         package = pack(tmp_path, fmus, gain=gain)
         both = [
-            run(package, SEEN[:1], step=STEP, steps=STEPS, order=ORDER, at_once=once).data
+            run(package, SEEN[:1], step=STEP, steps=STEPS, order=ORDER, in_order=once).data
             for once in (True, False)
         ]
         return float(np.abs(both[0] - both[1]).max())

@@ -69,7 +69,7 @@ def walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Walk:
 
 def importers(walk: Walk, *adapters: str, of: Sequence[str] = HERE) -> list[Row]:
     return [
-        compare.through(Importer(name, tuple(of), f"{name}.py", ""), walk, PYTHON)
+        compare.run_importer(Importer(name, tuple(of), f"{name}.py", ""), walk, PYTHON)
         for name in adapters
     ]
 
@@ -81,7 +81,7 @@ def tools(walk: Walk, *adapters: str, of: Sequence[str] = HERE) -> list[PackageR
         [PYTHON, walk.folder / f"{name}.py", none, walk.inputs, none, outputs] for name in adapters
     ]
     return [
-        packages.through(name, of, command, outputs, masters, ["x"])
+        packages.run_tool(name, of, command, outputs, masters, ["x"])
         for name, command in zip(adapters, commands, strict=True)
     ]
 
@@ -131,7 +131,7 @@ def test_what_could_not_be_installed_passes_with_a_remark(walk: Walk) -> None:
         )
         == 0
     )
-    without_rust = compare.through(
+    without_rust = compare.run_importer(
         Importer("crashes", (), "crashes.py", ""),
         walk,
         PYTHON,

@@ -16,7 +16,7 @@ import pytest
 
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_csv, write_csv
-from tools.importers.compare import ROUND_OFF, judged
+from tools.importers.compare import ROUND_OFF, largest_difference
 from tools.importers.walk import STEP, Walk, record
 
 DURATION = 0.6  # s    the ramp, a lift-off and a touch-down
@@ -76,7 +76,7 @@ def test_the_recorded_walk_lifts_and_sets_down_feet(walk: Walk) -> None:
 
 
 def test_our_master_and_fmpy_see_the_same_walk(walk: Walk) -> None:
-    assert judged(walk.recorded, walk.reference)[0] <= ROUND_OFF
+    assert largest_difference(walk.recorded, walk.reference)[0] <= ROUND_OFF
 
 
 def test_fmpy_told_our_masters_times_gives_every_bit(walk: Walk) -> None:
@@ -93,14 +93,14 @@ def test_a_command_one_step_late_is_no_round_off(walk: Walk) -> None:
     delayed = dataclasses.replace(walk, inputs=folder / "inputs.csv")
     write_csv(Recording(commands.names, late), delayed.inputs)
     found = delayed.replay(walk.recorded.time, np.full(len(walk.recorded.time), STEP))
-    assert judged(found, walk.reference)[0] > 1e6 * ROUND_OFF
+    assert largest_difference(found, walk.reference)[0] > 1e6 * ROUND_OFF
 
 
 def test_missing_rows_and_values_that_are_none_do_not_agree(walk: Walk) -> None:
     holed = walk.reference.data.copy()
     holed[3, 5] = np.nan
-    assert judged(Recording(walk.reference.names, holed), walk.reference)[0] > ROUND_OFF
-    assert judged(walk.reference.rows(slice(1, None)), walk.reference)[0] == np.inf
+    assert largest_difference(Recording(walk.reference.names, holed), walk.reference)[0] > ROUND_OFF
+    assert largest_difference(walk.reference.rows(slice(1, None)), walk.reference)[0] == np.inf
 
 
 def test_the_c_importer_walks_as_fmpy_does(walk: Walk, importer: Path, tmp_path: Path) -> None:
