@@ -24,7 +24,7 @@ CALL = re.compile(r"\b(hx_\w+)\b")
 
 
 def defined_in() -> dict[str, str]:
-    """The file that defines each function."""
+    """Returns the file that defines each function."""
     return {
         function: name
         for name in LAYER_OF

@@ -1,4 +1,4 @@
-"""interface.toml: the contract's names, and nothing in the repository that contradicts it."""
+"""interface.toml: it contains the agreed names, and generated files agree with it."""
 
 from __future__ import annotations
 
@@ -114,9 +114,7 @@ def test_no_two_variables_share_a_field_and_each_is_named_after_its_own() -> Non
         ] == [], variable.name
 
 
-def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nominal_that_is_not_zero() -> (
-    None
-):
+def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nonzero_nominal() -> None:
     for variable in ATHENA.variables:
         assert variable.description, variable.name
         if variable.type == "Real":
@@ -133,7 +131,7 @@ def test_start_values_are_those_of_the_robot() -> None:
     assert ATHENA.variable("contact.law").start == 1
 
 
-def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+def test_an_unknown_name_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(HexapodError, match=r"LF\.coxa\.angle_ref"):
         ATHENA.references(["LF.coxa.angel_ref"])
 
@@ -147,7 +145,7 @@ def test_a_robot_that_does_not_fit_its_variables_is_refused() -> None:
         load_interface(impossible)
 
 
-def test_the_guid_follows_every_number_of_the_robot() -> None:
+def test_the_guid_depends_on_every_number_of_the_robot() -> None:
     robot = load_robot("athena")
     heavier = dataclasses.replace(
         robot, torso=dataclasses.replace(robot.torso, mass=robot.torso.mass * (1 + 1e-15))
@@ -157,7 +155,7 @@ def test_the_guid_follows_every_number_of_the_robot() -> None:
     assert render_fmi2(load_interface(load_robot("athena"))).guid == GUID
 
 
-def test_the_guid_follows_every_unit_and_description() -> None:
+def test_the_guid_depends_on_every_unit_and_description() -> None:
     for change in ({"unit": "g"}, {"description": "other"}, {"maximum": 9.0}, {"reference": 9999}):
         first = dataclasses.replace(ATHENA.variables[0], **change)
         changed = dataclasses.replace(ATHENA, variables=(first, *ATHENA.variables[1:]))
@@ -170,7 +168,9 @@ def test_generated_files_are_what_the_generator_makes() -> None:
     assert process.returncode == 0, process.stdout + process.stderr
 
 
-def test_a_stale_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_not_up_to_date_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     generator = load_generator()
     monkeypatch.setattr(generator, "ROOT", tmp_path)
     for path, text in generator.stale_files().items():
@@ -185,7 +185,7 @@ def test_a_stale_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         changed.write_text(kept, encoding="utf-8")
 
 
-def test_the_model_description_tells_what_the_interface_says(athena_fmu: Path) -> None:
+def test_the_model_description_agrees_with_the_interface(athena_fmu: Path) -> None:
     description = fmpy.read_model_description(str(athena_fmu))
     assert description.guid == GUID
     for variable, told in zip(ATHENA.variables, description.modelVariables, strict=True):

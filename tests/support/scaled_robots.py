@@ -12,9 +12,9 @@ from hexapod_cosim.models.records import Leg, Link, Vector3, Vector6
 
 
 def scaled_robot(robot: Robot, by: float) -> Robot:
-    """Its motion is the robot's, with times sqrt(by) times as long.
+    """Returns a robot whose motion is similar, with times multiplied by sqrt(by).
 
-    Forces go with by^3, torques with by^4, moduli of elasticity with by.
+    Forces are multiplied by by^3, torques by by^4, moduli of elasticity by by.
     """
     time = by**0.5
 

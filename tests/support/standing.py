@@ -1,4 +1,4 @@
-"""The force laws of a robot that is planned to stand in its stance, on all legs or some."""
+"""The force laws of a robot that stands in its stance on all legs or some."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WEIGHT = weight(ROBOT)  # N
 GAINS = make_gains(ROBOT)
 HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 ALL = "111111"
-RAISED = 0.03  # m    a foot in mid-swing: beyond doubt in the air
+RAISED = 0.03  # m    height of a foot in mid-swing
 
 
 @cache
@@ -29,7 +29,7 @@ def rest(robot: Robot) -> Demand:
 def make_laws(
     robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None
 ) -> Compliance:
-    """The laws at rest, with no plan yet."""
+    """Returns the laws at rest, without a plan."""
     gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
     return Compliance(
         gains,
@@ -51,8 +51,8 @@ def plan(
     height: float = RAISED,
     rise: float = 0.0,
 ) -> None:
-    """Lays out steps in which these legs stand and the others are in the air, so high [m] and
-    rising so fast [m/s].
+    """Plans steps in which these legs stand and the others are in the air, at a height [m] and a
+    vertical speed [m/s].
     """
     still = rest(robot)
     demand = Demand(
@@ -78,12 +78,12 @@ def plan(
 
 
 def shared(laws: Compliance) -> np.ndarray:
-    """(6, 4) the planned forces."""
+    """Returns the planned forces, shape (6, 4)."""
     return np.asarray(laws._plan.shares.forces(0))
 
 
 def squeezing(size: float = 2.0) -> np.ndarray:
-    """(6, 4) all feet carry alike, the middle ones are pushed apart."""
+    """Returns forces (6, 4): equal loads on all feet, the middle ones pushed apart."""
     force = np.zeros((6, 4))
     force[:, 2] = WEIGHT / 6.0
     force[1, 1], force[4, 1] = size, -size
@@ -99,7 +99,7 @@ def run(
     standing: str = ALL,
     height: float = RAISED,
 ) -> None:
-    """Plans and takes so many steps under the same forces."""
+    """Plans and takes a number of steps under the same forces."""
     plan(laws, steps, robot=robot, standing=standing, height=height)
     for _ in range(steps):
         laws.step(force)
