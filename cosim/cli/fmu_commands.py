@@ -19,6 +19,23 @@ from hexapod_cosim.cosim.export.robot_package import SUFFIX as PACKAGE_SUFFIX
 from hexapod_cosim.cosim.validate.validation import find_problems
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
 
+MacroStep = Annotated[
+    float, typer.Option("--period", "--macro-step", help="Period of the controller [s].")
+]
+RequirementSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="REQUIREMENT=VALUE",
+        help="Ask for something else (phase_margin=50).",
+        autocompletion=completion.requirement,
+    ),
+]
+DesignFolder = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/design."),
+]
+
 
 class InvalidFmuError(FmuError):
     """An FMU with problems.
@@ -67,22 +84,9 @@ def validate(
 
 def design(
     robot: RobotName = "athena",
-    macro_step: Annotated[
-        float, typer.Option("--period", "--macro-step", help="Period of the controller [s].")
-    ] = DEFAULT_PERIOD,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="REQUIREMENT=VALUE",
-            help="Ask for something else (phase_margin=50).",
-            autocompletion=completion.requirement,
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="DIR", help="Where to write; default out/design."),
-    ] = None,
+    macro_step: MacroStep = DEFAULT_PERIOD,
+    settings: RequirementSettings = None,
+    output: DesignFolder = None,
     json: Json = False,
 ) -> None:
     """Design the gains of the compliant control, with plots."""
@@ -100,21 +104,20 @@ def design(
     deviation = check_design(loaded, gains).error
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files = [
-            save_gains(gains, folder / "gains.toml"),
-            *plot_design(loaded, gains, plants, folder),
-        ]
+        gains_file = save_gains(gains, folder / "gains.toml")
+        files = [gains_file, *plot_design(loaded, gains, plants, folder)]
     except OSError as error:
         raise not_writable(folder, error) from error
     if json:
-        show_json(
-            {
-                "gains": asdict(gains),
-                "check_error": deviation,
-                "files": [str(file) for file in files],
-            }
-        )
-        return
+        names = [str(file) for file in files]
+        show_json({"gains": asdict(gains), "check_error": deviation, "files": names})
+    else:
+        _show_design(gains, deviation)
+        show_files(files)
+
+
+def _show_design(gains: Gains, deviation: float) -> None:
+    """Prints requirements and margins; deviation: of the FMU from the linear loop, relative."""
     show_table(["requirement", "asked", "reached"], design_rows(gains), right=(1, 2))
     show_text(f"binding: {gains.margins.binding}")
     for text in gains.caveats:
@@ -123,7 +126,6 @@ def design(
         "a small squeeze in the non-linear FMU goes as the linear loop predicts, "
         f"to {100.0 * deviation:.2g} % of its peak"
     )
-    show_files(files)
 
 
 def design_rows(gains: Gains) -> list[tuple[str, str, str]]:

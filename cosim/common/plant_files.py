@@ -27,22 +27,22 @@ BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both nee
 # values of platform.machine() in lower case
 X86 = {"x86_64", "amd64", "i386", "i486", "i586", "i686", "x86"}
 
-_HERE = Path(__file__).resolve().parents[1]
-_TREE = _HERE.parent / "plant_fmu"
-_INSTALLED = _HERE.parent / "plant"
+_COSIM = Path(__file__).resolve().parents[1]
+_PLANT_TREE = _COSIM.parent / "plant_fmu"
+_INSTALLED = _COSIM.parent / "plant"
 
 
 def in_source_tree() -> bool:
     """Returns whether this package runs from a source tree: an editable install, or build/typing
     on the path.
     """
-    return (_TREE / "interface.toml").is_file()
+    return (_PLANT_TREE / "interface.toml").is_file()
 
 
 def interface_file(component: Component = PLANT) -> Path:
     """Returns the path of a component's interface.toml."""
     return (
-        _HERE.parent
+        _COSIM.parent
         / (component.tree if in_source_tree() else component.installed)
         / "interface.toml"
     )
@@ -55,9 +55,9 @@ def package_version() -> str:
     be older.
     """
     if in_source_tree():
-        project = tomllib.loads((_TREE.parent / "pyproject.toml").read_text(encoding="utf-8"))[
-            "project"
-        ]
+        project = tomllib.loads(
+            (_PLANT_TREE.parent / "pyproject.toml").read_text(encoding="utf-8")
+        )["project"]
         return str(project["version"])
     return metadata.version(DISTRIBUTION)
 
@@ -68,10 +68,10 @@ def code_hash() -> str:
     and co-simulation loop.
     """
     digest = hashlib.sha256()
-    for folder in (_HERE, _HERE.parent / "controller", _HERE.parent / "models"):
+    for folder in (_COSIM, _COSIM.parent / "controller", _COSIM.parent / "models"):
         for path in sorted([*folder.rglob("*.py"), *folder.glob("*.toml")]):
             digest.update(
-                path.relative_to(_HERE.parent).as_posix().encode()
+                path.relative_to(_COSIM.parent).as_posix().encode()
                 + hashlib.sha256(path.read_bytes()).digest()
             )
     digest.update(shared_library(LOOP).read_bytes())
@@ -91,9 +91,9 @@ def source_files(component: Component = PLANT) -> dict[str, Path]:
 
 def _own_sources(component: Component) -> dict[str, Path]:
     root = (
-        _HERE.parent / component.tree
+        _COSIM.parent / component.tree
         if in_source_tree()
-        else _HERE.parent / component.installed / "sources"
+        else _COSIM.parent / component.installed / "sources"
     )
     headers = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
     found = (
@@ -106,7 +106,7 @@ def _own_sources(component: Component) -> dict[str, Path]:
 
 def _fmi_folder() -> Path:
     """Returns the folder of the FMI layer, which all components share."""
-    return _TREE.parent / "fmi" if in_source_tree() else _INSTALLED / "sources" / "fmi"
+    return _PLANT_TREE.parent / "fmi" if in_source_tree() else _INSTALLED / "sources" / "fmi"
 
 
 def _sources_in(name: str, folder: Path) -> dict[str, Path]:
@@ -126,7 +126,7 @@ def _is_shared(name: str) -> bool:
 
 def licence_file() -> Path:
     """Returns the path of the licence."""
-    return _TREE.parent / "LICENSE" if in_source_tree() else _INSTALLED / "LICENSE"
+    return _PLANT_TREE.parent / "LICENSE" if in_source_tree() else _INSTALLED / "LICENSE"
 
 
 def fmi_headers() -> Path:
@@ -253,5 +253,5 @@ def plant_folders() -> list[Path]:
     if not in_source_tree():
         return [_INSTALLED]
     return [Path(entry) / "hexapod_cosim" / "plant" for entry in sys.path] + [
-        _TREE.parent / "build" / "plant"
+        _PLANT_TREE.parent / "build" / "plant"
     ]
