@@ -82,7 +82,7 @@ test-platforms: setup
 
 test-endurance: setup
 	$(BIN)/python -m pytest -q tests/fmi/test_endurance.py
-	$(BIN)/python tests/fmi/endurance.py build/test/plant_fmu/hexapod.[sd]*
+	PYTHONPATH=tests/support $(BIN)/python tests/fmi/endurance.py build/test/plant_fmu/hexapod.[sd]*
 
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py

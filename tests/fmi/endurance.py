@@ -1,7 +1,7 @@
 """Trials with many instances, libraries, threads and steps. Each prints its figures and exits with
 1 if they are bad.
 
-usage: python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
+usage: PYTHONPATH=tests/support python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
 
 Without a trial all of them run at full length, as in `make test-endurance`. test_endurance.py runs
 short ones, each in its own process.
@@ -28,8 +28,8 @@ from memory import resident
 from hexapod_cosim.cosim.export.export import start_values
 
 H = 0.005  # s
-ALLOWED_GROWTH = 1_000_000  # bytes: 1 % of the memory of 10,000 instances would be twice that
-FORGOTTEN = 100  # of the first calls, which fill the allocator's and Python's stores
+ALLOWED_GROWTH = 1_000_000  # bytes, half a percent of the memory of 10,000 instances
+WARM_UP = 100  # first calls, in which the allocator and Python reserve memory
 MAPS, OPEN_FILES = Path("/proc/self/maps"), Path("/proc/self/fd")
 
 Figures = dict[str, float]
@@ -43,7 +43,7 @@ def growth(action: Callable[[], object], count: int) -> Figures:
     """Repeats an action; returns the memory and open files that it leaks and the time of one
     repetition.
     """
-    for _ in range(FORGOTTEN):
+    for _ in range(WARM_UP):
         action()
     memory, files, begin = resident(), open_files(), time.perf_counter()
     for _ in range(count):

@@ -1,6 +1,6 @@
 """Random calls, legal and illegal, compared with a model of the standard's state machine.
 
-usage: python tests/fmi/fuzz.py LIBRARY SEED CALLS
+usage: PYTHONPATH=tests/support python tests/fmi/fuzz.py LIBRARY SEED CALLS
 
 After each call the status must be one that the model allows, a refused call must not have changed
 the state, and a reset instance must equal a new one. Exits with 1 and the last calls otherwise.

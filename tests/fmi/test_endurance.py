@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,13 +11,21 @@ import pytest
 
 SHORT = {"instances": 500, "libraries": 200, "threads": 20, "states": 500, "clock": 5000}
 SCRIPTS = Path(__file__).parent
+SUPPORT = SCRIPTS.parent / "support"  # modules that the scripts import
 TIMEOUT = 600  # s, much longer than any trial; ends calls that hang
 
 
 def outcome(script: str, *arguments: str) -> str:
     """Returns the output of a script; fails with its last lines unless it exits with 0."""
     command = [sys.executable, str(SCRIPTS / script), *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT)
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT,
+        env=os.environ | {"PYTHONPATH": str(SUPPORT)},
+    )
     assert done.returncode == 0, (
         f"exit code {done.returncode}\n{done.stdout[-1000:]}{done.stderr[-3000:]}"
     )
