@@ -25,8 +25,7 @@ void hx_component_defaults(struct hxVariables *variables);
  * bytes). */
 hxStatus hx_component_check(const struct hxVariables *variables, char *message);
 
-/* Resets to the start at time t [s], as the definition says; on failure changes the message only.
- */
+/* Resets to the start of the definition at time t [s]; on failure changes the message only. */
 hxStatus hx_component_reset(hxComponent *component, const struct hxVariables *variables, double t);
 
 /* Steps to t_end [s] exactly, under the input, which changes at a rate [1/s] (NULL: is constant);

@@ -434,7 +434,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
   return no_status(enter(c, GET_STATUS), s);
 }
 
-/* the plant never asks to end the simulation */
+/* The FMU never requests the end of the simulation. */
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
   fmi2Instance *instance = enter(c, GET_STATUS);
   if (!instance || !value || s != fmi2Terminated) return no_status(instance, s);

@@ -217,7 +217,7 @@ static int read_variable(struct hxVariables *variables, const hxVariable *variab
 
 static hxStatus refuse(hxInstance *instance, const hxReader *reader, const char *got,
                        const char *expected) {
-  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew",
+  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU again",
          file_name, reader->number, got ? got : "the end of the file", expected);
   return HX_INVALID_ARGUMENT;
 }
@@ -260,7 +260,7 @@ static hxStatus check_start(hxInstance *instance, const struct hxVariables *vari
   char message[HX_MESSAGE_SIZE];
   const hxStatus status = hx_component_check(variables, message);
   if (status != HX_OK)
-    hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU anew", file_name,
+    hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU again", file_name,
            message);
   return status;
 }

@@ -52,6 +52,7 @@ def build_editable(
 
 
 def _node(config_settings: Settings) -> list[str]:
+    """Returns the requirement of Node.js, if the viewer must be built without npm."""
     wanted = str((config_settings or {}).get(OPTION, "ON")).upper() not in OFF
     if not wanted or build_viewer.is_current():
         return []

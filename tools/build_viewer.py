@@ -92,6 +92,7 @@ def bundled_packages() -> list[Path]:
 
 
 def _package_section(folder: Path) -> str:
+    """Returns the licences of an npm package. Raises ViewerError without one."""
     about = json.loads((folder / "package.json").read_text(encoding="utf-8"))
     files = sorted(
         path for path in folder.iterdir() if path.is_file() and LICENCE_FILES.fullmatch(path.name)
@@ -102,6 +103,7 @@ def _package_section(folder: Path) -> str:
 
 
 def _section(title: str, files: list[Path]) -> str:
+    """Returns the texts of licence files under a title."""
     return "\n\n".join(
         [f"---- {title} ----", *(path.read_text(encoding="utf-8").strip() for path in files)]
     )
@@ -212,10 +214,12 @@ def node_version(node: str) -> int:
 
 
 def _stamp(path: Path) -> Path:
+    """Returns the file that holds a file's hash."""
     return path.with_suffix(".sha256")
 
 
 def _read(path: Path) -> str:
+    """Returns a file's text; "" without the file."""
     return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 

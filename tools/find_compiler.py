@@ -94,6 +94,7 @@ def _candidates() -> list[list[str]]:
 
 
 def _visual_studio() -> bool:
+    """Returns whether Visual Studio is installed."""
     return sys.platform == "win32" and any(
         (Path(os.environ[name]) / VSWHERE).is_file()
         for name in ("ProgramFiles(x86)", "ProgramFiles")

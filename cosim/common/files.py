@@ -67,6 +67,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def _umask() -> int:
+    """Returns the process's file mode creation mask."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
@@ -99,6 +100,7 @@ def to_json(content: Any) -> str:
 
 
 def _finite(value: Any) -> Any:
+    """Replaces NaN and infinities in nested values by None."""
     if isinstance(value, Mapping):
         return {str(key): _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -175,6 +177,7 @@ def clear_folder(folder: Path) -> None:
 
 
 def _remove(path: Path) -> None:
+    """Deletes a file or folder, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

@@ -90,6 +90,7 @@ def source_files(component: Component = PLANT) -> dict[str, Path]:
 
 
 def _own_sources(component: Component) -> dict[str, Path]:
+    """Returns the sources in the component's own folder."""
     root = (
         _COSIM.parent / component.tree
         if in_source_tree()

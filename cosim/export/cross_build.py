@@ -146,6 +146,7 @@ def user_cache() -> Path:
 
 
 def _flags(library: Library, target: str) -> tuple[str, ...]:
+    """Returns the flags of compiler and linker for a target."""
     chosen = TARGETS[target]
     link = (
         (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",)
@@ -181,6 +182,7 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
 
 
 def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) -> None:
+    """Runs the compiler. Raises FmuError when it fails or exceeds TIMEOUT."""
     environment = compiler_environment(root, cache_folder)
     try:
         process = subprocess.run(
@@ -206,7 +208,7 @@ def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) ->
             "\n".join(process.stderr.splitlines()[:SHOWN_LINES])
             or f"exit code {process.returncode}"
         )
-        fix = "correct the sources, or install the compiler anew if it is damaged"
+        fix = "correct the sources, or reinstall the compiler if it is damaged"
         raise FmuError(
             f"cannot build for {target}", got=messages, expected="sources that compile", fix=fix
         )
@@ -250,8 +252,10 @@ def _verified(data: bytes) -> bytes:
 
 
 def _headers(folder: Path) -> list[Path]:
+    """Returns the headers in a folder, sorted."""
     return sorted(folder.glob("*.h"))
 
 
 def _digest(parts: Sequence[str]) -> str:
+    """Returns a hash of texts."""
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

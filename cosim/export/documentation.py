@@ -116,6 +116,7 @@ def _capabilities(root: Element) -> list[Row]:
 
 
 def _words(value: str | None) -> str:
+    """Returns the text of a flag."""
     return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
 
 
@@ -137,6 +138,7 @@ def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> lis
 
 
 def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Interface) -> Row:
+    """Returns the table row of variables that share a description."""
     first = variables[0]
     display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(
         first.unit or "", ""
@@ -168,6 +170,7 @@ def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]
 
 
 def _range(variable: Variable) -> str:
+    """Returns the text of a range; "" without limits."""
     if variable.minimum is None and variable.maximum is None:
         return ""
     low, high = (

@@ -130,6 +130,7 @@ def start_values(interface: Interface, guid: str) -> str:
 
 
 def _start_line(variable: Variable) -> str:
+    """Returns the line "reference value name"; Reals are hexadecimal, so exact."""
     value = (
         float(variable.start or 0.0).hex()
         if variable.type == "Real"
@@ -165,6 +166,7 @@ def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
 
 
 def _member(name: str) -> zipfile.ZipInfo:
+    """Returns the ZIP entry of a path."""
     info = zipfile.ZipInfo(name, TIMESTAMP)
     info.compress_type = zipfile.ZIP_DEFLATED
     info.create_system = 3  # Unix, wherever it is packed

@@ -53,4 +53,5 @@ def _processor(data: bytes) -> tuple[int, int]:
 
 
 def _aligned(offset: int) -> int:
+    """Rounds an offset up to the alignment of slices."""
     return -(-offset >> PAGE_BITS) << PAGE_BITS

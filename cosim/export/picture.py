@@ -76,9 +76,11 @@ class Capsule:
 
     @property
     def _square(self) -> float:
+        """The squared length of the axis [m^2]; 1 for a sphere."""
         return float(np.sum((self.end - self.start) ** 2)) or 1.0
 
     def _from_axis(self, point: Points, share: Array) -> Points:
+        """Returns the vectors from the axis to points; share: position along the axis, 0 to 1."""
         return (
             point - _column(self.start) - _column(self.end - self.start) * np.clip(share, 0.0, 1.0)
         )
@@ -129,10 +131,12 @@ Shape = Box | Capsule
 
 
 def _column(vector: Array) -> Points:
+    """Reshapes a vector (3,) to (3, 1, 1)."""
     return vector[:, None, None]
 
 
 def _sphere(x: Array, y: Array, centre: Array, radius: float) -> Array:
+    """Returns the height z at which rays meet a sphere; -inf where they miss it."""
     square = radius**2 - (x - centre[0]) ** 2 - (y - centre[1]) ** 2
     return np.where(square > 0.0, centre[2] + np.sqrt(np.fmax(square, 0.0)), -np.inf)
 

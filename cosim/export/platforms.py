@@ -111,8 +111,10 @@ def _thread_pool(count: int) -> Iterator[ThreadPoolExecutor]:
 
 
 def _member(library: Library, folder: str, targets: tuple[str, ...]) -> str:
+    """Returns the path of a library in the FMU."""
     return f"binaries/{folder}/{library.name}{TARGETS[targets[0]].suffix}"
 
 
 def _joined(parts: list[bytes]) -> bytes:
+    """Joins the binaries of one folder to one file."""
     return parts[0] if len(parts) == 1 else join_mach_o(parts)

@@ -79,6 +79,7 @@ def _inputs(interface: Interface, time: float) -> tuple[float, ...]:
 def _run(
     fmu: Path, names: Sequence[str], inputs: Sequence[Sequence[float]]
 ) -> list[tuple[float, ...]]:
+    """Runs the FMU under inputs; returns time and outputs at each communication point."""
     with Fmu(fmu, name="reference") as plant:
         plant.initialise(0.0, STEPS * STEP)
         given, seen = plant.block(names), plant.block(OUTPUTS)
@@ -94,6 +95,7 @@ def _run(
 
 
 def _csv(header: Iterable[str], rows: Iterable[Sequence[float]]) -> bytes:
+    """Formats a header and rows of numbers as CSV."""
     lines = [",".join(f'"{name}"' for name in header)]
     lines += [",".join(f"{value + 0.0:.{DIGITS}g}" for value in row) for row in rows]
     return ("\n".join(lines) + "\n").encode()

@@ -257,6 +257,7 @@ def _range(variable: Any) -> tuple[float, float]:
 
 
 def _heading(name: str, *prefixes: str) -> dict[str, str]:
+    """Returns the attributes of a root element."""
     facts = {
         "version": VERSION,
         "name": name,
@@ -266,10 +267,12 @@ def _heading(name: str, *prefixes: str) -> dict[str, str]:
 
 
 def _values_file(component: Component) -> str:
+    """Returns the path of a component's parameter set in the package."""
     return f"resources/{component.name}.ssv"
 
 
 def _add_component(parent: Element, component: Component) -> None:
+    """Adds a component with its connectors and parameter set."""
     facts = {
         "name": component.name,
         "type": "application/x-fmu-sharedlibrary",
@@ -292,6 +295,7 @@ def _add_component(parent: Element, component: Component) -> None:
 
 
 def _described(variable: Any) -> dict[str, str]:
+    """Returns the name and description of a variable as attributes."""
     text = {"description": variable.description} if variable.description else {}
     return {"name": variable.name} | text
 
@@ -354,6 +358,7 @@ def _add_experiment(root: Element, experiment: Experiment) -> None:
 
 
 def _text(root: Element) -> bytes:
+    """Formats a document."""
     ElementTree.indent(root)
     return (
         b'<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -258,6 +258,7 @@ def plant_roots(robot: Robot) -> SimpleNamespace:
 
 
 def _settled_pose(robot: Robot) -> SimpleNamespace:
+    """Returns position, quaternion and angles of the robot at rest on the ground, rounded."""
     position, quaternion, angle = settled(robot)
     return SimpleNamespace(
         position=_rounded(position),
@@ -267,15 +268,18 @@ def _settled_pose(robot: Robot) -> SimpleNamespace:
 
 
 def _rounded(values: Iterable[float]) -> list[float]:
+    """Rounds numbers to POSE_DECIMALS."""
     return [round(float(value), POSE_DECIMALS) + 0.0 for value in values]
 
 
 def _enumeration(name: str, entry: Mapping[str, str]) -> Enumeration:
+    """Returns the enumeration type of an entry of interface.toml."""
     items = tuple((item, text) for item, text in entry.items() if item != "prefix")
     return Enumeration(name=name, prefix=entry["prefix"], items=items)
 
 
 def _unit(name: str, entry: Any) -> Unit:
+    """Returns the unit of an entry of interface.toml."""
     if isinstance(entry, str):
         return Unit(name=name, exponents=None, display=None)
     display = (
@@ -290,6 +294,7 @@ def _unit(name: str, entry: Any) -> Unit:
 def _pattern(
     entry: Mapping[str, Any], causality: Causality, axes: Mapping[str, list[str]]
 ) -> Pattern:
+    """Returns the pattern of an entry of interface.toml."""
     own = tuple((axis, tuple(labels)) for axis, labels in own_axes(entry, axes).items())
     kind = entry.get("unit", entry.get("type", ""))
     return Pattern(
@@ -304,6 +309,7 @@ def _pattern(
 def _expand_all(
     table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace
 ) -> Iterable[Variable]:
+    """Yields all variables by causality, in the order of interface.toml."""
     for causality in CAUSALITIES:
         places = itertools.chain.from_iterable(
             expand(entry, table["axis"]) for entry in table.get(causality, [])
@@ -323,6 +329,7 @@ def _variable(
     roots: SimpleNamespace,
     table: Mapping[str, Any],
 ) -> Variable:
+    """Returns the variable of an entry at one combination of its axes."""
     labels = {axis: label for axis, (_, label) in place.items()}
     enumeration = enumerations.get(entry.get("type", ""))
     kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
@@ -353,6 +360,7 @@ def _variable(
 
 
 def _states(table: Mapping[str, Any]) -> Iterable[State]:
+    """Yields the continuous states."""
     for entry in table.get("state", []):
         for _, place in expand(entry, table["axis"]):
             labels = {axis: label for axis, (_, label) in place.items()}
@@ -371,6 +379,7 @@ def _start(
     enumeration: Enumeration | None,
     roots: SimpleNamespace,
 ) -> float | int | None:
+    """Returns a start value: a constant, or the value at a path such as robot.torso.mass."""
     if not isinstance(given, str):
         return given
     value: Any = roots

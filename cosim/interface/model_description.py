@@ -50,6 +50,7 @@ def render_fmi2(interface: Interface) -> ModelDescription:
 
 
 def _document(interface: Interface) -> Element:
+    """Returns the document with an empty GUID."""
     own = {
         "fmiVersion": "2.0",
         "guid": "",
@@ -92,10 +93,12 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
 
 
 def _flag(value: bool) -> str:
+    """Formats a Boolean."""
     return "true" if value else "false"
 
 
 def _add_sources(element: Element, component: Component) -> None:
+    """Adds the list of the component's C files."""
     files = SubElement(element, "SourceFiles")
     for name in source_files(component):
         if name.endswith(".c") and name != FMI3_SOURCE:
@@ -139,6 +142,7 @@ def add_units(root: Element, units: Iterable[Unit]) -> None:
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
+    """Adds the types of units and enumerations."""
     parent = SubElement(root, "TypeDefinitions")
     for unit in units:
         _add_real_type(parent, unit)
@@ -149,6 +153,7 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
 
 
 def _add_real_type(parent: Element, unit: Unit) -> None:
+    """Adds the type of a unit."""
     if unit.type is not None:
         display = {"displayUnit": unit.display[0]} if unit.display else {}
         SubElement(
@@ -159,11 +164,13 @@ def _add_real_type(parent: Element, unit: Unit) -> None:
 
 
 def _add_provenance(root: Element, interface: Interface) -> None:
+    """Adds the robot's name and hash."""
     tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=DISTRIBUTION)
     SubElement(tool, "Robot", name=interface.robot.name, hash=interface.robot.hash)
 
 
 def _add_variable(parent: Element, variable: Variable, interface: Interface) -> None:
+    """Adds a variable."""
     element = SubElement(
         parent,
         "ScalarVariable",

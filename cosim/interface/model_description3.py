@@ -95,6 +95,7 @@ def render_build_description(component: Component, sources: Iterable[str]) -> st
 
 
 def _document(root: Element) -> str:
+    """Formats a document."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
@@ -116,6 +117,7 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
+    """Adds the types of enumerations and units."""
     parent = SubElement(root, "TypeDefinitions")
     for enumeration in enumerations:
         element = SubElement(parent, "EnumerationType", name=enumeration.name)
@@ -132,6 +134,7 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
 
 
 def _add_variables(root: Element, interface: Interface, variables: Iterable[Array]) -> None:
+    """Adds time and all variables."""
     parent = SubElement(root, "ModelVariables")
     reference = str(interface.first_reference["independent"])
     SubElement(
@@ -160,6 +163,7 @@ def _references(variables: Iterable[Array]) -> dict[str, int]:
 def _add_variable(
     parent: Element, array: Array, interface: Interface, derivative_of: int | None
 ) -> None:
+    """Adds a variable; derivative_of: value reference of its state."""
     first = array.first
     displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
     types = {unit.name: unit.type for unit in interface.units}
@@ -245,6 +249,7 @@ def _knowns(
 def _add_unknown(
     structure: Element, title: str, array: Array, knowns: Iterable[int] | None
 ) -> None:
+    """Adds an unknown. Without stated dependencies it depends on all knowns."""
     attributes = {"valueReference": str(array.reference)}
     if knowns is not None:
         attributes["dependencies"] = " ".join(map(str, knowns))
@@ -252,5 +257,6 @@ def _add_unknown(
 
 
 def _add_provenance(root: Element, interface: Interface) -> None:
+    """Adds the robot's name and hash."""
     annotation = SubElement(SubElement(root, "Annotations"), "Annotation", type=DISTRIBUTION)
     SubElement(annotation, "Robot", name=interface.robot.name, hash=interface.robot.hash)

@@ -34,6 +34,7 @@ def parameter_values(component: Component, roots: SimpleNamespace) -> dict[str, 
 def _value(
     roots: SimpleNamespace, path: tuple[Step, ...], enumeration: Enumeration | None
 ) -> float:
+    """Returns the value at a path from the roots."""
     value: Any = roots
     for step in path:
         value = getattr(value, step) if isinstance(step, str) else value[step]
@@ -49,6 +50,7 @@ def _rows(component: Component) -> tuple[Row, ...]:
 
 
 def _parameters(component: Component) -> Iterator[Row]:
+    """Yields the parameters of interface.toml that have a start value."""
     table, enumerations = read_table(component), enumerations_of(component)
     for entry in table.get("parameter", []):
         given = entry.get("start")
@@ -62,5 +64,6 @@ def _parameters(component: Component) -> Iterator[Row]:
 
 
 def _path(given: str, place: Any) -> Iterator[Step]:
+    """Yields the steps of a path such as robot.legs[leg].hip_yaw."""
     for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
         yield attribute or (place[axis][0] if axis in place else int(axis))

@@ -105,12 +105,14 @@ def _document() -> tuple[Element, Element]:
 
 
 def _text(root: Element) -> str:
+    """Formats the document."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
 def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
+    """Adds the terminals of a leg."""
     terminal = _add(parent, leg, f"leg {leg}")
     for name, text, quantities in LEGS:
         members = [f"{joint}.{quantity}" for joint in JOINT_NAMES for quantity in quantities]

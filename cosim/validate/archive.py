@@ -166,6 +166,7 @@ def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
 
 
 def _includes(text: bytes) -> list[str]:
+    """Returns the names in quotes that a source includes."""
     return [
         include.decode()
         for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
@@ -173,6 +174,7 @@ def _includes(text: bytes) -> list[str]:
 
 
 def _is_there(include: str, name: str, present: Iterable[str]) -> bool:
+    """Returns whether an included file is among the sources."""
     return include in present or posixpath.normpath(PurePosixPath(name).parent / include) in present
 
 

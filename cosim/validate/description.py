@@ -71,6 +71,7 @@ def _structure_problems(root: Element) -> Iterator[str]:
 
 
 def _unknown_problems(section: str, unknown: Element, ordered: list[Element]) -> Iterator[str]:
+    """Yields the problems of one entry of ModelStructure."""
     where = f"ModelStructure/{section} index {unknown.get('index')}"
     if not 1 <= int(unknown.get("index", "0")) <= len(ordered):
         yield f"{where}: no such variable, there are {len(ordered)}"

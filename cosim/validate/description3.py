@@ -43,6 +43,7 @@ def variables3(root: Element) -> list[Entry]:
 
 
 def _items(entry: Element) -> tuple[str, ...]:
+    """Returns the values of an enumeration type."""
     return tuple(item.get("value", "") for item in entry.iterfind("Item"))
 
 
@@ -87,6 +88,7 @@ def _structure_problems(root: Element) -> Iterator[str]:
 def _unknown_problems(
     section: str, unknown: Element, known: Mapping[int, Element]
 ) -> Iterator[str]:
+    """Yields the problems of one entry of ModelStructure."""
     where = f"ModelStructure/{section} {unknown.get('valueReference')}"
     variable = known.get(int(unknown.get("valueReference", "-1")))
     if variable is None:

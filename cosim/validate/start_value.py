@@ -45,6 +45,7 @@ def start_value_problems(data: bytes | None, token: str, description: Any) -> It
 def _line_problems(
     where: str, words: list[str], stated: dict[int, tuple[str, float]]
 ) -> Iterator[str]:
+    """Yields the problems of one line; stated: name and value by reference."""
     if len(words) < 2 or not words[0].isdecimal() or math.isnan(_number(words[1])):
         yield f"{where}: got {' '.join(words)!r}, expected a value reference and a value"
         return
@@ -58,6 +59,7 @@ def _line_problems(
 
 
 def _missing_problems(missing: list[str]) -> Iterator[str]:
+    """Yields the missing values, SHOWN of them by name."""
     for name in missing[:SHOWN]:
         yield f"{START_VALUES} lacks the value reference {name}"
     if len(missing) > SHOWN:

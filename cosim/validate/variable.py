@@ -45,6 +45,7 @@ def declaration_problems(
 
 
 def _identity_problems(root: Element, variables: Sequence[Entry]) -> Iterator[str]:
+    """Yields invalid identifiers and duplicate names."""
     found = [root.find(name) for name in INTERFACES]
     identifiers = {element.get("modelIdentifier", "") for element in found if element is not None}
     for name in identifiers:
@@ -78,6 +79,7 @@ def _unit_problems(
 
 
 def _type_problems(user: Entry, types: Mapping[str, Entry]) -> Iterator[str]:
+    """Yields problems of a variable's declared type."""
     declared = user.attributes.get("declaredType")
     if declared is None:
         return
@@ -94,6 +96,7 @@ def _type_problems(user: Entry, types: Mapping[str, Entry]) -> Iterator[str]:
 
 
 def _variable_problems(variable: Entry, types: Mapping[str, Entry]) -> Iterator[str]:
+    """Yields the problems of one variable."""
     base = types.get(variable.attributes.get("declaredType", ""))
     if not variable.description:
         yield f"{variable.name} has no description"
@@ -145,6 +148,7 @@ def dependency_problems(where: str, unknown: Element, known: Collection[int]) ->
 
 
 def _experiment_problems(root: Element) -> Iterator[str]:
+    """Yields an invalid default experiment."""
     experiment = root.find("DefaultExperiment")
     if experiment is None:
         return
