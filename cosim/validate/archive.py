@@ -47,7 +47,8 @@ PLATFORMS = {
     "x86_64-darwin": (".dylib", MACH, 4, b"\x07\x00\x00\x01"),
     "aarch64-darwin": (".dylib", MACH, 4, b"\x0c\x00\x00\x01"),
 }
-FAT, FAT_ENTRIES = b"\xca\xfe\xba\xbe", 8  # universal Mach-O: magic, offset of its big-endian list
+# universal Mach-O: magic; offset and size of the entries, which are big-endian
+FAT, FAT_ENTRIES, FAT_ENTRY_SIZE = b"\xca\xfe\xba\xbe", 8, 20
 PE_HEADER = 0x3C  # offset of the address of a PE file's header
 # absolute paths of the machine where a file was made
 ABSOLUTE = re.compile(
@@ -210,22 +211,12 @@ def binary_problems(root: Element, found: dict[str, bytes], fmi: int) -> Iterato
 def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> Iterator[str]:
     """Yields the problems of a library; reads its bytes, since its platform may be another."""
     _, magic, place, machine = PLATFORMS[platform]
-    if magic == MACH and data.startswith(FAT):
-        magic, entries = FAT, int.from_bytes(data[4:8], "big")
-        machines = [
-            data[at : at + 4][::-1] for at in range(FAT_ENTRIES, FAT_ENTRIES + 20 * entries, 20)
-        ]
-    else:
-        at = (
-            int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4
-            if place is None
-            else place
-        )
-        machines = [data[at : at + len(machine)]]
-    if not data.startswith(magic) or machine not in machines:
+    machines = _machine_types(data, magic, place, len(machine))
+    known_magic = (MACH, FAT) if magic == MACH else (magic,)
+    if not data.startswith(known_magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
-    start = b"\0_" if magic in (MACH, FAT) else b"\0"
+    start = b"\0_" if magic == MACH else b"\0"
     missing = [
         function
         for function in standard_functions(fmi)
@@ -233,6 +224,20 @@ def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> 
     ]
     if missing:
         yield f"{name} lacks {len(missing)} functions of the standard: {', '.join(missing)}"
+
+
+def _machine_types(data: bytes, magic: bytes, place: int | None, size: int) -> list[bytes]:
+    """Returns the machine types of a library, `size` bytes each; several of a universal one.
+
+    place: their offset; None: behind the PE header.
+    """
+    if magic == MACH and data.startswith(FAT):
+        count = int.from_bytes(data[4:8], "big")
+        offsets = range(FAT_ENTRIES, FAT_ENTRIES + FAT_ENTRY_SIZE * count, FAT_ENTRY_SIZE)
+        return [data[at : at + 4][::-1] for at in offsets]
+    if place is None:
+        place = int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4
+    return [data[place : place + size]]
 
 
 def terminal_problems(known: set[str], found: dict[str, bytes]) -> Iterator[str]:
