@@ -1,5 +1,7 @@
-"""Shows that a study of 500 runs gives the same bytes when it is killed twice and resumed, when it
-runs uninterrupted, and when it runs on a Dask cluster (`make study-demo`).
+"""Shows for `make study-demo` that a study gives the same bytes however it is executed.
+
+A study of 500 runs is killed twice and completed, run without interruption, and run on a Dask
+cluster.
 
 usage: python -m tools.study_demo FOLDER
 """
@@ -29,11 +31,11 @@ duration = 4.0
 friction.mu = [0.3, 0.45, 0.6, 0.75, 0.9]
 command.vx = { linspace = [4, 12, 5], unit = "cm/s" }
 """
-KILLED_AT = (100, 300)  # number of stored runs
+KILLED_AT = (100, 300)  # stored runs
 
 
 def main() -> int:
-    """Runs the three studies; returns 0 when their results are equal."""
+    """Returns 0 when all three results are the same, 2 for wrong usage."""
     if len(sys.argv) != 2:
         print(__doc__, file=sys.stderr)
         return 2
@@ -60,7 +62,7 @@ def main() -> int:
 
 
 def command(folder: Path, name: str, *more: str) -> list[str]:
-    """Returns the command of a study that writes to folder/name."""
+    """Returns the command that runs the study into a folder within the given one."""
     return [
         sys.executable,
         "-m",
@@ -74,7 +76,7 @@ def command(folder: Path, name: str, *more: str) -> list[str]:
 
 
 def kill_at(folder: Path, least: int) -> None:
-    """Runs the study until `least` runs are stored, then kills the program and its workers."""
+    """Starts the study and kills it with its workers when `least` runs are stored."""
     process = subprocess.Popen(
         command(folder, "killed"),
         start_new_session=True,
@@ -89,7 +91,7 @@ def kill_at(folder: Path, least: int) -> None:
 
 
 def stored(folder: Path) -> int:
-    """Returns the number of stored runs of the killed study."""
+    """Returns the number of runs in the parts of the study that is killed."""
     return sum(
         pq.ParquetFile(path).metadata.num_rows
         for path in (folder / "killed" / "runs").glob("*.parquet")
@@ -97,15 +99,15 @@ def stored(folder: Path) -> int:
 
 
 def finish(folder: Path, name: str, *more: str) -> None:
-    """Runs a study to its end and prints how long it took."""
+    """Runs a study to its end and prints its duration."""
     begin = time.monotonic()
     done = subprocess.run(
         command(folder, name, "--json", *more), check=True, stdout=subprocess.PIPE
     )
     summary = json.loads(done.stdout)
+    duration = time.monotonic() - begin
     print(
-        f"{name}: {summary['runs']} runs, walked {summary['walked']}, in "
-        f"{time.monotonic() - begin:.0f} s",
+        f"{name}: {summary['runs']} runs, walked {summary['walked']}, in {duration:.0f} s",
         flush=True,
     )
 

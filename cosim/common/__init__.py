@@ -1,1 +1,1 @@
-"""Files, locks, events and the locations of the installed FMUs. Imports no other room."""
+"""Files, events and the locations of the installed FMUs. Imports no other room."""
