@@ -55,7 +55,11 @@ $(STAMP): $(SOURCES)
 	@for cc in "$${CC:-cc}" gcc clang; do command -v $$cc >/dev/null && exit 0; done; \
 	echo "no C compiler: looked for $${CC:-cc}, gcc and clang, found none; install one (Debian, Ubuntu: apt-get install gcc libc6-dev)" \
 	"or name yours with CC=..." >&2; exit 1
-	$(PYTHON) tools/make_venv.py $(VENV)
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || \
+	$(PYTHON) -c 'import ensurepip, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	echo "no usable Python: got $$($(PYTHON) --version 2>&1), expected Python 3.11 or later with its venv module;" \
+	"install it (Debian, Ubuntu: apt-get install python3 python3-venv) or name another one with PYTHON=..." >&2; exit 1; }
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $@
 
@@ -78,7 +82,7 @@ test-platforms: setup
 
 test-endurance: setup
 	$(BIN)/python -m pytest -q tests/fmi/test_endurance.py
-	$(BIN)/python tests/fmi/endurance.py build/test/plant_fmu/hexapod.[sd]*
+	PYTHONPATH=tests/support $(BIN)/python tests/fmi/endurance.py build/test/plant_fmu/hexapod.[sd]*
 
 test-robots: setup
 	HEXAPOD_ROBOTS=all $(BIN)/python -m pytest -q -s tests/design/test_random_robots.py

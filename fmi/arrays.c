@@ -1,4 +1,4 @@
-/* arrays.c - FMI 3's arrays: each is the run of the table's rows that begins at its reference. */
+/* arrays.c - FMI 3's arrays: each is a range of rows of the table that begins at its reference. */
 #include "fmi/instance.h"
 
 #include <limits.h>
@@ -6,9 +6,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-enum { CHUNK = 64 }; /* rows that go to the table at once */
+enum { CHUNK = 64 }; /* rows that are read or written at once */
 
-/* get or set: values are those of hx_instance_get */
+/* gets, checks or sets rows; values are as in hx_instance_get */
 typedef hxStatus rowsFunction(hxInstance *instance, hxType type, const unsigned reference[],
                               size_t n, void *value);
 
@@ -22,11 +22,11 @@ static hxStatus set_rows(hxInstance *instance, hxType type, const unsigned refer
   return hx_instance_set(instance, type, reference, n, value);
 }
 
-/* rows of an array; 0, with a message, when none begins there */
+/* the number of rows of an array; logs and returns 0 when none begins at the reference */
 static size_t rows_of(hxInstance *instance, hxType type, unsigned reference) {
   hxCausality causality;
   const hxVariable *variable = hx_variable_find(reference, &causality);
-  if (variable && variable->run) return variable->run;
+  if (variable && variable->array_rows) return variable->array_rows;
   if (reference == hx_time_reference && type == HX_REAL) return 1;
   hx_log(instance, HX_LOG_ERROR,
          "value reference: got %u, expected one of modelDescription.xml; nothing was done",
@@ -34,6 +34,7 @@ static size_t rows_of(hxInstance *instance, hxType type, unsigned reference) {
   return 0;
 }
 
+/* checks that n_values is the number of elements of all the arrays */
 static hxStatus check_count(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                             size_t n_values) {
   size_t expected = 0;
@@ -50,7 +51,7 @@ static hxStatus check_count(hxInstance *instance, hxType type, const unsigned re
   return HX_INVALID_ARGUMENT;
 }
 
-/* a number out of int's range is out of any variable's */
+/* numbers outside int's range are outside every variable's range, so they may saturate */
 static int to_int(int64_t value) {
   return value > INT_MAX ? INT_MAX : value < INT_MIN ? INT_MIN : (int)value;
 }
@@ -70,7 +71,7 @@ static void write_ints(hxType type, const int number[], void *value, size_t firs
   }
 }
 
-/* a function for all rows of an array, whose values begin at `first` */
+/* applies a function to all rows of an array; its values begin at index `first` */
 static hxStatus each_row(hxInstance *instance, rowsFunction *function, hxType type,
                          unsigned reference, size_t rows, void *value, size_t first) {
   unsigned row[CHUNK];
@@ -110,7 +111,7 @@ hxStatus hx_arrays_get(hxInstance *instance, hxType type, const unsigned referen
                          : status;
 }
 
-/* all rows of all arrays are looked at before the first is set */
+/* all values are checked before the first is set */
 hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                        const void *value, size_t n_values) {
   hxStatus status = check_count(instance, type, reference, n, n_values);
@@ -128,10 +129,10 @@ hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned referen
 /* ----------------------------------------------------------------------------------------------
  * derivatives */
 
-/* All rows of arrays, one reference each, to be freed; NULL, with a message, when their number is
- * not n_values or there is no memory. Derivatives are taken of all elements at once. */
-static unsigned *spread(hxInstance *instance, const unsigned reference[], size_t n,
-                        size_t n_values) {
+/* The references of all rows of arrays, to be freed by the caller. Logs and returns NULL when their
+ * number is not n_values or memory is short. */
+static unsigned *row_references(hxInstance *instance, const unsigned reference[], size_t n,
+                                size_t n_values) {
   if (check_count(instance, HX_REAL, reference, n, n_values) != HX_OK) return NULL;
   unsigned *row = malloc((n_values + 1) * sizeof *row), *next = row;
   if (!row) hx_log(instance, HX_LOG_ERROR, "derivatives: out of memory; free some and try again");
@@ -145,8 +146,8 @@ static unsigned *spread(hxInstance *instance, const unsigned reference[], size_t
 hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
                                const unsigned known[], size_t n_known, const double change[],
                                size_t n_change, double result[], size_t n_result) {
-  unsigned *unknowns = spread(instance, unknown, n_unknown, n_result);
-  unsigned *knowns = unknowns ? spread(instance, known, n_known, n_change) : NULL;
+  unsigned *unknowns = row_references(instance, unknown, n_unknown, n_result);
+  unsigned *knowns = unknowns ? row_references(instance, known, n_known, n_change) : NULL;
   const hxStatus status = knowns ? hx_instance_directional(instance, unknowns, n_result, knowns,
                                                            n_change, change, result)
                                  : HX_INVALID_ARGUMENT;
@@ -157,7 +158,7 @@ hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], s
 
 hxStatus hx_arrays_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
                                     double rate[], size_t n_rate) {
-  unsigned *rows = spread(instance, reference, n, n_rate);
+  unsigned *rows = row_references(instance, reference, n, n_rate);
   const hxStatus status =
       rows ? hx_instance_get_output_rates(instance, rows, n_rate, rate) : HX_INVALID_ARGUMENT;
   free(rows);

@@ -1,7 +1,5 @@
-/* call.c - what both versions of the standard look at before they do a call. */
+/* call.c - checks of mode, interface and array arguments that precede each call of the standard. */
 #include "fmi/instance.h"
-
-#include <string.h>
 
 static const char *mode_name(int mode) {
   if (mode == HX_MODE_INSTANTIATED) return "before initialization mode";
@@ -15,7 +13,7 @@ static const char *interface_name(int interface) {
   return interface == HX_MODEL_EXCHANGE ? "model exchange" : "co-simulation";
 }
 
-int hx_call_admit(hxInstance *instance, const hxCall *call) {
+int hx_call_is_legal(hxInstance *instance, const hxCall *call) {
   const hxInstanceState *state = &instance->state;
   if (!(call->interfaces & state->interface))
     hx_log(instance, HX_LOG_ERROR,
@@ -30,15 +28,15 @@ int hx_call_admit(hxInstance *instance, const hxCall *call) {
   return 0;
 }
 
-int hx_call_given(hxInstance *instance, const hxCall *call, size_t n, const void *array,
-                  const void *other) {
+int hx_call_has_arrays(hxInstance *instance, const hxCall *call, size_t n, const void *array,
+                       const void *other) {
   if (n == 0 || (array && other)) return 1;
   hx_log(instance, HX_LOG_ERROR, "%s: got NULL, expected an array of %zu; nothing was changed",
          call->name, n);
   return 0;
 }
 
-int hx_call_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]) {
+int hx_call_is_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]) {
   for (size_t i = 0; i < n; i++)
     if (order[i] != 1) {
       hx_log(instance, HX_LOG_ERROR, "%s: got order %d, expected 1; nothing was done", call->name,
@@ -46,27 +44,4 @@ int hx_call_first_order(hxInstance *instance, const hxCall *call, size_t n, cons
       return 0;
     }
   return 1;
-}
-
-static int find_category(const char *name) {
-  for (int k = 0; k < HX_LOG_CATEGORIES; k++)
-    if (name && strcmp(name, hx_log_category_names[k]) == 0) return k;
-  return -1;
-}
-
-hxStatus hx_log_choose(hxInstance *instance, const char *call, int on, size_t n,
-                       const char *const category[]) {
-  unsigned chosen = n == 0 ? ~0u : 0;
-  for (size_t i = 0; i < n; i++) {
-    const int k = find_category(category[i]);
-    if (k < 0) {
-      hx_log(instance, HX_LOG_ERROR,
-             "%s: got category '%s', expected one of modelDescription.xml; nothing was changed",
-             call, category[i] ? category[i] : "(NULL)");
-      return HX_INVALID_ARGUMENT;
-    }
-    chosen |= k == HX_LOG_ALL ? ~0u : 1u << k;
-  }
-  instance->logged = (on ? chosen : instance->logged & ~chosen) | HX_LOG_ALWAYS;
-  return HX_OK;
 }

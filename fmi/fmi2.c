@@ -1,5 +1,5 @@
-/* fmi2.c - FMI 2.0, co-simulation and model exchange: every function of the standard, in its order.
- * No physics. */
+/* fmi2.c - FMI 2.0 for co-simulation and model exchange: every function of the standard, in its
+ * order. */
 #include "fmi/instance.h"
 
 #include <math.h>
@@ -68,9 +68,9 @@ typedef enum fmi2Call {
   GET_NOMINALS
 } fmi2Call;
 
-/* The standard's tables of allowed calls (sections 3.2.3 and 4.2.4), but for liberties that
- * importers take and that harm nothing: values are read before initialisation, states and their
- * rates in it, and a terminated instance is terminated again. */
+/* The standard's tables of allowed calls (sections 3.2.3 and 4.2.4). Some importers make further
+ * calls that do no harm, which are allowed too: they read values before initialization, read states
+ * and rates during it, and terminate a terminated instance. */
 static const hxCall calls[] = {
     [SET_DEBUG_LOGGING] = {"fmi2SetDebugLogging", ANY_MODE, EITHER},
     [SETUP_EXPERIMENT] = {"fmi2SetupExperiment", HX_MODE_INSTANTIATED, EITHER},
@@ -113,10 +113,10 @@ static const hxCall calls[] = {
     [GET_NOMINALS] = {"fmi2GetNominalsOfContinuousStates", ANY_MODE, HX_MODEL_EXCHANGE},
 };
 
-/* the instance of a call that is legal now; NULL, with a message, otherwise */
+/* the instance if the call is legal now; otherwise logs and returns NULL */
 static fmi2Instance *enter(fmi2Component component, fmi2Call call) {
   fmi2Instance *instance = component;
-  return instance && hx_call_admit(&instance->base, &calls[call]) ? instance : NULL;
+  return instance && hx_call_is_legal(&instance->base, &calls[call]) ? instance : NULL;
 }
 
 static fmi2Status status_of(hxStatus status) {
@@ -124,15 +124,15 @@ static fmi2Status status_of(hxStatus status) {
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi2Discard : fmi2Error;
 }
 
-static int given(fmi2Instance *instance, fmi2Call call, size_t n, const void *array,
-                 const void *other) {
-  return hx_call_given(&instance->base, &calls[call], n, array, other);
+static int has_arrays(fmi2Instance *instance, fmi2Call call, size_t n, const void *array,
+                      const void *other) {
+  return hx_call_has_arrays(&instance->base, &calls[call], n, array, other);
 }
 
 /* ----------------------------------------------------------------------------------------------
  * log */
 
-/* the importer's logger reads printf format, and # as a reference to a variable */
+/* the importer's logger interprets the text as a printf format, and # as a variable reference */
 static void log_sink(hxInstance *base, hxLogCategory category, const char *text) {
   static const fmi2Status status[] = {fmi2Error, fmi2Discard, fmi2Warning, fmi2OK, fmi2OK};
   const fmi2Instance *instance = (const fmi2Instance *)base;
@@ -150,14 +150,14 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
   fmi2Instance *instance = enter(c, SET_DEBUG_LOGGING);
-  if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
+  if (!instance || !has_arrays(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
     return fmi2Error;
-  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
+  return status_of(hx_log_select(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
                                  nCategories, categories));
 }
 
 /* ----------------------------------------------------------------------------------------------
- * life */
+ * instances */
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
@@ -203,7 +203,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
   if (!instance || hx_instance_set_experiment(&instance->base, name, startTime, stopTimeDefined,
                                               stopTime) != HX_OK)
     return fmi2Error;
-  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance)
+  return hx_instance_check_tolerance(&instance->base, name, toleranceDefined, tolerance)
              ? fmi2OK
              : fmi2Warning;
 }
@@ -249,18 +249,18 @@ fmi2Status fmi2Reset(fmi2Component c) {
 static fmi2Status get_values(fmi2Component c, fmi2Call call, hxType type,
                              const fmi2ValueReference vr[], size_t nvr, void *value) {
   fmi2Instance *instance = enter(c, call);
-  if (!instance || !given(instance, call, nvr, vr, value)) return fmi2Error;
+  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi2Error;
   return status_of(hx_instance_get(&instance->base, type, vr, nvr, value));
 }
 
 static fmi2Status set_values(fmi2Component c, fmi2Call call, hxType type,
                              const fmi2ValueReference vr[], size_t nvr, const void *value) {
   fmi2Instance *instance = enter(c, call);
-  if (!instance || !given(instance, call, nvr, vr, value)) return fmi2Error;
+  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi2Error;
   return hx_instance_set(&instance->base, type, vr, nvr, value) == HX_OK ? fmi2OK : fmi2Error;
 }
 
-/* there are no String variables, so none can be meant */
+/* accepts calls for no variables only, since the FMU has no String variables */
 static fmi2Status no_strings(fmi2Component c, fmi2Call call, size_t nvr) {
   fmi2Instance *instance = enter(c, call);
   if (instance && nvr == 0) return fmi2OK;
@@ -318,13 +318,13 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
   fmi2Instance *instance = enter(c, GET_STATE);
-  if (!instance || !given(instance, GET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
-  return status_of(hx_instance_keep(&instance->base, FMUstate));
+  if (!instance || !has_arrays(instance, GET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
+  return status_of(hx_instance_save(&instance->base, FMUstate));
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
   fmi2Instance *instance = enter(c, SET_STATE);
-  if (!instance || !given(instance, SET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
+  if (!instance || !has_arrays(instance, SET_STATE, 1, FMUstate, FMUstate)) return fmi2Error;
   return status_of(hx_instance_restore(&instance->base, FMUstate));
 }
 
@@ -339,7 +339,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
   fmi2Instance *instance = enter(c, SERIALIZED_SIZE);
-  if (!instance || !given(instance, SERIALIZED_SIZE, 1, FMUstate, size)) return fmi2Error;
+  if (!instance || !has_arrays(instance, SERIALIZED_SIZE, 1, FMUstate, size)) return fmi2Error;
   *size = hx_instance_state_size();
   return fmi2OK;
 }
@@ -347,7 +347,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
                                  size_t size) {
   fmi2Instance *instance = enter(c, SERIALIZE);
-  if (!instance || !given(instance, SERIALIZE, 1, FMUstate, serializedState)) return fmi2Error;
+  if (!instance || !has_arrays(instance, SERIALIZE, 1, FMUstate, serializedState)) return fmi2Error;
   return status_of(hx_instance_serialize(&instance->base, calls[SERIALIZE].name, FMUstate,
                                          serializedState, size));
 }
@@ -355,7 +355,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
   fmi2Instance *instance = enter(c, DESERIALIZE);
-  if (!instance || !given(instance, DESERIALIZE, 1, serializedState, FMUstate)) return fmi2Error;
+  if (!instance || !has_arrays(instance, DESERIALIZE, 1, serializedState, FMUstate))
+    return fmi2Error;
   return status_of(hx_instance_deserialize(&instance->base, serializedState, size, FMUstate));
 }
 
@@ -376,19 +377,19 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
 fmi2Status fmi2CancelStep(fmi2Component c) {
   fmi2Instance *instance = enter(c, CANCEL_STEP);
   if (instance)
-    hx_log(
-        &instance->base, HX_LOG_ERROR,
-        "fmi2CancelStep: got a call, expected none, as steps are finished when fmi2DoStep returns");
+    hx_log(&instance->base, HX_LOG_ERROR,
+           "fmi2CancelStep: got a call, expected none, as steps are finished when fmi2DoStep "
+           "returns");
   return fmi2Error;
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
   fmi2Instance *instance = enter(c, SET_INPUT_DERIVATIVES);
-  if (!instance || !given(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) ||
-      !given(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
+  if (!instance || !has_arrays(instance, SET_INPUT_DERIVATIVES, nvr, vr, value) ||
+      !has_arrays(instance, SET_INPUT_DERIVATIVES, nvr, order, order))
     return fmi2Error;
-  if (!hx_call_first_order(&instance->base, &calls[SET_INPUT_DERIVATIVES], nvr, order))
+  if (!hx_call_is_first_order(&instance->base, &calls[SET_INPUT_DERIVATIVES], nvr, order))
     return fmi2Error;
   return status_of(hx_instance_set_input_rates(&instance->base, vr, nvr, value));
 }
@@ -396,21 +397,21 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
   fmi2Instance *instance = enter(c, GET_OUTPUT_DERIVATIVES);
-  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
-      !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+  if (!instance || !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
+      !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
     return fmi2Error;
-  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
+  if (!hx_call_is_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
     return fmi2Error;
   return status_of(hx_instance_get_output_rates(&instance->base, vr, nvr, value));
 }
 
-/* a kind of status that the type asked for does not have */
+/* refuses a kind of status that has no value of the requested type */
 static fmi2Status no_status(fmi2Instance *instance, fmi2StatusKind kind) {
   if (!instance) return fmi2Error;
-  hx_log(
-      &instance->base, HX_LOG_DISCARD,
-      "fmi2GetXXXStatus: got kind %d, which has no value of this type here; nothing was returned",
-      (int)kind);
+  hx_log(&instance->base, HX_LOG_DISCARD,
+         "fmi2GetXXXStatus: got kind %d, which has no value of this type here; nothing was "
+         "returned",
+         (int)kind);
   return fmi2Discard;
 }
 
@@ -433,7 +434,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
   return no_status(enter(c, GET_STATUS), s);
 }
 
-/* the plant never asks to end the simulation */
+/* The FMU never requests the end of the simulation. */
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
   fmi2Instance *instance = enter(c, GET_STATUS);
   if (!instance || !value || s != fmi2Terminated) return no_status(instance, s);
@@ -454,9 +455,9 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
   fmi2Instance *instance = enter(c, DIRECTIONAL_DERIVATIVE);
-  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknown, vUnknown_ref, dvUnknown))
+  if (!instance || !has_arrays(instance, DIRECTIONAL_DERIVATIVE, nUnknown, vUnknown_ref, dvUnknown))
     return fmi2Error;
-  if (!given(instance, DIRECTIONAL_DERIVATIVE, nKnown, vKnown_ref, dvKnown)) return fmi2Error;
+  if (!has_arrays(instance, DIRECTIONAL_DERIVATIVE, nKnown, vKnown_ref, dvKnown)) return fmi2Error;
   return status_of(hx_instance_directional(&instance->base, vUnknown_ref, nUnknown, vKnown_ref,
                                            nKnown, dvKnown, dvUnknown));
 }
@@ -471,12 +472,12 @@ fmi2Status fmi2EnterEventMode(fmi2Component c) {
   return fmi2OK;
 }
 
-/* touch-downs and lift-offs; nothing follows from them at once, and no time event is ever known
- * beforehand */
+/* Handles touch-downs and lift-offs. One iteration is enough, and there are no time events. */
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
   fmi2Instance *instance = enter(c, NEW_DISCRETE_STATES);
   int changed;
-  if (!instance || !given(instance, NEW_DISCRETE_STATES, 1, eventInfo, eventInfo)) return fmi2Error;
+  if (!instance || !has_arrays(instance, NEW_DISCRETE_STATES, 1, eventInfo, eventInfo))
+    return fmi2Error;
   const hxStatus status = hx_instance_update(&instance->base, &changed);
   *eventInfo = (fmi2EventInfo){.valuesOfContinuousStatesChanged = changed};
   return status_of(status);
@@ -496,7 +497,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
   fmi2Instance *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance ||
-      !given(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation))
+      !has_arrays(instance, COMPLETED_INTEGRATOR_STEP, 1, enterEventMode, terminateSimulation))
     return fmi2Error;
   *enterEventMode = *terminateSimulation = fmi2False;
   return status_of(hx_instance_completed_step(&instance->base));
@@ -509,17 +510,17 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
   fmi2Instance *instance = enter(c, SET_CONTINUOUS_STATES);
-  if (!instance || !given(instance, SET_CONTINUOUS_STATES, nx, x, x)) return fmi2Error;
+  if (!instance || !has_arrays(instance, SET_CONTINUOUS_STATES, nx, x, x)) return fmi2Error;
   return status_of(hx_instance_set_states(&instance->base, x, nx));
 }
 
-/* a getter of doubles, as many as there are */
+/* a function that reads an array of n doubles */
 typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
 
 static fmi2Status get_array(fmi2Component c, fmi2Call call, Getter *getter, fmi2Real value[],
                             size_t n) {
   fmi2Instance *instance = enter(c, call);
-  if (!instance || !given(instance, call, n, value, value)) return fmi2Error;
+  if (!instance || !has_arrays(instance, call, n, value, value)) return fmi2Error;
   return status_of(getter(&instance->base, value, n));
 }
 

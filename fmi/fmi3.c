@@ -1,5 +1,5 @@
 /* fmi3.c - FMI 3.0 for model exchange and co-simulation: every function of the standard, in its
- * order. No physics. */
+ * order. */
 #include "fmi/instance.h"
 
 #include <stdint.h>
@@ -71,9 +71,8 @@ typedef enum fmi3Call {
   UNSUPPORTED
 } fmi3Call;
 
-/* The standard's tables of allowed calls (sections 2.3, 3.2 and 4.2), but for the liberties of
- * fmi2.c: values are read before initialisation, states and their rates in it, and a terminated
- * instance is terminated again. */
+/* The standard's tables of allowed calls (sections 2.3, 3.2 and 4.2), and the further calls that
+ * fmi2.c allows. */
 static const hxCall calls[] = {
     [SET_DEBUG_LOGGING] = {"fmi3SetDebugLogging", ANY_MODE, EITHER},
     [ENTER_INITIALIZATION_MODE] = {"fmi3EnterInitializationMode", HX_MODE_INSTANTIATED, EITHER},
@@ -116,10 +115,10 @@ static const hxCall calls[] = {
     [UNSUPPORTED] = {"a function that is not offered", ANY_MODE, EITHER},
 };
 
-/* the instance of a call that is legal now; NULL, with a message, otherwise */
+/* the instance if the call is legal now; otherwise logs and returns NULL */
 static fmi3InstanceData *enter(fmi3Instance c, fmi3Call call) {
   fmi3InstanceData *instance = c;
-  return instance && hx_call_admit(&instance->base, &calls[call]) ? instance : NULL;
+  return instance && hx_call_is_legal(&instance->base, &calls[call]) ? instance : NULL;
 }
 
 static fmi3Status status_of(hxStatus status) {
@@ -127,12 +126,13 @@ static fmi3Status status_of(hxStatus status) {
   return status == HX_STEP_TOO_SMALL || status == HX_NOT_FINITE ? fmi3Discard : fmi3Error;
 }
 
-static int given(fmi3InstanceData *instance, fmi3Call call, size_t n, const void *array,
-                 const void *other) {
-  return hx_call_given(&instance->base, &calls[call], n, array, other);
+static int has_arrays(fmi3InstanceData *instance, fmi3Call call, size_t n, const void *array,
+                      const void *other) {
+  return hx_call_has_arrays(&instance->base, &calls[call], n, array, other);
 }
 
-/* importers bind every function of the standard, so all are here */
+/* Refuses a function that the FMU does not offer. It exists because importers load every function
+ * of the standard. */
 static fmi3Status not_supported(fmi3Instance c, const char *name) {
   fmi3InstanceData *instance = enter(c, UNSUPPORTED);
   if (instance)
@@ -141,7 +141,7 @@ static fmi3Status not_supported(fmi3Instance c, const char *name) {
   return fmi3Error;
 }
 
-/* of a type that no variable has, or of clocks */
+/* accepts calls for no variables only: for types that no variable has, and for clocks */
 static fmi3Status no_variables(fmi3Instance c, fmi3Call call, size_t n) {
   fmi3InstanceData *instance = enter(c, call);
   if (instance && n == 0) return fmi3OK;
@@ -151,7 +151,7 @@ static fmi3Status no_variables(fmi3Instance c, fmi3Call call, size_t n) {
   return fmi3Error;
 }
 
-static void put(fmi3Boolean *place, int value) {
+static void set_flag(fmi3Boolean *place, int value) {
   if (place) *place = value != 0;
 }
 
@@ -168,18 +168,18 @@ static void log_sink(hxInstance *base, hxLogCategory category, const char *text)
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[]) {
   fmi3InstanceData *instance = enter(c, SET_DEBUG_LOGGING);
-  if (!instance || !given(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
+  if (!instance || !has_arrays(instance, SET_DEBUG_LOGGING, nCategories, categories, categories))
     return fmi3Error;
-  return status_of(hx_log_choose(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
+  return status_of(hx_log_select(&instance->base, calls[SET_DEBUG_LOGGING].name, loggingOn,
                                  nCategories, categories));
 }
 
 /* ----------------------------------------------------------------------------------------------
- * life */
+ * instances */
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
-/* an instance that can say why it is not to be; NULL when out of memory */
+/* allocates an instance that can log; NULL when out of memory */
 static fmi3InstanceData *new_instance(hxInterface interface, fmi3String name, fmi3Boolean loggingOn,
                                       fmi3InstanceEnvironment environment,
                                       fmi3LogMessageCallback log) {
@@ -223,7 +223,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                             : refuse_kind(instance, "model exchange");
 }
 
-/* there are no intermediate updates, so none of their variables is looked at */
+/* There are no intermediate updates, so the variables required for them are ignored. */
 fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
@@ -260,7 +260,7 @@ void fmi3FreeInstance(fmi3Instance c) {
   free(instance);
 }
 
-/* a tolerance without sense is no reason to stop: it is not used */
+/* An invalid tolerance gives a warning only, since it is not used. */
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined,
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
@@ -270,7 +270,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefi
                                               stopTime) != HX_OK)
     return fmi3Error;
   instance->base.state.mode = HX_MODE_INITIALIZATION;
-  return hx_instance_note_tolerance(&instance->base, name, toleranceDefined, tolerance)
+  return hx_instance_check_tolerance(&instance->base, name, toleranceDefined, tolerance)
              ? fmi3OK
              : fmi3Warning;
 }
@@ -322,7 +322,7 @@ fmi3Status fmi3Reset(fmi3Instance c) {
 static fmi3Status get_values(fmi3Instance c, fmi3Call call, hxType type,
                              const fmi3ValueReference vr[], size_t nvr, void *value, size_t n) {
   fmi3InstanceData *instance = enter(c, call);
-  if (!instance || !given(instance, call, nvr, vr, value)) return fmi3Error;
+  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi3Error;
   return status_of(hx_arrays_get(&instance->base, type, vr, nvr, value, n));
 }
 
@@ -330,7 +330,7 @@ static fmi3Status set_values(fmi3Instance c, fmi3Call call, hxType type,
                              const fmi3ValueReference vr[], size_t nvr, const void *value,
                              size_t n) {
   fmi3InstanceData *instance = enter(c, call);
-  if (!instance || !given(instance, call, nvr, vr, value)) return fmi3Error;
+  if (!instance || !has_arrays(instance, call, nvr, vr, value)) return fmi3Error;
   return status_of(hx_arrays_set(&instance->base, type, vr, nvr, value, n));
 }
 
@@ -339,7 +339,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
   return get_values(c, GET_FLOAT64, HX_REAL, vr, nvr, value, n);
 }
 
-/* enumerations come as Int64 */
+/* enumerations are Int64 */
 fmi3Status fmi3GetInt64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
                         fmi3Int64 value[], size_t n) {
   return get_values(c, GET_INT64, HX_INTEGER, vr, nvr, value, n);
@@ -403,7 +403,7 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 /* ----------------------------------------------------------------------------------------------
  * dependencies */
 
-/* which element depends on which is not told: providesPerElementDependencies says so */
+/* Dependencies of single elements are not offered: see providesPerElementDependencies. */
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
   (void)vr, (void)n;
   return not_supported(c, "fmi3GetNumberOfVariableDependencies");
@@ -425,13 +425,13 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
   fmi3InstanceData *instance = enter(c, GET_STATE);
-  if (!instance || !given(instance, GET_STATE, 1, state, state)) return fmi3Error;
-  return status_of(hx_instance_keep(&instance->base, state));
+  if (!instance || !has_arrays(instance, GET_STATE, 1, state, state)) return fmi3Error;
+  return status_of(hx_instance_save(&instance->base, state));
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
   fmi3InstanceData *instance = enter(c, SET_STATE);
-  if (!instance || !given(instance, SET_STATE, 1, state, state)) return fmi3Error;
+  if (!instance || !has_arrays(instance, SET_STATE, 1, state, state)) return fmi3Error;
   return status_of(hx_instance_restore(&instance->base, state));
 }
 
@@ -446,7 +446,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
   fmi3InstanceData *instance = enter(c, SERIALIZED_SIZE);
-  if (!instance || !given(instance, SERIALIZED_SIZE, 1, state, size)) return fmi3Error;
+  if (!instance || !has_arrays(instance, SERIALIZED_SIZE, 1, state, size)) return fmi3Error;
   *size = hx_instance_state_size();
   return fmi3OK;
 }
@@ -454,7 +454,7 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[],
                                  size_t size) {
   fmi3InstanceData *instance = enter(c, SERIALIZE);
-  if (!instance || !given(instance, SERIALIZE, 1, state, bytes)) return fmi3Error;
+  if (!instance || !has_arrays(instance, SERIALIZE, 1, state, bytes)) return fmi3Error;
   return status_of(
       hx_instance_serialize(&instance->base, calls[SERIALIZE].name, state, bytes, size));
 }
@@ -462,7 +462,7 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte by
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size,
                                    fmi3FMUState *state) {
   fmi3InstanceData *instance = enter(c, DESERIALIZE);
-  if (!instance || !given(instance, DESERIALIZE, 1, bytes, state)) return fmi3Error;
+  if (!instance || !has_arrays(instance, DESERIALIZE, 1, bytes, state)) return fmi3Error;
   return status_of(hx_instance_deserialize(&instance->base, bytes, size, state));
 }
 
@@ -474,9 +474,9 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
                                         size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
                                         fmi3Float64 sensitivity[], size_t nSensitivity) {
   fmi3InstanceData *instance = enter(c, DIRECTIONAL_DERIVATIVE);
-  if (!instance || !given(instance, DIRECTIONAL_DERIVATIVE, nUnknowns, unknowns, sensitivity))
+  if (!instance || !has_arrays(instance, DIRECTIONAL_DERIVATIVE, nUnknowns, unknowns, sensitivity))
     return fmi3Error;
-  if (!given(instance, DIRECTIONAL_DERIVATIVE, nKnowns, knowns, seed)) return fmi3Error;
+  if (!has_arrays(instance, DIRECTIONAL_DERIVATIVE, nKnowns, knowns, seed)) return fmi3Error;
   return status_of(hx_arrays_directional(&instance->base, unknowns, nUnknowns, knowns, nKnowns,
                                          seed, nSeed, sensitivity, nSensitivity));
 }
@@ -493,7 +493,7 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
 /* ----------------------------------------------------------------------------------------------
  * configuration, clocks */
 
-/* no structural parameters */
+/* There are no structural parameters. */
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) {
   return not_supported(c, "fmi3EnterConfigurationMode");
 }
@@ -549,8 +549,8 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
   return not_supported(c, "fmi3EvaluateDiscreteStates");
 }
 
-/* Model exchange: touch-downs and lift-offs, from which nothing follows at once. Co-simulation: the
- * step that ended here has done it all. No time event is ever known beforehand. */
+/* Model exchange: handles touch-downs and lift-offs; one iteration is enough. Co-simulation: the
+ * last step has already handled them. There are no time events. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
                                     fmi3Boolean *nominalsOfContinuousStatesChanged,
@@ -561,11 +561,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *discreteStatesN
   if (!instance) return fmi3Error;
   const int exchange = instance->base.state.interface == HX_MODEL_EXCHANGE;
   const hxStatus status = exchange ? hx_instance_update(&instance->base, &changed) : HX_OK;
-  put(discreteStatesNeedUpdate, 0);
-  put(terminateSimulation, 0);
-  put(nominalsOfContinuousStatesChanged, 0);
-  put(valuesOfContinuousStatesChanged, changed);
-  put(nextEventTimeDefined, 0);
+  set_flag(discreteStatesNeedUpdate, 0);
+  set_flag(terminateSimulation, 0);
+  set_flag(nominalsOfContinuousStatesChanged, 0);
+  set_flag(valuesOfContinuousStatesChanged, changed);
+  set_flag(nextEventTimeDefined, 0);
   if (nextEventTime) *nextEventTime = 0.0;
   return status_of(status);
 }
@@ -586,8 +586,8 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean noSetFMUState
   (void)noSetFMUStatePriorToCurrentPoint;
   fmi3InstanceData *instance = enter(c, COMPLETED_INTEGRATOR_STEP);
   if (!instance) return fmi3Error;
-  put(enterEventMode, 0);
-  put(terminateSimulation, 0);
+  set_flag(enterEventMode, 0);
+  set_flag(terminateSimulation, 0);
   return status_of(hx_instance_completed_step(&instance->base));
 }
 
@@ -598,17 +598,17 @@ fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n) {
   fmi3InstanceData *instance = enter(c, SET_CONTINUOUS_STATES);
-  if (!instance || !given(instance, SET_CONTINUOUS_STATES, n, x, x)) return fmi3Error;
+  if (!instance || !has_arrays(instance, SET_CONTINUOUS_STATES, n, x, x)) return fmi3Error;
   return status_of(hx_instance_set_states(&instance->base, x, n));
 }
 
-/* a getter of doubles, as many as there are */
+/* a function that reads an array of n doubles */
 typedef hxStatus Getter(hxInstance *instance, double value[], size_t n);
 
 static fmi3Status get_row(fmi3Instance c, fmi3Call call, Getter *getter, fmi3Float64 value[],
                           size_t n) {
   fmi3InstanceData *instance = enter(c, call);
-  if (!instance || !given(instance, call, n, value, value)) return fmi3Error;
+  if (!instance || !has_arrays(instance, call, n, value, value)) return fmi3Error;
   return status_of(getter(&instance->base, value, n));
 }
 
@@ -630,7 +630,7 @@ fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominal
 
 static fmi3Status get_number(fmi3Instance c, size_t *place, size_t number) {
   fmi3InstanceData *instance = enter(c, GET_NUMBER);
-  if (!instance || !given(instance, GET_NUMBER, 1, place, place)) return fmi3Error;
+  if (!instance || !has_arrays(instance, GET_NUMBER, 1, place, place)) return fmi3Error;
   *place = number;
   return fmi3OK;
 }
@@ -656,16 +656,16 @@ fmi3Status fmi3EnterStepMode(fmi3Instance c) {
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
                                     const fmi3Int32 order[], fmi3Float64 value[], size_t n) {
   fmi3InstanceData *instance = enter(c, GET_OUTPUT_DERIVATIVES);
-  if (!instance || !given(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
-      !given(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
+  if (!instance || !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, vr, value) ||
+      !has_arrays(instance, GET_OUTPUT_DERIVATIVES, nvr, order, order))
     return fmi3Error;
-  if (!hx_call_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
+  if (!hx_call_is_first_order(&instance->base, &calls[GET_OUTPUT_DERIVATIVES], nvr, order))
     return fmi3Error;
   return status_of(hx_arrays_get_output_rates(&instance->base, vr, nvr, value, n));
 }
 
-/* an importer that allows it gets the step back where discrete variables change; one with event
- * mode is told to enter it */
+/* Returns early where discrete variables change, if the importer allows it; requests event mode, if
+ * the importer uses it. */
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
                       fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
@@ -679,9 +679,9 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
   const hxStatus status =
       hx_instance_step_to_event(&instance->base, t, h, instance->may_return_early, &event);
   const double reached = hx_instance_time(&instance->base);
-  put(eventHandlingNeeded, event && instance->base.uses_event_mode);
-  put(terminateSimulation, 0);
-  put(earlyReturn, event && reached < t + h);
+  set_flag(eventHandlingNeeded, event && instance->base.uses_event_mode);
+  set_flag(terminateSimulation, 0);
+  set_flag(earlyReturn, event && reached < t + h);
   if (lastSuccessfulTime) *lastSuccessfulTime = reached;
   return status_of(status);
 }

@@ -1,8 +1,18 @@
-/* instance.h - one instance of the FMU, whatever the standard's version: values, modes, stepping,
- * saved states, log.
+/* instance.h - one instance of the FMU, independent of the standard's version: values, modes,
+ * steps, saved states, log.
  *
- * Every function either does all it was asked or changes nothing; a refusal is logged with what was
- * got and expected.
+ * The files of fmi/ in layers; each calls the layers below it only:
+ *
+ *   fmi2.c  fmi3.c                        the functions of the standard
+ *   arrays.c                              FMI 3's arrays
+ *   step.c  exchange.c  state.c  call.c   co-simulation, model exchange, saved states, legal order
+ *   instance.c                            opening, values, initialization, reset
+ *   resources.c                           start values from the FMU's resources
+ *   table.c                               the table of variables
+ *   log.c                                 messages to the importer
+ *
+ * Every function either does all that it was asked for or changes nothing; a refusal is logged with
+ * what was got and what was expected.
  */
 #ifndef HEXAPOD_FMI_INSTANCE_H
 #define HEXAPOD_FMI_INSTANCE_H
@@ -32,27 +42,26 @@ typedef enum hxLogCategory {
   HX_LOG_CATEGORIES
 } hxLogCategory;
 
-/* s  a start further from 0 is refused: the clock's last bit is to stay well below the solver's
- * steps */
+/* s  the latest start: the resolution of a later clock is too coarse for the solver's steps */
 static const double hx_latest_start = 1e9;
 
 enum { HX_GUID_SIZE = 40, HX_NAME_SIZE = 128, HX_LOG_SIZE = 2 * HX_MESSAGE_SIZE };
 
 typedef struct hxInstance hxInstance;
 
-/* Passes a finished message on to the importer. */
+/* Passes a formatted message on to the importer. */
 typedef void hxLogSink(hxInstance *instance, hxLogCategory category, const char *text);
 
 /* What a saved state holds besides the component's bytes. */
 typedef struct hxInstanceState {
-  int mode;         /* hxMode */
-  int model_stale;  /* parameters were set since the component was reset */
-  int output_stale; /* variables.output is not that of the present time and input */
-  int rate_stale;   /* nor are the rates of the states */
-  int interface;    /* hxInterface */
-  int ramped;       /* input_rate is of the next step; else of the last one */
-  double start_time;
-  double stop_time; /* no step goes past it; infinite when the importer names none */
+  int mode;           /* hxMode */
+  int model_stale;    /* parameters were set since the component was reset */
+  int output_stale;   /* variables.output is not that of the present time and input */
+  int rate_stale;     /* the rates of the states are not those of the present time and input */
+  int interface;      /* hxInterface */
+  int ramped;         /* 1: input_rate belongs to the next step; 0: to the last one */
+  double start_time;  /* s */
+  double stop_time;   /* s  no step passes it; infinite when the importer gives none */
   hxInput input_rate; /* 1/s */
   struct hxVariables variables;
 } hxInstanceState;
@@ -60,21 +69,62 @@ typedef struct hxInstanceState {
 struct hxInstance {
   hxInstanceState state;
   hxComponent *component;
-  struct hxVariables
-      start; /* what a reset returns to: definition and input, compiled in or from the resources */
+  struct hxVariables start; /* values after a reset: compiled in or from the resources */
   char guid[HX_GUID_SIZE];
   char name[HX_NAME_SIZE];
-  int uses_event_mode; /* of co-simulation: the importer handles events */
-  unsigned logged; /* bit k: category k is passed on */
+  int uses_event_mode; /* co-simulation: the importer handles events */
+  unsigned logged;     /* bit k: category k is passed on */
   hxLogSink *sink;
 };
 
+/* ----------------------------------------------------------------------------------------------
+ * log.c */
+
+#if defined(__GNUC__)
+__attribute__((format(printf, 3, 4)))
+#endif
+void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);
+
+/* The categories that are passed on in any case. */
+enum { HX_LOG_ALWAYS = 1u << HX_LOG_ERROR | 1u << HX_LOG_DISCARD };
+
+/* Turns n categories on or off; all of them when n = 0. */
+hxStatus hx_log_select(hxInstance *instance, const char *call, int on, size_t n,
+                       const char *const category[]);
+
+/* ----------------------------------------------------------------------------------------------
+ * table.c */
+
+/* The row of a reference, or NULL; sets its causality. */
+const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality);
+
+/* The same for a variable of the given type; for others logs and returns NULL. */
+const hxVariable *hx_variable_of_type(hxInstance *instance, hxType type, unsigned reference,
+                                      hxCausality *causality);
+
+/* Whether a variable may have the value; false for NaN. */
+int hx_variable_in_range(const hxVariable *variable, double value);
+
+/* The address of a Real variable. */
+static inline double *hx_variable_place(struct hxVariables *variables, const hxVariable *variable) {
+  return (double *)(void *)((char *)variables + variable->offset);
+}
+
+/* ----------------------------------------------------------------------------------------------
+ * resources.c */
+
+/* Reads start_values.txt of the resources into start; sets *found to whether the file exists. */
+hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found);
+
+/* ----------------------------------------------------------------------------------------------
+ * instance.c */
+
 /* Opens an instance that is zero but for its name, log, sink and interface; resources is a URI, a
- * path or NULL. On failure it is to be closed all the same. */
+ * path or NULL. The instance must be closed on failure too. */
 hxStatus hx_instance_open(hxInstance *instance, const char *guid, const char *resources);
 void hx_instance_close(hxInstance *instance);
 
-/* Values by reference, n at once. Integers and Booleans come as int, by the type asked for. */
+/* Values of n references. Integers and Booleans are int. */
 hxStatus hx_instance_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                          void *value);
 hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
@@ -82,7 +132,108 @@ hxStatus hx_instance_set(hxInstance *instance, hxType type, const unsigned refer
 hxStatus hx_instance_check_set(hxInstance *instance, hxType type, const unsigned reference[],
                                size_t n, const void *value);
 
-/* FMI 3: of whole arrays, n_values numbers in all; integers are int64_t, Booleans bool. */
+/* Updates output or rates to the present time and input, after initializing a component whose
+ * parameters were set. */
+hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate);
+
+/* Returns HX_NOT_FINITE, so that a solver tries a smaller step, unless all numbers are finite. */
+hxStatus hx_instance_check_finite(hxInstance *instance, const double number[], size_t n,
+                                  const char *what);
+
+/* Marks output and rates as not up to date. */
+static inline void hx_mark_stale(hxInstance *instance) {
+  instance->state.output_stale = instance->state.rate_stale = 1;
+}
+
+double hx_instance_time(const hxInstance *instance);
+
+/* Sets the start and, if stop_defined, the stop time [s]. */
+hxStatus hx_instance_set_experiment(hxInstance *instance, const char *call, double start,
+                                    int stop_defined, double stop);
+
+/* Returns 1 if the importer's tolerance, which is not used, is valid; else logs a warning. */
+int hx_instance_check_tolerance(hxInstance *instance, const char *call, int defined,
+                                double tolerance);
+
+/* Resets the component to the start time with the present parameters. */
+hxStatus hx_instance_initialize(hxInstance *instance);
+
+/* Returns the instance to its start values, before initialization. */
+void hx_instance_reset(hxInstance *instance);
+
+/* ----------------------------------------------------------------------------------------------
+ * step.c */
+
+/* A step from t to t + h [s]. hx_instance_step_to_event sets *event to whether discrete variables
+ * changed; with stop it ends where they first do (see component.h). */
+hxStatus hx_instance_step(hxInstance *instance, double t, double h);
+hxStatus hx_instance_step_to_event(hxInstance *instance, double t, double h, int stop, int *event);
+
+/* Sets rates of Real inputs [1/s] for the next step. */
+hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n,
+                                     const double rate[]);
+
+/* ----------------------------------------------------------------------------------------------
+ * exchange.c */
+
+/* Model exchange: continuous states and their rates, in the order of hx_states; event indicators.
+ */
+hxStatus hx_instance_set_time(hxInstance *instance, double t);
+hxStatus hx_instance_get_states(hxInstance *instance, double x[], size_t n);
+hxStatus hx_instance_set_states(hxInstance *instance, const double x[], size_t n);
+hxStatus hx_instance_get_rates(hxInstance *instance, double rate[], size_t n);
+hxStatus hx_instance_get_nominals(hxInstance *instance, double nominal[], size_t n);
+hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], size_t n);
+
+/* The importer's solver has completed a step. */
+hxStatus hx_instance_completed_step(hxInstance *instance);
+
+/* Handles an event. */
+hxStatus hx_instance_update(hxInstance *instance, int *states_changed);
+
+/* Exact derivatives of unknowns (outputs, rates) along a change of knowns (inputs, continuous
+ * states). */
+hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
+                                 const unsigned known[], size_t n_known, const double change[],
+                                 double result[]);
+
+/* Time derivatives of outputs [1/s]. */
+hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
+                                      double rate[]);
+
+/* ----------------------------------------------------------------------------------------------
+ * state.c */
+
+/* A saved state is one block without pointers, which the caller frees. save allocates it when
+ * *block is NULL. serialize copies a block to n bytes and adds the checksum that deserialize
+ * verifies. */
+size_t hx_instance_state_size(void);
+hxStatus hx_instance_save(hxInstance *instance, void **block);
+hxStatus hx_instance_restore(hxInstance *instance, const void *block);
+hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *block, void *bytes,
+                               size_t n);
+hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t n, void **block);
+
+/* ----------------------------------------------------------------------------------------------
+ * call.c */
+
+/* A function of the standard, with the modes and interfaces in which it may be called, as masks. */
+typedef struct hxCall {
+  const char *name;
+  int modes, interfaces;
+} hxCall;
+
+/* Checks of a call: that it is legal now, that arrays of n > 0 elements are not NULL, that all
+ * derivatives are of order 1. They return 1, or log and return 0. */
+int hx_call_is_legal(hxInstance *instance, const hxCall *call);
+int hx_call_has_arrays(hxInstance *instance, const hxCall *call, size_t n, const void *array,
+                       const void *other);
+int hx_call_is_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]);
+
+/* ----------------------------------------------------------------------------------------------
+ * arrays.c */
+
+/* FMI 3: whole arrays, with n_values numbers in all. Integers are int64_t, Booleans bool. */
 hxStatus hx_arrays_get(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
                        void *value, size_t n_values);
 hxStatus hx_arrays_set(hxInstance *instance, hxType type, const unsigned reference[], size_t n,
@@ -92,102 +243,6 @@ hxStatus hx_arrays_directional(hxInstance *instance, const unsigned unknown[], s
                                size_t n_change, double result[], size_t n_result);
 hxStatus hx_arrays_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
                                     double rate[], size_t n_rate);
-
-/* When it all begins and, if stop_defined, ends. The tolerance is not used, only looked at: the
- * sound ones return 1. */
-hxStatus hx_instance_set_experiment(hxInstance *instance, const char *call, double start,
-                                    int stop_defined, double stop);
-int hx_instance_note_tolerance(hxInstance *instance, const char *call, int defined,
-                               double tolerance);
-
-hxStatus hx_instance_initialize(hxInstance *instance); /* the component takes the parameters */
-hxStatus hx_instance_step(hxInstance *instance, double t, double h);
-hxStatus hx_instance_step_to_event(hxInstance *instance, double t, double h, int stop,
-                                   int *event); /* see component.h */
-void hx_instance_reset(hxInstance *instance);
-double hx_instance_time(const hxInstance *instance);
-
-/* Model exchange (exchange.c): continuous states and their rates, in the order of hx_states; event
- * indicators; what an event brings about. */
-hxStatus hx_instance_set_time(hxInstance *instance, double t);
-hxStatus hx_instance_get_states(hxInstance *instance, double x[], size_t n);
-hxStatus hx_instance_set_states(hxInstance *instance, const double x[], size_t n);
-hxStatus hx_instance_get_rates(hxInstance *instance, double rate[], size_t n);
-hxStatus hx_instance_completed_step(hxInstance *instance); /* of the importer's solver */
-hxStatus hx_instance_get_nominals(hxInstance *instance, double nominal[], size_t n);
-hxStatus hx_instance_get_indicators(hxInstance *instance, double indicator[], size_t n);
-hxStatus hx_instance_update(hxInstance *instance, int *states_changed);
-
-/* Derivatives by reference (exchange.c): of unknowns (outputs, rates) along a change of knowns
- * (inputs, continuous states), exact; rates of inputs for the next steps; rates of outputs now. All
- * or nothing. */
-hxStatus hx_instance_directional(hxInstance *instance, const unsigned unknown[], size_t n_unknown,
-                                 const unsigned known[], size_t n_known, const double change[],
-                                 double result[]);
-hxStatus hx_instance_set_input_rates(hxInstance *instance, const unsigned reference[], size_t n,
-                                     const double rate[]);
-hxStatus hx_instance_get_output_rates(hxInstance *instance, const unsigned reference[], size_t n,
-                                      double rate[]);
-
-/* Saved states: one block without pointers, taken with calloc where *block is NULL, to be freed by
- * the caller. serialize copies one into room for n bytes, with the checksum that deserialize
- * verifies; deserialize makes one of n intact bytes of this FMU. */
-size_t hx_instance_state_size(void);
-hxStatus hx_instance_keep(hxInstance *instance, void **block);
-hxStatus hx_instance_restore(hxInstance *instance, const void *block);
-hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *block, void *bytes,
-                               size_t n);
-hxStatus hx_instance_deserialize(hxInstance *instance, const void *bytes, size_t n, void **block);
-
-#if defined(__GNUC__)
-__attribute__((format(printf, 3, 4)))
-#endif
-void hx_log(hxInstance *instance, hxLogCategory category, const char *format, ...);
-
-/* A function of the standard: when it may be called, as masks. */
-typedef struct hxCall {
-  const char *name;
-  int modes, interfaces;
-} hxCall;
-
-/* Whether a call is legal now; whether n elements may be at two places; whether derivatives are of
- * order 1. They complain if not. */
-int hx_call_admit(hxInstance *instance, const hxCall *call);
-int hx_call_given(hxInstance *instance, const hxCall *call, size_t n, const void *array,
-                  const void *other);
-int hx_call_first_order(hxInstance *instance, const hxCall *call, size_t n, const int order[]);
-
-/* What is passed on: refusals and discarded steps always, the rest when the importer wants it.
- * choose: these categories, all when n = 0. */
-enum { HX_LOG_ALWAYS = 1u << HX_LOG_ERROR | 1u << HX_LOG_DISCARD };
-hxStatus hx_log_choose(hxInstance *instance, const char *call, int on, size_t n,
-                       const char *const category[]);
-
-/* Reads start_values.txt of the resources into start; *found says whether there is one. */
-hxStatus hx_resources_read(hxInstance *instance, const char *resources, int *found);
-
-/* The input at the end of the next step, if it is ramped and that is in range; complains if not. */
-hxStatus hx_instance_ramp_end(hxInstance *instance, double h, hxInput *end);
-
-/* Output and rates are to be found anew. */
-static inline void hx_stale(hxInstance *instance) {
-  instance->state.output_stale = instance->state.rate_stale = 1;
-}
-
-/* Brings output or rates to the present time and input, and the component to the parameters before
- * that; the row of a reference if it is of the type asked for. */
-hxStatus hx_instance_refresh(hxInstance *instance, int output, int rate);
-const hxVariable *hx_instance_find(hxInstance *instance, hxType type, unsigned reference,
-                                   hxCausality *causality);
-
-/* Whether numbers are finite; a solver is told to try a smaller step otherwise. */
-hxStatus hx_instance_check_finite(hxInstance *instance, const double number[], size_t n,
-                                  const char *what);
-
-/* The row of a reference, or NULL; and a value's fitness for it (NaN and infinities fit nowhere).
- */
-const hxVariable *hx_variable_find(unsigned reference, hxCausality *causality);
-int hx_variable_takes(const hxVariable *variable, double value);
 
 HX_HIDDEN_END
 

@@ -1,9 +1,9 @@
-/* resources.c - start values in the FMU's resources.
+/* resources.c - reads the start values in the FMU's resources.
  *
  * start_values.txt: the GUID; then, for every input and parameter in the order of their references,
- * a line "reference value name"; then "checksum" and, in 16 hexadecimal digits, hx_checksum over
- * the lines above without their ends, each one's checksum the next one's seed. Reals are
- * hexadecimal (0x1.8p+1), so they are exact and no locale has a say.
+ * a line "reference value name"; then "checksum" and 16 hexadecimal digits: hx_checksum over the
+ * lines above without their line ends, where each line's checksum is the next one's seed. Reals are
+ * hexadecimal (0x1.8p+1), so that they are exact and independent of the locale.
  */
 #include "fmi/instance.h"
 
@@ -32,7 +32,7 @@ static int hex_digit(char c) {
   return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
 }
 
-/* %41 -> A, in place; what is no such triple stays as it is */
+/* replaces escapes such as %41 by their characters, in place; keeps invalid escapes */
 static void percent_decode(char *text) {
   char *out = text;
   while (*text) {
@@ -47,7 +47,7 @@ static void percent_decode(char *text) {
   *out = '\0';
 }
 
-/* file:///x, file://host/x and file:/x -> /x; NULL when it is no file: URI */
+/* file:///x, file://host/x and file:/x -> /x; NULL for other URIs and paths */
 static const char *skip_scheme(const char *uri) {
   static const char scheme[] = "file:";
   for (size_t i = 0; i < sizeof scheme - 1; i++)
@@ -77,8 +77,8 @@ static void to_windows_path(char *path) {
 }
 #endif
 
-/* path of start_values.txt below the resources, decoded or as it is given, to be freed; NULL when
- * out of memory */
+/* The path of start_values.txt in the resources folder, with or without percent decoding, to be
+ * freed by the caller; NULL when out of memory. */
 static char *start_values_path(const char *resources, int decode) {
   const char *after_scheme = skip_scheme(resources);
   char *path = malloc(strlen(resources) + sizeof file_name + 1);
@@ -107,8 +107,8 @@ static FILE *open_file(const char *path) {
 /* ----------------------------------------------------------------------------------------------
  * lines */
 
-/* hexadecimal floating point, at most 15 digits so that the mantissa is exact; returns 1 if all of
- * the text is one */
+/* Parses a hexadecimal floating point number of at most 15 digits, so that the mantissa is exact.
+ * Returns 1 if the whole text is such a number. */
 static int parse_real(const char *text, double *value) {
   const int negative = text[0] == '-';
   unsigned long long mantissa = 0;
@@ -134,7 +134,7 @@ static int parse_real(const char *text, double *value) {
   return 1;
 }
 
-/* at most 9 decimal digits */
+/* Parses a number of at most 9 decimal digits. Returns 1 if the whole text is one. */
 static int parse_count(const char *text, unsigned *value) {
   size_t length = 0;
   for (*value = 0; is_digit(text[length]) && length < 10; length++)
@@ -152,14 +152,14 @@ static int parse_value(const hxVariable *variable, const char *text, double *val
 
 typedef struct hxReader {
   FILE *file;
-  int number;        /* of the last line, from 1 */
-  uint64_t checksum; /* of the lines before the last */
+  int number;        /* of the last line read, from 1 */
+  uint64_t checksum; /* of the lines before the last one read */
   uint64_t next_checksum;
   char line[LINE_SIZE];
 } hxReader;
 
-/* the next line without its end, or NULL at the end of the file; a line too long comes in pieces
- * and so parses as none */
+/* Reads the next line without its line end; NULL at the end of the file. A line that is too long is
+ * returned in pieces, none of which can be parsed. */
 static char *next_line(hxReader *reader) {
   size_t length = 0;
   int c = fgetc(reader->file);
@@ -176,7 +176,7 @@ static char *next_line(hxReader *reader) {
   return reader->line;
 }
 
-/* splits "reference value name" in place; returns 0 if the line has no such form */
+/* Splits "reference value name" in place. Returns 1 if the line has this form. */
 static int split(char *line, char *part[3]) {
   part[0] = line;
   for (int k = 1; k < 3; k++) {
@@ -198,7 +198,7 @@ static void store(struct hxVariables *variables, const hxVariable *variable, dou
   }
 }
 
-/* one line against the row it must be of; returns 0 if it is not */
+/* Reads one line, which must belong to the given variable. Returns 1 if it does. */
 static int read_variable(struct hxVariables *variables, const hxVariable *variable,
                          unsigned reference, char *line) {
   char *part[3];
@@ -207,7 +207,7 @@ static int read_variable(struct hxVariables *variables, const hxVariable *variab
   if (!line || !split(line, part) || !parse_count(part[0], &given) || given != reference ||
       strcmp(part[2], variable->name) != 0)
     return 0;
-  if (!parse_value(variable, part[1], &value) || !hx_variable_takes(variable, value)) return 0;
+  if (!parse_value(variable, part[1], &value) || !hx_variable_in_range(variable, value)) return 0;
   store(variables, variable, value);
   return 1;
 }
@@ -217,7 +217,7 @@ static int read_variable(struct hxVariables *variables, const hxVariable *variab
 
 static hxStatus refuse(hxInstance *instance, const hxReader *reader, const char *got,
                        const char *expected) {
-  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU anew",
+  hx_log(instance, HX_LOG_ERROR, "%s: line %d: got '%s', expected %s; export the FMU again",
          file_name, reader->number, got ? got : "the end of the file", expected);
   return HX_INVALID_ARGUMENT;
 }
@@ -242,7 +242,7 @@ static hxStatus read_variables(hxInstance *instance, hxReader *reader,
   return HX_OK;
 }
 
-/* the last line tells whether the ones above are as they were exported */
+/* checks that the lines are as they were exported and that no others follow */
 static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
   char expected[LINE_SIZE];
   const char *line = next_line(reader);
@@ -255,12 +255,12 @@ static hxStatus read_checksum(hxInstance *instance, hxReader *reader) {
   return line ? refuse(instance, reader, line, "the end of the file") : HX_OK;
 }
 
-/* whether there can be such a robot */
+/* checks that the component accepts the definition */
 static hxStatus check_start(hxInstance *instance, const struct hxVariables *variables) {
   char message[HX_MESSAGE_SIZE];
   const hxStatus status = hx_component_check(variables, message);
   if (status != HX_OK)
-    hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU anew", file_name,
+    hx_log(instance, HX_LOG_ERROR, "%s: %s; correct the robot and export the FMU again", file_name,
            message);
   return status;
 }
@@ -286,8 +286,8 @@ static hxStatus read_file(hxInstance *instance, FILE *file) {
   return HX_OK;
 }
 
-/* opens start_values.txt; a folder may be called %41 in a URI that was never encoded: the path as
- * it is given is the second try */
+/* Opens start_values.txt. Some importers pass paths that were never percent-encoded, so the path
+ * without decoding is tried second. */
 static hxStatus open_resources(hxInstance *instance, const char *resources, FILE **file) {
   *file = NULL;
   for (int decode = 1; decode >= 0 && !*file; decode--) {

@@ -1,4 +1,4 @@
-/* state.c - saved states: header, instance, component, in one block without pointers. */
+/* state.c - saved states: header, instance and component in one block without pointers. */
 #include "fmi/instance.h"
 
 #include <stdint.h>
@@ -12,8 +12,8 @@ static const char state_magic[8] = "hexapod";
 typedef struct hxStateHeader {
   char magic[8];
   uint32_t format;
-  uint32_t size;     /* of the block: another word size or component makes another one */
-  uint64_t checksum; /* of what follows the header; written by hx_instance_serialize */
+  uint32_t size;     /* of the block [B]: differs between platforms and components */
+  uint64_t checksum; /* of the bytes after the header; written by hx_instance_serialize */
   char guid[HX_GUID_SIZE];
 } hxStateHeader;
 
@@ -36,7 +36,7 @@ static void save(const hxInstance *instance, void *bytes) {
   hx_component_get_state(instance->component, block->component);
 }
 
-/* memory for a saved state, taken where there is none yet */
+/* allocates a block for a saved state unless there is one */
 static hxStatus need_block(hxInstance *instance, void **block) {
   if (!*block) *block = calloc(1, hx_instance_state_size());
   if (*block) return HX_OK;
@@ -44,13 +44,13 @@ static hxStatus need_block(hxInstance *instance, void **block) {
   return HX_OUT_OF_MEMORY;
 }
 
-hxStatus hx_instance_keep(hxInstance *instance, void **block) {
+hxStatus hx_instance_save(hxInstance *instance, void **block) {
   const hxStatus status = need_block(instance, block);
   if (status == HX_OK) save(instance, *block);
   return status;
 }
 
-/* bytes may be unaligned */
+/* checksum of a block; its bytes may be unaligned */
 static uint64_t checksum(const void *bytes) {
   return hx_checksum(0, (const char *)bytes + sizeof(hxStateHeader),
                      hx_instance_state_size() - sizeof(hxStateHeader));
@@ -63,6 +63,7 @@ static hxStatus refuse(hxInstance *instance, const char *what) {
   return HX_BAD_STATE;
 }
 
+/* why a header does not belong to a state of this FMU; NULL when it does */
 static const char *fault(const hxInstance *instance, const hxStateHeader *header) {
   if (memcmp(header->magic, state_magic, sizeof state_magic) != 0)
     return "bytes that are no saved state";
@@ -87,7 +88,7 @@ hxStatus hx_instance_serialize(hxInstance *instance, const char *call, void *sav
   return HX_OK;
 }
 
-/* bytes may be unaligned: the header is copied out */
+/* checks size, header and checksum; the bytes may be unaligned, so the header is copied */
 static hxStatus check(hxInstance *instance, const void *bytes, size_t n) {
   hxStateHeader header;
   if (n != hx_instance_state_size())
@@ -114,7 +115,7 @@ hxStatus hx_instance_restore(hxInstance *instance, const void *bytes) {
   if (hx_component_set_state(instance->component, block->component) != HX_OK)
     return refuse(instance, "a damaged component");
   memcpy(&instance->state, &block->instance, sizeof instance->state);
-  /* saved by an instance with event mode: here steps follow one another */
+  /* the state was saved by an instance with event mode, which this one does not use */
   if (instance->state.interface == HX_CO_SIMULATION && instance->state.mode == HX_MODE_EVENT &&
       !instance->uses_event_mode)
     instance->state.mode = HX_MODE_STEP;

@@ -1,5 +1,5 @@
-/* variables.h - the table of variables that generated/variables.c fills in; their structure is in
- * generated/variables.h. */
+/* variables.h - the table of variables, whose rows are in generated/variables.c; the structure that
+ * holds their values is in generated/variables.h. */
 #ifndef HEXAPOD_FMI_VARIABLES_H
 #define HEXAPOD_FMI_VARIABLES_H
 
@@ -8,28 +8,25 @@
 
 HX_HIDDEN_BEGIN
 
-typedef enum hxType {
-  HX_REAL,
-  HX_INTEGER,
-  HX_BOOLEAN
-} hxType; /* double, int, int; an enumeration is an HX_INTEGER */
+/* Stored as double, int, int. Enumerations are HX_INTEGER. */
+typedef enum hxType { HX_REAL, HX_INTEGER, HX_BOOLEAN } hxType;
 
+/* Local variables are the rates of states. */
 typedef enum hxCausality {
   HX_INPUT,
   HX_OUTPUT,
   HX_PARAMETER,
   HX_LOCAL,
   HX_CAUSALITIES
-} hxCausality; /* local: rates of states */
+} hxCausality;
 
 typedef struct hxVariable {
   const char *name;
-  const char *unit;  /* "" when it has none */
-  double min, max;   /* inclusive, finite: what lies outside, infinite or NaN is refused */
-  unsigned short offset; /* into struct hxVariables */
-  unsigned char type;    /* hxType */
-  unsigned short
-      run;    /* FMI 3: rows of the array that begins here, 1 for a scalar; 0 within an array */
+  const char *unit; /* "" when it has none */
+  double min, max; /* the allowed range, finite and inclusive */
+  unsigned short offset; /* in struct hxVariables */
+  unsigned char type; /* hxType */
+  unsigned short array_rows; /* FMI 3: of the array that begins here; 1: scalar, 0: within one */
 } hxVariable;
 
 /* The variables of one causality; their value references are first, first + 1, ... */
@@ -41,13 +38,13 @@ typedef struct hxSection {
 
 extern const hxSection hx_sections[HX_CAUSALITIES];
 
-/* A continuous state of model exchange: the variable that shows it, and its usual size. */
+/* A continuous state of model exchange: its variable and its nominal value. */
 typedef struct hxStateRow {
   unsigned reference;
   double nominal;
 } hxStateRow;
 
-/* In the order of the state in struct hxVariables; none without model exchange. */
+/* In the order of the state in struct hxVariables; empty without model exchange. */
 extern const hxStateRow *const hx_states;
 extern const size_t hx_state_count;
 

@@ -1,4 +1,4 @@
-/* plant.c - the plant as an FMU's component */
+/* component.c - the plant as an FMU's component */
 #include "fmi/component.h"
 
 #include <string.h>
@@ -81,7 +81,7 @@ static void indicate(const hxComponent *component, double indicator[]) {
   hx_plant_indicators(const_plant(component), indicator);
 }
 
-/* slack bristles are the only states that an event sets */
+/* an event sets the bristles of feet without contact to zero: the only states that events change */
 static int update(hxComponent *component, struct hxVariables *variables) {
   hxCoordinates now;
   if (!hx_plant_update_contacts(plant_of(component))) return 0;

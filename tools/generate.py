@@ -3,7 +3,7 @@ models/athena.toml and pyproject.toml's version.
 
 usage: python tools/generate.py [--check]
 
---check writes nothing, names what is stale and exits with 1 if anything is.
+--check writes nothing, lists the files that are not up to date and exits with 1 if there are any.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TYPES = {"Real": "HX_REAL", "Enumeration": "HX_INTEGER", "Boolean": "HX_BOOLEAN"
 
 
 def main() -> int:
-    """Writes or checks; returns the exit code."""
+    """Writes or checks the files; returns the exit code."""
     parser = argparse.ArgumentParser(
         description="Generates plant_fmu/generated/ and controller_fmu/generated/."
     )
@@ -53,7 +53,7 @@ def main() -> int:
 
 
 def stale_files() -> dict[Path, str]:
-    """Path and text of the generated files that are missing or differ from what they should be."""
+    """Returns path and new text of the files that are missing or not up to date."""
     return {
         path: text
         for path, text in render_all().items()
@@ -62,7 +62,7 @@ def stale_files() -> dict[Path, str]:
 
 
 def render_all() -> dict[Path, str]:
-    """Every generated file's path and text."""
+    """Returns path and text of every generated file."""
     robot = load_robot(DEFAULT_ROBOT)
     setup = ControllerSetup(robot=robot, gait=make_gait(robot), period=DEFAULT_PERIOD)
     return render_component(load_interface(robot)) | render_component(
@@ -71,7 +71,7 @@ def render_all() -> dict[Path, str]:
 
 
 def render_component(interface: Interface) -> dict[Path, str]:
-    """The generated files of one component."""
+    """Returns path and text of the generated files of one component."""
     folder, description = ROOT / interface.component.tree / "generated", render_fmi2(interface)
     return {
         folder / "variables.h": render_structure(interface.component),
@@ -87,7 +87,7 @@ def render_component(interface: Interface) -> dict[Path, str]:
 
 
 def render_structure(component: Component) -> str:
-    """What the variables are fields of, as C."""
+    """Returns variables.h: the C structure that holds the values of the variables."""
     kind = component.structure
     lines = [
         _head("variables.h - what the FMU's variables are fields of."),
@@ -103,34 +103,38 @@ def render_structure(component: Component) -> str:
         f"  hx{kind}Output output;",
     ]
     if component is PLANT:
-        lines += [
-            "  hxCoordinates state, rate; /* of model exchange: continuous states and their derivatives */"
-        ]
+        lines.append(
+            "  hxCoordinates state, rate; /* of model exchange: continuous states and their "
+            "derivatives */"
+        )
         lines += ["  double indicator[HX_LEGS]; /* events are its changes of sign */"]
     return "\n".join([*lines, "};", "", "#endif", ""])
 
 
 def render_variables(interface: Interface, guid: str) -> str:
-    """The table of variables as C."""
+    """Returns variables.c: the table of variables."""
     lines = [
         _head("variables.c - every variable of the FMU: where it is and what it may be."),
         "#include <float.h>",
         "",
     ]
     lines += ['#include "fmi/variables.h"', ""]
-    runs = {array.reference: len(array.elements) for array in arrays(interface)}
+    array_rows = {array.reference: len(array.elements) for array in arrays(interface)}
     for causality in CAUSALITIES:
         if rows := [
-            _row(variable, runs.get(variable.reference, 0))
+            _row(variable, array_rows.get(variable.reference, 0))
             for variable in interface.of_causality(causality)
         ]:
             lines += [f"static const hxVariable {causality}s[] = {{", *rows, "};", ""]
     lines += ["const hxSection hx_sections[HX_CAUSALITIES] = {"]
     for causality in CAUSALITIES:
-        first, any_there = interface.first_reference[causality], interface.of_causality(causality)
+        first, any_variables = (
+            interface.first_reference[causality],
+            interface.of_causality(causality),
+        )
         row = (
             f"{first}, sizeof {causality}s / sizeof {causality}s[0], {causality}s"
-            if any_there
+            if any_variables
             else f"{first}, 0, 0"
         )
         lines += [f"    [HX_{causality.upper()}] = {{{row}}},"]
@@ -147,13 +151,11 @@ def render_variables(interface: Interface, guid: str) -> str:
 
 
 def _states(interface: Interface) -> list[str]:
-    """The continuous states as rows, in the order of struct hxVariables' state."""
+    """Returns the C table of continuous states, in the order of the state in struct hxVariables."""
     if not interface.states:
         return ["const hxStateRow *const hx_states = 0;", "const size_t hx_state_count = 0;", ""]
-    rows = [
-        f"    {{{interface.variable(state.name).reference}, {interface.variable(state.name).nominal!r}}},"
-        for state in interface.states
-    ]
+    variables = [interface.variable(state.name) for state in interface.states]
+    rows = [f"    {{{variable.reference}, {variable.nominal!r}}}," for variable in variables]
     lines = [
         "static const hxStateRow states[] = {",
         *rows,
@@ -161,33 +163,40 @@ def _states(interface: Interface) -> list[str]:
         "const hxStateRow *const hx_states = states;",
     ]
     lines += ["const size_t hx_state_count = sizeof states / sizeof states[0];", ""]
-    lines += [
-        '_Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");',
-        "",
-    ]
-    return lines
+    lines.append(
+        "_Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / "
+        'sizeof(double), "each state has its row");'
+    )
+    return [*lines, ""]
 
 
-def _row(variable: Variable, run: int) -> str:
+def _row(variable: Variable, array_rows: int) -> str:
+    """Returns the C row of a variable."""
     place = f"offsetof(struct hxVariables, {variable.field})"
-    return f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, {TYPES[variable.type]}, {run}}},'
+    return (
+        f'    {{"{variable.name}", "{variable.unit or ""}", {_limits(variable)}, {place}, '
+        f"{TYPES[variable.type]}, {array_rows}}},"
+    )
 
 
 def _limits(variable: Variable) -> str:
+    """Returns a variable's limits in C."""
     low = "-DBL_MAX" if variable.minimum is None else repr(variable.minimum)
     high = "DBL_MAX" if variable.maximum is None else repr(variable.maximum)
     return f"{low}, {high}"
 
 
 def _enumeration_checks(interface: Interface) -> Iterable[str]:
-    """The numbers that users give are the ones that the C enumerations have."""
+    """Yields C assertions that enumeration items have the same numbers in C and in the FMU."""
     for enumeration in interface.enumerations.values():
         for number in range(1, len(enumeration.items) + 1):
-            yield f'_Static_assert({enumeration.constant(number)} == {number}, "{enumeration.name}");'
+            yield (
+                f'_Static_assert({enumeration.constant(number)} == {number}, "{enumeration.name}");'
+            )
 
 
 def render_defaults(interface: Interface) -> str:
-    """The default robot as C."""
+    """Returns defaults.c: the default robot's values, the ranges of variables, the version."""
     component = interface.component
     lines = [
         _head(f"defaults.c - the robot {interface.robot.name} and the version."),
@@ -216,11 +225,9 @@ def render_defaults(interface: Interface) -> str:
 
 
 def _default(interface: Interface, member: str) -> Iterable[str]:
-    """A structure's default values, and the function that hands them out."""
-    structure, function = (
-        f"hx{interface.component.structure}{member.capitalize()}",
-        f"hx_{interface.component.prefix}{member}_default",
-    )
+    """Yields a structure's default values and the function that copies them."""
+    structure = f"hx{interface.component.structure}{member.capitalize()}"
+    function = f"hx_{interface.component.prefix}{member}_default"
     yield from (
         f"static const {structure} default_{member} = {{",
         *_initialisers(interface, member),
@@ -236,15 +243,20 @@ def _default(interface: Interface, member: str) -> Iterable[str]:
 
 
 def _ranges(interface: Interface, member: str, structure: str) -> Iterable[str]:
+    """Yields the C rows of ranges for one structure."""
     for variable in interface.of_causality("input", "parameter"):
         root, _, field = variable.field.partition(".")
         if root == member:
             place = f"offsetof({structure}, {field})"
             unit = "" if variable.unit in (None, "1") else variable.unit
-            yield f'    {{"{variable.name}", "{unit}", {_limits(variable)}, {place}, {int(variable.type != "Real")}}},'
+            yield (
+                f'    {{"{variable.name}", "{unit}", {_limits(variable)}, {place}, '
+                f"{int(variable.type != 'Real')}}},"
+            )
 
 
 def _initialisers(interface: Interface, member: str) -> Iterable[str]:
+    """Yields the C initialisers of one structure."""
     for variable in interface.of_causality("input", "parameter"):
         root, _, field = variable.field.partition(".")
         if root == member and variable.start is not None:
@@ -252,13 +264,18 @@ def _initialisers(interface: Interface, member: str) -> Iterable[str]:
 
 
 def _constant(interface: Interface, variable: Variable) -> str:
+    """Returns a start value in C."""
     if variable.enumeration is not None:
         return interface.enumerations[variable.enumeration].constant(int(variable.start or 0))
     return str(int(variable.start)) if isinstance(variable.start, bool) else repr(variable.start)
 
 
 def _head(purpose: str) -> str:
-    return f"/* {purpose}\n * Generated by tools/generate.py: change interface.toml or the robot's file, not this. */"
+    """Returns the comment at the beginning of a generated file."""
+    return (
+        f"/* {purpose}\n * Generated by tools/generate.py: change interface.toml or the robot's "
+        "file, not this. */"
+    )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,10 @@
-"""Writes what of the default robot's FMU is drawn or simulated rather than rendered: pictures and
-reference results.
+"""Writes pictures and reference results of the default robot's FMU to plant_fmu/generated/.
 
 usage: python tools/generate_extras.py [--check]
 
-They go to plant_fmu/generated/, from where CMake packs them. Another library or compiler may change
-last digits, so --check, which writes nothing and exits with 1 if anything is stale, compares
-numbers and pixels. Needs the installed plant.
+--check writes nothing and exits with 1 if a file is not up to date. It compares numbers and pixels
+with tolerances, since other libraries and compilers may change the last digits. The program needs
+the installed plant.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ from hexapod_cosim.models.robot import load_robot
 
 GENERATED = Path(__file__).resolve().parents[1] / "plant_fmu" / "generated"
 DEFAULT_ROBOT = "athena"
-GREY_LEVELS = 2.0  # mean difference between pictures that are the same to the eye
+GREY_LEVELS = 2.0  # largest mean difference between pictures that look the same
 
 
 def main() -> int:
-    """Writes or checks; returns the exit code."""
+    """Writes or checks the files; returns the exit code."""
     parser = argparse.ArgumentParser(
         description="Generates the pictures and reference results in plant_fmu/generated/."
     )
@@ -53,7 +52,7 @@ def main() -> int:
 
 
 def render_all() -> dict[Path, bytes]:
-    """Every file's path and content."""
+    """Returns path and content of every file."""
     robot = load_robot(DEFAULT_ROBOT)
     interface = load_interface(robot)
     with TemporaryDirectory() as folder:
@@ -65,14 +64,14 @@ def render_all() -> dict[Path, bytes]:
 
 
 def same(name: str, old: bytes, new: bytes) -> bool:
-    """Whether two versions of a file say the same."""
+    """Returns whether two versions of a file are equal within tolerances."""
     if name.endswith(".png"):
         return same_picture(old, new)
     return same_results(old, new) if name.endswith(".csv") else old == new
 
 
 def same_picture(old: bytes, new: bytes) -> bool:
-    """Whether two PNGs look the same."""
+    """Returns whether two PNGs look the same."""
     first, second = (
         np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"), dtype=float) for data in (old, new)
     )
@@ -80,9 +79,7 @@ def same_picture(old: bytes, new: bytes) -> bool:
 
 
 def same_results(old: bytes, new: bytes) -> bool:
-    """Whether two CSVs have the same columns, and numbers that differ by solver rounding at
-    most.
-    """
+    """Returns whether two CSV files have the same columns and equal numbers within TOLERANCE."""
     first, second = read_csv(old), read_csv(new)
     return list(first) == list(second) and all(
         np.allclose(first[name], second[name], rtol=TOLERANCE, atol=TOLERANCE) for name in first

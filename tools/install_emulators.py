@@ -1,5 +1,5 @@
-"""Installs what `make test-platforms` runs foreign binaries with, from Debian's or Ubuntu's
-packages: Wine, qemu-user, an Arm C library.
+"""Installs the emulators of `make test-platforms` from Debian's or Ubuntu's packages: Wine,
+qemu-user, an Arm C library.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-PACKAGES = {  # by what shows that a package is there
+PACKAGES = {  # by a program or file of the package
     "wine": ["wine", "wine64"],
     "qemu-aarch64": ["qemu-user"],
     "/usr/aarch64-linux-gnu/lib/libc.so.6": ["libc6-arm64-cross"],
@@ -18,7 +18,7 @@ PACKAGES = {  # by what shows that a package is there
 
 
 def main() -> int:
-    """Installs what is missing; returns the exit code."""
+    """Installs the missing packages; returns the exit code."""
     packages = [
         name
         for need, names in PACKAGES.items()
@@ -35,7 +35,8 @@ def main() -> int:
             else "the rights of root"
         )
         print(
-            f"missing: {', '.join(packages)}; to install them this needs {expected}. As root: {' '.join(command)}",
+            f"missing: {', '.join(packages)}; to install them this needs {expected}. As "
+            f"root: {' '.join(command)}",
             file=sys.stderr,
         )
         return 1

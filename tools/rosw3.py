@@ -1,11 +1,10 @@
-"""Makes the coefficients of the method rosw3 (plant_fmu/src/method.c): those nearest to ROS34PW2's
-that keep order 3 with A_i formed anew.
+"""Calculates the coefficients of the method rosw3 (plant_fmu/src/method.c).
 
-ROS34PW2 (Rang and Angermann, BIT 45, 2005) is a W-method: order 3 with one inexact Jacobian A for
-all its stages. Here every stage has its own (its masses and joints are where the stage is), which
-asks for one condition more, sum b_i c_i gamma_i = 0; ROS34PW2 misses it by 0.0025.
-Kept: gamma, the last stage's a = (0, 0, 1) and stiff accuracy (b = last row of a + g + gamma), so
-that it stays A- and L-stable.
+ROS34PW2 (Rang and Angermann, BIT 45, 2005) is a W-method: of order 3 with one inexact Jacobian A
+for all stages. In the plant every stage i has its own A_i, since A depends on the configuration.
+Order 3 then requires a further condition, sum b_i c_i gamma_i = 0, which ROS34PW2 misses by 0.0025.
+rosw3 has the coefficients nearest to ROS34PW2's that meet it. Unchanged are gamma, the last stage's
+a = (0, 0, 1) and stiff accuracy (b = last row of a + g + gamma), so that rosw3 is A- and L-stable.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ EMBEDDED = np.array([0.378109031458194, -0.096042292212423, 0.5, 0.2179332607542
 
 
 def method(x: Array) -> tuple[Array, Array, Array]:
-    """a (4, 4), g (4, 4) without gamma, b (4,)"""
+    """Returns a (4, 4), g (4, 4) without gamma, b (4,) of the free coefficients x (9,)."""
     a, g = np.zeros((4, 4)), np.zeros((4, 4))
     a[1, 0], a[2, :2], a[3, 2] = x[0], x[1:3], 1.0
     b = np.array([*x[6:9], GAMMA])
@@ -38,7 +37,7 @@ def method(x: Array) -> tuple[Array, Array, Array]:
 
 
 def conditions(x: Array) -> Array:
-    """What must vanish: order 3 with any A, and with A changing along the solution (the last)."""
+    """Returns the residuals of the order conditions: order 3 with any A; the last with any A_i."""
     a, g, b = method(x)
     full, c = g + GAMMA * np.eye(4), a.sum(axis=1)
     rows = full.sum(axis=1)
@@ -55,7 +54,7 @@ def conditions(x: Array) -> Array:
 
 
 def embedded_weights(x: Array) -> Array:
-    """The weights nearest to ROS34PW2's embedded ones that have order 2 with any A."""
+    """Returns the weights of order 2 with any A that are nearest to ROS34PW2's embedded ones."""
     a, g, _ = method(x)
     rows = np.vstack([np.ones(4), a.sum(axis=1), (g + GAMMA * np.eye(4)).sum(axis=1)])
     return EMBEDDED + rows.T @ np.linalg.solve(
@@ -64,6 +63,7 @@ def embedded_weights(x: Array) -> Array:
 
 
 def main() -> None:
+    """Prints the coefficients."""
     solution = least_squares(conditions, START, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     a, g, b = method(solution.x)
     for name, value in (
@@ -74,7 +74,7 @@ def main() -> None:
         ("e", b - embedded_weights(solution.x)),
     ):
         print(name, [[float(entry) for entry in row] for row in np.atleast_2d(value)])
-    print("largest condition left:", float(np.max(np.abs(conditions(solution.x)))))
+    print("largest residual of the conditions:", float(np.max(np.abs(conditions(solution.x)))))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import typer
 
 from hexapod_cosim.cosim.cli import (
     compare_command,
+    export_command,
     fmu_commands,
     listing,
     run_commands,
@@ -23,7 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     epilog=EPILOG,
 )
-app.command("export")(fmu_commands.export)
+app.command("export")(export_command.export)
 app.command("simulate", epilog=run_commands.EPILOG)(run_commands.simulate)
 app.command("compare", epilog=compare_command.EPILOG)(compare_command.compare)
 app.command("study", epilog=study_command.EPILOG)(study_command.study)

@@ -1,1 +1,1 @@
-"""Files, messages and the places of the installed plant. Imports no other room."""
+"""Files, events and the locations of the installed FMUs. Imports no other room."""

@@ -1,5 +1,6 @@
-"""What there are FMUs of: the plant and its controller. Both live behind one FMI layer and are
-described in one form of interface.toml.
+"""The components that FMUs exist for: the plant and its controller.
+
+Both use the FMI layer in fmi/ and describe their variables in an interface.toml.
 """
 
 from __future__ import annotations
@@ -9,17 +10,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Component:
-    """Where a component's files are, and what its C calls things."""
+    """Locations of a component's files, and names in its C code."""
 
-    name: str  # for messages
+    name: str  # in messages
     identifier: str  # FMI's model identifier, and the name of the binary
-    tree: str  # its folder in a source tree
-    installed: str  # and in an installed package
-    header: str  # of its C API
-    prefix: str  # of its functions hx_{prefix}definition_default and so on
-    structure: str  # of its C structures hx{structure}Definition, Input, Output
-    suffix: str  # of the model's name after the robot's
-    description: str  # of the model; {bodies} and {joints} are the robot's
+    tree: str  # the folder in a source tree
+    installed: str  # the folder in an installed package
+    header: str  # of the C API
+    prefix: str  # of C functions: hx_{prefix}definition_default
+    structure: str  # in names of C structures: hx{structure}Definition
+    suffix: str  # of the model's name, after the robot's
+    description: str  # of the model, with the robot's {bodies} and {joints}
 
 
 PLANT = Component(
@@ -31,7 +32,10 @@ PLANT = Component(
     prefix="",
     structure="",
     suffix="",
-    description="Hexapod robot of {bodies} rigid bodies and {joints} servo joints, walking on compliant ground",
+    description=(
+        "Hexapod robot of {bodies} rigid bodies and {joints} servo joints, walking on compliant "
+        "ground"
+    ),
 )
 CONTROLLER = Component(
     name="controller",
@@ -42,5 +46,8 @@ CONTROLLER = Component(
     prefix="controller_",
     structure="Controller",
     suffix="_controller",
-    description="Walking controller of a hexapod robot: commands of its {joints} joints from a body velocity and from foot forces",
+    description=(
+        "Walking controller of a hexapod robot: commands of its {joints} joints from a body "
+        "velocity and from foot forces"
+    ),
 )

@@ -1,6 +1,4 @@
-"""Event sinks: functions that take messages about what a program waits for or corrects by
-itself.
-"""
+"""Event sinks: functions that receive messages about waiting and automatic corrections."""
 
 from __future__ import annotations
 
@@ -10,4 +8,4 @@ EventSink = Callable[[str], None]
 
 
 def ignore_event(_text: str) -> None:
-    """An event sink that ignores every message."""
+    """Ignores a message: the event sink of callers that show none."""

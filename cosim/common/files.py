@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and the folder a command writes into."""
+"""Atomic writing of files, and the folder that a command writes into."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from typing import Any, TextIO
 
 from hexapod_cosim.models import HexapodError
 
-RUN_FILE = "run.json"  # marks a folder as ours
+RUN_FILE = "run.json"  # marks a folder as written by this package
 RUNNING = "running"
-STUDY = "study"  # the kind of a folder that goes on where it was
-OUR_FILES = (
+STUDY = "study"  # the kind of a folder that holds a study, which can be resumed
+RESULT_FILES = (
     "results.parquet",
     "results.csv",
     "commands.csv",
@@ -36,10 +36,10 @@ OUR_FILES = (
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to, which takes its place when the block ends well and vanishes
-    when it does not.
+    """Yields a temporary path beside `path`, which replaces `path` when the block succeeds and is
+    deleted when it fails.
 
-    Raises HexapodError for a folder, and for a place that cannot be written to.
+    Raises HexapodError when `path` is a folder or cannot be written.
     """
     if path.is_dir():
         raise HexapodError(
@@ -67,6 +67,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def _umask() -> int:
+    """Returns the process's file mode creation mask."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
@@ -74,7 +75,7 @@ def _umask() -> int:
 
 @contextmanager
 def atomic_text(path: Path) -> Iterator[TextIO]:
-    """The same as an open text file in UTF-8."""
+    """Yields a text file (UTF-8) that replaces `path` when the block succeeds."""
     with (
         atomic_path(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="\n") as file,
@@ -83,22 +84,23 @@ def atomic_text(path: Path) -> Iterator[TextIO]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Writes a text file, whole or not at all."""
+    """Writes a text file atomically."""
     with atomic_text(path) as file:
         file.write(text)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Writes a JSON file, whole or not at all; numbers that are none become null."""
+    """Writes a JSON file atomically; NaN and infinities become null."""
     write_text(path, to_json(content) + "\n")
 
 
 def to_json(content: Any) -> str:
-    """JSON that every reader takes: NaN and infinities, which JSON lacks, become null."""
+    """Returns standard JSON: NaN and infinities become null."""
     return json.dumps(_finite(content), indent=2, ensure_ascii=False)
 
 
 def _finite(value: Any) -> Any:
+    """Replaces NaN and infinities in nested values by None."""
     if isinstance(value, Mapping):
         return {str(key): _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -107,7 +109,7 @@ def _finite(value: Any) -> Any:
 
 
 def not_writable(path: Path, error: OSError) -> HexapodError:
-    """The error for a place that cannot be written to."""
+    """Returns the error for a path that cannot be written."""
     fix = "choose another place with -o"
     if isinstance(error, FileExistsError | NotADirectoryError):
         return HexapodError(
@@ -128,10 +130,10 @@ def not_writable(path: Path, error: OSError) -> HexapodError:
 
 
 def claim_folder(folder: Path) -> list[Path]:
-    """Sees that results can go here, and touches no file. Returns the folders made for it, the
-    innermost first.
+    """Checks that results can be written to a folder, and creates it if need be.
 
-    Raises HexapodError when the folder is someone else's, or cannot be written to.
+    Returns the folders that were created, the innermost first. Raises HexapodError when the folder
+    holds other files or cannot be written.
     """
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
@@ -161,12 +163,13 @@ def claim_folder(folder: Path) -> list[Path]:
 
 
 def clear_folder(folder: Path) -> None:
-    """Clears a claimed folder of an earlier run's files and marks it as a run's. Raises
-    HexapodError.
+    """Deletes an earlier run's files from a claimed folder and marks it as a running run's.
+
+    Raises HexapodError when the folder cannot be written.
     """
     try:
         folder.mkdir(exist_ok=True)
-        for name in OUR_FILES:
+        for name in RESULT_FILES:
             _remove(folder / name)
         write_json(folder / RUN_FILE, {"status": RUNNING})
     except OSError as error:
@@ -174,6 +177,7 @@ def clear_folder(folder: Path) -> None:
 
 
 def _remove(path: Path) -> None:
+    """Deletes a file or folder, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
@@ -181,7 +185,7 @@ def _remove(path: Path) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """A JSON file of ours. Raises HexapodError when it is missing or damaged."""
+    """Reads a JSON file of a results folder. Raises HexapodError when it is missing or damaged."""
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -1,5 +1,5 @@
-"""Where a component's files are: the binaries, the sources and interface.toml, in a source tree
-or in an installed wheel.
+"""Locations of a component's binaries, sources and interface.toml, in a source tree or in an
+installed wheel.
 """
 
 from __future__ import annotations
@@ -17,67 +17,61 @@ from hexapod_cosim.models.errors import FmuError
 
 DISTRIBUTION = "hexapod-cosim"
 GENERATED_SOURCES = ("variables.h", "variables.c", "defaults.c")
-SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")  # of the plant's, in every component
+# files of the plant that every component contains
+SHARED_SOURCES = ("status.c", "checksum.c", "checker.c")
 SHARED_HEADERS = ("status.h", "legs.h", "inside.h", "checker.h")
 LOOP = "hexapod_master"  # the shared library of the co-simulation loop
-FMI2_SOURCE, FMI3_SOURCE = (
-    "fmi/fmi2.c",
-    "fmi/fmi3.c",
-)  # each needs the headers of its own standard alone
+# each needs the headers of its version of the standard only
+FMI2_SOURCE, FMI3_SOURCE = "fmi/fmi2.c", "fmi/fmi3.c"
 BUILD = "run `pip install -e .` in the source tree, or `pip install .` (both need a C compiler)"
-X86 = {
-    "x86_64",
-    "amd64",
-    "i386",
-    "i486",
-    "i586",
-    "i686",
-    "x86",
-}  # as platform.machine() has them in lower case
+# values of platform.machine() in lower case
+X86 = {"x86_64", "amd64", "i386", "i486", "i586", "i686", "x86"}
 
-_HERE = Path(__file__).resolve().parents[1]
-_TREE = _HERE.parent / "plant_fmu"
-_INSTALLED = _HERE.parent / "plant"
+_COSIM = Path(__file__).resolve().parents[1]
+_PLANT_TREE = _COSIM.parent / "plant_fmu"
+_INSTALLED = _COSIM.parent / "plant"
 
 
 def in_source_tree() -> bool:
-    """Whether this package runs from a source tree (an editable install, or build/typing on the
-    path).
+    """Returns whether this package runs from a source tree: an editable install, or build/typing
+    on the path.
     """
-    return (_TREE / "interface.toml").is_file()
+    return (_PLANT_TREE / "interface.toml").is_file()
 
 
 def interface_file(component: Component = PLANT) -> Path:
-    """A component's interface.toml."""
+    """Returns the path of a component's interface.toml."""
     return (
-        _HERE.parent
+        _COSIM.parent
         / (component.tree if in_source_tree() else component.installed)
         / "interface.toml"
     )
 
 
 def package_version() -> str:
-    """The version that pyproject.toml states, from there if it is at hand (an editable install's
-    metadata may be older).
+    """Returns the package's version.
+
+    In a source tree it is read from pyproject.toml, since the metadata of an editable install may
+    be older.
     """
     if in_source_tree():
-        project = tomllib.loads((_TREE.parent / "pyproject.toml").read_text(encoding="utf-8"))[
-            "project"
-        ]
+        project = tomllib.loads(
+            (_PLANT_TREE.parent / "pyproject.toml").read_text(encoding="utf-8")
+        )["project"]
         return str(project["version"])
     return metadata.version(DISTRIBUTION)
 
 
 @cache
 def code_hash() -> str:
-    """16 digits that tell this package's code from any other: of its Python files, robots and
-    co-simulation loop.
+    """Returns 16 hexadecimal digits that identify this package's code: its Python files, robots
+    and co-simulation loop.
     """
     digest = hashlib.sha256()
-    for folder in (_HERE, _HERE.parent / "controller", _HERE.parent / "models"):
+    for folder in (_COSIM, _COSIM.parent / "controller", _COSIM.parent / "models"):
         for path in sorted([*folder.rglob("*.py"), *folder.glob("*.toml")]):
             digest.update(
-                path.relative_to(_HERE.parent).as_posix().encode()
+                path.relative_to(_COSIM.parent).as_posix().encode()
                 + hashlib.sha256(path.read_bytes()).digest()
             )
     digest.update(shared_library(LOOP).read_bytes())
@@ -85,8 +79,9 @@ def code_hash() -> str:
 
 
 def source_files(component: Component = PLANT) -> dict[str, Path]:
-    """A component's C sources and headers, by their path below an FMU's sources folder; includes
-    resolve with -I sources.
+    """Returns a component's C sources and headers by their path in an FMU's sources folder.
+
+    Includes resolve with -I sources.
     """
     found = _own_sources(component) | _sources_in("fmi", _fmi_folder())
     if component is not PLANT:
@@ -95,10 +90,11 @@ def source_files(component: Component = PLANT) -> dict[str, Path]:
 
 
 def _own_sources(component: Component) -> dict[str, Path]:
+    """Returns the sources in the component's own folder."""
     root = (
-        _HERE.parent / component.tree
+        _COSIM.parent / component.tree
         if in_source_tree()
-        else _HERE.parent / component.installed / "sources"
+        else _COSIM.parent / component.installed / "sources"
     )
     headers = root / "include" / "hexapod" if in_source_tree() else root / "hexapod"
     found = (
@@ -110,13 +106,13 @@ def _own_sources(component: Component) -> dict[str, Path]:
 
 
 def _fmi_folder() -> Path:
-    """The folder of the FMI layer, which all components share."""
-    return _TREE.parent / "fmi" if in_source_tree() else _INSTALLED / "sources" / "fmi"
+    """Returns the folder of the FMI layer, which all components share."""
+    return _PLANT_TREE.parent / "fmi" if in_source_tree() else _INSTALLED / "sources" / "fmi"
 
 
 def _sources_in(name: str, folder: Path) -> dict[str, Path]:
-    """C sources and headers of a folder, by their path below an FMU's sources folder, where it
-    is called `name`.
+    """Returns C sources and headers of a folder by their path in an FMU's sources folder, where
+    the folder is called `name`.
     """
     return {
         f"{name}/{path.relative_to(folder).as_posix()}": path for path in folder.rglob("*.[ch]")
@@ -124,18 +120,18 @@ def _sources_in(name: str, folder: Path) -> dict[str, Path]:
 
 
 def _is_shared(name: str) -> bool:
-    """Whether a source of the plant is part of every component: statuses and checksums."""
+    """Returns whether a source of the plant is part of every component."""
     folder, _, file = name.partition("/")
     return {"src": file in SHARED_SOURCES, "hexapod": file in SHARED_HEADERS}.get(folder, False)
 
 
 def licence_file() -> Path:
-    """The licence's text."""
-    return _TREE.parent / "LICENSE" if in_source_tree() else _INSTALLED / "LICENSE"
+    """Returns the path of the licence."""
+    return _PLANT_TREE.parent / "LICENSE" if in_source_tree() else _INSTALLED / "LICENSE"
 
 
 def fmi_headers() -> Path:
-    """Folder of the standard's C headers: the installed fmpy's."""
+    """Returns the folder of the standard's C headers, which fmpy brings. Raises FmuError."""
     spec = util.find_spec("fmpy")
     if spec is None or spec.origin is None:
         raise FmuError(
@@ -145,29 +141,29 @@ def fmi_headers() -> Path:
 
 
 def fmi2_platform() -> str:
-    """The folder of an FMI 2 archive that holds this machine's binary; processors that FMI 2 has
-    no name for go by FMI 3's (2.0.5).
+    """Returns the folder of an FMI 2 archive for this machine's binary.
+
+    Processors without a name in FMI 2 have FMI 3's name (FMI 2.0.5, section 2.3). darwin64 is for
+    both processors of Macs.
     """
     system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
-    if (
-        system != "darwin" and platform.machine().lower() not in X86
-    ):  # darwin64 is for both processors of Macs
+    if system != "darwin" and platform.machine().lower() not in X86:
         return fmi3_platform()
     return system + ("64" if sys.maxsize > 2**32 else "32")
 
 
 def fmi3_platform() -> str:
-    """The same in an FMI 3 archive."""
+    """Returns the folder of an FMI 3 archive for this machine's binary."""
     system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine().lower()
-    )
+    machine = platform.machine().lower()
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine)
     return f"{machine}-{system}"
 
 
 def packed_binary(folder: str | Path, identifier: str) -> str | None:
-    """This machine's binary in an unpacked FMI 2 FMU; None if it is not where it should be: then
-    fmpy looks, in linux64 on Arm too.
+    """Returns the path of this machine's binary in an unpacked FMI 2 FMU.
+
+    None if it is not there: then fmpy looks for it, on Arm in linux64 too.
     """
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     path = Path(folder).resolve() / "binaries" / fmi2_platform() / f"{identifier}{suffix}"
@@ -175,8 +171,9 @@ def packed_binary(folder: str | Path, identifier: str) -> str | None:
 
 
 def binary(fmi_platform: str, component: Component = PLANT) -> Path:
-    """The FMU's shared library for a platform such as linux64, the newest at hand. Raises
-    FmuError when there is none or it is stale.
+    """Returns the newest installed binary of a component for a platform such as linux64.
+
+    Raises FmuError when there is none or it is older than its sources.
     """
     found = [
         path
@@ -184,11 +181,8 @@ def binary(fmi_platform: str, component: Component = PLANT) -> Path:
         for path in (folder / "binaries" / fmi_platform).glob(f"{component.identifier}.*")
     ]
     if not found:
-        expected = (
-            "one of: " + ", ".join(platforms)
-            if (platforms := installed_platforms())
-            else "a built one"
-        )
+        platforms = installed_platforms()
+        expected = "one of: " + ", ".join(platforms) if platforms else "a built one"
         raise FmuError(
             f"no {component.name} binary for this platform",
             got=fmi_platform,
@@ -201,8 +195,8 @@ def binary(fmi_platform: str, component: Component = PLANT) -> Path:
 
 
 def shared_library(name: str) -> Path:
-    """A shared library for this machine's own programs, the newest at hand. Raises FmuError when
-    there is none.
+    """Returns the newest installed shared library of this package, such as the co-simulation
+    loop. Raises FmuError when there is none.
     """
     found = [path for folder in plant_folders() for path in (folder / "lib").glob(f"{name}.[sd]*")]
     if not found:
@@ -211,7 +205,7 @@ def shared_library(name: str) -> Path:
 
 
 def installed_platforms() -> list[str]:
-    """Platforms whose binary is at hand."""
+    """Returns the platforms of the installed binaries."""
     return sorted(
         {
             path.name
@@ -222,17 +216,23 @@ def installed_platforms() -> list[str]:
     )
 
 
-def _built(path: Path) -> int:
-    """Whole seconds: an installation drops the rest, and would be older than sources written in
-    the same second.
+def _modification_time(path: Path) -> int:
+    """Returns a file's time in whole seconds.
+
+    Installation drops the fraction; with it, a binary would be older than a source that was written
+    in the same second.
     """
     return int(path.stat().st_mtime)
 
 
 def _refuse_stale(path: Path, component: Component) -> None:
-    """In a source tree the sources may have moved on since the binary was built."""
+    """Raises FmuError when sources of the source tree are newer than the binary."""
     changed = (
-        [name for name, source in source_files(component).items() if _built(source) > _built(path)]
+        [
+            name
+            for name, source in source_files(component).items()
+            if _modification_time(source) > _modification_time(path)
+        ]
         if in_source_tree()
         else []
     )
@@ -247,11 +247,12 @@ def _refuse_stale(path: Path, component: Component) -> None:
 
 
 def plant_folders() -> list[Path]:
-    """Folders laid out like the wheel's hexapod_cosim/plant: an editable install keeps it in
-    site-packages, a build in build/plant.
+    """Returns the folders where binaries may be, each laid out as the wheel's hexapod_cosim/plant.
+
+    An editable install keeps it in site-packages, a build in build/plant.
     """
     if not in_source_tree():
         return [_INSTALLED]
     return [Path(entry) / "hexapod_cosim" / "plant" for entry in sys.path] + [
-        _TREE.parent / "build" / "plant"
+        _PLANT_TREE.parent / "build" / "plant"
     ]

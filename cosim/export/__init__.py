@@ -1,3 +1,1 @@
-"""Writes FMUs, SSP packages and robot descriptions for other tools. Imports `common` to
-`master`.
-"""
+"""Writes FMUs, SSP packages and robot descriptions. Imports `common` to `master`."""

@@ -1,6 +1,4 @@
-"""Packs a controller as an FMU: the C controller with the set-up that the Python controller of a
-run would have.
-"""
+"""Writes a controller's FMU: the C controller with the setup of a Python controller."""
 
 from __future__ import annotations
 
@@ -21,7 +19,8 @@ def export_controller(
     fmi: int = 2,
     platforms: Iterable[str] | None = None,
 ) -> Path:
-    """Writes a controller's FMU and returns its path; arguments and errors as of `export_fmu`,
-    and what `Controller` refuses.
+    """Writes a controller's FMU and returns its path.
+
+    Arguments and errors are those of `export_fmu`; also raises the errors of `Controller`.
     """
     return export_interface(load_controller_interface(setup), path, fmi=fmi, platforms=platforms)

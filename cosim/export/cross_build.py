@@ -1,10 +1,8 @@
-"""Shared libraries for other systems and processors, compiled on this machine by the C compiler of
-the ziglang package.
+"""Cross-compiles shared libraries with the C compiler of the ziglang package.
 
-Zig brings each system's headers and link stubs, so nothing else has to be installed. Sources are
-compiled in a folder of their own under their relative names, so no path of this machine gets into a
-binary, and what is built is a function of sources, compiler and flags alone: that is what the cache
-goes by.
+Zig contains each system's headers and link stubs, so nothing else has to be installed. Sources are
+compiled in a temporary folder under their relative names, so that binaries contain no path of this
+machine and depend on sources, compiler and flags only. These are the key of the cache.
 """
 
 from __future__ import annotations
@@ -27,10 +25,10 @@ from hexapod_cosim.models.errors import FmuError, HexapodError
 
 PACKAGE = "ziglang"
 APPLICATION = "hexapod-cosim"
-SHOWN_LINES = 12  # of a compiler's complaints
-PATIENCE = 1200  # s    the compiler was seen to wait for itself for ever, now and then, for Windows
+SHOWN_LINES = 12  # of the compiler's messages
+TIMEOUT = 1200  # s    builds for Windows were seen to hang
 
-# as plant_fmu/CMakeLists.txt, with reasons
+# as in plant_fmu/CMakeLists.txt, which gives the reasons
 COMPILE = (
     "-std=c11",
     "-O3",
@@ -46,17 +44,15 @@ ELF = ("-fPIC", "-Wl,-z,relro,-z,now,--no-undefined", "-lm")
 
 @dataclass(frozen=True)
 class Target:
-    """A system and processor: how Zig calls it, how its shared libraries end, how they are
-    linked.
-    """
+    """A system and processor: Zig's name, suffix and linker flags of its shared libraries."""
 
     triple: str
     suffix: str
     link: tuple[str, ...] = ()
 
 
-# the oldest systems in use: CentOS 7's C library, the first macOS for both processors, the C
-# library that comes with Windows 10
+# the oldest supported systems: CentOS 7 (glibc 2.17), macOS 11 (the first for both processors),
+# Windows 10
 TARGETS = {
     "x86_64-linux": Target("x86_64-linux-gnu.2.17", ".so", ELF),
     "aarch64-linux": Target("aarch64-linux-gnu.2.17", ".so", ELF),
@@ -68,10 +64,10 @@ TARGETS = {
 
 @dataclass(frozen=True)
 class Library:
-    """What a shared library is built from.
+    """The sources and flags of a shared library.
 
-    sources: C files and headers by their path below the folder that includes are relative to.
-    headers: further folders of headers.
+    sources: C files and headers by their path in the include folder.
+    headers: further include folders.
     """
 
     name: str
@@ -80,7 +76,7 @@ class Library:
     flags: tuple[str, ...] = field(default=())
 
     def digest(self) -> str:
-        """A fingerprint of all that goes in."""
+        """Returns a hash of names, flags and contents of all files."""
         parts = [self.name, *self.flags]
         files = [
             *self.sources.items(),
@@ -104,10 +100,13 @@ class Compiler:
 
 @cache
 def find_compiler() -> Compiler:
-    """The installed cross compiler. Raises FmuError when there is none."""
+    """Returns the installed cross compiler. Raises FmuError when there is none."""
     spec = util.find_spec(PACKAGE)
     if spec is None or spec.origin is None:
-        fix = f"{install_extra('platforms')}; without --platforms an FMU gets this machine's installed binary"
+        fix = (
+            f"{install_extra('platforms')}; without --platforms an FMU gets this machine's "
+            "installed binary"
+        )
         raise FmuError("no cross compiler", got=f"no package {PACKAGE}", expected=PACKAGE, fix=fix)
     program = Path(spec.origin).parent / ("zig.exe" if os.name == "nt" else "zig")
     return Compiler((str(program), "cc"), metadata.version(PACKAGE))
@@ -120,21 +119,21 @@ def build_library(
     compiler: Compiler | None = None,
     cache_folder: Path | None = None,
 ) -> bytes:
-    """The shared library for a target, from the cache if it was built before.
+    """Builds a shared library for a target, or takes it from the cache.
 
     Args:
-        library: what to build.
+        library: the library to build.
         target: a key of TARGETS.
-        compiler: by default the installed one.
-        cache_folder: by default the user's; processes may share it.
+        compiler: the installed one by default.
+        cache_folder: the user's by default; processes may share it.
 
-    Raises FmuError: no compiler, or sources that it does not compile.
+    Raises FmuError without a compiler, and for sources that do not compile.
     """
     compiler, folder = compiler or find_compiler(), cache_folder or user_cache()
     flags = (*_flags(library, target), *library.flags)
     key = _digest([library.digest(), compiler.version, *flags])
     kept = folder / "binaries" / f"{library.name}-{target}-{key[:32]}{TARGETS[target].suffix}"
-    if kept.is_file() and (data := _unsealed(kept.read_bytes())):
+    if kept.is_file() and (data := _verified(kept.read_bytes())):
         return data
     data = _compile(library, [*compiler.command, *flags], target, folder)
     _keep(kept, data)
@@ -142,11 +141,12 @@ def build_library(
 
 
 def user_cache() -> Path:
-    """Where built binaries are kept: the user's cache folder."""
+    """Returns the user's cache folder, where binaries are kept."""
     return Path(platformdirs.user_cache_path(APPLICATION, appauthor=False))
 
 
 def _flags(library: Library, target: str) -> tuple[str, ...]:
+    """Returns the flags of compiler and linker for a target."""
     chosen = TARGETS[target]
     link = (
         (f"-Wl,-install_name,@rpath/{library.name}{chosen.suffix}",)
@@ -182,6 +182,7 @@ def _compile(library: Library, command: Sequence[str], target: str, cache_folder
 
 
 def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) -> None:
+    """Runs the compiler. Raises FmuError when it fails or exceeds TIMEOUT."""
     environment = compiler_environment(root, cache_folder)
     try:
         process = subprocess.run(
@@ -192,30 +193,31 @@ def _run(command: Sequence[str], root: Path, target: str, cache_folder: Path) ->
             text=True,
             errors="replace",
             check=False,
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
         )
     except subprocess.TimeoutExpired as error:
         fix = "run it again: what is done so far is kept"
         raise FmuError(
             f"cannot build for {target}",
             got="a compiler that hangs",
-            expected=f"an end within {PATIENCE} s",
+            expected=f"an end within {TIMEOUT} s",
             fix=fix,
         ) from error
     if process.returncode != 0:
-        complaint = (
+        messages = (
             "\n".join(process.stderr.splitlines()[:SHOWN_LINES])
             or f"exit code {process.returncode}"
         )
-        fix = "correct the sources, or install the compiler anew if it is damaged"
+        fix = "correct the sources, or reinstall the compiler if it is damaged"
         raise FmuError(
-            f"cannot build for {target}", got=complaint, expected="sources that compile", fix=fix
+            f"cannot build for {target}", got=messages, expected="sources that compile", fix=fix
         )
 
 
 def compiler_environment(scratch: Path, cache_folder: Path) -> dict[str, str]:
-    """Environment of the compiler: what it makes of the systems' libraries is kept in the cache,
-    the rest goes to a scratch folder.
+    """Returns the compiler's environment variables.
+
+    Compiled system libraries are kept in the cache; other temporary files go to the scratch folder.
     """
     folders = {
         "ZIG_LOCAL_CACHE_DIR": scratch / "zig",
@@ -225,6 +227,7 @@ def compiler_environment(scratch: Path, cache_folder: Path) -> dict[str, str]:
 
 
 def _writable(folder: Path, otherwise: Path) -> Path:
+    """Returns the folder if it can be written, else a folder in `otherwise`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -233,7 +236,7 @@ def _writable(folder: Path, otherwise: Path) -> Path:
 
 
 def _keep(path: Path, data: bytes) -> None:
-    """Writes to the cache, whole or not at all; a cache that cannot be written to is none."""
+    """Writes to the cache atomically; does nothing when the cache cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(path) as part:
@@ -242,15 +245,17 @@ def _keep(path: Path, data: bytes) -> None:
         return
 
 
-def _unsealed(data: bytes) -> bytes:
-    """What `_keep` wrote, or nothing if it is damaged."""
+def _verified(data: bytes) -> bytes:
+    """Returns the data that `_keep` wrote, or b"" if the file is damaged."""
     size = hashlib.sha256().digest_size
     return data[size:] if hashlib.sha256(data[size:]).digest() == data[:size] else b""
 
 
 def _headers(folder: Path) -> list[Path]:
+    """Returns the headers in a folder, sorted."""
     return sorted(folder.glob("*.h"))
 
 
 def _digest(parts: Sequence[str]) -> str:
+    """Returns a hash of texts."""
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

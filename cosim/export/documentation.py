@@ -1,4 +1,4 @@
-"""documentation/index.html inside an FMU: what an importer's user needs to know, on one page."""
+"""Writes documentation/index.html of an FMU."""
 
 from __future__ import annotations
 
@@ -15,35 +15,47 @@ from hexapod_cosim.cosim.interface.interface import CAUSALITIES, Interface, Patt
 from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 INTERFACES = {"CoSimulation": "co-simulation", "ModelExchange": "model exchange"}
-# what a user asks of a tool's compatibility list, by the flag of modelDescription.xml
+SERIALIZED = (
+    "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused"
+)
+# descriptions of the capability flags of modelDescription.xml
 CAPABILITIES = {
     "canHandleVariableCommunicationStepSize": "steps of any size, from rounding error to 100 s",
     "canGetAndSetFMUstate": "state saved and restored, bit for bit",
-    "canSerializeFMUstate": "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused",
+    "canSerializeFMUstate": SERIALIZED,
     "providesDirectionalDerivative": "directional derivatives",
     "canInterpolateInputs": "derivatives of inputs over a step; without them inputs are held",
     "maxOutputDerivativeOrder": "derivatives of outputs, highest order",
     "canBeInstantiatedOnlyOncePerProcess": "one instance a process only",
     "canRunAsynchronuously": "steps that return before they are done",
-    "completedIntegratorStepNotNeeded": "model exchange without a call after every step of the solver",
+    "completedIntegratorStepNotNeeded": (
+        "model exchange without a call after every step of the solver"
+    ),
     "canNotUseMemoryManagementFunctions": "needs no memory functions of the importer",
     "canGetAndSetFMUState": "state saved and restored, bit for bit",
-    "canSerializeFMUState": "state as bytes: versioned, without pointers, checksummed; a damaged or foreign one is refused",
+    "canSerializeFMUState": SERIALIZED,
     "providesDirectionalDerivatives": "directional derivatives",
     "providesAdjointDerivatives": "adjoint derivatives",
     "providesPerElementDependencies": "dependencies of single elements of arrays",
     "hasEventMode": "event mode, where discrete variables change and inputs may",
-    "mightReturnEarlyFromDoStep": "steps that end where discrete variables change, if the importer allows",
+    "mightReturnEarlyFromDoStep": (
+        "steps that end where discrete variables change, if the importer allows"
+    ),
     "providesIntermediateUpdate": "intermediate updates",
     "providesEvaluateDiscreteStates": "discrete states evaluated without an update",
     "needsCompletedIntegratorStep": "model exchange needs a call after every step of the solver",
 }
-# how the names in the tables are to be read, and whether they are of arrays
+# explanations of the names in the tables, for scalars (False) and arrays (True)
 NAMES = {
-    False: "Below, {leg}, {joint} and {inertia} stand for each of the names above or of xx, yy, zz, xy, xz, yz; [i] for 1, 2, 3 "
-    "(quaternions: to 4).",
-    True: "Below, the numbers behind a name are an array's sizes: 6 legs, 3 joints in the order above, 3 axes; the last index runs "
-    "fastest. What FMI 2.0 calls LF.coxa.angle_ref is the first element of angle_ref.",
+    False: (
+        "Below, {leg}, {joint} and {inertia} stand for each of the names above or of xx, yy, zz, "
+        "xy, xz, yz; [i] for 1, 2, 3 (quaternions: to 4)."
+    ),
+    True: (
+        "Below, the numbers behind a name are an array's sizes: 6 legs, 3 joints in the order "
+        "above, 3 axes; the last index runs fastest. What FMI 2.0 calls LF.coxa.angle_ref is the "
+        "first element of angle_ref."
+    ),
 }
 AXES = {"leg": LEG_NAMES, "joint": JOINT_NAMES}
 
@@ -51,13 +63,13 @@ Row = dict[str, str]
 
 
 def render_html(interface: Interface, description: str, *, picture: str, reference: bool) -> str:
-    """The page for one robot's FMU. What is a component's own is in pages/.
+    """Returns the page of one FMU. The templates are in pages/, one for each component.
 
     Args:
-        interface: what to tell of.
-        description: its modelDescription.xml.
-        picture: the robot's picture, by its path in the archive.
-        reference: whether the archive has reference results.
+        interface: of the FMU.
+        description: the FMU's modelDescription.xml.
+        picture: path of the robot's picture in the archive.
+        reference: whether the archive contains reference results.
     """
     root = ElementTree.fromstring(description.encode())
     environment = Environment(
@@ -87,7 +99,7 @@ def render_html(interface: Interface, description: str, *, picture: str, referen
 
 
 def _capabilities(root: Element) -> list[Row]:
-    """Every flag that the model description declares, of every interface that it offers."""
+    """Returns the capability flags that any interface of the model description declares."""
     found = {tag: root.find(tag) for tag in INTERFACES}
     offered = {tag: element for tag, element in found.items() if element is not None}
     return [
@@ -104,11 +116,12 @@ def _capabilities(root: Element) -> list[Row]:
 
 
 def _words(value: str | None) -> str:
+    """Returns the text of a flag."""
     return {"true": "yes", "false": "no", None: "not declared"}.get(value, str(value))
 
 
 def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> list[Row]:
-    """What to tell of the variables of a causality: a row per pattern, or per FMI 3.0 array."""
+    """Returns table rows of the variables of a causality: one for each pattern or FMI 3.0 array."""
     if arrayed:
         chosen = [array for array in arrays(interface) if array.first.causality == causality]
         sizes = ["".join(f"[{size}]" for size in array.shape) for array in chosen]
@@ -125,6 +138,7 @@ def variable_rows(interface: Interface, causality: str, *, arrayed: bool) -> lis
 
 
 def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Interface) -> Row:
+    """Returns the table row of variables that share a description."""
     first = variables[0]
     display = {unit.name: unit.display[0] for unit in interface.units if unit.display}.get(
         first.unit or "", ""
@@ -145,7 +159,7 @@ def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Inte
 
 
 def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]:
-    """The variables that a pattern stands for."""
+    """Returns the variables that a pattern stands for."""
     expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d\]")
     expression = re.sub(
         r"\\\{(\w+)\\\}",
@@ -156,6 +170,7 @@ def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]
 
 
 def _range(variable: Variable) -> str:
+    """Returns the text of a range; "" without limits."""
     if variable.minimum is None and variable.maximum is None:
         return ""
     low, high = (
@@ -165,7 +180,7 @@ def _range(variable: Variable) -> str:
 
 
 def _starts(variables: Sequence[Variable], choices: Sequence[str]) -> str:
-    """The start values, in short: one if all are the same."""
+    """Returns a short text of the start values: one if all are equal, a range if there are many."""
     values = list(
         dict.fromkeys(variable.start for variable in variables if variable.start is not None)
     )

@@ -1,4 +1,4 @@
-"""Packs an FMU: the same binary for every robot, with the robot's model description and start
+"""Writes FMUs: the same binary for every robot, with the robot's model description and start
 values.
 """
 
@@ -31,23 +31,23 @@ from hexapod_cosim.models.records import Robot
 
 FMI_VERSIONS = (2, 3)
 FNV_BASIS, FNV_PRIME, MASK, WORD = 0xCBF29CE484222325, 0x100000001B3, (1 << 64) - 1, 8
-TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member: the same robot makes the same bytes
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # of every member, so that archives are reproducible
 
 
 def export_fmu(
     robot: Robot, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None
 ) -> Path:
-    """Writes a robot's FMU and returns its path.
+    """Writes the plant's FMU of a robot and returns its path.
 
     Args:
-        robot: what the FMU's start values are.
-        path: the file to write; it appears complete or not at all. Its folder is made if need be.
+        robot: the robot whose values the FMU starts with.
+        path: the file to write, atomically. Its folder is created if need be.
         fmi: version of the standard.
-        platforms: folders such as linux64, or "all", each cross-compiled; "sources": no binary at
-            all. By default this machine's binary as it was installed.
+        platforms: names such as linux64 or "all", to cross-compile binaries; "sources" for no
+            binary. By default the installed binary of this machine.
 
-    Raises FmuError: no binary, no cross compiler, a version or platform that is not offered;
-    HexapodError: a path that cannot be written.
+    Raises FmuError without a binary or cross compiler and for an unknown version or platform,
+    HexapodError when the path cannot be written.
     """
     return export_interface(load_interface(robot), path, fmi=fmi, platforms=platforms)
 
@@ -55,7 +55,7 @@ def export_fmu(
 def export_interface(
     interface: Interface, path: str | Path, *, fmi: int = 2, platforms: Iterable[str] | None = None
 ) -> Path:
-    """Writes the FMU of a component with this interface, as `export_fmu` does."""
+    """Writes the FMU of a component with this interface; arguments and errors as `export_fmu`."""
     if fmi not in FMI_VERSIONS:
         offered = ", ".join(map(str, FMI_VERSIONS))
         raise FmuError(
@@ -72,18 +72,14 @@ def export_interface(
 
 
 def installed_binary(component: Component = PLANT, *, fmi: int = 2) -> dict[str, bytes]:
-    """This machine's binary as it was built when this package was installed, by its path in the
-    FMU.
-    """
-    library, folder = (
-        binary(fmi2_platform(), component),
-        fmi2_platform() if fmi == 2 else fmi3_platform(),
-    )
+    """Returns the binary that was installed with this package, by its path in the FMU."""
+    library = binary(fmi2_platform(), component)
+    folder = fmi2_platform() if fmi == 2 else fmi3_platform()
     return {f"binaries/{folder}/{component.identifier}{library.suffix}": library.read_bytes()}
 
 
 def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
-    """Contents of the archive by path."""
+    """Returns the contents of the archive by path."""
     description = (render_fmi2 if fmi == 2 else render_fmi3)(interface)
     members = {
         "modelDescription.xml": description.xml.encode(),
@@ -99,8 +95,8 @@ def _members(interface: Interface, binaries: Mapping[str, bytes], fmi: int) -> d
 
 
 def _sources(component: Component, fmi: int) -> dict[str, bytes]:
-    """All that the binary was made of, but for the other version's layer, whose headers an
-    importer need not have.
+    """Returns the binary's sources without the file for the other version of the standard, whose
+    headers an importer may not have.
     """
     other = FMI3_SOURCE if fmi == 2 else FMI2_SOURCE
     files = {name: path for name, path in source_files(component).items() if name != other}
@@ -114,9 +110,7 @@ def _sources(component: Component, fmi: int) -> dict[str, bytes]:
 
 
 def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, bytes]:
-    """Reference results of the plant where this machine can run it: none for an FMU that is
-    packed for other platforms alone.
-    """
+    """Returns reference results of the plant; none when the FMU has no binary for this machine."""
     if interface.component is not PLANT or not any(
         name.startswith(f"binaries/{fmi2_platform()}/") for name in members
     ):
@@ -126,19 +120,17 @@ def _reference(interface: Interface, members: dict[str, bytes]) -> dict[str, byt
 
 
 def start_values(interface: Interface, guid: str) -> str:
-    """What the binary reads at instantiation: the GUID, then "reference value name" of every
-    input and parameter, exactly; a checksum.
+    """Returns start_values.txt, which the binary reads at instantiation (fmi/resources.c).
+
+    It holds the GUID, a line "reference value name" for every input and parameter, and a checksum.
     """
     lines = [guid, *map(_start_line, interface.of_causality("input", "parameter"))]
-    return (
-        "\n".join(
-            [*lines, f"checksum {reduce(checksum, (line.encode() for line in lines), 0):016x}"]
-        )
-        + "\n"
-    )
+    total = reduce(checksum, (line.encode() for line in lines), 0)
+    return "\n".join([*lines, f"checksum {total:016x}"]) + "\n"
 
 
 def _start_line(variable: Variable) -> str:
+    """Returns the line "reference value name"; Reals are hexadecimal, so exact."""
     value = (
         float(variable.start or 0.0).hex()
         if variable.type == "Real"
@@ -148,8 +140,8 @@ def _start_line(variable: Variable) -> str:
 
 
 def checksum(seed: int, data: bytes) -> int:
-    """hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, its high bits mixed
-    into the low ones.
+    """Returns hx_checksum of the plant: FNV-1a over little-endian words of 64 bits, with its high
+    bits mixed into the low ones.
     """
     value = seed ^ FNV_BASIS
     for place in range(0, len(data), WORD):
@@ -159,8 +151,9 @@ def checksum(seed: int, data: bytes) -> int:
 
 
 def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
-    """A ZIP archive, whole or not at all, the same bytes for the same members. Raises
-    HexapodError when it cannot be written.
+    """Writes a ZIP archive atomically; equal members give equal bytes.
+
+    Raises HexapodError when it cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -173,6 +166,7 @@ def write_archive(path: Path, members: Mapping[str, bytes]) -> Path:
 
 
 def _member(name: str) -> zipfile.ZipInfo:
+    """Returns the ZIP entry of a path."""
     info = zipfile.ZipInfo(name, TIMESTAMP)
     info.compress_type = zipfile.ZIP_DEFLATED
     info.create_system = 3  # Unix, wherever it is packed

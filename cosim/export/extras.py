@@ -1,12 +1,10 @@
-"""What an FMU holds besides what runs: page, picture, icon, terminals, licence. The same for
-every version of the standard.
-"""
+"""Further files of an FMU: documentation, pictures, terminals, licence."""
 
 from __future__ import annotations
 
 from hexapod_cosim.cosim.common.plant_files import licence_file
 from hexapod_cosim.cosim.export.documentation import render_html
-from hexapod_cosim.cosim.export.portrait import draw_robot
+from hexapod_cosim.cosim.export.picture import draw_robot
 from hexapod_cosim.cosim.interface.arrays import arrays
 from hexapod_cosim.cosim.interface.interface import Interface
 from hexapod_cosim.cosim.interface.terminals import (
@@ -16,10 +14,8 @@ from hexapod_cosim.cosim.interface.terminals import (
     render_terminals3,
 )
 
-PICTURES = {
-    2: "model.png",
-    3: "documentation/diagram.png",
-}  # where each version of the standard has the model's picture
+# path of the model's picture by version of the standard
+PICTURES = {2: "model.png", 3: "documentation/diagram.png"}
 LICENCE = "documentation/licenses/license.txt"
 PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
 
@@ -27,8 +23,13 @@ PICTURE_SIZE, ICON_SIZE = (480, 360), (160, 160)  # pixels
 def extra_members(
     interface: Interface, description: str, *, fmi: int = 2, reference: bool = False
 ) -> dict[str, bytes]:
-    """Contents by path in the archive, for an FMU whose modelDescription.xml is given, with
-    reference results or without.
+    """Returns the files by path in the archive.
+
+    Args:
+        interface: of the FMU.
+        description: the FMU's modelDescription.xml.
+        fmi: version of the standard.
+        reference: whether the archive contains reference results.
     """
     ports = [
         array.name for array in arrays(interface) if array.first.causality in ("input", "output")
@@ -45,7 +46,7 @@ def extra_members(
 
 
 def pictures(interface: Interface, *, fmi: int = 2) -> dict[str, bytes]:
-    """The robot's picture and icon by path in the archive."""
+    """Returns the robot's picture and icon by path in the archive."""
     sizes = {PICTURES[fmi]: PICTURE_SIZE, f"{FOLDER}/{ICON}": ICON_SIZE}
     return {
         path: draw_robot(interface.robot, width=width, height=height)

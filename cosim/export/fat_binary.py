@@ -1,6 +1,4 @@
-"""The universal Mach-O file: libraries for several processors in one, as Apple's lipo joins
-them.
-"""
+"""Joins Mach-O libraries for several processors into one universal file, as Apple's lipo does."""
 
 from __future__ import annotations
 
@@ -15,11 +13,11 @@ _HEADER, _SLICE, _MACH_HEADER = struct.Struct(">II"), struct.Struct(">5I"), stru
 
 
 def join_mach_o(slices: Sequence[bytes]) -> bytes:
-    """One universal file of 64-bit Mach-O files, one a processor.
+    """Returns a universal file of 64-bit Mach-O files, one for each processor.
 
-    Layout (mach-o/fat.h, all big-endian): magic and number of slices; for each its processor,
-    subtype, offset, size, alignment; the slices. Raises FmuError when one is not such a file, or
-    two are for the same processor.
+    Layout (mach-o/fat.h, all big-endian): magic and number of slices; processor, subtype, offset,
+    size and alignment of each; the slices. Raises FmuError when one is no such file, or two are for
+    the same processor.
     """
     processors = [_processor(data) for data in slices]
     if len(set(processors)) < len(processors):
@@ -40,7 +38,7 @@ def join_mach_o(slices: Sequence[bytes]) -> bytes:
 
 
 def _processor(data: bytes) -> tuple[int, int]:
-    """Type and subtype of the processor that a Mach-O file is for."""
+    """Returns type and subtype of a Mach-O file's processor. Raises FmuError for other files."""
     magic, kind, subtype = _MACH_HEADER.unpack(
         data[: _MACH_HEADER.size].ljust(_MACH_HEADER.size, b"\0")
     )
@@ -55,4 +53,5 @@ def _processor(data: bytes) -> tuple[int, int]:
 
 
 def _aligned(offset: int) -> int:
+    """Rounds an offset up to the alignment of slices."""
     return -(-offset >> PAGE_BITS) << PAGE_BITS

@@ -1,9 +1,8 @@
-"""Which platforms an FMU can hold binaries for, under the names each version of the standard gives
-them, and their binaries.
+"""Builds an FMU's binaries for the platforms of the standard.
 
-One compiler (cosim/export/cross_build.py) makes all of them, this machine's too: then the same
-package makes the same bytes wherever it runs, and a binary needs no newer C library than any
-importer has. Without a choice an FMU gets the binary that was installed with this package.
+One cross compiler (cosim/export/cross_build.py) builds all of them, this machine's too, so that the
+same package gives the same bytes on every machine, and binaries need an old C library only. Unless
+platforms are chosen, an FMU gets the binary that was installed with this package.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from hexapod_cosim.models.errors import FmuError
 
 ALL, SOURCES = "all", "sources"
 
-# FMI 2 names 64-bit x86 in its own way and takes FMI 3's names for everything else (2.0.5, section
+# FMI 2 has its own names for 64-bit x86 and FMI 3's names for other processors (FMI 2.0.5, section
 # 2.3). darwin64 is for both processors of Macs: importers on either look there.
 _FMI2 = {
     "linux64": ("x86_64-linux",),
@@ -32,24 +31,18 @@ _FMI3 = {name: (name,) for name in TARGETS}
 
 
 def platform_targets(fmi: int) -> Mapping[str, tuple[str, ...]]:
-    """Folders below binaries in an FMU of a version of the standard, and the targets of the
-    compiler that go into each.
-    """
+    """Returns the targets of the compiler for each folder of binaries/ in an FMU."""
     return _FMI2 if fmi == 2 else _FMI3
 
 
 def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
-    """The folders that names stand for: "all", "sources" for none, or platforms as either version
-    of the standard calls them.
+    """Returns the folders of binaries/ for platform names of either version of the standard.
 
-    A platform of FMI 2 that is several of FMI 3 (darwin64) stands for all of these, and each of
-    these for it. Raises FmuError for a name that is none of these.
+    "all" stands for all folders, "sources" for none. darwin64 of FMI 2 stands for the two platforms
+    of FMI 3, and each of them for darwin64. Raises FmuError for an unknown name.
     """
-    chosen, targets, known = (
-        [names] if isinstance(names, str) else list(names),
-        set[str](),
-        platform_targets(fmi),
-    )
+    chosen = [names] if isinstance(names, str) else list(names)
+    targets: set[str] = set()
     for name in chosen:
         if name not in _FMI2 and name not in _FMI3 and name not in (ALL, SOURCES):
             expected = ", ".join(
@@ -69,38 +62,38 @@ def choose_platforms(names: Iterable[str], *, fmi: int) -> list[str]:
             expected=f"{SOURCES} alone",
             fix=f"leave out {SOURCES}",
         )
-    return [folder for folder, parts in known.items() if targets.intersection(parts)]
+    return [
+        folder for folder, parts in platform_targets(fmi).items() if targets.intersection(parts)
+    ]
 
 
 def component_library(component: Component = PLANT) -> Library:
-    """The library of a component's FMU."""
+    """Returns the sources of a component's FMU as a library."""
     return Library(component.identifier, source_files(component), (fmi_headers(),))
 
 
 def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> dict[str, bytes]:
-    """Shared libraries by their path in an FMU (binaries/linux64/hexapod.so), built at once, or
-    taken from the cache.
+    """Builds shared libraries in parallel, or takes them from the cache.
+
+    Returns them by path in the FMU, such as binaries/linux64/hexapod.so.
 
     Args:
-        library: what to build.
+        library: the library to build.
         platforms: folders, as `choose_platforms` returns them.
         fmi: version of the standard.
 
-    Raises FmuError: no cross compiler, or sources it does not compile.
+    Raises FmuError without a cross compiler, and for sources that do not compile.
     """
     wanted = {name: platform_targets(fmi)[name] for name in platforms}
     targets = list(dict.fromkeys(target for parts in wanted.values() for target in parts))
     if not targets:
         return {}
     compiler = find_compiler()
-    with _workers(len(targets)) as pool:
-        built = dict(
-            zip(
-                targets,
-                pool.map(lambda target: build_library(library, target, compiler=compiler), targets),
-                strict=True,
-            )
+    with _thread_pool(len(targets)) as pool:
+        libraries = pool.map(
+            lambda target: build_library(library, target, compiler=compiler), targets
         )
+        built = dict(zip(targets, libraries, strict=True))
     return {
         _member(library, name, parts): _joined([built[part] for part in parts])
         for name, parts in wanted.items()
@@ -108,10 +101,8 @@ def build_binaries(library: Library, platforms: Iterable[str], *, fmi: int) -> d
 
 
 @contextmanager
-def _workers(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads that each wait for a compiler. What has not begun is dropped when one fails or the
-    user interrupts.
-    """
+def _thread_pool(count: int) -> Iterator[ThreadPoolExecutor]:
+    """Yields a thread pool, whose waiting jobs are cancelled on an error or interrupt."""
     pool = ThreadPoolExecutor(count)
     try:
         yield pool
@@ -120,8 +111,10 @@ def _workers(count: int) -> Iterator[ThreadPoolExecutor]:
 
 
 def _member(library: Library, folder: str, targets: tuple[str, ...]) -> str:
+    """Returns the path of a library in the FMU."""
     return f"binaries/{folder}/{library.name}{TARGETS[targets[0]].suffix}"
 
 
 def _joined(parts: list[bytes]) -> bytes:
+    """Joins the binaries of one folder to one file."""
     return parts[0] if len(parts) == 1 else join_mach_o(parts)

@@ -1,10 +1,9 @@
-"""Reference results inside an FMU: what a short run gave where it was packed, for importers to
-compare with.
+"""Calculates the reference results inside an FMU, which importers can compare with.
 
-Laid out as the FMI cross-check has it: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. The inputs (a
-pushed torso, two moved joints) are sampled at every communication step, so that it does not matter
-how an importer interpolates; the outputs depend on the state alone, so that it does not matter
-whether it reads them before or after it sets the next inputs.
+The files are those of the FMI cross-check: NAME_in.csv, NAME_ref.csv, NAME_ref.opt. The inputs (a
+force on the torso, two moving joints) are sampled at every communication step, so that results do
+not depend on the importer's interpolation. The outputs depend on the state only, so that they may
+be read before or after the next inputs are set.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 
 FOLDER = "documentation/reference"
 STEP, STEPS = 0.01, 100  # s, 1
-PUSH = 0.05  # of the robot's weight, at most
-SWING = 0.05  # rad, of the moved joints at most
+PUSH = 0.05  # amplitude, of the robot's weight
+SWING = 0.05  # rad, amplitude of the moving joints
 MOVED = ("LF.femur.angle_ref", "RR.coxa.angle_ref")
 OUTPUTS = (
     "torso.position[1]",
@@ -34,14 +33,15 @@ OUTPUTS = (
     "RM.foot.normal_force",
     "energy.kinetic",
 )
-# stated in NAME_ref.opt: solvers elsewhere round differently; the same binary gives the same digits
+# relative; in NAME_ref.opt, for solvers that round differently
 TOLERANCE = 1e-6
 DIGITS = 12
 
 
 def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
-    """The three files by their path in the archive, from a run of the robot's packed FMU. Raises
-    FmuError when it does not run.
+    """Runs an FMU and returns the three files by their path in the archive.
+
+    Raises FmuError when it does not run.
     """
     inputs = [
         (k * STEP, *(float(f"{value:.{DIGITS}g}") for value in _inputs(interface, k * STEP)))
@@ -61,12 +61,12 @@ def reference_members(interface: Interface, fmu: Path) -> dict[str, bytes]:
 
 
 def input_names() -> tuple[str, ...]:
-    """The inputs that the run moves; the others stay at their start values."""
+    """Returns the inputs that the run changes; the others keep their start values."""
     return ("torso.push_force[1]", "torso.push_force[2]", *MOVED)
 
 
 def _inputs(interface: Interface, time: float) -> tuple[float, ...]:
-    """Smooth from rest, each with a rhythm of its own."""
+    """Returns the inputs at a time [s]: smooth, zero at the start, of different frequencies."""
     weight = interface.robot.total_mass * math.hypot(*interface.robot.gravity)
     pushes = [PUSH * weight * math.sin(2.0 * math.pi * rate * time) for rate in (1.0, 1.5)]
     swings = [SWING * (1.0 - math.cos(2.0 * math.pi * rate * time)) / 2.0 for rate in (2.0, 1.0)]
@@ -79,6 +79,7 @@ def _inputs(interface: Interface, time: float) -> tuple[float, ...]:
 def _run(
     fmu: Path, names: Sequence[str], inputs: Sequence[Sequence[float]]
 ) -> list[tuple[float, ...]]:
+    """Runs the FMU under inputs; returns time and outputs at each communication point."""
     with Fmu(fmu, name="reference") as plant:
         plant.initialise(0.0, STEPS * STEP)
         given, seen = plant.block(names), plant.block(OUTPUTS)
@@ -94,13 +95,14 @@ def _run(
 
 
 def _csv(header: Iterable[str], rows: Iterable[Sequence[float]]) -> bytes:
+    """Formats a header and rows of numbers as CSV."""
     lines = [",".join(f'"{name}"' for name in header)]
     lines += [",".join(f"{value + 0.0:.{DIGITS}g}" for value in row) for row in rows]
     return ("\n".join(lines) + "\n").encode()
 
 
 def read_csv(data: bytes) -> Mapping[str, list[float]]:
-    """Columns of such a file by name."""
+    """Returns the columns of a reference file by name."""
     header, *rows = data.decode().splitlines()
     columns = zip(*([float(value) for value in row.split(",")] for row in rows), strict=True)
     return {

@@ -1,4 +1,4 @@
-"""A robot written for other tools: as a URDF, as a MuJoCo model."""
+"""Writes a robot as a URDF or as a MuJoCo model (MJCF)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hexapod_cosim.models.urdf.writer import robot_to_urdf
 
 @dataclass(frozen=True)
 class Format:
-    """A way to describe a robot."""
+    """A file format of robots."""
 
     name: str
     title: str
@@ -29,8 +29,9 @@ FORMATS = {
 
 
 def chosen_format(path: Path | None, *, urdf: bool, mjcf: bool) -> Format | None:
-    """The format that is asked for, by name or by the suffix of the file; None for an FMU.
-    Raises HexapodError for two.
+    """Returns the format chosen by an option or by the file's suffix; None for an FMU.
+
+    Raises HexapodError for two options.
     """
     if urdf and mjcf:
         raise HexapodError(
@@ -47,8 +48,9 @@ def chosen_format(path: Path | None, *, urdf: bool, mjcf: bool) -> Format | None
 
 
 def export_description(robot: Robot, path: str | Path, form: Format) -> Path:
-    """Writes a robot's file and returns its path; it appears whole or not at all. Raises
-    HexapodError.
+    """Writes a robot's file atomically and returns its path.
+
+    Raises HexapodError for another suffix, and when the file cannot be written.
     """
     path = Path(path)
     if path.suffix != form.suffix:

@@ -1,4 +1,4 @@
-"""A robot, its controller and a walk as one System Structure package."""
+"""Writes a robot, its controller and a walking command as one package (SSP)."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.scenario.records import GRAVITY_NAMES
 from hexapod_cosim.models import FmuError, HexapodError, unknown_name
 
-PLANT, CONTROLLER = (
-    "plant",
-    "controller",
-)  # in the order in which their outputs follow from each other
+PLANT, CONTROLLER = "plant", "controller"  # in the order of calculation
 SUFFIX = ".ssp"
 FMI = 2
 STOP = 10.0  # s
-WALK: Mapping[str, float] = MappingProxyType({"command.vx": 0.08})  # m/s    the paper's experiment
+WALK: Mapping[str, float] = MappingProxyType(
+    {"command.vx": 0.08}
+)  # m/s    as in the paper's experiment
 
 Values = Mapping[str, Mapping[str, float]]  # by component and name
 
@@ -35,19 +34,19 @@ def export_package(
     stop: float = STOP,
     platforms: Iterable[str] | None = None,
 ) -> Path:
-    """Writes a package of a controller's robot, the controller, what connects them and their
-    parameters, and returns its path.
+    """Writes a package of plant FMU, controller FMU, connections and parameters; returns its path.
 
     Args:
         setup: the controller and its robot.
-        path: the file to write; it appears complete or not at all.
-        values: of parameters and of the walking command, in place of what the FMUs start with and
-            of 0.08 m/s straight on.
-        stop: time at which tools end if they are told nothing else [s].
-        platforms: of both FMUs, as for `export_fmu`, but one at least: what uses a package compiles
-            nothing.
+        path: the file to write, atomically.
+        values: of parameters and of the walking command, instead of the FMUs' start values and
+            0.08 m/s straight ahead.
+        stop: default stop time of the simulation [s].
+        platforms: of both FMUs, as for `export_fmu`. At least one is required, since tools for
+            packages do not compile sources.
 
-    Raises what `export_fmu`, `export_controller` and `export_ssp` raise, FmuError for no platform.
+    Raises the errors of `export_fmu`, `export_controller` and `export_ssp`; FmuError without a
+    platform.
     """
     chosen = None if platforms is None else choose_platforms(platforms, fmi=FMI)
     if chosen == []:
@@ -73,10 +72,10 @@ def export_package(
 def chosen_package(
     path: Path | None, *, wanted: bool, described: bool, values: Sequence[str] | None, fmi: int = 2
 ) -> bool:
-    """Whether a package is asked for, by name or by the suffix of the file.
+    """Returns whether a package is chosen, by option or by the file's suffix.
 
-    Raises HexapodError for two formats, for values of none, and for FMI 3.0, whose arrays an SSP
-    1.0 package cannot connect.
+    Raises HexapodError for two formats, for values without a package, and for FMI 3.0, whose arrays
+    SSP 1.0 cannot connect.
     """
     package = wanted or (path is not None and path.suffix == SUFFIX)
     if package and described:
@@ -100,7 +99,7 @@ def chosen_package(
 
 
 def package_path(path: Path | None, name: str) -> Path:
-    """Where a package goes. Raises HexapodError for what is no package's name."""
+    """Returns the path of the package to write. Raises HexapodError for another suffix."""
     if path is not None and (path.is_dir() or path.suffix != SUFFIX):
         fix = f"write -o {path / name if path.is_dir() else path.with_suffix('')}{SUFFIX}"
         raise HexapodError(
@@ -110,7 +109,7 @@ def package_path(path: Path | None, name: str) -> Path:
 
 
 def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
-    """Values from "COMPONENT.NAME=NUMBER". Raises HexapodError."""
+    """Parses "COMPONENT.NAME=NUMBER" to values by component and name. Raises HexapodError."""
     found: dict[str, dict[str, float]] = {}
     for text in texts:
         name, _, number = (part.strip() for part in text.partition("="))
@@ -118,7 +117,10 @@ def read_values(texts: Iterable[str]) -> dict[str, dict[str, float]]:
         if component not in {PLANT, CONTROLLER}:
             raise unknown_name("component", component, (PLANT, CONTROLLER), where=f"--set {text}")
         if variable in GRAVITY_NAMES:
-            fix = "write gravity = [0, 0, -1.62] into the robot's file: gains and the standing pose follow from it"
+            fix = (
+                "write gravity = [0, 0, -1.62] into the robot's file: gains and the standing "
+                "pose follow from it"
+            )
             raise HexapodError(
                 "gravity of one component alone",
                 got=name,

@@ -1,9 +1,8 @@
-"""Packs plant and controller FMUs, what connects them and their parameters as a System Structure
-package (SSP 1.0).
+"""Writes FMUs, their connections and their parameters as a System Structure package (SSP 1.0).
 
-Variables connect by name: an output of one component drives the other's input of the same name and
-type. What is left unconnected, such as the walking command, stays an input and is in the parameter
-set. Enumerations keep the FMU's own start values: SSP readers refuse them.
+An output of one component is connected to the input of the other that has the same name and type.
+Unconnected inputs, such as the walking command, are in the parameter set. Enumerations are not,
+since readers of packages refuse them; they keep the FMU's start values.
 """
 
 from __future__ import annotations
@@ -26,20 +25,12 @@ VERSION = "1.0"
 STANDARD = "http://ssp-standard.org/SSP1/SystemStructure"
 SSD, SSC, SSV = f"{STANDARD}Description", f"{STANDARD}Common", f"{STANDARD}ParameterValues"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
-PREFIXES = {
-    "ssd": SSD,
-    "ssc": SSC,
-    "ssv": SSV,
-    "osp": OSP,
-}  # readers look for these prefixes, not for the namespaces
-PARAMETER_SET = (
-    "start"  # one name for all components' sets: a tool that is told to apply it applies all
-)
+# some readers require these prefixes, not the namespaces only
+PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP}
+PARAMETER_SET = "start"  # the same name for all components, so that tools apply all sets together
 TYPES = ("Real", "Boolean")
-OPTIONS = {
-    "control": "choose it with --controller",
-    "gait.pattern": "choose it with --gait",
-}  # enumerations of no robot file
+# enumerations that no robot file has
+OPTIONS = {"control": "choose it with --controller", "gait.pattern": "choose it with --gait"}
 KINDS = ("input", "output", "parameter")
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
@@ -47,7 +38,7 @@ BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 
 @dataclass(frozen=True, kw_only=True)
 class Experiment:
-    """How the package is meant to run [s]."""
+    """Default step size and stop time of the package [s]."""
 
     step: float
     stop: float
@@ -63,7 +54,7 @@ class Component:
 
     @property
     def variables(self) -> dict[str, Any]:
-        """Its inputs, outputs and parameters that a package can name, in the FMU's order."""
+        """Inputs, outputs and parameters of the types that SSP supports, in the FMU's order."""
         return {
             one.name: one
             for one in self.description.modelVariables
@@ -71,7 +62,7 @@ class Component:
         }
 
     def of(self, causality: str) -> dict[str, Any]:
-        """Those of one causality."""
+        """Returns the variables of one causality."""
         return {
             name: variable
             for name, variable in self.variables.items()
@@ -81,7 +72,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Connection:
-    """An output of one component and the input that it drives; both have this name."""
+    """A connection of an output to an input of the same name."""
 
     start: str
     end: str
@@ -96,19 +87,18 @@ def export_ssp(
     experiment: Experiment,
     values: Mapping[str, Mapping[str, float]] = NOTHING,
 ) -> Path:
-    """Writes a package of FMUs, which connect by the names of their variables, and returns its
-    path.
+    """Writes a package of FMUs, connected by the names of their variables, and returns its path.
 
     Args:
-        path: the file to write; it appears complete or not at all.
+        path: the file to write, atomically.
         fmus: files by the names of their components.
         title: of the system.
-        experiment: step and stop time that tools take if they are told nothing else.
-        values: of parameters and unconnected inputs, by component and name, in place of the FMU's
+        experiment: default step size and stop time.
+        values: of parameters and unconnected inputs by component and name, instead of the FMUs'
             start values.
 
-    Raises FmuError: not co-simulation FMUs, nothing to connect, a value for something that is not
-    there or out of its range; HexapodError: a path that cannot be written.
+    Raises FmuError for FMUs without co-simulation, FMUs that do not connect, and unknown or invalid
+    values; HexapodError when the path cannot be written.
     """
     components = [Component(name, fmu, read_description(fmu)) for name, fmu in fmus.items()]
     connections = connect(components)
@@ -126,8 +116,9 @@ def export_ssp(
 
 
 def connect(components: Sequence[Component]) -> list[Connection]:
-    """Every output that drives another component's input. Raises FmuError when a component is
-    left alone, or an input has two drivers.
+    """Returns the connections between components.
+
+    Raises FmuError for a component without connections, and for an input with two sources.
     """
     found = [
         Connection(source.name, target.name, name)
@@ -163,7 +154,7 @@ def structure(
     title: str,
     experiment: Experiment,
 ) -> Element:
-    """SystemStructure.ssd."""
+    """Returns the root of SystemStructure.ssd."""
     root = Element("ssd:SystemStructureDescription", _heading(title, "ssd", "ssc", "osp"))
     system = SubElement(
         root,
@@ -191,8 +182,9 @@ def structure(
 def parameter_set(
     component: Component, connections: Iterable[Connection], values: Mapping[str, float]
 ) -> Element:
-    """The component's parameters and unconnected inputs as an .ssv file's root. Raises FmuError
-    for other values.
+    """Returns the root of a component's .ssv file: its parameters and unconnected inputs.
+
+    Raises FmuError for values of other variables.
     """
     driven = {one.name for one in connections if one.end == component.name}
     settable = component.of("parameter") | {
@@ -216,9 +208,7 @@ def parameter_set(
 def _check_value(
     component: Component, settable: Mapping[str, Any], name: str, value: float
 ) -> None:
-    """Raises FmuError for a value of something that no package can set, or one that the FMU
-    would refuse.
-    """
+    """Raises FmuError for a value that a package cannot set or that the FMU would refuse."""
     if name in {
         one.name for one in component.description.modelVariables if one.type == "Enumeration"
     }:
@@ -255,7 +245,7 @@ def _check_value(
 
 
 def _range(variable: Any) -> tuple[float, float]:
-    """Its least and largest value, of its own or of its type."""
+    """Returns minimum and maximum of a variable, its own or those of its type."""
     if variable.type == "Boolean":
         return 0.0, 1.0
     sources = [one for one in (variable, variable.declaredType) if one is not None]
@@ -267,6 +257,7 @@ def _range(variable: Any) -> tuple[float, float]:
 
 
 def _heading(name: str, *prefixes: str) -> dict[str, str]:
+    """Returns the attributes of a root element."""
     facts = {
         "version": VERSION,
         "name": name,
@@ -276,10 +267,12 @@ def _heading(name: str, *prefixes: str) -> dict[str, str]:
 
 
 def _values_file(component: Component) -> str:
+    """Returns the path of a component's parameter set in the package."""
     return f"resources/{component.name}.ssv"
 
 
 def _add_component(parent: Element, component: Component) -> None:
+    """Adds a component with its connectors and parameter set."""
     facts = {
         "name": component.name,
         "type": "application/x-fmu-sharedlibrary",
@@ -302,30 +295,29 @@ def _add_component(parent: Element, component: Component) -> None:
 
 
 def _described(variable: Any) -> dict[str, str]:
+    """Returns the name and description of a variable as attributes."""
     text = {"description": variable.description} if variable.description else {}
     return {"name": variable.name} | text
 
 
 def _start(variable: Any, value: float | None) -> str:
-    """In place of the FMU's own start value if given, as text that reads back the same."""
+    """Returns the given value or the FMU's start value as text without loss of digits."""
     if variable.type == "Boolean":
         return str(variable.start == "true" if value is None else bool(value)).lower()
     return repr(float(variable.start) if value is None else float(value))
 
 
 def _unit(variable: Any, component: Component) -> dict[str, str]:
-    """The unit, where base units of whole exponents can say it: a package's units have no other
-    form.
-    """
-    sayable = any(
+    """Returns the unit attribute, if the unit has integer exponents, which SSP requires."""
+    supported = any(
         unit.name == variable.unit and unit.baseUnit is not None
         for unit in component.description.unitDefinitions
     )
-    return {"unit": variable.unit} if variable.type == "Real" and sayable else {}
+    return {"unit": variable.unit} if variable.type == "Real" and supported else {}
 
 
 def _add_units(root: Element, tag: str, components: Iterable[Component]) -> None:
-    """Every unit in use, once."""
+    """Adds each used unit once."""
     known = {
         unit.name: unit.baseUnit
         for one in components
@@ -351,7 +343,7 @@ def _add_units(root: Element, tag: str, components: Iterable[Component]) -> None
 
 
 def _add_experiment(root: Element, experiment: Experiment) -> None:
-    """Start and stop; the step in the one annotation that a reader takes it from."""
+    """Adds start and stop time, and the step size in an annotation that readers support."""
     parent = SubElement(
         root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(experiment.stop)
     )
@@ -366,6 +358,7 @@ def _add_experiment(root: Element, experiment: Experiment) -> None:
 
 
 def _text(root: Element) -> bytes:
+    """Formats a document."""
     ElementTree.indent(root)
     return (
         b'<?xml version="1.0" encoding="UTF-8"?>\n'

@@ -1,9 +1,9 @@
-"""The variables as FMI 3 has them: one for each pattern of interface.toml, an array if the pattern
+"""The variables of the FMI 3 FMU: one for each pattern of interface.toml, an array if the pattern
 has axes.
 
-The name is the pattern's without its axes, the dimensions are the axes in the name's order, and the
-value reference is that of the first element: LF.coxa.angle_ref, LF.femur.angle_ref, ...
-RR.tibia.angle_ref of FMI 2 are angle_ref[6][3].
+An array's name is the pattern's name without its axes, its dimensions are the axes in the order of
+the name, and its value reference is that of its first element. LF.coxa.angle_ref, ...
+RR.tibia.angle_ref of FMI 2 are angle_ref[6][3] in FMI 3.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ class Array:
     """One variable of the FMI 3 FMU."""
 
     name: str
-    pattern: str  # its name in interface.toml
+    pattern: str  # the name in interface.toml
     shape: tuple[int, ...]  # () for a scalar
-    elements: tuple[Variable, ...]  # the last index fastest
+    elements: tuple[Variable, ...]  # the last index runs fastest
     description: str
 
     @property
     def first(self) -> Variable:
-        """The first element: what it says of type, unit and range holds for all."""
+        """The first element, whose type, unit and range are those of all."""
         return self.elements[0]
 
     @property
@@ -42,8 +42,9 @@ class Array:
 
 
 def arrays(interface: Interface) -> tuple[Array, ...]:
-    """All variables, in the order of interface.toml. Raises HexapodError when two patterns would
-    have one name.
+    """Returns all variables in the order of interface.toml.
+
+    Raises HexapodError when two patterns have one name.
     """
     found: list[Array] = []
     for causality in CAUSALITIES:
@@ -65,12 +66,12 @@ def arrays(interface: Interface) -> tuple[Array, ...]:
 
 
 def array_name(pattern: str) -> str:
-    """A pattern's name without its axes."""
+    """Returns a pattern's name without its axes."""
     return AXES.sub("", pattern)
 
 
 def _array(pattern: Pattern, variables: Iterator[Variable]) -> Array:
-    """The array of a pattern, whose elements are the next variables."""
+    """Makes the array of a pattern, whose elements are the next variables."""
     shape = tuple(len(labels) for _, labels in pattern.axes)
     elements = tuple(islice(variables, math.prod(shape)))
     return Array(
@@ -83,7 +84,7 @@ def _array(pattern: Pattern, variables: Iterator[Variable]) -> Array:
 
 
 def _description(pattern: Pattern) -> str:
-    """The pattern's, with what its indices mean where they are not 1, 2, 3."""
+    """Returns the pattern's description with the labels of axes other than 1, 2, 3."""
     axes = [f"{axis} ({' '.join(labels)})" for axis, labels in pattern.axes if axis != "i"]
     text = re.sub(r"Entry \{\w+\}", "Entries", pattern.description)
     return f"{text}; by {', '.join(axes)}" if axes else text

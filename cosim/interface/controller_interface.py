@@ -1,5 +1,5 @@
-"""The controller's FMU variables, expanded from controller_fmu/interface.toml for one set-up of
-the controller.
+"""The variables of the controller's FMU, from controller_fmu/interface.toml and one setup of the
+controller.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerSetup:
-    """What `Controller` is made of. Gains None: kinematic control."""
+    """The arguments of `Controller`. Without gains the control is kinematic."""
 
     robot: Robot
     gait: Gait
@@ -41,13 +41,11 @@ class ControllerSetup:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is doubtful about it: those of the Python controller."""
+        """Warnings about gains of another robot or period, as of the Python controller."""
         return gains_warnings(self.robot, self.gains, self.period)
 
     def build(self) -> Controller:
-        """The Python controller of this set-up. Raises RobotError, ControllerError for one that
-        cannot be.
-        """
+        """Builds the Python controller. Raises RobotError or ControllerError for invalid values."""
         return Controller(
             self.robot, period=self.period, gait=self.gait, gains=self.gains, parts=self.parts
         )
@@ -55,15 +53,16 @@ class ControllerSetup:
 
 @lru_cache(maxsize=16)
 def load_controller_interface(setup: ControllerSetup) -> Interface:
-    """The interface of a controller's FMU. Raises what `Controller` raises, HexapodError when a
-    value does not fit its variable.
+    """Returns the interface of a controller's FMU.
+
+    Raises the errors of `Controller`, and HexapodError when a value is out of its variable's range.
     """
-    setup.build()  # refuses what the C, which takes joint axes and gaits for granted, could not
+    setup.build()  # checks joint axes and gait, which the C code does not
     return expand_interface(CONTROLLER, setup.robot, controller_roots(setup))
 
 
 def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
-    """What the path of a start value of the controller may begin with."""
+    """Returns the objects that start values in the controller's interface.toml refer to."""
     settings = SimpleNamespace(
         control="kinematic" if setup.gains is None else "compliant",
         period=setup.period,
@@ -76,26 +75,25 @@ def controller_roots(setup: ControllerSetup) -> SimpleNamespace:
 
 
 def controller_parameters(setup: ControllerSetup) -> dict[str, float]:
-    """All parameters of the FMU of a set-up. Raises what `Controller` raises."""
+    """Returns all parameters of a controller's FMU by name. Raises the errors of `Controller`."""
     _build_kinematic(setup.robot, setup.gait, setup.period)
     return parameter_values(CONTROLLER, controller_roots(setup))
 
 
 @lru_cache(maxsize=64)
 def _build_kinematic(robot: Robot, gait: Gait, period: float) -> None:
-    """Refuses what no gains change."""
+    """Raises the errors of `Controller` that do not depend on the gains."""
     ControllerSetup(robot=robot, gait=gait, period=period).build()
 
 
 def passive_gains(robot: Robot) -> SimpleNamespace:
-    """What the gains' parameters start with under kinematic control, which has none: a law against
-    slip that answers nothing, and what requirements alone say of the rest.
+    """Returns start values of the gains' parameters for kinematic control, which does not use them.
+
+    The slip law's gains are zero; the other values follow from the requirements.
     """
     wanted, servo = requirements_for(robot), robot.servo
-    stiffness, omega = (
-        robot.weight / TRIPOD_LEGS / wanted.deflection,
-        2.0 * math.pi * wanted.frequency,
-    )
+    stiffness = robot.weight / TRIPOD_LEGS / wanted.deflection
+    omega = 2.0 * math.pi * wanted.frequency
     slip = SlipGains(
         kp=0.0,
         ki=0.0,

@@ -1,4 +1,4 @@
-"""Model descriptions, as fmpy reads them."""
+"""Reads model descriptions of FMUs with fmpy."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ FIX = "make one with `hexapod export -o FILE.fmu`"
 
 
 def read_description(path: Path) -> Any:
-    """Model description, as fmpy reads it, of an FMI 2.0 co-simulation FMU. Raises FmuError for
-    anything else.
+    """Returns fmpy's model description of an FMI 2.0 co-simulation FMU.
+
+    Raises FmuError for any other file.
     """
     description = open_description(path)
     if description.fmiVersion != "2.0" or description.coSimulation is None:
@@ -31,8 +32,9 @@ def read_description(path: Path) -> Any:
 
 
 def open_description(path: Path) -> Any:
-    """Model description, as fmpy reads it, of an FMU of any version. Raises FmuError when it is
-    none.
+    """Returns fmpy's model description of an FMU of any version.
+
+    Raises FmuError for a file that is no FMU.
     """
     if not path.is_file():
         raise FmuError("no such FMU", got=str(path), expected="an existing .fmu file", fix=FIX)

@@ -1,5 +1,7 @@
-"""The FMU's variables, expanded from plant_fmu/interface.toml for one robot: the only list of
-names, references and start values.
+"""The FMU's variables, from a component's interface.toml and one robot.
+
+This is the only list of names, value references and start values: model descriptions, C tables and
+documentation are generated from it.
 """
 
 from __future__ import annotations
@@ -31,26 +33,30 @@ DEFAULT_VARIABILITY = {
     "parameter": "fixed",
     "local": "continuous",
 }
-# of the settled pose (m, rad): far below what matters, far above what differs between machines
+# of the settled pose [m, rad]: rounds off differences between machines
 POSE_DECIMALS = 10
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unit:
-    """A unit as exponents of the SI base units (None where FMI's integers cannot say it) and as
-    users like to see it.
+    """A unit and its display unit.
+
+    exponents: of the SI base units; None where they are no integers, as FMI requires.
+    display: name of the display unit and factor: display value = factor * value.
+    type: the type that variables of this unit declare.
     """
 
     name: str
     exponents: Mapping[str, int] | None
-    display: tuple[str, float] | None  # name, and display value = factor * value
-    type: str | None = None  # the type that variables of this unit declare
+    display: tuple[str, float] | None
+    type: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Enumeration:
-    """A choice; item k of `items` (name, description) has the number k + 1 and the C constant
-    {prefix}_{NAME}.
+    """An enumeration type.
+
+    Item k of `items` (name, description) has the number k + 1 and the C constant {prefix}_{NAME}.
     """
 
     name: str
@@ -58,20 +64,24 @@ class Enumeration:
     items: tuple[tuple[str, str], ...]
 
     def number(self, item: str) -> int:
-        """The number of an item. Raises HexapodError for an unknown one."""
+        """Returns the number of an item. Raises HexapodError for an unknown one."""
         names = [name for name, _ in self.items]
         if item not in names:
             raise unknown_name(self.name, item, names)
         return names.index(item) + 1
 
     def constant(self, number: int) -> str:
-        """The C constant of a number."""
+        """Returns the C constant of a number."""
         return f"{self.prefix}_{self.items[number - 1][0]}".upper()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One scalar variable of the FMU."""
+    """One scalar variable of the FMU.
+
+    depends: states and inputs that an output or local variable is a direct function of; None: all.
+    initial: parameters that its initial value depends on, besides those of its states; None: all.
+    """
 
     name: str
     reference: int
@@ -85,19 +95,15 @@ class Variable:
     start: float | int | None  # None for outputs
     enumeration: str | None
     field: str  # lvalue in struct hxVariables
-    depends: (
-        tuple[str, ...] | None
-    )  # of an output or local: the states and inputs it is a direct function of; None: all
-    initial: (
-        tuple[str, ...] | None
-    )  # the parameters it comes from at the start, besides those of its states; None: all
+    depends: tuple[str, ...] | None
+    initial: tuple[str, ...] | None
     description: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class State:
-    """A continuous state of model exchange, its derivative and the parameters it starts from, by
-    the names of their variables.
+    """A continuous state of model exchange, its derivative and the parameters that its initial
+    value depends on, by the names of their variables.
     """
 
     name: str
@@ -108,20 +114,22 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Pattern:
-    """One entry of interface.toml: what its variables have in common."""
+    """One entry of interface.toml, which stands for one variable or for several.
+
+    axes: the axes in the name, each with its labels; in the order of the variables the first axis
+    runs slowest.
+    """
 
     name: str
-    axes: tuple[
-        tuple[str, tuple[str, ...]], ...
-    ]  # of the name, each with its labels; the variables come with the first axis slowest
+    axes: tuple[tuple[str, tuple[str, ...]], ...]
     causality: Causality
-    kind: str  # the unit, or the type
+    kind: str  # unit or type
     description: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Interface:
-    """Everything an importer sees of one robot's FMU."""
+    """The content of one FMU's model description."""
 
     component: Component
     robot: Robot
@@ -129,7 +137,7 @@ class Interface:
     variables: tuple[Variable, ...]
     states: tuple[State, ...]  # in the order in which importers exchange them
     event_indicators: int
-    shows_events: str | None  # the pattern whose variables are the indicators
+    indicator_pattern: str | None  # the pattern whose variables are the event indicators
     patterns: tuple[Pattern, ...]
     units: tuple[Unit, ...]
     enumerations: Mapping[str, Enumeration]
@@ -145,12 +153,12 @@ class Interface:
 
     @cached_property
     def index(self) -> Mapping[str, int]:
-        """Places of variables in the model description, from 1, by name."""
+        """Indices of variables in the model description, from 1, by name."""
         return {variable.name: place for place, variable in enumerate(self.variables, start=1)}
 
     @cached_property
     def derivative_of(self) -> Mapping[str, int]:
-        """By the names of derivatives, places of the states that they are derivatives of."""
+        """Indices of states by the names of their derivatives."""
         return {state.derivative: self.index[state.name] for state in self.states}
 
     @cached_property
@@ -159,11 +167,14 @@ class Interface:
         return frozenset(state.name for state in self.states if state.reinit)
 
     def depends(self, name: str) -> tuple[str, ...] | None:
-        """States and inputs that an output or a derivative is a direct function of; None: all."""
+        """Returns the states and inputs that an output or derivative is a direct function of.
+
+        None: all.
+        """
         return self.variable(name).depends
 
     def depends_initially(self, name: str) -> tuple[str, ...] | None:
-        """Parameters and inputs that it comes from at the start; None: all."""
+        """Returns the parameters and inputs that an initial value depends on; None: all."""
         variable, start = self.variable(name), {state.name: state.initial for state in self.states}
         if name in start:
             return start[name]
@@ -173,31 +184,33 @@ class Interface:
         return tuple(dict.fromkeys([*through, *variable.initial]))
 
     def variable(self, name: str) -> Variable:
-        """A variable by name. Raises HexapodError naming the nearest one."""
+        """Returns a variable by name. Raises HexapodError, which suggests the nearest name."""
         if name not in self.by_name:
             raise unknown_name("FMU variable", name, self.by_name)
         return self.by_name[name]
 
     def references(self, names: Iterable[str]) -> list[int]:
-        """Value references of variables by name, in the order given. Raises HexapodError."""
+        """Returns value references in the order of the names. Raises HexapodError."""
         return [self.variable(name).reference for name in names]
 
     def of_causality(self, *causalities: Causality) -> list[Variable]:
-        """Variables of some causalities, in the order of their references."""
+        """Returns the variables of these causalities in the order of their references."""
         return [variable for variable in self.variables if variable.causality in causalities]
 
 
 @lru_cache(maxsize=16)
 def load_interface(robot: Robot) -> Interface:
-    """The interface of a robot's FMU. Raises HexapodError when a value of the robot does not fit
-    its variable.
+    """Returns the interface of a robot's plant FMU.
+
+    Raises HexapodError when a value of the robot is out of its variable's range.
     """
     return expand_interface(PLANT, robot, plant_roots(robot))
 
 
 def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace) -> Interface:
-    """A component's interface, with start values from the attributes of `roots`. Raises
-    HexapodError when one does not fit its variable.
+    """Returns a component's interface, with start values from the attributes of `roots`.
+
+    Raises HexapodError when one is out of its variable's range.
     """
     table = read_table(component)
     enumerations = enumerations_of(component)
@@ -209,7 +222,7 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
         variables=variables,
         states=tuple(_states(table)),
         event_indicators=table["event"]["indicators"] if "event" in table else 0,
-        shows_events=table["event"]["shown_by"] if "event" in table else None,
+        indicator_pattern=table["event"]["shown_by"] if "event" in table else None,
         patterns=tuple(
             _pattern(entry, causality, table["axis"])
             for causality in CAUSALITIES
@@ -226,13 +239,13 @@ def expand_interface(component: Component, robot: Robot, roots: SimpleNamespace)
 
 @cache
 def read_table(component: Component) -> dict[str, Any]:
-    """A component's interface.toml, which no one may change."""
+    """Reads a component's interface.toml. The result is shared and must not be changed."""
     return tomllib.loads(interface_file(component).read_text(encoding="utf-8"))
 
 
 @cache
 def enumerations_of(component: Component) -> Mapping[str, Enumeration]:
-    """A component's choices by name."""
+    """Returns a component's enumeration types by name."""
     return {
         name: _enumeration(name, entry)
         for name, entry in read_table(component)["enumeration"].items()
@@ -240,11 +253,12 @@ def enumerations_of(component: Component) -> Mapping[str, Enumeration]:
 
 
 def plant_roots(robot: Robot) -> SimpleNamespace:
-    """What the path of a start value of the plant may begin with."""
+    """Returns the objects that start values in the plant's interface.toml refer to."""
     return SimpleNamespace(robot=robot, settled=_settled_pose(robot))
 
 
 def _settled_pose(robot: Robot) -> SimpleNamespace:
+    """Returns position, quaternion and angles of the robot at rest on the ground, rounded."""
     position, quaternion, angle = settled(robot)
     return SimpleNamespace(
         position=_rounded(position),
@@ -254,15 +268,18 @@ def _settled_pose(robot: Robot) -> SimpleNamespace:
 
 
 def _rounded(values: Iterable[float]) -> list[float]:
+    """Rounds numbers to POSE_DECIMALS."""
     return [round(float(value), POSE_DECIMALS) + 0.0 for value in values]
 
 
 def _enumeration(name: str, entry: Mapping[str, str]) -> Enumeration:
+    """Returns the enumeration type of an entry of interface.toml."""
     items = tuple((item, text) for item, text in entry.items() if item != "prefix")
     return Enumeration(name=name, prefix=entry["prefix"], items=items)
 
 
 def _unit(name: str, entry: Any) -> Unit:
+    """Returns the unit of an entry of interface.toml."""
     if isinstance(entry, str):
         return Unit(name=name, exponents=None, display=None)
     display = (
@@ -277,6 +294,7 @@ def _unit(name: str, entry: Any) -> Unit:
 def _pattern(
     entry: Mapping[str, Any], causality: Causality, axes: Mapping[str, list[str]]
 ) -> Pattern:
+    """Returns the pattern of an entry of interface.toml."""
     own = tuple((axis, tuple(labels)) for axis, labels in own_axes(entry, axes).items())
     kind = entry.get("unit", entry.get("type", ""))
     return Pattern(
@@ -291,6 +309,7 @@ def _pattern(
 def _expand_all(
     table: Mapping[str, Any], enumerations: Mapping[str, Enumeration], roots: SimpleNamespace
 ) -> Iterable[Variable]:
+    """Yields all variables by causality, in the order of interface.toml."""
     for causality in CAUSALITIES:
         places = itertools.chain.from_iterable(
             expand(entry, table["axis"]) for entry in table.get(causality, [])
@@ -310,6 +329,7 @@ def _variable(
     roots: SimpleNamespace,
     table: Mapping[str, Any],
 ) -> Variable:
+    """Returns the variable of an entry at one combination of its axes."""
     labels = {axis: label for axis, (_, label) in place.items()}
     enumeration = enumerations.get(entry.get("type", ""))
     kind: Type = "Enumeration" if enumeration else entry.get("type", "Real")
@@ -340,6 +360,7 @@ def _variable(
 
 
 def _states(table: Mapping[str, Any]) -> Iterable[State]:
+    """Yields the continuous states."""
     for entry in table.get("state", []):
         for _, place in expand(entry, table["axis"]):
             labels = {axis: label for axis, (_, label) in place.items()}
@@ -358,6 +379,7 @@ def _start(
     enumeration: Enumeration | None,
     roots: SimpleNamespace,
 ) -> float | int | None:
+    """Returns a start value: a constant, or the value at a path such as robot.torso.mass."""
     if not isinstance(given, str):
         return given
     value: Any = roots
@@ -373,7 +395,7 @@ def _start(
 
 
 def _check_start(variable: Variable) -> None:
-    """A start value outside its variable's range would make an FMU that importers refuse."""
+    """Raises HexapodError for a start value out of range, for which importers refuse the FMU."""
     low = -math.inf if variable.minimum is None else variable.minimum
     high = math.inf if variable.maximum is None else variable.maximum
     if variable.start is not None and not (

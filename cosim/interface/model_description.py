@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0 and the GUID that ties it to the binary's start values."""
+"""Writes modelDescription.xml of FMI 2.0 and the GUID that the binary's start values share."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.common.plant_files import DISTRIBUTION, FMI3_SOURCE, source_files
 from hexapod_cosim.cosim.interface.interface import Enumeration, Interface, Unit, Variable
 
-# what the binary can do; tests/fmi/test_fmi.py and tests/fmi/test_fmi_exchange.py hold each of
-# these to its word
+# capabilities, each tested by tests/fmi/test_fmi.py or tests/fmi/test_fmi_exchange.py
 BOTH = {
     "canBeInstantiatedOnlyOncePerProcess": "false",
     "canNotUseMemoryManagementFunctions": "true",
@@ -22,9 +21,8 @@ BOTH = {
     "canSerializeFMUstate": "true",
 }
 MODEL_EXCHANGE = {"completedIntegratorStepNotNeeded": "false"} | BOTH
-# canInterpolateInputs: derivatives of inputs are taken whenever they are given, but some masters
-# that connect sources without any refuse an FMU that declares it, and none refuses one that does
-# not
+# canInterpolateInputs is false although the FMU accepts derivatives of inputs: some masters refuse
+# an FMU that declares it when their sources have no derivatives
 CO_SIMULATION = {
     "canHandleVariableCommunicationStepSize": "true",
     "canInterpolateInputs": "false",
@@ -34,16 +32,14 @@ CO_SIMULATION = {
 
 @dataclass(frozen=True)
 class ModelDescription:
-    """The document and its GUID, a fingerprint of the document: any other variable, unit, value
-    or version is another GUID.
-    """
+    """modelDescription.xml and its GUID, which is a hash of the document."""
 
     guid: str
     xml: str
 
 
 def render_fmi2(interface: Interface) -> ModelDescription:
-    """The model description of a robot's FMU."""
+    """Returns the model description of a component's FMU."""
     root = _document(interface)
     digest = hashlib.sha256(ElementTree.tostring(root)).digest()
     guid = "{" + str(uuid.UUID(bytes=digest[:16], version=4)) + "}"
@@ -54,6 +50,7 @@ def render_fmi2(interface: Interface) -> ModelDescription:
 
 
 def _document(interface: Interface) -> Element:
+    """Returns the document with an empty GUID."""
     own = {
         "fmiVersion": "2.0",
         "guid": "",
@@ -80,9 +77,7 @@ def _document(interface: Interface) -> Element:
 
 
 def _add_interfaces(root: Element, interface: Interface) -> None:
-    """Model exchange for components with continuous states, whose derivatives are exact;
-    co-simulation.
-    """
+    """Adds CoSimulation and, for components with continuous states, ModelExchange."""
     differentiable = {"providesDirectionalDerivative": _flag(bool(interface.states))}
     order = {"maxOutputDerivativeOrder": str(int(bool(interface.states)))}
     identifier = {"modelIdentifier": interface.component.identifier}
@@ -98,10 +93,12 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
 
 
 def _flag(value: bool) -> str:
+    """Formats a Boolean."""
     return "true" if value else "false"
 
 
 def _add_sources(element: Element, component: Component) -> None:
+    """Adds the list of the component's C files."""
     files = SubElement(element, "SourceFiles")
     for name in source_files(component):
         if name.endswith(".c") and name != FMI3_SOURCE:
@@ -109,7 +106,7 @@ def _add_sources(element: Element, component: Component) -> None:
 
 
 def general_facts(interface: Interface) -> dict[str, str]:
-    """The attributes of the document that are the same in both versions of the standard."""
+    """Returns the attributes of the root that both versions of the standard share."""
     robot = interface.robot
     joints = sum(len(leg.links) for leg in robot.legs)
     return {
@@ -123,14 +120,14 @@ def general_facts(interface: Interface) -> dict[str, str]:
 
 
 def add_log_categories(root: Element, interface: Interface) -> None:
-    """The log's categories."""
+    """Adds the log categories."""
     categories = SubElement(root, "LogCategories")
     for name, text in interface.log_categories.items():
         SubElement(categories, "Category", name=name, description=text)
 
 
 def add_units(root: Element, units: Iterable[Unit]) -> None:
-    """The units, with how users like to see them."""
+    """Adds the units with their display units."""
     parent = SubElement(root, "UnitDefinitions")
     for unit in units:
         element = SubElement(parent, "Unit", name=unit.name)
@@ -145,6 +142,7 @@ def add_units(root: Element, units: Iterable[Unit]) -> None:
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
+    """Adds the types of units and enumerations."""
     parent = SubElement(root, "TypeDefinitions")
     for unit in units:
         _add_real_type(parent, unit)
@@ -155,6 +153,7 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
 
 
 def _add_real_type(parent: Element, unit: Unit) -> None:
+    """Adds the type of a unit."""
     if unit.type is not None:
         display = {"displayUnit": unit.display[0]} if unit.display else {}
         SubElement(
@@ -165,11 +164,13 @@ def _add_real_type(parent: Element, unit: Unit) -> None:
 
 
 def _add_provenance(root: Element, interface: Interface) -> None:
+    """Adds the robot's name and hash."""
     tool = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=DISTRIBUTION)
     SubElement(tool, "Robot", name=interface.robot.name, hash=interface.robot.hash)
 
 
 def _add_variable(parent: Element, variable: Variable, interface: Interface) -> None:
+    """Adds a variable."""
     element = SubElement(
         parent,
         "ScalarVariable",
@@ -183,7 +184,7 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
         },
     )
     if variable.causality == "input":
-        del element.attrib["initial"]  # the standard forbids to state it
+        del element.attrib["initial"]  # the standard forbids it for inputs
     displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
     types = {unit.name: unit.type for unit in interface.units}
     attributes = {
@@ -205,15 +206,15 @@ def _add_variable(parent: Element, variable: Variable, interface: Interface) -> 
 
 
 def attribute_text(value: float | int | str) -> str:
-    """A number, truth or text as XML has it."""
+    """Formats a number, Boolean or text for XML."""
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else repr(value)
 
 
 def _add_structure(root: Element, interface: Interface) -> None:
-    """Outputs and derivatives with what they depend on now; the same and the states with what
-    they depend on at the start.
+    """Adds outputs and derivatives with their dependencies, and these and the states with the
+    dependencies of their initial values.
     """
     structure = SubElement(root, "ModelStructure")
     outputs = [variable.name for variable in interface.of_causality("output")]
@@ -236,7 +237,7 @@ def _add_structure(root: Element, interface: Interface) -> None:
 def _add_unknown(
     parent: Element, interface: Interface, name: str, depends: Iterable[str] | None
 ) -> None:
-    """Without dependencies an unknown depends on all knowns."""
+    """Adds an unknown. Without stated dependencies it depends on all knowns."""
     attributes = {"index": str(interface.index[name])}
     if depends is not None:
         attributes["dependencies"] = " ".join(

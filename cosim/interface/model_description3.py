@@ -1,5 +1,6 @@
-"""modelDescription.xml and buildDescription.xml of FMI 3.0: the interface of FMI 2.0 with arrays
-in the place of their elements.
+"""Writes modelDescription.xml and buildDescription.xml of FMI 3.0.
+
+The variables are those of FMI 2.0, with arrays in the place of their elements.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from hexapod_cosim.cosim.interface.model_description import (
     render_fmi2,
 )
 
-# what the binary can do; tests/fmi/test_fmi3.py holds each of these to its word
+# capabilities, each tested by tests/fmi/test_fmi3.py
 CAPABILITIES = {
     "needsExecutionTool": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
@@ -43,8 +44,9 @@ TIME = "time"
 
 
 def render_fmi3(interface: Interface) -> ModelDescription:
-    """The model description of a robot's FMI 3.0 FMU. Its token is the GUID of the FMI 2.0 one:
-    the same binary, values and robot.
+    """Returns the model description of a component's FMI 3.0 FMU.
+
+    Its instantiation token is the GUID of the FMI 2.0 FMU with the same binary and start values.
     """
     guid = render_fmi2(interface).guid
     variables = arrays(interface)
@@ -70,7 +72,7 @@ def render_fmi3(interface: Interface) -> ModelDescription:
 
 
 def render_build_description(component: Component, sources: Iterable[str]) -> str:
-    """buildDescription.xml of a component, for C files below the archive's sources folder."""
+    """Returns buildDescription.xml of a component, for C files in the archive's sources folder."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(
         root,
@@ -93,15 +95,14 @@ def render_build_description(component: Component, sources: Iterable[str]) -> st
 
 
 def _document(root: Element) -> str:
+    """Formats a document."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
 def _add_interfaces(root: Element, interface: Interface) -> None:
-    """Model exchange for components with continuous states, whose derivatives are exact;
-    co-simulation.
-    """
+    """Adds CoSimulation and, for components with continuous states, ModelExchange."""
     has_states = bool(interface.states)
     both = {"modelIdentifier": interface.component.identifier} | CAPABILITIES
     both |= {"providesDirectionalDerivatives": "true" if has_states else "false"}
@@ -116,6 +117,7 @@ def _add_interfaces(root: Element, interface: Interface) -> None:
 
 
 def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterable[Unit]) -> None:
+    """Adds the types of enumerations and units."""
     parent = SubElement(root, "TypeDefinitions")
     for enumeration in enumerations:
         element = SubElement(parent, "EnumerationType", name=enumeration.name)
@@ -132,6 +134,7 @@ def _add_types(root: Element, enumerations: Iterable[Enumeration], units: Iterab
 
 
 def _add_variables(root: Element, interface: Interface, variables: Iterable[Array]) -> None:
+    """Adds time and all variables."""
     parent = SubElement(root, "ModelVariables")
     reference = str(interface.first_reference["independent"])
     SubElement(
@@ -153,13 +156,14 @@ def _add_variables(root: Element, interface: Interface, variables: Iterable[Arra
 
 
 def _references(variables: Iterable[Array]) -> dict[str, int]:
-    """Of the arrays that hold them, by the names of elements."""
+    """Returns the value references of arrays by the names of their elements."""
     return {element.name: array.reference for array in variables for element in array.elements}
 
 
 def _add_variable(
     parent: Element, array: Array, interface: Interface, derivative_of: int | None
 ) -> None:
+    """Adds a variable; derivative_of: value reference of its state."""
     first = array.first
     displays = {unit.name: unit.display[0] for unit in interface.units if unit.display}
     types = {unit.name: unit.type for unit in interface.units}
@@ -189,28 +193,23 @@ def _add_variable(
 
 
 def _starts(array: Array) -> str | None:
-    """The elements' start values; None for outputs."""
-    return (
-        None
-        if array.first.start is None
-        else " ".join(attribute_text(e.start) for e in array.elements if e.start is not None)
-    )
+    """Returns the elements' start values; None for outputs."""
+    values = [e.start for e in array.elements if e.start is not None]
+    return " ".join(map(attribute_text, values)) if values else None
 
 
 def _add_structure(root: Element, interface: Interface, variables: tuple[Array, ...]) -> None:
-    """What FMI 2.0's tells of elements, of their arrays; event indicators are arrays too."""
+    """Adds FMI 2.0's dependencies of elements as those of their arrays, and event indicators."""
     structure = SubElement(root, "ModelStructure")
-    by_reference, references = (
-        {array.reference: array for array in variables},
-        _references(variables),
-    )
+    by_reference = {array.reference: array for array in variables}
+    references = _references(variables)
     outputs = [array for array in variables if array.first.causality == "output"]
-    derivatives = _holding(
+    derivatives = _arrays_of(
         [state.derivative for state in interface.states], references, by_reference
     )
-    states = _holding([state.name for state in interface.states], references, by_reference)
+    states = _arrays_of([state.name for state in interface.states], references, by_reference)
     initial = sorted({array.reference for array in (*outputs, *derivatives, *states)})
-    indicators = [array for array in variables if array.pattern == interface.shows_events]
+    indicators = [array for array in variables if array.pattern == interface.indicator_pattern]
     for title, arrays_, depends in (
         ("Output", outputs, interface.depends),
         ("ContinuousStateDerivative", derivatives, interface.depends),
@@ -225,10 +224,10 @@ def _add_structure(root: Element, interface: Interface, variables: tuple[Array, 
             _add_unknown(structure, title, array, _knowns(array, depends, references))
 
 
-def _holding(
+def _arrays_of(
     names: Iterable[str], references: Mapping[str, int], by_reference: Mapping[int, Array]
 ) -> list[Array]:
-    """The arrays that hold elements, each once, in the order of these."""
+    """Returns the arrays of elements, each once, in the order of the elements."""
     return [
         by_reference[reference] for reference in dict.fromkeys(references[name] for name in names)
     ]
@@ -237,7 +236,7 @@ def _holding(
 def _knowns(
     array: Array, depends: Callable[[str], tuple[str, ...] | None], references: Mapping[str, int]
 ) -> list[int] | None:
-    """References of the arrays that some element depends on; None: all."""
+    """Returns the references of the arrays that some element depends on; None: all."""
     found: set[int] = set()
     for element in array.elements:
         knowns = depends(element.name)
@@ -250,6 +249,7 @@ def _knowns(
 def _add_unknown(
     structure: Element, title: str, array: Array, knowns: Iterable[int] | None
 ) -> None:
+    """Adds an unknown. Without stated dependencies it depends on all knowns."""
     attributes = {"valueReference": str(array.reference)}
     if knowns is not None:
         attributes["dependencies"] = " ".join(map(str, knowns))
@@ -257,5 +257,6 @@ def _add_unknown(
 
 
 def _add_provenance(root: Element, interface: Interface) -> None:
+    """Adds the robot's name and hash."""
     annotation = SubElement(SubElement(root, "Annotations"), "Annotation", type=DISTRIBUTION)
     SubElement(annotation, "Robot", name=interface.robot.name, hash=interface.robot.hash)

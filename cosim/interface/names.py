@@ -9,20 +9,20 @@ AXES = (1, 2, 3)
 
 
 def joint_names(quantity: str) -> list[str]:
-    """Names of a quantity of all joints, legs slowest."""
+    """Returns the names of a quantity of all joints; legs run slowest."""
     return [f"{leg}.{joint}.{quantity}" for leg in LEG_NAMES for joint in JOINT_NAMES]
 
 
 def foot_names(quantity: str) -> list[str]:
-    """Names of a scalar quantity of all feet."""
+    """Returns the names of a scalar quantity of all feet."""
     return [f"{leg}.foot.{quantity}" for leg in LEG_NAMES]
 
 
 def vector_names(stem: str, size: int = 3) -> list[str]:
-    """Names of a vector's entries."""
+    """Returns the names of a vector's elements."""
     return [f"{stem}[{k}]" for k in range(1, size + 1)]
 
 
 def foot_vector_names(quantity: str) -> list[str]:
-    """Names of a vector quantity of all feet, axes fastest."""
+    """Returns the names of a vector quantity of all feet; axes run fastest."""
     return [name for stem in foot_names(quantity) for name in vector_names(stem)]

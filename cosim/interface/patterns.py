@@ -1,4 +1,4 @@
-"""Names in interface.toml: patterns with axes, for all that share a form."""
+"""Expands the names in interface.toml, which are patterns with axes such as {leg}.{joint}.angle."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any
 def expand(
     entry: Mapping[str, Any], axes: Mapping[str, list[str]]
 ) -> Iterable[tuple[Mapping[str, Any], dict[str, tuple[int, str]]]]:
-    """An entry with each combination of its axes: axis -> (index from 0, label)."""
+    """Yields an entry with each combination of its axes: axis -> (index from 0, label)."""
     used = own_axes(entry, axes)
     for combination in itertools.product(*map(enumerate, used.values())):
         yield entry, dict(zip(used, combination, strict=True))
 
 
 def own_axes(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> dict[str, list[str]]:
-    """The labels of the axes in an entry's name, in its order."""
+    """Returns the labels of the axes in an entry's name, in the order of the name."""
     labels = dict(axes) | {"i": [str(i + 1) for i in range(entry.get("size", 0))]}
     return {
         axis or "i": labels[axis or "i"] for axis in re.findall(r"\{(\w+)\}|\[i\]", entry["name"])
@@ -26,15 +26,17 @@ def own_axes(entry: Mapping[str, Any], axes: Mapping[str, list[str]]) -> dict[st
 
 
 def labelled(pattern: str, labels: Mapping[str, str]) -> str:
-    """A pattern's name with these labels for its axes."""
+    """Replaces the axes of a pattern by labels."""
     return pattern.replace("[i]", f"[{labels.get('i')}]").format(**labels)
 
 
 def expand_names(
     patterns: Iterable[str] | None, labels: Mapping[str, str], table: Mapping[str, Any]
 ) -> tuple[str, ...] | None:
-    """Names by patterns: @ begins a group, {axis} is one's own label, * every leg, joint or
-    index (of three, or of a quaternion's four).
+    """Returns the names that patterns stand for; None for None.
+
+    A pattern @name stands for a group of `table`, {axis} for the label of the variable that the
+    patterns belong to, and * for every leg, joint or index (1 to 3, of quaternions 1 to 4).
     """
     if patterns is None:
         return None
@@ -50,8 +52,8 @@ def expand_names(
 
 
 def _every(pattern: str, axes: Mapping[str, list[str]]) -> list[str]:
-    """A name for every label of its stars: a leg at the beginning, a joint inside, an index in
-    brackets (a quaternion has four).
+    """Returns the names with every label in the place of each star: a leg at the beginning, a
+    joint inside, an index in brackets.
     """
     indices = [f"[{i + 1}]" for i in range(4 if "quaternion" in pattern else 3)]
     joints, legs = ([f".{joint}." for joint in axes["joint"]], [f"{leg}." for leg in axes["leg"]])

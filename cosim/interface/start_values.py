@@ -1,5 +1,6 @@
-"""Start values of an FMU's parameters without the rest of its interface: what a run sets that
-walks a robot on another one's FMU.
+"""Start values of an FMU's parameters, without the rest of its interface.
+
+A run sets them when it simulates a robot on the FMU of another one.
 """
 
 from __future__ import annotations
@@ -14,50 +15,55 @@ from hexapod_cosim.cosim.common.components import Component
 from hexapod_cosim.cosim.interface.interface import Enumeration, enumerations_of, read_table
 from hexapod_cosim.cosim.interface.patterns import expand, labelled
 
-Step = str | int  # an attribute's name or a place in a sequence
-Row = tuple[
-    str, Any, tuple[Step, ...], Enumeration | None
-]  # name, a constant or None, else the way from the roots to the value
+Step = str | int  # an attribute's name or an index of a sequence
+# name; a constant or None; without a constant the path from the roots to the value; enumeration
+Row = tuple[str, Any, tuple[Step, ...], Enumeration | None]
 
 
 def parameter_values(component: Component, roots: SimpleNamespace) -> dict[str, float]:
-    """All parameters that start with something, by name, as `expand_interface` has them; their
-    ranges are the FMU's to judge.
+    """Returns the start values of parameters by name, as `expand_interface` does.
+
+    Their ranges are not checked: the FMU does.
     """
     return {
-        name: constant if constant is not None else _value(roots, way, choices)
-        for name, constant, way, choices in _rows(component)
+        name: constant if constant is not None else _value(roots, path, enumeration)
+        for name, constant, path, enumeration in _rows(component)
     }
 
 
-def _value(roots: SimpleNamespace, way: tuple[Step, ...], choices: Enumeration | None) -> float:
+def _value(
+    roots: SimpleNamespace, path: tuple[Step, ...], enumeration: Enumeration | None
+) -> float:
+    """Returns the value at a path from the roots."""
     value: Any = roots
-    for step in way:
+    for step in path:
         value = getattr(value, step) if isinstance(step, str) else value[step]
     if isinstance(value, bool):
         return value
-    return choices.number(value) if choices else float(value)
+    return enumeration.number(value) if enumeration else float(value)
 
 
 @cache
 def _rows(component: Component) -> tuple[Row, ...]:
-    """interface.toml's parameters, read once."""
+    """Returns the parameters of interface.toml, which is read once."""
     return tuple(_parameters(component))
 
 
 def _parameters(component: Component) -> Iterator[Row]:
+    """Yields the parameters of interface.toml that have a start value."""
     table, enumerations = read_table(component), enumerations_of(component)
     for entry in table.get("parameter", []):
         given = entry.get("start")
         for _, place in expand(entry, table["axis"]):
             name = labelled(entry["name"], {axis: label for axis, (_, label) in place.items()})
-            choices = enumerations.get(entry.get("type", ""))
+            enumeration = enumerations.get(entry.get("type", ""))
             if isinstance(given, str):
-                yield name, None, tuple(_way(given, place)), choices
+                yield name, None, tuple(_path(given, place)), enumeration
             elif given is not None:
-                yield name, given, (), choices
+                yield name, given, (), enumeration
 
 
-def _way(given: str, place: Any) -> Iterator[Step]:
+def _path(given: str, place: Any) -> Iterator[Step]:
+    """Yields the steps of a path such as robot.legs[leg].hip_yaw."""
     for attribute, axis in re.findall(r"(?:^|\.)(\w+)|\[(\w+)\]", given):
         yield attribute or (place[axis][0] if axis in place else int(axis))

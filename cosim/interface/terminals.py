@@ -1,9 +1,9 @@
-"""terminalsAndIcons.xml: the FMU's variables bundled as a user connects them, and its icon.
+"""Writes terminalsAndIcons.xml: groups of variables that users connect together, and the icon.
 
-Defined by FMI 3.0 (section 2.4.9), in the same folder and form since FMI 2.0.4. Legs have a
-terminal each: command (what a controller gives), state (what joint sensors measure) and foot (the
-contact); the torso has push, motion and imu. Terminals match by their members' names (rule "plug"),
-so that a controller's terminal of the same members connects in one go.
+The file is defined by FMI 3.0 (section 2.4.9) and used since FMI 2.0.4. Each leg has the terminals
+command (from a controller), state (measured by joint sensors) and foot (the contact); the torso has
+push, motion and imu. Terminals connect by their members' names (rule "plug"), so that a
+controller's terminal with the same members is connected as a whole.
 """
 
 from __future__ import annotations
@@ -16,11 +16,9 @@ from hexapod_cosim.models.records import JOINT_NAMES, LEG_NAMES
 
 FOLDER = "terminalsAndIcons"
 ICON = "icon.png"
-COMMANDS, STATES = (
-    ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref"),
-    ("angle", "speed", "torque"),
-)
-BODY = ("vx", "vy", "yaw_rate", "height", "roll", "pitch")  # of a controller
+COMMANDS = ("angle_ref", "speed_ref", "torque_ref", "acceleration_ref")
+STATES = ("angle", "speed", "torque")
+BODY = ("vx", "vy", "yaw_rate", "height", "roll", "pitch")  # inputs of a controller
 Group = tuple[str, str, tuple[str, ...]]  # name, meaning, members
 LEGS: tuple[Group, ...] = (
     ("command", "joint commands", COMMANDS),
@@ -37,14 +35,12 @@ TORSO: tuple[Group, ...] = (
     ("command", "what the torso is told to do", tuple(f"command.{name}" for name in BODY)),
     ("imu", "an ideal inertial sensor", ("imu.specific_force", "imu.angular_velocity")),
 )
-HALF_SIZE = 100.0  # of the icon's coordinates, which run from - to +
-MILLIMETRES = 0.1  # of a diagram, per unit of these coordinates
+HALF_SIZE = 100.0  # the icon's coordinates run from -100 to 100
+MILLIMETRES = 0.1  # per unit of these coordinates
 
 
 def render_terminals(names: Sequence[str]) -> str:
-    """The document for an FMU whose variables have these names; arrays are spelt out, as FMI 2.0
-    has them.
-    """
+    """Returns the document for an FMI 2.0 FMU with scalar variables of these names."""
     root, terminals = _document()
     for leg in LEG_NAMES:
         _add_leg(terminals, leg, names)
@@ -61,8 +57,9 @@ def render_terminals(names: Sequence[str]) -> str:
 
 
 def render_terminals3(names: Sequence[str]) -> str:
-    """The document for an FMI 3.0 FMU with these inputs and outputs, arrays over legs and
-    joints: the same terminals, once for all legs.
+    """Returns the document for an FMI 3.0 FMU with these inputs and outputs.
+
+    They are arrays over legs and joints, so there is one set of terminals for all legs.
     """
     root, terminals = _document()
     legs = _add(terminals, "legs", "all legs: arrays over legs and joints")
@@ -91,7 +88,7 @@ def render_terminals3(names: Sequence[str]) -> str:
 
 
 def _document() -> tuple[Element, Element]:
-    """A document with the icon's place, and the element for its terminals."""
+    """Returns a document with the icon, and its element for terminals."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     corners = {
         "x1": repr(-HALF_SIZE),
@@ -108,11 +105,14 @@ def _document() -> tuple[Element, Element]:
 
 
 def _text(root: Element) -> str:
+    """Formats the document."""
     ElementTree.indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
 def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
+    """Adds the terminals of a leg."""
     terminal = _add(parent, leg, f"leg {leg}")
     for name, text, quantities in LEGS:
         members = [f"{joint}.{quantity}" for joint in JOINT_NAMES for quantity in quantities]
@@ -130,7 +130,7 @@ def _add_leg(parent: Element, leg: str, names: Sequence[str]) -> None:
 
 
 def _add(parent: Element, name: str, text: str, members: Iterable[tuple[str, str]] = ()) -> Element:
-    """A terminal of (variable, member) pairs."""
+    """Adds a terminal of (variable, member) pairs."""
     terminal = SubElement(parent, "Terminal", name=name, matchingRule="plug", description=text)
     for variable, member in members:
         SubElement(

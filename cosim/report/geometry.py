@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hexapod_cosim.cosim.export.portrait import COLOURS, THICKNESS
+from hexapod_cosim.cosim.export.picture import COLOURS, THICKNESS
 from hexapod_cosim.cosim.interface.names import vector_names
 from hexapod_cosim.cosim.results.results import StoredResult
 from hexapod_cosim.cosim.results.walk import FLAT

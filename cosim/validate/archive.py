@@ -1,5 +1,5 @@
-"""Is an FMU's archive whole? Its ZIP, sources, binaries, terminals, licence: what checkers of
-modelDescription.xml do not look at.
+"""Checks the files of an FMU's archive besides modelDescription.xml: ZIP format, sources, binaries,
+terminals, documentation, licence.
 """
 
 from __future__ import annotations
@@ -24,21 +24,18 @@ from hexapod_cosim.cosim.validate.description import (
 )
 from hexapod_cosim.cosim.validate.variable import INTERFACES
 
-DESCRIPTION, TERMINALS, PAGE = (
-    "modelDescription.xml",
-    f"{FOLDER}/terminalsAndIcons.xml",
-    "documentation/index.html",
-)
+DESCRIPTION, PAGE = "modelDescription.xml", "documentation/index.html"
+TERMINALS = f"{FOLDER}/terminalsAndIcons.xml"
 BUILD_DESCRIPTION = "sources/buildDescription.xml"
-# the importer's own headers, by version of the standard; the first declares all functions
+# headers of the standard, which importers have; the first declares all functions
 HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
 }
-DEFLATE_VERSION = 20  # of the ZIP format, the latest that the standard lets an FMU need
-DESCRIPTOR = 1 << 3  # general purpose bit: sizes stand behind the data
+DEFLATE_VERSION = 20  # the latest version of the ZIP format that the standard allows
+DESCRIPTOR = 1 << 3  # general purpose bit: sizes are stored after the data
 PNG = b"\x89PNG\r\n\x1a\n"
-# suffix, magic number, and bytes of it that tell the machine, of what each platform's folder holds
+# of each platform's binaries: suffix, magic number, offset and bytes of the machine type
 ELF, PE, MACH = b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe"
 PLATFORMS = {
     "linux64": (".so", ELF, 18, b"\x3e\x00"),
@@ -50,20 +47,20 @@ PLATFORMS = {
     "x86_64-darwin": (".dylib", MACH, 4, b"\x07\x00\x00\x01"),
     "aarch64-darwin": (".dylib", MACH, 4, b"\x0c\x00\x00\x01"),
 }
-FAT, FAT_ENTRIES = (
-    b"\xca\xfe\xba\xbe",
-    8,
-)  # libraries of several machines in one Mach-O file; where the list of them begins, big-endian
-PE_HEADER = 0x3C  # where a PE file says where its header is
-# paths that only the machine where it was made has
+# universal Mach-O: magic; offset and size of the entries, which are big-endian
+FAT, FAT_ENTRIES, FAT_ENTRY_SIZE = b"\xca\xfe\xba\xbe", 8, 20
+PE_HEADER = 0x3C  # offset of the address of a PE file's header
+# absolute paths of the machine where a file was made
 ABSOLUTE = re.compile(
-    rb"(?:/home/|/root/|/Users/|/tmp/|/work/|[A-Z]:[\\/](?:Users|Windows|Program Files|build|work|src)[\\/])[\w.+-]+"
+    rb"(?:/home/|/root/|/Users/|/tmp/|/work/"
+    rb"|[A-Z]:[\\/](?:Users|Windows|Program Files|build|work|src)[\\/])[\w.+-]+"
 )
 
 
 def archive_problems(path: Path) -> list[str]:
-    """What is wrong with the archive and its documents, one sentence each. Raises KeyError
-    without a modelDescription.xml.
+    """Returns the problems of an FMI 2.0 archive and its documents, one sentence each.
+
+    Raises KeyError without a modelDescription.xml.
     """
     found, problems = read_members(path)
     if found is None:
@@ -79,7 +76,7 @@ def archive_problems(path: Path) -> list[str]:
 
 
 def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
-    """The archive's files by path, None if one is damaged; and what is wrong with it as a ZIP."""
+    """Returns the archive's files by path (None if one is damaged) and its problems as a ZIP."""
     with zipfile.ZipFile(path) as archive:
         damaged = archive.testzip()
         if damaged:
@@ -91,12 +88,12 @@ def read_members(path: Path) -> tuple[dict[str, bytes] | None, list[str]]:
 def member_problems(
     root: Element, found: dict[str, bytes], names: Iterable[str], *, fmi: int
 ) -> list[str]:
-    """What is wrong with an archive's members, for either version of the standard.
+    """Returns the problems of an archive's files, for either version of the standard.
 
     Args:
         root: of modelDescription.xml.
-        found: the members by path.
-        names: the variables'.
+        found: the files by path.
+        names: of the variables.
         fmi: version of the standard.
     """
     checks = (
@@ -109,7 +106,7 @@ def member_problems(
 
 
 def zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
-    """Section 2.3: what any unpacker can be expected to handle."""
+    """Yields violations of section 2.3: what every ZIP reader can be expected to handle."""
     names = archive.namelist()
     for name in sorted({name for name in names if names.count(name) > 1}):
         yield f"{name} is there more than once"
@@ -128,7 +125,10 @@ def zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
             info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
             or info.extract_version > DEFLATE_VERSION
         ):
-            yield f"{name} is packed by method {info.compress_type}, version {info.extract_version}; expected store or deflate, 2.0"
+            yield (
+                f"{name} is packed by method {info.compress_type}, version "
+                f"{info.extract_version}; expected store or deflate, 2.0"
+            )
         if info.flag_bits & DESCRIPTOR and info.compress_type == zipfile.ZIP_STORED:
             yield f"{name} is stored with its size behind it"
         if stat.S_ISLNK(info.external_attr >> 16):
@@ -136,7 +136,7 @@ def zip_problems(archive: zipfile.ZipFile) -> Iterator[str]:
 
 
 def _source_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
-    """Sources listed and present, both ways, for each interface."""
+    """Yields sources that are listed but missing, or present but not listed."""
     present = {name.removeprefix("sources/") for name in found if name.startswith("sources/")}
     for interface in root.iterfind("*"):
         if interface.tag not in INTERFACES:
@@ -151,7 +151,7 @@ def _source_problems(root: Element, found: dict[str, bytes]) -> Iterator[str]:
 
 
 def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
-    """Headers that sources include, there but for the standard's."""
+    """Yields included headers that are missing, and headers of the standard, which must be."""
     present = {name.removeprefix("sources/") for name in found if name.startswith("sources/")}
     for name in sorted(present):
         if PurePosixPath(name).name in HEADERS[fmi]:
@@ -167,6 +167,7 @@ def include_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
 
 
 def _includes(text: bytes) -> list[str]:
+    """Returns the names in quotes that a source includes."""
     return [
         include.decode()
         for include in re.findall(rb'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE)
@@ -174,17 +175,18 @@ def _includes(text: bytes) -> list[str]:
 
 
 def _is_there(include: str, name: str, present: Iterable[str]) -> bool:
+    """Returns whether an included file is among the sources."""
     return include in present or posixpath.normpath(PurePosixPath(name).parent / include) in present
 
 
 def standard_functions(fmi: int = 2) -> list[str]:
-    """Every function that the standard asks of a binary."""
+    """Returns the functions of the standard that a binary must export."""
     text = (Path(fmpy.__file__).parent / "c-code" / HEADERS[fmi][0]).read_text(encoding="utf-8")
     return re.findall(r"FMI[23]_Export fmi[23]\w+TYPE\s+(fmi[23]\w+);", text)
 
 
 def binary_problems(root: Element, found: dict[str, bytes], fmi: int) -> Iterator[str]:
-    """A library for every interface in each platform's folder."""
+    """Yields folders of unknown platforms and missing or invalid libraries."""
     elements = [root.find(name) for name in INTERFACES]
     identifiers = {
         str(element.get("modelIdentifier")) for element in elements if element is not None
@@ -207,24 +209,14 @@ def binary_problems(root: Element, found: dict[str, bytes], fmi: int) -> Iterato
 
 
 def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> Iterator[str]:
-    """By its bytes alone, so that it works for machines that are not this one."""
+    """Yields the problems of a library; reads its bytes, since its platform may be another."""
     _, magic, place, machine = PLATFORMS[platform]
-    if magic == MACH and data.startswith(FAT):
-        magic, entries = FAT, int.from_bytes(data[4:8], "big")
-        machines = [
-            data[at : at + 4][::-1] for at in range(FAT_ENTRIES, FAT_ENTRIES + 20 * entries, 20)
-        ]
-    else:
-        at = (
-            int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4
-            if place is None
-            else place
-        )
-        machines = [data[at : at + len(machine)]]
-    if not data.startswith(magic) or machine not in machines:
+    machines = _machine_types(data, magic, place, len(machine))
+    known_magic = (MACH, FAT) if magic == MACH else (magic,)
+    if not data.startswith(known_magic) or machine not in machines:
         yield f"{name} is no library of {platform}"
         return
-    start = b"\0_" if magic in (MACH, FAT) else b"\0"
+    start = b"\0_" if magic == MACH else b"\0"
     missing = [
         function
         for function in standard_functions(fmi)
@@ -234,8 +226,22 @@ def library_problems(name: str, data: bytes, platform: str, *, fmi: int = 2) -> 
         yield f"{name} lacks {len(missing)} functions of the standard: {', '.join(missing)}"
 
 
+def _machine_types(data: bytes, magic: bytes, place: int | None, size: int) -> list[bytes]:
+    """Returns the machine types of a library, `size` bytes each; several of a universal one.
+
+    place: their offset; None: behind the PE header.
+    """
+    if magic == MACH and data.startswith(FAT):
+        count = int.from_bytes(data[4:8], "big")
+        offsets = range(FAT_ENTRIES, FAT_ENTRIES + FAT_ENTRY_SIZE * count, FAT_ENTRY_SIZE)
+        return [data[at : at + 4][::-1] for at in offsets]
+    if place is None:
+        place = int.from_bytes(data[PE_HEADER : PE_HEADER + 4], "little") + 4
+    return [data[place : place + size]]
+
+
 def terminal_problems(known: set[str], found: dict[str, bytes]) -> Iterator[str]:
-    """Terminals of known variables, and the icon that they place."""
+    """Yields problems of terminalsAndIcons.xml: unknown variables, duplicate names, no icon."""
     if TERMINALS not in found:
         return
     broken = schema_problems(TERMINALS, found[TERMINALS], "fmi3/fmi3TerminalsAndIcons.xsd")
@@ -251,7 +257,7 @@ def terminal_problems(known: set[str], found: dict[str, bytes]) -> Iterator[str]
 
 
 def _group_problems(parent: Element, path: str, known: set[str]) -> Iterator[str]:
-    """Terminals below one, their names and members."""
+    """Yields duplicate names and unknown members of the terminals in an element."""
     names = [terminal.get("name") for terminal in parent.iterfind("Terminal")]
     if len(names) != len(set(names)):
         yield f"{TERMINALS}: terminals of {path or 'the FMU'} share a name"
@@ -260,14 +266,17 @@ def _group_problems(parent: Element, path: str, known: set[str]) -> Iterator[str
         members = list(terminal.iterfind("TerminalMemberVariable"))
         for member in members:
             if member.get("variableName") not in known:
-                yield f"{TERMINALS}: terminal {where} has {member.get('variableName')!r}, which is no variable"
+                yield (
+                    f"{TERMINALS}: terminal {where} has {member.get('variableName')!r}, which is "
+                    "no variable"
+                )
         if len({member.get("memberName") for member in members}) != len(members):
             yield f"{TERMINALS}: members of terminal {where} share a name or have none"
         yield from _group_problems(terminal, f"{where}.", known)
 
 
 def document_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
-    """Licence, page and pictures there; nothing that tells of the machine where they were made."""
+    """Yields missing documents and pictures, and files that contain absolute paths."""
     for name, use in (
         (LICENCE, "the licence"),
         (PAGE, "the documentation"),
@@ -281,4 +290,7 @@ def document_problems(found: dict[str, bytes], fmi: int) -> Iterator[str]:
     for name, data in found.items():
         match = None if name.endswith(".png") else ABSOLUTE.search(data)
         if match:
-            yield f"{name} holds a path of the machine it was made on: {match[0].decode(errors='replace')}"
+            yield (
+                f"{name} holds a path of the machine it was made on: "
+                f"{match[0].decode(errors='replace')}"
+            )

@@ -1,6 +1,4 @@
-"""Is a modelDescription.xml of FMI 2.0 what the standard means? What its schema and fmpy's
-validation do not see.
-"""
+"""Checks modelDescription.xml of FMI 2.0 for errors that its schema and fmpy do not find."""
 
 from __future__ import annotations
 
@@ -18,9 +16,7 @@ KINDS = {"Real", "Integer", "Boolean", "String", "Enumeration"}
 
 
 def schema_problems(member: str, data: bytes, schema: str) -> list[str]:
-    """Where a document breaks one of the standard's schemas, such as
-    fmi3/fmi3TerminalsAndIcons.xsd.
-    """
+    """Returns a document's violations of a schema such as fmi3/fmi3TerminalsAndIcons.xsd."""
     try:
         document = etree.fromstring(data)
     except etree.XMLSyntaxError as error:
@@ -31,7 +27,7 @@ def schema_problems(member: str, data: bytes, schema: str) -> list[str]:
 
 
 def description_problems(root: Element) -> list[str]:
-    """Everything below, of a document that its schema accepts."""
+    """Returns the problems of a document that its schema accepts, one sentence each."""
     types = [
         Entry(
             entry.get("name", ""),
@@ -47,7 +43,7 @@ def description_problems(root: Element) -> list[str]:
 
 
 def variables(root: Element) -> list[Entry]:
-    """Each ScalarVariable with what the element of its type says."""
+    """Returns each ScalarVariable with the attributes of its type's element."""
     return [
         Entry(variable.get("name", ""), kind.tag, kind.attrib, variable.get("description", ""))
         for variable in root.iterfind("ModelVariables/ScalarVariable")
@@ -57,7 +53,7 @@ def variables(root: Element) -> list[Entry]:
 
 
 def _structure_problems(root: Element) -> Iterator[str]:
-    """Indices of ModelStructure, from 1, and what they may refer to."""
+    """Yields invalid indices in ModelStructure, which count from 1."""
     ordered = list(root.iterfind("ModelVariables/ScalarVariable"))
     for section in root.iterfind("ModelStructure/*"):
         indices = [int(unknown.get("index", "0")) for unknown in section]
@@ -68,10 +64,14 @@ def _structure_problems(root: Element) -> Iterator[str]:
     count = len(root.findall("ModelStructure/Derivatives/Unknown"))
     states = len([entry for entry in variables(root) if "derivative" in entry.attributes])
     if count != states:
-        yield f"ModelStructure/Derivatives has {count} entries, but {states} variables are derivatives"
+        yield (
+            f"ModelStructure/Derivatives has {count} entries, but {states} variables are "
+            "derivatives"
+        )
 
 
 def _unknown_problems(section: str, unknown: Element, ordered: list[Element]) -> Iterator[str]:
+    """Yields the problems of one entry of ModelStructure."""
     where = f"ModelStructure/{section} index {unknown.get('index')}"
     if not 1 <= int(unknown.get("index", "0")) <= len(ordered):
         yield f"{where}: no such variable, there are {len(ordered)}"

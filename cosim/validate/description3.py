@@ -1,6 +1,4 @@
-"""Is a modelDescription.xml of FMI 3.0 what the standard means? What its schema and fmpy's
-validation do not see.
-"""
+"""Checks modelDescription.xml of FMI 3.0 for errors that its schema and fmpy do not find."""
 
 from __future__ import annotations
 
@@ -17,11 +15,11 @@ SECTIONS = (
     "InitialUnknown",
     "EventIndicator",
 )
-DERIVATIVES = "ContinuousStateDerivative"  # in the states' order; all others ascending
+DERIVATIVES = "ContinuousStateDerivative"  # in the order of the states; others are ascending
 
 
 def description_problems3(root: Element) -> list[str]:
-    """Everything below, of a document that its schema accepts."""
+    """Returns the problems of a document that its schema accepts, one sentence each."""
     types = [
         Entry(
             entry.get("name", ""), entry.tag.removesuffix("Type"), entry.attrib, items=_items(entry)
@@ -36,7 +34,7 @@ def description_problems3(root: Element) -> list[str]:
 
 
 def variables3(root: Element) -> list[Entry]:
-    """Each variable; arrays are one."""
+    """Returns each variable; an array is one variable."""
     found = root.iterfind("ModelVariables/*")
     return [
         Entry(entry.get("name", ""), entry.tag, entry.attrib, entry.get("description", ""))
@@ -45,11 +43,12 @@ def variables3(root: Element) -> list[Entry]:
 
 
 def _items(entry: Element) -> tuple[str, ...]:
+    """Returns the values of an enumeration type."""
     return tuple(item.get("value", "") for item in entry.iterfind("Item"))
 
 
 def _size_problems(root: Element) -> Iterator[str]:
-    """As many start values as elements; one stands for all."""
+    """Yields variables whose number of start values is neither 1 nor that of the elements."""
     for variable in root.iterfind("ModelVariables/*"):
         size = math.prod(
             int(dimension.get("start", "1")) for dimension in variable.iterfind("Dimension")
@@ -60,7 +59,7 @@ def _size_problems(root: Element) -> Iterator[str]:
 
 
 def _structure_problems(root: Element) -> Iterator[str]:
-    """Value references of ModelStructure and what they may refer to."""
+    """Yields invalid value references in ModelStructure."""
     known = {
         int(variable.get("valueReference", "-1")): variable
         for variable in root.iterfind("ModelVariables/*")
@@ -89,6 +88,7 @@ def _structure_problems(root: Element) -> Iterator[str]:
 def _unknown_problems(
     section: str, unknown: Element, known: Mapping[int, Element]
 ) -> Iterator[str]:
+    """Yields the problems of one entry of ModelStructure."""
     where = f"ModelStructure/{section} {unknown.get('valueReference')}"
     variable = known.get(int(unknown.get("valueReference", "-1")))
     if variable is None:

@@ -1,5 +1,5 @@
-"""The binary takes its robot from start_values.txt, importers see modelDescription.xml: do both
-say the same?
+"""Checks that start_values.txt, which the binary reads, and modelDescription.xml, which importers
+read, state the same values.
 """
 
 from __future__ import annotations
@@ -9,17 +9,16 @@ from collections.abc import Iterator
 from typing import Any
 
 START_VALUES, CHECKSUM = "resources/start_values.txt", "checksum "
-SHOWN = 5  # missing values that are named one by one
+SHOWN = 5  # the number of missing values that are listed
 
 
 def start_value_problems(data: bytes | None, token: str, description: Any) -> Iterator[str]:
-    """What is wrong with start_values.txt, one sentence each.
+    """Yields the problems of start_values.txt, one sentence each.
 
     Args:
-        data: its bytes; None without one.
+        data: the content of start_values.txt; None if it is missing.
         token: the GUID or instantiation token of modelDescription.xml.
-        description: the rest of modelDescription.xml, as fmpy reads it; arrays stand for
-            consecutive value references.
+        description: fmpy's model description; arrays have consecutive value references.
     """
     if data is None:
         yield f"{START_VALUES} is missing: the binary takes the robot from it"
@@ -30,7 +29,7 @@ def start_value_problems(data: bytes | None, token: str, description: Any) -> It
     stated, seen = _stated(description), set()
     for number, line in enumerate(lines, start=2):
         words = line.split()
-        if not words or line.startswith(CHECKSUM):  # which the binary checks as it loads
+        if not words or line.startswith(CHECKSUM):  # the binary checks it
             continue
         seen.add(words[0])
         yield from _line_problems(f"{START_VALUES} line {number}", words, stated)
@@ -46,6 +45,7 @@ def start_value_problems(data: bytes | None, token: str, description: Any) -> It
 def _line_problems(
     where: str, words: list[str], stated: dict[int, tuple[str, float]]
 ) -> Iterator[str]:
+    """Yields the problems of one line; stated: name and value by reference."""
     if len(words) < 2 or not words[0].isdecimal() or math.isnan(_number(words[1])):
         yield f"{where}: got {' '.join(words)!r}, expected a value reference and a value"
         return
@@ -59,6 +59,7 @@ def _line_problems(
 
 
 def _missing_problems(missing: list[str]) -> Iterator[str]:
+    """Yields the missing values, SHOWN of them by name."""
     for name in missing[:SHOWN]:
         yield f"{START_VALUES} lacks the value reference {name}"
     if len(missing) > SHOWN:
@@ -66,8 +67,9 @@ def _missing_problems(missing: list[str]) -> Iterator[str]:
 
 
 def _stated(description: Any) -> dict[int, tuple[str, float]]:
-    """Names and start values by the references of elements: an array's own, and those that
-    follow.
+    """Returns names and start values by value references of elements.
+
+    The elements of an array have its reference and those that follow.
     """
     return {
         int(variable.valueReference) + place: (str(variable.name), _number(word))
@@ -78,7 +80,7 @@ def _stated(description: Any) -> dict[int, tuple[str, float]]:
 
 
 def _number(word: str) -> float:
-    """NaN, which equals nothing, for what is no number."""
+    """Parses a number or Boolean; NaN for other text."""
     if word in ("true", "false"):
         return float(word == "true")
     try:

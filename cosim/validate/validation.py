@@ -1,4 +1,4 @@
-"""Is this FMU one of ours, and sound? fmpy's checks, then what no general checker sees."""
+"""Validates FMUs that this package wrote: with fmpy's checks and with checks of its own."""
 
 from __future__ import annotations
 
@@ -30,8 +30,9 @@ FOREIGN_GUID = "{00000000-0000-0000-0000-000000000000}"
 
 
 def find_problems(path: Path) -> list[str]:
-    """What is wrong with an FMU, one sentence each; empty when it is sound. Raises FmuError when
-    it is no FMU at all.
+    """Returns the problems of an FMU, one sentence each; empty for a valid FMU.
+
+    Raises FmuError for a file that is no FMU.
     """
     try:
         description = open_description(path)
@@ -47,8 +48,9 @@ def find_problems(path: Path) -> list[str]:
 
 
 def _unread_problems(path: Path) -> list[str]:
-    """Of a modelDescription.xml that fmpy makes no sense of: it refers to what is not there,
-    say. Empty if it cannot be parsed at all.
+    """Returns the problems of a modelDescription.xml that fmpy cannot read.
+
+    Empty if it is no XML.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -66,8 +68,9 @@ def _unread_problems(path: Path) -> list[str]:
 
 
 def find_own_problems(path: Path) -> list[str]:
-    """The same without fmpy's checks; what was packed for other machines alone is not run.
-    Raises FmuError when it is no FMU at all.
+    """Returns the problems that this package's own checks find in an FMI 2.0 FMU.
+
+    An FMU without a binary for this machine is not run. Raises FmuError for a file that is no FMU.
     """
     description, problems = read_description(path), archive_problems(path)
     with zipfile.ZipFile(path) as archive:
@@ -79,7 +82,7 @@ def find_own_problems(path: Path) -> list[str]:
 
 
 def _run_problems(path: Path) -> list[str]:
-    """Loads the binary, starts it, takes a step."""
+    """Loads, initializes and steps the FMU; returns the error, if any."""
     try:
         with Fmu(path, name="validate") as plant:
             plant.initialise(0.0, 1.0)
@@ -94,31 +97,30 @@ def _run_problems(path: Path) -> list[str]:
 
 
 def _guid_problems(path: Path, description: Any) -> list[str]:
-    """A binary that takes any GUID would run with another model's description."""
+    """Checks that the binary refuses another model description's GUID."""
     callbacks = fmi2CallbackFunctions()
     with TemporaryDirectory(prefix="hexapod-validate-") as folder:
         extract(path, folder)
         identifier = description.coSimulation.modelIdentifier
         try:
-            with chdir(
-                Path.cwd()
-            ):  # fmpy leaves the working folder changed when the library does not load
+            with chdir(Path.cwd()):  # fmpy does not restore the working folder when loading fails
                 facts = {
                     "guid": FOREIGN_GUID,
                     "modelIdentifier": identifier,
                     "libraryPath": packed_binary(folder, identifier),
                 }
                 slave = FMU2Slave(unzipDirectory=folder, instanceName="validate", **facts)
-        except (
-            Exception
-        ):  # fmpy's errors have no common type; that it does not load is told elsewhere
+        except Exception:  # fmpy's errors have no common type; _run_problems reports this one
             return []
         try:
             slave.instantiate(callbacks=callbacks)
-        except Exception:  # as it should
+        except Exception:  # the binary refuses the GUID
             slave.freeLibrary()
             return []
         slave.freeInstance()
     return [
-        f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of modelDescription.xml alone"
+        (
+            f"binaries: {identifier} takes the GUID {FOREIGN_GUID}, expected that of "
+            "modelDescription.xml alone"
+        )
     ]

@@ -1,6 +1,4 @@
-"""Is this FMI 3.0 FMU one of ours, and sound? What `cosim/validate/validation.py` asks of FMI
-2.0, where the standards differ.
-"""
+"""Validates FMI 3.0 FMUs: the checks of validation.py that differ between the standards."""
 
 from __future__ import annotations
 
@@ -35,7 +33,7 @@ TRIAL_STEP = 0.001  # s
 
 
 def find_own_problems3(path: Path, description: Any) -> list[str]:
-    """What is wrong, one sentence each, of an FMU whose model description fmpy has read."""
+    """Returns the problems of an FMU whose model description fmpy has read, one sentence each."""
     found, problems = read_members(path)
     if found is None:
         return problems
@@ -59,7 +57,7 @@ def find_own_problems3(path: Path, description: Any) -> list[str]:
 
 
 def _source_problems(found: dict[str, bytes]) -> Iterator[str]:
-    """Sources listed and present, both ways."""
+    """Yields sources that are listed but missing, or present but not listed."""
     root = ElementTree.fromstring(found[BUILD_DESCRIPTION])
     listed = {f"sources/{file.get('name')}" for file in root.iter("SourceFile")}
     for name in sorted(listed - set(found)):
@@ -73,34 +71,38 @@ def _source_problems(found: dict[str, bytes]) -> Iterator[str]:
 
 
 def _run_problems(path: Path, description: Any) -> list[str]:
-    """Loads this machine's binary, if there is one, starts it and takes a step; and it must
-    refuse a foreign token.
+    """Loads, initializes and steps the FMU, and checks that it refuses another token.
+
+    Returns no problems for an FMU without a binary for this machine.
     """
     with TemporaryDirectory(prefix="hexapod-validate-") as folder:
         extract(path, folder)
         if not (Path(folder) / "binaries" / platform_tuple).is_dir():
             return []
         try:
-            _try(folder, description, description.instantiationToken)
+            _run_step(folder, description, description.instantiationToken)
         except Exception as error:  # fmpy's errors have no common type
             return [f"binaries: {error}"]
-        with suppress(Exception):  # as it should
-            _try(folder, description, FOREIGN_TOKEN)
+        with suppress(Exception):  # the binary refuses the token
+            _run_step(folder, description, FOREIGN_TOKEN)
             return [
-                f"binaries: it takes the token {FOREIGN_TOKEN}, expected that of modelDescription.xml alone"
+                (
+                    f"binaries: it takes the token {FOREIGN_TOKEN}, expected that of "
+                    "modelDescription.xml alone"
+                )
             ]
     return []
 
 
-def _try(folder: str, description: Any, token: str) -> None:
-    """Raises what fmpy raises when a call comes back with an error."""
+def _run_step(folder: str, description: Any, token: str) -> None:
+    """Runs the FMU for one step. Raises fmpy's exceptions when a call fails."""
     identifier = description.coSimulation.modelIdentifier
-    with chdir(Path.cwd()):  # fmpy leaves the working folder changed when the library does not load
+    with chdir(Path.cwd()):  # fmpy does not restore the working folder when loading fails
         fmu = FMU3Slave(
             guid=token, modelIdentifier=identifier, unzipDirectory=folder, instanceName="validate"
         )
     try:
-        fmu.instantiate(logMessage=_say_nothing)
+        fmu.instantiate(logMessage=_ignore_message)
     except Exception:
         fmu.freeLibrary()
         raise
@@ -113,5 +115,5 @@ def _try(folder: str, description: Any, token: str) -> None:
         fmu.freeInstance()
 
 
-def _say_nothing(*_: object) -> None:
-    """A logger."""
+def _ignore_message(*_: object) -> None:
+    """A logger that ignores messages."""

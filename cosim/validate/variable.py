@@ -1,6 +1,4 @@
-"""Are a model description's variables what the standard means? What FMI 2.0 and 3.0 ask alike,
-however they write it down.
-"""
+"""Checks the variables of a model description: the rules that FMI 2.0 and 3.0 share."""
 
 from __future__ import annotations
 
@@ -11,7 +9,7 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 INTERFACES = ("ModelExchange", "CoSimulation")
-NUMBERS = ("Real", "Int", "UInt", "Float")  # how the kinds begin that have min, max and nominal
+NUMBERS = ("Real", "Int", "UInt", "Float")  # beginnings of the types that have min, max, nominal
 DEPENDENCY_KINDS = {"dependent", "constant", "fixed", "tunable", "discrete"}
 
 
@@ -27,14 +25,17 @@ class Entry:
 
     @property
     def starts(self) -> list[str]:
-        """Start values of all elements."""
+        """The start values of all elements."""
         return self.attributes.get("start", "").split()
 
 
 def declaration_problems(
     root: Element, variables: Sequence[Entry], types: Sequence[Entry]
 ) -> Iterator[str]:
-    """Everything below, of a model description that its schema accepts."""
+    """Yields the problems of variables, types, units and default experiment.
+
+    The model description must be one that its schema accepts.
+    """
     by_name = {entry.name: entry for entry in types}
     yield from _identity_problems(root, variables)
     yield from _unit_problems(root, [*variables, *types], by_name)
@@ -44,6 +45,7 @@ def declaration_problems(
 
 
 def _identity_problems(root: Element, variables: Sequence[Entry]) -> Iterator[str]:
+    """Yields invalid identifiers and duplicate names."""
     found = [root.find(name) for name in INTERFACES]
     identifiers = {element.get("modelIdentifier", "") for element in found if element is not None}
     for name in identifiers:
@@ -60,7 +62,7 @@ def _identity_problems(root: Element, variables: Sequence[Entry]) -> Iterator[st
 def _unit_problems(
     root: Element, users: Sequence[Entry], types: Mapping[str, Entry]
 ) -> Iterator[str]:
-    """Units defined and used, display units and types known."""
+    """Yields units, display units and types that are unknown or unused."""
     displays = {
         unit.get("name"): {entry.get("name") for entry in unit.iterfind("DisplayUnit")}
         for unit in root.iterfind(".//Unit")
@@ -77,12 +79,16 @@ def _unit_problems(
 
 
 def _type_problems(user: Entry, types: Mapping[str, Entry]) -> Iterator[str]:
+    """Yields problems of a variable's declared type."""
     declared = user.attributes.get("declaredType")
     if declared is None:
         return
     base = types.get(declared)
     if base is None or base.kind != user.kind:
-        yield f"{user.name}: declared type {declared!r} is {'not defined' if base is None else f'no {user.kind}'}"
+        yield (
+            f"{user.name}: declared type {declared!r} is "
+            f"{'not defined' if base is None else f'no {user.kind}'}"
+        )
         return
     unit, expected = user.attributes.get("unit"), base.attributes.get("unit")
     if unit is not None and unit != expected:
@@ -90,6 +96,7 @@ def _type_problems(user: Entry, types: Mapping[str, Entry]) -> Iterator[str]:
 
 
 def _variable_problems(variable: Entry, types: Mapping[str, Entry]) -> Iterator[str]:
+    """Yields the problems of one variable."""
     base = types.get(variable.attributes.get("declaredType", ""))
     if not variable.description:
         yield f"{variable.name} has no description"
@@ -103,7 +110,7 @@ def _variable_problems(variable: Entry, types: Mapping[str, Entry]) -> Iterator[
 
 
 def _number_problems(variable: Entry, inherited: Mapping[str, str]) -> Iterator[str]:
-    """Attributes of the variable itself stand before its type's."""
+    """Yields invalid numbers. Attributes of the variable precede those of its type."""
     words = {**inherited, **variable.attributes}
     given = {key: float(words[key]) for key in ("min", "max", "nominal") if key in words}
     starts = [float(word) for word in words.get("start", "").split()]
@@ -121,8 +128,9 @@ def _number_problems(variable: Entry, inherited: Mapping[str, str]) -> Iterator[
 
 
 def dependency_problems(where: str, unknown: Element, known: Collection[int]) -> Iterator[str]:
-    """Of an entry of ModelStructure, whose dependencies are to be among known indices or value
-    references.
+    """Yields invalid dependencies of an entry of ModelStructure.
+
+    Dependencies must be among the known indices or value references.
     """
     dependencies = [int(word) for word in unknown.get("dependencies", "").split()]
     if any(dependency not in known for dependency in dependencies):
@@ -133,10 +141,14 @@ def dependency_problems(where: str, unknown: Element, known: Collection[int]) ->
     if kinds is not None and (
         len(kinds.split()) != len(dependencies) or not set(kinds.split()) <= DEPENDENCY_KINDS
     ):
-        yield f"{where}: dependenciesKind does not tell one kind for each of {len(dependencies)} dependencies"
+        yield (
+            f"{where}: dependenciesKind does not tell one kind for each of {len(dependencies)} "
+            "dependencies"
+        )
 
 
 def _experiment_problems(root: Element) -> Iterator[str]:
+    """Yields an invalid default experiment."""
     experiment = root.find("DefaultExperiment")
     if experiment is None:
         return

@@ -1,8 +1,9 @@
+/* master.c - the co-simulation loop of a plant FMU and a controller FMU. */
 #include "hexapod/master.h"
 
 #include <string.h>
 
-/* notes a refusal; returns whether there was none */
+/* stores a failed call and its status; returns 1 if the call succeeded */
 static int accept(hxMaster *master, hxMasterCall call, fmi2Status status) {
   if (status <= fmi2Warning) return 1;
   master->call = (int)call;
@@ -34,7 +35,7 @@ static int get_flags(hxMaster *master, const hxMasterFmu *fmu, const hxMasterBlo
 /* ----------------------------------------------------------------------------------------------
  * sensors */
 
-/* of one foot: what is shown instead of its delayed reading, or that */
+/* writes the reading of one foot: delayed, zero (dead sensor) or the last one (stuck sensor) */
 static void show_foot(const hxMasterSensor *sensor, int fault, size_t moment, const double *delayed,
                       double *reading) {
   const size_t size = sensor->forces / sensor->feet * sizeof *reading;
@@ -44,7 +45,7 @@ static void show_foot(const hxMasterSensor *sensor, int fault, size_t moment, co
     memcpy(reading, delayed, size);
 }
 
-/* the readings of a moment, from what is true now */
+/* calculates the readings after `moment` macro-steps from the true forces */
 static void read_sensor(const hxMasterSensor *sensor, size_t moment, double *value) {
   const size_t n = sensor->forces, each = n / sensor->feet, slots = sensor->delay + 1;
   double *newest = sensor->memory + moment % slots * n;
@@ -52,7 +53,7 @@ static void read_sensor(const hxMasterSensor *sensor, size_t moment, double *val
   for (size_t i = 0; i < n; ++i) newest[i] = value[sensor->place + i];
   if (sensor->factor)
     for (size_t i = 0; i < n; ++i) newest[i] *= sensor->factor[moment * n + i];
-  /* before there is a reading so old, the first one holds */
+  /* until there are readings as old as the delay, the first one is used */
   for (size_t slot = 1; slot < slots && moment == 0; ++slot)
     memcpy(sensor->memory + slot * n, newest, n * sizeof *newest);
   for (size_t foot = 0; foot < sensor->feet; ++foot) {
@@ -61,7 +62,7 @@ static void read_sensor(const hxMasterSensor *sensor, size_t moment, double *val
   }
 }
 
-/* ---------------------------------------------------------------------------------------------- a
+/* ----------------------------------------------------------------------------------------------
  * macro-step */
 
 static int read_plant(hxMaster *master, size_t moment) {
@@ -72,7 +73,7 @@ static int read_plant(hxMaster *master, size_t moment) {
   return 1;
 }
 
-/* the controller's inputs: the command in force and what the robot senses */
+/* collects the controller's inputs: the command and the measurements */
 static void sense(const hxMaster *master, double *input) {
   memcpy(input, master->command + master->step * master->command_count,
          master->command_count * sizeof *input);
@@ -80,7 +81,7 @@ static void sense(const hxMaster *master, double *input) {
   for (size_t i = 0; i < master->sensed_count; ++i) input[i] = master->value[master->sensed[i]];
 }
 
-/* joint commands for the macro-step, and the controller over it */
+/* reads the joint commands for the macro-step and steps the controller */
 static int control(hxMaster *master) {
   const hxMasterFmu *controller = &master->controller;
   const size_t inputs = master->command_count + master->sensed_count;
@@ -116,7 +117,7 @@ static void write_row(hxMasterTable *table, const double *value) {
   ++table->rows;
 }
 
-/* the largest of each peak since the last row */
+/* updates the largest value of each peak since the last recorded row */
 static void fold_peaks(hxMasterPeaks *peaks, const double *value) {
   const size_t first = peaks->places - peaks->counts;
   for (size_t i = 0; i < peaks->places; ++i) {
@@ -132,14 +133,14 @@ static void fold_peaks(hxMasterPeaks *peaks, const double *value) {
   }
 }
 
-/* puts the largest into the row of values, and begins anew */
+/* writes the largest values to the row of values and resets them */
 static void show_peaks(hxMasterPeaks *peaks, double *value) {
   for (size_t i = 0; i < peaks->places; ++i) value[peaks->place[i]] = peaks->largest[i];
   memset(peaks->largest, 0, peaks->places * sizeof *peaks->largest);
   memcpy(peaks->kept, peaks->seen, peaks->counts * sizeof *peaks->kept);
 }
 
-/* the present moment, kept when it is `due` */
+/* records the present values in `judged`, and in `kept` when a row is due */
 static void record(hxMaster *master, int due) {
   write_row(&master->judged, master->value);
   if (master->every > 1) fold_peaks(&master->peaks, master->value);

@@ -29,7 +29,7 @@ def make(parts: Parts | None = None, **changes: float) -> Hold:
 def sight(**changes: Any) -> Sight:
     """At rest, as planned."""
     still = Sight(HOME, LEVEL, HOME, LEVEL, LOADS, np.zeros(2), 0.0, 0j, 0.0)
-    values = {
+    values: dict[str, Any] = {
         name: np.array(value) if isinstance(value, list | tuple) else value
         for name, value in changes.items()
     }

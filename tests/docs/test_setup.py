@@ -1,4 +1,4 @@
-"""The set-up says what is missing before it does anything."""
+"""The set-up reports missing programs before it makes anything."""
 
 from __future__ import annotations
 
@@ -12,31 +12,53 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def test_a_missing_compiler_is_said_in_a_line_before_anything_is_made(tmp_path: Path) -> None:
+def make_setup(tmp_path: Path, *programs: str, **stubs: str) -> subprocess.CompletedProcess[str]:
+    """Runs `make setup` where PATH holds these programs and stubs (shell scripts) only."""
     tools = tmp_path / "bin"
     tools.mkdir()
-    for name in ("make", "sh", "python3", "find", "touch", "mkdir"):
+    for name in ("make", "sh", "find", "touch", "mkdir", *programs):
         program = shutil.which(name)
         assert program is not None
         (tools / name).symlink_to(program)
-    venv = tmp_path / "venv"
-    done = subprocess.run(
-        ["make", "setup", f"VENV={venv}"],
+    for name, script in stubs.items():
+        (tools / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tools / name).chmod(0o755)
+    return subprocess.run(
+        ["make", "setup", f"VENV={tmp_path / 'venv'}"],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
         env={"PATH": str(tools)},
     )
+
+
+def test_a_missing_compiler_is_reported_in_a_line_before_anything_is_made(tmp_path: Path) -> None:
+    done = make_setup(tmp_path, "python3")
     assert done.returncode != 0
     assert "no C compiler: looked for cc, gcc and clang, found none; install one" in done.stderr
     assert "Traceback" not in done.stderr + done.stdout
-    assert not venv.exists()
+    assert not (tmp_path / "venv").exists()
 
 
-# the hooks of the build backend, in a process of their own, on a stand-in for scikit-build-core
-# that says what was asked of it
-ASK = "import build_backend; print(build_backend.{hook}); import os; print('CC', os.environ.get('CC'))"
+def test_a_python_without_venv_is_reported_in_a_line_before_anything_is_made(
+    tmp_path: Path,
+) -> None:
+    python = 'if [ "$1" = --version ]; then echo Python 3.11.2; else exit 1; fi'
+    done = make_setup(tmp_path, cc="exit 0", python3=python)
+    assert done.returncode != 0
+    assert "got Python 3.11.2, expected Python 3.11 or later with its venv module" in done.stderr
+    assert "apt-get install python3 python3-venv" in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    assert not (tmp_path / "venv").exists()
+
+
+# the hooks of the build backend, in a separate process, with a stand-in for scikit-build-core
+# that returns which hook was called
+ASK = (
+    "import build_backend; print(build_backend.{hook}); "
+    "import os; print('CC', os.environ.get('CC'))"
+)
 HOOKS = (
     "get_requires_for_build_wheel()",
     "get_requires_for_build_editable()",
@@ -83,7 +105,7 @@ def test_a_build_without_a_compiler_ends_at_once_with_one_paragraph(
     assert "apt-get install gcc libc6-dev" in done.stderr
 
 
-def test_a_compiler_that_cannot_compile_is_told_with_its_own_words(tmp_path: Path) -> None:
+def test_a_compiler_that_cannot_compile_is_reported_with_its_error_message(tmp_path: Path) -> None:
     broken = "echo 'program.c:1:10: fatal error: math.h: No such file or directory' >&2; exit 1"
     done = ask(tmp_path, HOOKS[0], compilers={"gcc": broken})
     assert done.returncode == 1
@@ -105,7 +127,7 @@ def test_the_build_uses_the_compiler_that_was_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["CMAKE_TOOLCHAIN_FILE", "CMAKE_C_COMPILER"])
-def test_a_toolchain_that_cmake_is_told_of_is_believed(tmp_path: Path, name: str) -> None:
+def test_a_toolchain_that_is_chosen_for_cmake_is_not_checked(tmp_path: Path, name: str) -> None:
     assert ask(tmp_path, HOOKS[0], CMAKE_ARGS=f"-D{name}=/some/where").returncode == 0
     told = f"{HOOKS[0][:-1]}{{'cmake.define.{name}': '/some/where'}})"
     assert ask(tmp_path, told).returncode == 0

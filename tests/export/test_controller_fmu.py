@@ -1,5 +1,5 @@
-"""The controller as an FMU: it walks the plant FMU as the Python controller does, and is what
-its description says.
+"""The controller FMU walks the plant FMU as the Python controller does, and its model description
+is correct.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def packed(
     stop: float = 60.0,
     **parameters: object,
 ) -> Iterator[Fmu]:
-    """The controller FMU of a set-up, initialised."""
+    """Yields the initialized controller FMU of a setup."""
     with Fmu(export_controller(setup, folder / "controller.fmu"), name="controller") as fmu:
         fmu.set_parameters({name.replace("__", "."): value for name, value in parameters.items()})
         fmu.initialise(start, stop)
@@ -73,8 +73,9 @@ def packed(
 
 
 class Both:
-    """The Python controller at work, the FMU told the same: the largest differences of all joint
-    commands.
+    """The Python controller, and the FMU with the same inputs:
+
+    records the largest differences of all joint commands.
     """
 
     def __init__(self, setup: ControllerSetup, fmu: Fmu) -> None:
@@ -111,7 +112,7 @@ class Both:
 
 
 def walked(scenario: Scenario, controller: JointController) -> Recording:
-    """A scenario on the plant FMU under a controller, as the master runs it."""
+    """Runs a scenario on the plant FMU with a controller and the master."""
     schedule = make_schedule(scenario)
     with open_plant(scenario) as plant:
         plant.initialise(scenario.start, scenario.start + scenario.duration)
@@ -149,7 +150,7 @@ FAULTS = 'events=[{time=1.5, leg="LM", fault="dead"}, {time=2.5, leg="RF", fault
         ),
     ],
 )
-def test_told_the_same_it_commands_the_same(
+def test_the_same_inputs_give_the_same_commands(
     tmp_path: Path, name: str, settings: list[str], falls_back: bool | None
 ) -> None:
     scenario = load_scenario(name, overrides=["control=compliant", *settings])
@@ -174,7 +175,9 @@ def test_plant_and_controller_fmu_walk_as_the_python_master_does(
             walked(scenario, FmuController(fmu, period=setup.period)),
         )
     position = vector_names("torso.position")
-    assert ours.columns(position)[-1, 0] - ours.columns(position)[0, 0] > 0.5  # m: it walks
+    assert (
+        ours.columns(position)[-1, 0] - ours.columns(position)[0, 0] > 0.5
+    )  # m, the distance walked
     np.testing.assert_allclose(
         theirs.columns(COMMANDED["angle_ref"]),
         ours.columns(COMMANDED["angle_ref"]),
@@ -214,17 +217,19 @@ def compliant_fmu(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -
 
 @pytest.fixture
 def fmu(compliant_fmu: Path) -> Iterator[Fmu]:
-    """Not yet initialised."""
+    """Returns the controller FMU before initialization."""
     with Fmu(compliant_fmu, name="controller") as instance:
         yield instance
 
 
-def test_checkers_find_nothing(compliant_fmu: Path) -> None:
+def test_validation_finds_no_problems(compliant_fmu: Path) -> None:
     assert validate_fmu(compliant_fmu) == []
     assert find_problems(compliant_fmu) == []
 
 
-def test_fmi_3_walks_the_same_walk(plant_build: Path, tmp_path: Path, compliant_fmu: Path) -> None:
+def test_the_fmi_3_fmu_gives_the_same_walk(
+    plant_build: Path, tmp_path: Path, compliant_fmu: Path
+) -> None:
     robot = load_robot("athena")
     setup = ControllerSetup(
         robot=robot, gait=make_gait(robot), period=PERIOD, gains=make_gains(robot)
@@ -269,21 +274,21 @@ def test_its_variables_have_the_plants_names_units_and_directions_reversed(
 
 
 def outputs(fmu: Fmu) -> np.ndarray:
-    """All Real outputs now."""
+    """Returns all Real outputs."""
     block = fmu.block(fmu.names("output"))
     block.get()
     return block.values.copy()
 
 
 def give(fmu: Fmu, **values: float) -> None:
-    """Inputs by name, dots and brackets spelt a__b and a_1."""
+    """Sets inputs by name, with dots as a__b and brackets as a_1."""
     block = fmu.block([name.replace("__", ".") for name in values])
     block.values[:] = list(values.values())
     block.set()
 
 
 def walk(fmu: Fmu, first: int, count: int, *, h: float = PERIOD) -> np.ndarray:
-    """Outputs at communication points of a walk with unequal forces on the feet."""
+    """Returns outputs at communication points of a walk with unequal forces on the feet."""
     robot, found = load_robot("athena"), []
     block = fmu.block(
         [
@@ -326,7 +331,9 @@ def test_outputs_follow_inputs_at_once_where_the_description_says_so_and_nowhere
         block.set()
         assert (outputs(fmu) != plain).any()
         flags.get()
-        np.testing.assert_array_equal(flags.values, before)  # of commands alone, but for fallback
+        np.testing.assert_array_equal(
+            flags.values, before
+        )  # depends on commands only, except in fallback
         block.values[:] = old
         block.set()
         np.testing.assert_array_equal(outputs(fmu), plain)
@@ -335,8 +342,8 @@ def test_outputs_follow_inputs_at_once_where_the_description_says_so_and_nowhere
 
 
 def test_every_parameter_is_tunable_before_the_start(tmp_path: Path, compliant_fmu: Path) -> None:
-    """The kinematic athena's FMU, told to be the compliant phantomx in a ripple gait, is what is
-    exported for that one.
+    """The kinematic athena's FMU with the parameters of the compliant phantomx in a ripple gait
+    equals the FMU that is exported for it.
     """
     athena, other = load_robot("athena"), load_robot("phantomx_mk4")
     wanted = ControllerSetup(
@@ -368,7 +375,7 @@ def test_a_custom_gait_of_a_patterns_offsets_is_that_pattern(tmp_path: Path) -> 
 # as an FMU
 
 
-def test_saved_restored_and_serialised_states_go_on_bit_for_bit(
+def test_saved_restored_and_serialised_states_continue_bit_for_bit(
     fmu: Fmu, compliant_fmu: Path
 ) -> None:
     fmu.initialise(0.0, 60.0)
@@ -386,7 +393,7 @@ def test_saved_restored_and_serialised_states_go_on_bit_for_bit(
         np.testing.assert_array_equal(walk(other, 123, 150), rest)
 
 
-def test_a_reset_instance_is_as_good_as_new(fmu: Fmu) -> None:
+def test_a_reset_instance_equals_a_new_one(fmu: Fmu) -> None:
     fmu.initialise(0.0, 60.0)
     first = walk(fmu, 0, 150)
     fmu.reset()
@@ -395,7 +402,7 @@ def test_a_reset_instance_is_as_good_as_new(fmu: Fmu) -> None:
 
 
 def test_communication_steps_of_any_length_end_at_the_same_walk(compliant_fmu: Path) -> None:
-    """Under inputs that do not change. 7 ms is no multiple of the period."""
+    """The inputs are constant. 7 ms is no multiple of the period."""
     found = []
     for h, count in ((PERIOD, 420), (0.02, 105), (0.007, 300), (2.1, 1)):
         with Fmu(compliant_fmu) as fmu:
@@ -456,7 +463,9 @@ def test_inputs_that_are_no_numbers_and_steps_back_are_refused(fmu: Fmu) -> None
 # command
 
 
-def test_the_command_packs_what_simulate_walks_with(call: Call, tmp_path: Path) -> None:
+def test_the_export_command_writes_the_controller_that_simulate_uses(
+    call: Call, tmp_path: Path
+) -> None:
     robot, path, gains = load_robot("phantomx_mk4"), tmp_path / "c.fmu", tmp_path / "gains.toml"
     save_gains(make_gains(robot), gains)
     code, said, _ = call(
@@ -491,7 +500,7 @@ def test_the_command_packs_what_simulate_walks_with(call: Call, tmp_path: Path) 
         (["--controller", "kinematic", "-o", "walk.zip"], "a name that ends in .fmu"),
     ],
 )
-def test_what_cannot_be_packed_is_refused_in_words(
+def test_controllers_that_cannot_be_exported_are_refused_with_a_message(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], said: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -501,7 +510,7 @@ def test_what_cannot_be_packed_is_refused_in_words(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_gains_of_another_robot_are_packed_with_a_warning_and_kinematic_control_takes_none(
+def test_gains_of_another_robot_give_a_warning_and_kinematic_control_takes_none(
     call: Call, tmp_path: Path
 ) -> None:
     save_gains(make_gains(load_robot("phantomx_mk4")), tmp_path / "gains.toml")

@@ -1,4 +1,4 @@
-"""Building shared libraries with the cross compiler: the cache, and what goes wrong."""
+"""Cross-compiled libraries: the cache and the errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hexapod_cosim.cosim.export.cross_build import Library, build_library, find_
 from hexapod_cosim.models.errors import FmuError
 
 
-def test_what_changes_a_binary_changes_its_place_in_the_cache(tmp_path: Path) -> None:
+def test_each_input_of_the_build_changes_the_key_of_the_cache(tmp_path: Path) -> None:
     source = tmp_path / "a.c"
     source.write_text("int a;", encoding="utf-8")
     first = Library("a", {"a.c": source})
@@ -27,7 +27,7 @@ def test_what_changes_a_binary_changes_its_place_in_the_cache(tmp_path: Path) ->
     assert len({*digests, first.digest()}) == 5
 
 
-def test_a_damaged_or_unwritable_cache_is_made_do_without(tmp_path: Path) -> None:
+def test_a_damaged_or_unwritable_cache_is_ignored(tmp_path: Path) -> None:
     source = tmp_path / "tiny.c"
     source.write_text(
         '__attribute__((visibility("default"))) int fmi2Tiny(void) { return 7; }\n',
@@ -45,7 +45,7 @@ def test_a_damaged_or_unwritable_cache_is_made_do_without(tmp_path: Path) -> Non
     assert build_library(library, "x86_64-linux", cache_folder=cache) == data
 
 
-def test_sources_that_do_not_compile_are_one_error_with_the_compiler_s_words(
+def test_sources_that_do_not_compile_are_one_error_with_the_compiler_s_message(
     tmp_path: Path,
 ) -> None:
     source = tmp_path / "bad.c"
@@ -77,7 +77,7 @@ def test_without_the_compiler_the_error_says_how_to_get_it(
         ("x86_64-amiga", "linux64"),
     ],
 )
-def test_platforms_that_are_none_are_refused_with_those_there_are(
+def test_unknown_platforms_are_refused_with_the_list_of_platforms(
     call: Call, tmp_path: Path, name: str, expected: str
 ) -> None:
     code, _, err = call("export", "--platforms", name, "-o", tmp_path / "a.fmu")

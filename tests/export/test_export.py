@@ -1,4 +1,4 @@
-"""The exporter and what the binary reads of an FMU's resources."""
+"""The exporter, and how the binary reads an FMU's resources."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def heavy() -> Robot:
 
 
 def write_resources(folder: Path, robot: Robot) -> str:
-    """Start values of a robot in a folder; returns the GUID."""
+    """Writes start values of a robot to a folder; returns the GUID."""
     interface = load_interface(robot)
     guid = render_fmi2(interface).guid
     folder.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,7 @@ def test_the_same_robot_makes_the_same_bytes(exported: Path, tmp_path: Path) -> 
     )
 
 
-def test_both_packers_make_the_same_fmu(exported: Path, athena_fmu: Path) -> None:
+def test_cmake_and_the_exporter_write_the_same_fmu(exported: Path, athena_fmu: Path) -> None:
     ours, cmakes = members(exported), members(athena_fmu)
     assert set(ours) == set(cmakes)
     # compiled, drawn and simulated parts are compared in test_extras.py: other compilers and
@@ -124,7 +124,7 @@ def test_another_robot_starts_with_its_own_values_and_stands(
     assert result["torso.mass"][0] == robot.torso.mass
     assert sum(result[name][-1] for name in names[2:]) == pytest.approx(
         weight, rel=1e-3
-    )  # at rest but for the last tremor
+    )  # nearly at rest
 
 
 def test_every_listed_source_is_packed(exported: Path) -> None:
@@ -175,7 +175,7 @@ def test_a_folder_whose_name_looks_encoded_is_found(
 @pytest.mark.parametrize(
     "resources", [None, "", "file:///nowhere/at/all", "http://example.org/resources"]
 )
-def test_without_resources_only_the_default_robot_is_there(
+def test_without_resources_only_the_default_robot_is_available(
     plant_library: Path, heavy: Robot, resources: str | None
 ) -> None:
     with Plant(plant_library, resources=resources) as plant:
@@ -190,7 +190,7 @@ def test_without_resources_only_the_default_robot_is_there(
         assert "start_values.txt" in plant.last_message
 
 
-def test_start_values_arrive_exactly(plant_library: Path, tmp_path: Path) -> None:
+def test_start_values_are_read_exactly(plant_library: Path, tmp_path: Path) -> None:
     interface = load_interface(load_robot("phantomx_mk4"))
     guid = write_resources(tmp_path, interface.robot)
     with Plant(plant_library, guid=guid, resources=tmp_path.as_uri()) as plant:
@@ -212,8 +212,8 @@ def test_foreign_resources_are_refused(plant_library: Path, tmp_path: Path, heav
 
 
 def refusal(library: Path, folder: Path, robot: Robot, old: str, new: str) -> str:
-    """What the FMU says of a robot's start values in which old was replaced by new: it must
-    refuse them.
+    """Returns the FMU's message about start values in which `old` was replaced by `new`, which it
+    must refuse.
     """
     guid = write_resources(folder, robot)
     file = folder / "start_values.txt"
@@ -296,7 +296,7 @@ def test_truncated_or_continued_start_values_are_refused(
             assert plant.component is None
 
 
-def test_an_unwritable_place_is_one_clear_error_and_leaves_nothing(
+def test_an_unwritable_path_is_one_error_and_leaves_no_file(
     plant_build: Path, tmp_path: Path
 ) -> None:
     blocker = tmp_path / "file"
@@ -325,7 +325,9 @@ def test_a_binary_is_stale_a_second_before_its_newest_source(
         assert plant_files.binary(plant_files.fmi2_platform()) == library
 
 
-def test_what_is_not_offered_is_refused_by_name(plant_build: Path, tmp_path: Path) -> None:
+def test_unknown_versions_and_platforms_are_refused_by_name(
+    plant_build: Path, tmp_path: Path
+) -> None:
     with pytest.raises(HexapodError, match=r"FMI version.*got 4"):
         export_fmu(load_robot("athena"), tmp_path / "a.fmu", fmi=4)
     with pytest.raises(HexapodError, match="amiga64"):

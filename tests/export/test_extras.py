@@ -1,6 +1,4 @@
-"""What travels inside an FMU besides the binary: pictures, terminals, licence, page, reference
-results.
-"""
+"""The further files of an FMU: pictures, terminals, licence, documentation, reference results."""
 
 from __future__ import annotations
 
@@ -74,7 +72,7 @@ def test_an_importer_gets_the_reference_results(
         ), name
 
 
-def test_the_reference_run_moves_what_it_shows(exported: Path) -> None:
+def test_the_reference_run_changes_every_recorded_output(exported: Path) -> None:
     with zipfile.ZipFile(exported) as archive:
         reference = read_csv(archive.read(f"{FOLDER}/athena_ref.csv"))
     for name in set(OUTPUTS) - {"torso.yaw"}:
@@ -94,10 +92,10 @@ def test_pictures_show_the_whole_robot(robot: str) -> None:
         height, width = opaque.shape
         assert (
             min(rows[0], columns[0], height - 1 - rows[-1], width - 1 - columns[-1]) >= 1
-        )  # nothing is cut off
+        )  # the robot is not cut off
         assert (
             max(np.ptp(rows) / height, np.ptp(columns) / width) > 0.85
-        )  # and it fills the picture
+        )  # the robot fills the picture
 
 
 def test_a_larger_torso_makes_another_picture() -> None:
@@ -120,7 +118,7 @@ def test_every_input_of_a_leg_and_the_torso_is_in_one_terminal() -> None:
     } <= set(members)
 
 
-def test_legs_terminals_differ_in_their_variables_alone() -> None:
+def test_terminals_of_legs_differ_in_their_variables_only() -> None:
     document = ElementTree.fromstring(render_terminals(list(ATHENA.by_name)))
     shapes = {
         tuple(
@@ -174,7 +172,7 @@ def test_the_page_s_quick_start_runs_as_it_stands(
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
     exec(html.unescape(snippet[1]), names)
-    assert np.abs(names["result"]["torso.position[2]"]).max() > 1e-4  # m: the push pushed
+    assert np.abs(names["result"]["torso.position[2]"]).max() > 1e-4  # m, moved by the push
     assert capsys.readouterr().out.endswith("]\n")
 
 
@@ -202,7 +200,7 @@ def test_the_page_names_every_variable_s_pattern_unit_choice_and_flag(exported: 
     assert sum(counts) == len(ATHENA.variables)
 
 
-def test_the_page_s_links_lead_somewhere(exported: Path) -> None:
+def test_the_page_s_links_have_targets(exported: Path) -> None:
     with zipfile.ZipFile(exported) as archive:
         page, present = archive.read("documentation/index.html").decode(), set(archive.namelist())
     anchors, targets = (
@@ -218,7 +216,7 @@ def test_the_page_s_links_lead_somewhere(exported: Path) -> None:
 
 
 @pytest.mark.parametrize(("fmi", "platforms"), [(2, None), (2, "sources"), (3, None)])
-def test_the_page_tells_of_what_is_in_the_archive_alone(
+def test_the_page_describes_only_what_the_archive_contains(
     plant_build: Path, tmp_path: Path, fmi: int, platforms: str | None
 ) -> None:
     with zipfile.ZipFile(
@@ -236,5 +234,5 @@ def test_the_page_tells_of_what_is_in_the_archive_alone(
 
 
 @pytest.mark.parametrize(("fmi", "picture"), [(2, "model.png"), (3, "documentation/diagram.png")])
-def test_the_picture_is_where_the_standard_has_it(fmi: int, picture: str) -> None:
+def test_the_picture_has_the_path_of_the_standard(fmi: int, picture: str) -> None:
     assert list(pictures(ATHENA, fmi=fmi)) == [picture, "terminalsAndIcons/icon.png"]

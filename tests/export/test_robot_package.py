@@ -1,5 +1,5 @@
-"""Plant and controller FMU in a package walk as the Python master and controller do, on time and
-with measurements a period late.
+"""A package of plant and controller FMU walks as the Python master and controller do, with present
+measurements or with those of one period before.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from hexapod_cosim.cosim.export.robot_package import CONTROLLER, PLANT, export_p
 from hexapod_cosim.cosim.interface.controller_interface import ControllerSetup
 from hexapod_cosim.cosim.master.signals import ACCELERATION, COMMANDED, MEASURED
 from hexapod_cosim.models import FmuError, HexapodError, load_robot
-from tools.importers import late
-from tools.importers.compare import judged
+from tools.importers import delayed
+from tools.importers.compare import largest_difference
 from tools.importers.package import run
 
 ORDER = (PLANT, CONTROLLER)
 STEPS = 160  # the ramp, lift-offs and touch-downs
-# the controllers' last bits, which the servos' stiffness and the ground's turn into forces
+# due to the last bits of the commands, which stiff servos and the ground amplify
 SAME = 1e-9
 KINEMATIC = ("--ssp", "--controller", "kinematic", "--set")
-# of outputs that inputs do not reach at once
+# outputs without direct feed-through
 SEEN = (
     "torso.position[1]",
     "torso.position[3]",
@@ -60,13 +60,13 @@ def plant(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         return Path(archive.extract("resources/plant.fmu", tmp_path_factory.mktemp("plant")))
 
 
-def test_what_the_controller_looks_at_and_says_is_connected(package: Path) -> None:
+def test_the_inputs_and_outputs_of_the_controller_are_connected(package: Path) -> None:
     connections = read_ssd(str(package), validate=True).system.connections
     joints = {name for names in (*COMMANDED.values(), ACCELERATION) for name in names}
-    looked_at = {*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]}
+    measured = {*MEASURED["angle"], *MEASURED["foot_force"], *MEASURED["quaternion"]}
     assert {one.startConnector for one in connections if one.startElement == CONTROLLER} == joints
-    assert {one.startConnector for one in connections if one.startElement == PLANT} == looked_at
-    assert len(connections) == len(joints) + len(looked_at)
+    assert {one.startConnector for one in connections if one.startElement == PLANT} == measured
+    assert len(connections) == len(joints) + len(measured)
 
 
 @pytest.mark.parametrize("is_late", [False, True], ids=["on time", "a period late"])
@@ -74,8 +74,8 @@ def test_a_package_walks_as_the_python_master_does(
     setup: ControllerSetup, package: Path, plant: Path, is_late: bool
 ) -> None:
     names = [f"{PLANT}.{name}" for name in SEEN]
-    found = run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=not is_late)
-    expected = late.walk(setup, plant, duration=STEPS * PERIOD, overrides=[], late=is_late)
+    found = run(package, names, step=PERIOD, steps=STEPS, order=ORDER, in_order=not is_late)
+    expected = delayed.walk(setup, plant, duration=STEPS * PERIOD, overrides=[], late=is_late)
     scale = np.maximum(np.abs(expected.columns(SEEN)).max(axis=0), 1e-3)
     assert expected.column("LF.foot.contact").min() == 0.0
     assert np.abs(found.columns(names) - expected.columns(SEEN)).max(
@@ -83,13 +83,13 @@ def test_a_package_walks_as_the_python_master_does(
     ) / scale == pytest.approx(0.0, abs=SAME)
 
 
-def test_lateness_is_no_round_off(package: Path) -> None:
+def test_a_delay_of_one_period_exceeds_round_off(package: Path) -> None:
     names = [f"{PLANT}.{name}" for name in SEEN]
-    prompt, delayed = (
-        run(package, names, step=PERIOD, steps=STEPS, order=ORDER, at_once=once)
+    present, late = (
+        run(package, names, step=PERIOD, steps=STEPS, order=ORDER, in_order=once)
         for once in (True, False)
     )
-    assert judged(prompt, delayed)[0] > 1e3 * SAME
+    assert largest_difference(present, late)[0] > 1e3 * SAME
 
 
 def test_values_reach_the_parameter_sets(
@@ -109,7 +109,7 @@ def test_values_reach_the_parameter_sets(
     assert sets[CONTROLLER]["command.yaw_rate"].unit == "rad/s"
 
 
-def test_without_values_the_robot_walks_straight_on(package: Path) -> None:
+def test_without_values_the_robot_walks_straight_ahead(package: Path) -> None:
     found = {
         one.name: one.value
         for one in read_ssv(str(package), f"resources/{CONTROLLER}.ssv").parameters
@@ -122,7 +122,7 @@ def test_without_values_the_robot_walks_straight_on(package: Path) -> None:
     ("text", "said"),
     [("ctrl.command.vx=1", "component"), ("controller.command.vx=fast", "not a number")],
 )
-def test_values_that_cannot_be_are_refused(text: str, said: str) -> None:
+def test_invalid_values_are_refused(text: str, said: str) -> None:
     with pytest.raises(HexapodError, match=said):
         read_values([text])
 
@@ -169,7 +169,7 @@ def test_the_command_packs_a_kinematic_walk(call: Call, tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_packed_is_refused_and_nothing_written(
+def test_invalid_packages_are_refused_and_no_file_is_written(
     call: Call,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -183,7 +183,7 @@ def test_what_cannot_be_packed_is_refused_and_nothing_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_validate_says_that_it_checks_fmus_alone(call: Call, package: Path) -> None:
+def test_validate_refuses_a_package_and_says_that_it_checks_fmus(call: Call, package: Path) -> None:
     code, out, err = call("validate", package)
     assert (code != 0, out) == (True, "")
     assert "packages are not checked" in err

@@ -1,6 +1,4 @@
-"""Packages of plant and controller: what they say is valid and true, and what they do when a
-plain master runs them.
-"""
+"""Packages of plant and controller: validity, content, and results with a minimal master."""
 
 from __future__ import annotations
 
@@ -65,7 +63,7 @@ def test_a_package_is_valid_by_the_standards_schemas(package: Path) -> None:
         assert read_ssv(str(package), f"resources/{component}.ssv", validate=True).parameters
 
 
-def test_the_fmus_are_packed_as_they_are(package: Path, fmus: dict[str, Path]) -> None:
+def test_the_package_contains_the_fmus_unchanged(package: Path, fmus: dict[str, Path]) -> None:
     with zipfile.ZipFile(package) as archive:
         assert {name: archive.read(f"resources/{name}.fmu") for name in fmus} == {
             name: fmu.read_bytes() for name, fmu in fmus.items()
@@ -113,7 +111,7 @@ def test_connectors_are_the_fmus_variables_with_their_units(
             )
 
 
-def test_parameter_sets_say_what_the_fmu_says_to_the_last_bit(
+def test_parameter_sets_hold_the_fmu_s_start_values_to_the_last_bit(
     package: Path, fmus: dict[str, Path]
 ) -> None:
     found = parameters(package, "plant")
@@ -123,15 +121,15 @@ def test_parameter_sets_say_what_the_fmu_says_to_the_last_bit(
             assert found[variable.name].unit in {variable.unit, None}
 
 
-def test_every_unit_in_use_is_defined_and_what_cannot_be_said_is_left_out(package: Path) -> None:
+def test_every_used_unit_is_defined_and_units_without_integer_exponents_are_left_out(
+    package: Path,
+) -> None:
     with zipfile.ZipFile(package) as archive:
         text = archive.read("resources/plant.ssv").decode()
     used = {one.unit for one in parameters(package, "plant").values() if one.unit}
     assert "kg.m2" in used
     assert all(f'<ssc:Unit name="{unit}">' in text for unit in used)
-    assert (
-        parameters(package, "controller")["gain"].unit is None
-    )  # a base unit to the power of a half
+    assert parameters(package, "controller")["gain"].unit is None  # the square root of a base unit
 
 
 def test_values_given_replace_start_values_and_inputs_that_are_driven_are_not_set(
@@ -145,7 +143,7 @@ def test_values_given_replace_start_values_and_inputs_that_are_driven_are_not_se
     assert "LM.coxa.angle_ref" in driven
 
 
-def test_the_same_system_makes_the_same_bytes(
+def test_the_same_system_gives_the_same_bytes(
     package: Path, fmus: dict[str, Path], tmp_path: Path
 ) -> None:
     assert pack(tmp_path, fmus).read_bytes() == package.read_bytes()
@@ -156,8 +154,8 @@ def test_the_step_is_where_readers_look_for_it(package: Path) -> None:
         assert f'baseStepSize="{STEP}"' in archive.read("SystemStructure.ssd").decode()
 
 
-def test_a_controller_that_answers_at_once_holds_its_law_at_every_point(package: Path) -> None:
-    found = run(package, SEEN, step=STEP, steps=STEPS, order=ORDER, at_once=True)
+def test_a_controller_with_feed_through_holds_its_law_at_every_point(package: Path) -> None:
+    found = run(package, SEEN, step=STEP, steps=STEPS, order=ORDER, in_order=True)
     angle, reference = found.column(SEEN[0]), found.column(SEEN[1])
     late = np.concatenate(
         [[math.nan], angle[:-1]]
@@ -167,17 +165,19 @@ def test_a_controller_that_answers_at_once_holds_its_law_at_every_point(package:
     assert reference[1:] == pytest.approx(law[1:], abs=1e-14)
 
 
-def test_one_step_of_delay_is_seen_by_feedback_alone(fmus: dict[str, Path], tmp_path: Path) -> None:
+def test_a_delay_of_one_step_changes_only_results_with_feedback(
+    fmus: dict[str, Path], tmp_path: Path
+) -> None:
     def spread(gain: float) -> float:
         package = pack(tmp_path, fmus, gain=gain)
         both = [
-            run(package, SEEN[:1], step=STEP, steps=STEPS, order=ORDER, at_once=once).data
+            run(package, SEEN[:1], step=STEP, steps=STEPS, order=ORDER, in_order=once).data
             for once in (True, False)
         ]
         return float(np.abs(both[0] - both[1]).max())
 
     assert spread(0.5) > 1e-4
-    assert spread(0.0) < 2e-6 * STEPS  # but for what the controller counts
+    assert spread(0.0) < 2e-6 * STEPS  # except what the controller counts
 
 
 def test_components_that_share_no_names_are_refused(controller: Path, tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_an_input_with_two_drivers_is_refused(fmus: dict[str, Path], tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["swimg", f"{JOINT}.angle", f"{JOINT}.angle_ref"])
-def test_a_value_for_what_is_not_there_or_driven_or_an_output_is_refused(
+def test_a_value_of_an_unknown_or_connected_variable_or_an_output_is_refused(
     fmus: dict[str, Path], tmp_path: Path, name: str
 ) -> None:
     with pytest.raises(FmuError, match="no such value"):
@@ -205,6 +205,6 @@ def test_a_value_for_what_is_not_there_or_driven_or_an_output_is_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_an_fmu_that_is_none_is_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
+def test_a_file_that_is_no_fmu_is_refused(fmus: dict[str, Path], tmp_path: Path) -> None:
     with pytest.raises(HexapodError, match="no such FMU"):
         pack(tmp_path, fmus | {"controller": tmp_path / "missing.fmu"})

@@ -1,4 +1,4 @@
-"""What `hexapod validate` finds wrong with an FMU."""
+"""The problems that `hexapod validate` finds in FMI 2.0 FMUs."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def tampered(source: Path, target: Path, member: str, change: Callable[[bytes], 
         ("binaries/linux64/hexapod.so", lambda _: b"no library", "cannot be loaded"),
     ],
 )
-def test_what_no_general_checker_sees_is_found(
+def test_problems_that_fmpy_does_not_find_are_found(
     plant_build: Path, tmp_path: Path, member: str, change: Callable[[bytes], bytes], part: str
 ) -> None:
     good = export_fmu(load_robot("athena"), tmp_path / "good.fmu")
@@ -56,7 +56,7 @@ def test_what_no_general_checker_sees_is_found(
     assert any(part in problem for problem in problems)
 
 
-def test_validate_says_what_is_wrong(call: Call, tmp_path: Path, plant_build: Path) -> None:
+def test_validate_prints_the_problems(call: Call, tmp_path: Path, plant_build: Path) -> None:
     good = export_fmu(load_robot("athena"), tmp_path / "good.fmu")
     bad = tampered(
         good,
@@ -72,7 +72,7 @@ def test_validate_says_what_is_wrong(call: Call, tmp_path: Path, plant_build: Pa
     assert "the FMU is not sound" in err
 
 
-def test_an_fmu_for_other_machines_alone_is_checked_without_running_it(
+def test_an_fmu_for_other_machines_is_checked_without_running_it(
     plant_build: Path, tmp_path: Path
 ) -> None:
     good = export_fmu(load_robot("athena"), tmp_path / "good.fmu")
@@ -103,7 +103,7 @@ def test_a_missing_resource_is_found(plant_build: Path, tmp_path: Path) -> None:
         (b"<fmiModelDescription fmiVersion='2.0' />", "'guid' is required"),
     ],
 )
-def test_an_unreadable_description_is_told_as_json_too(
+def test_an_unreadable_description_is_reported_as_json_too(
     call: Call, tmp_path: Path, text: bytes, part: str
 ) -> None:
     bad = tmp_path / "bad.fmu"

@@ -1,4 +1,4 @@
-"""`hexapod validate` on FMI 3.0 FMUs: sound ones pass, each damage is found."""
+"""The problems that `hexapod validate` finds in FMI 3.0 FMUs."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def added(name: str) -> Callable[[Members], None]:
 
 
 def described(before: str, old: str, new: str) -> Callable[[Members], None]:
-    """modelDescription.xml with new in place of what matches old, where it first stands behind
-    what matches before.
+    """Returns modelDescription.xml with `new` in place of the first match of `old` after a match of
+    `before`.
     """
 
     def damage(members: Members) -> None:
@@ -58,7 +58,7 @@ def described(before: str, old: str, new: str) -> Callable[[Members], None]:
     return damage
 
 
-def test_a_sound_fmu_has_no_problems(sound3: Path, call: Call) -> None:
+def test_a_valid_fmu_has_no_problems(sound3: Path, call: Call) -> None:
     assert find_problems(sound3) == []
     assert call("validate", sound3)[0] == 0
 

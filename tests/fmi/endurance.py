@@ -1,10 +1,10 @@
-"""What must hold however often: instances, libraries, threads, steps. Each trial prints its figures
-and ends with 1 if they are bad.
+"""Trials with many instances, libraries, threads and steps. Each prints its figures and exits with
+1 if they are bad.
 
-usage: python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
+usage: PYTHONPATH=tests/support python tests/fmi/endurance.py LIBRARY [TRIAL COUNT]
 
-Without a trial: all of them at full length, as `make test-endurance` does. test_endurance.py runs
-them short, each in a process of its own.
+Without a trial all of them run at full length, as in `make test-endurance`. test_endurance.py runs
+short ones, each in its own process.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from memory import resident
 from hexapod_cosim.cosim.export.export import start_values
 
 H = 0.005  # s
-ALLOWED_GROWTH = 1_000_000  # bytes: 1 % of the memory of 10,000 instances would be twice that
-FORGOTTEN = 100  # of the first calls, which fill the allocator's and Python's stores
+ALLOWED_GROWTH = 1_000_000  # bytes, half a percent of the memory of 10,000 instances
+WARM_UP = 100  # first calls, in which the allocator and Python reserve memory
 MAPS, OPEN_FILES = Path("/proc/self/maps"), Path("/proc/self/fd")
 
 Figures = dict[str, float]
@@ -40,8 +40,10 @@ def open_files() -> int:
 
 
 def growth(action: Callable[[], object], count: int) -> Figures:
-    """Memory and open files that repeating something leaves behind, and the time of one."""
-    for _ in range(FORGOTTEN):
+    """Repeats an action; returns the memory and open files that it leaks and the time of one
+    repetition.
+    """
+    for _ in range(WARM_UP):
         action()
     memory, files, begin = resident(), open_files(), time.perf_counter()
     for _ in range(count):
@@ -59,8 +61,8 @@ def growth(action: Callable[[], object], count: int) -> Figures:
 
 
 def instances(library: Path, count: int) -> Figures:
-    """Instantiated from resources, initialised, stepped, saved, freed without fmi2Terminate; and
-    refused for a wrong GUID.
+    """Creates, initializes, steps, saves and frees instances without fmi2Terminate, and instances
+    with a wrong GUID.
     """
     with tempfile.TemporaryDirectory() as folder:
         resources = Path(folder)
@@ -77,7 +79,7 @@ def instances(library: Path, count: int) -> Figures:
 
 
 def libraries(library: Path, count: int) -> Figures:
-    """Loaded, an instance made and freed, unloaded."""
+    """Loads the library, creates and frees an instance, and unloads it."""
 
     def load() -> None:
         handle = _ctypes.dlopen(str(library), os.RTLD_NOW | os.RTLD_LOCAL)
@@ -96,7 +98,7 @@ def libraries(library: Path, count: int) -> Figures:
 
 
 def trace(plant: Plant, seed: int, first: int, last: int) -> list[list[float]]:
-    """All variables after each of some steps under inputs of its own."""
+    """Returns all variables after each step under inputs of this instance."""
     rows = []
     for k in range(first, last):
         assert (
@@ -114,13 +116,13 @@ def trace(plant: Plant, seed: int, first: int, last: int) -> list[list[float]]:
 
 
 def threads(library: Path, count: int) -> Figures:
-    """64 instances stepped from 2 threads in turns, bit for bit what each gives alone."""
+    """Steps 64 instances from 2 threads in turns; results must equal those of single instances bit
+    for bit.
+    """
     plants = [Plant(library, name=f"plant {k}").initialize() for k in range(64)]
     together: list[list[list[float]]] = [[] for _ in plants]
     with ThreadPoolExecutor(2) as pool:
-        for k in range(
-            count
-        ):  # whoever is free takes the next instance, so instances change threads
+        for k in range(count):  # a free thread takes the next instance, so instances change threads
             for seed, rows in enumerate(
                 pool.map(lambda seed, k=k: trace(plants[seed], seed, k, k + 1), range(len(plants)))
             ):
@@ -134,8 +136,9 @@ def threads(library: Path, count: int) -> Figures:
 
 
 def clock(library: Path, count: int) -> Figures:
-    """Steps of 1/60 s of a master that adds them up: the FMU's clock is its clock, to the last
-    bit, up to the stop time.
+    """Steps of 1/60 s of a master that sums up time:
+
+    the FMU follows its clock to the last bit until the stop time.
     """
     size, now, reached = 1.0 / 60.0, 0.0, ctypes.c_double()
     with Plant(library) as plant:
@@ -152,7 +155,7 @@ def clock(library: Path, count: int) -> Figures:
         assert plant.call("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, ctypes.byref(reached)) == OK
         assert reached.value == now
         sunk = abs(plant.real("torso.position[3]") - height)
-    assert sunk < 1e-9, sunk  # m: it stands as it stood
+    assert sunk < 1e-9, sunk  # m, the robot has not moved
     return {
         "steps": count,
         "off_by_s": now - count * size,
@@ -162,8 +165,9 @@ def clock(library: Path, count: int) -> Figures:
 
 
 def states(library: Path, count: int) -> Figures:
-    """A state taken at every step and never freed: its own bytes, and no step slower for those
-    before it.
+    """Saves a state at every step and frees none:
+
+    the memory is that of the states, and steps do not slow down.
     """
     with Plant(library) as plant:
         plant.initialize()
@@ -179,7 +183,7 @@ def states(library: Path, count: int) -> Figures:
 
 
 def fuzz(library: Path, count: int) -> Figures:
-    """Random calls on instance after instance."""
+    """Makes random calls on one instance after the other."""
     each = 1000
     for seed in range(max(1, count // each)):
         run(library, seed, min(count, each))
@@ -197,7 +201,7 @@ TRIALS: dict[str, tuple[Callable[[Path, int], Figures], int]] = {
 
 
 def main(arguments: list[str]) -> int:
-    """One trial, or all at full length, each in a process of its own."""
+    """Runs one trial, or all at full length, each in its own process."""
     library = arguments[0]
     if len(arguments) == 1:
         trials = (

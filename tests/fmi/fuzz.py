@@ -1,10 +1,9 @@
-"""Random calls, legal and not, against a model of the standard's state machine.
+"""Random calls, legal and illegal, compared with a model of the standard's state machine.
 
-usage: python tests/fmi/fuzz.py LIBRARY SEED CALLS
+usage: PYTHONPATH=tests/support python tests/fmi/fuzz.py LIBRARY SEED CALLS
 
-After each call the status must be one that the model allows, a refused call must have left every
-byte of the state as it was, and a reset instance must be a new one. Ends with 1 and the last calls
-if not; a crash is the parent's to notice (test_fuzz.py).
+After each call the status must be one that the model allows, a refused call must not have changed
+the state, and a reset instance must equal a new one. Exits with 1 and the last calls otherwise.
 """
 
 from __future__ import annotations
@@ -50,13 +49,13 @@ GENTLE = 0.05  # of an input's range at most, so that most steps can be taken
 Statuses = tuple[int, ...]
 
 
-class BrokenPromiseError(AssertionError):
-    """A promise that was not kept."""
+class RuleViolationError(AssertionError):
+    """The FMU violated a rule."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """What is known of an instance."""
+    """The known state of an instance."""
 
     mode: str = INSTANTIATED
     time: float = 0.0  # s
@@ -65,7 +64,7 @@ class Model:
 
 @dataclass
 class Fuzz:
-    """One instance, the model of it, and the saved states with theirs."""
+    """An instance, its model, and saved states with their models."""
 
     plant: Plant
     random: Random
@@ -106,36 +105,36 @@ class Fuzz:
         self.rare = (self.terminate, self.reset)
 
     def bytes(self) -> bytes:
-        """The whole state."""
+        """Returns the whole state."""
         state = self.plant.save()
         data = self.plant.serialize(state)
         self.plant.free(state)
         return data
 
     def call(self, action: Callable[[], tuple[int, Statuses]]) -> None:
-        """One action, and what must hold after it."""
+        """Makes a call and checks the rules after it."""
         before = self.bytes()
         self.calls.append(f"{action.__name__} in {self.model}")
         status, allowed = action()
         self.counts[status] = self.counts.get(status, 0) + 1
         if status not in allowed:
-            raise BrokenPromiseError(
+            raise RuleViolationError(
                 f"status {status}, expected one of {allowed}; said {self.plant.messages[-1:]}"
             )
         if status in (ERROR, DISCARD) and self.bytes() != before:
-            raise BrokenPromiseError(
+            raise RuleViolationError(
                 f"a refused call changed the state; said {self.plant.last_message}"
             )
         if status in (ERROR, DISCARD) and not self.plant.messages:
-            raise BrokenPromiseError("a refused call without a message")
+            raise RuleViolationError("a refused call without a message")
         self.plant.messages.clear()
 
     def allow(self, *modes: str) -> Statuses:
-        """The status of a call that is legal in some modes alone."""
+        """Checks the status of a call that is legal in some modes only."""
         return (OK,) if self.model.mode in modes else (ERROR,)
 
     def go(self, function: str, mode: str, *modes: str) -> tuple[int, Statuses]:
-        """A call that leads from some modes to one."""
+        """Makes a call that changes the mode."""
         allowed = self.allow(*modes)
         if allowed == (OK,):
             self.model = replace(self.model, mode=mode)
@@ -165,7 +164,7 @@ class Fuzz:
         status = self.plant.call("fmi2Reset")
         self.model = Model()
         if self.bytes() != self.fresh:
-            raise BrokenPromiseError("a reset instance is not as a new one")
+            raise RuleViolationError("a reset instance is not as a new one")
         return status, (OK,)
 
     def read(self) -> tuple[int, Statuses]:
@@ -178,7 +177,7 @@ class Fuzz:
             "fmi2GetReal", [variable.reference for variable in variables]
         )
         if not all(map(math.isfinite, values)):
-            raise BrokenPromiseError(f"{[variable.name for variable in variables]} are {values}")
+            raise RuleViolationError(f"{[variable.name for variable in variables]} are {values}")
         return status, (OK,)
 
     def read_unknown(self) -> tuple[int, Statuses]:
@@ -262,7 +261,7 @@ class Fuzz:
 
 
 def run(library: Path, seed: int, calls: int) -> Fuzz:
-    """That many calls on one instance. Raises BrokenPromiseError, with the last calls."""
+    """Makes a number of calls on one instance. Raises RuleViolationError with the last calls."""
     with Plant(library) as plant:
         fuzz = Fuzz(plant, Random(seed))
         try:
@@ -270,8 +269,8 @@ def run(library: Path, seed: int, calls: int) -> Fuzz:
                 action = fuzz.random.choice(fuzz.actions)
                 if action not in fuzz.rare or fuzz.random.random() < 0.1:
                     fuzz.call(action)
-        except BrokenPromiseError as error:
-            raise BrokenPromiseError("\n".join([f"seed {seed}: {error}", *fuzz.calls])) from error
+        except RuleViolationError as error:
+            raise RuleViolationError("\n".join([f"seed {seed}: {error}", *fuzz.calls])) from error
         for state, _ in fuzz.saved:
             plant.free(state)
         return fuzz

@@ -1,5 +1,5 @@
-"""A recorded walk that the FMU's binaries for other platforms repeat, each driven by a small C
-program, under an emulator where need be.
+"""Repeats a recorded walk with the FMU's binaries for other platforms, each called by a small C
+program, under an emulator where necessary.
 """
 
 from __future__ import annotations
@@ -33,15 +33,13 @@ WALKER = Path(__file__).resolve().parents[1] / "native" / "walker.c"
 ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 DURATION = 1.5  # s    of walking: touch-downs and lift-offs of all feet
 TIMEOUT = 300  # s
-ATTEMPTS = 5  # the compiler was seen to wait for itself for ever, now and then, for Windows
+ATTEMPTS = 5  # builds for Windows were seen to hang
 EVERYTHING = os.environ.get("HEXAPOD_PLATFORMS") == "all"  # as `make test-platforms` sets it
 
 
 @dataclass(frozen=True)
 class Emulator:
-    """How programs for a target run here: what must be installed, the command in front of them,
-    how paths are written.
-    """
+    """How programs for a target run on this machine: required programs, command, form of paths."""
 
     needs: tuple[str, ...] = ()
     command: tuple[str, ...] = ()
@@ -59,7 +57,7 @@ EMULATORS = {
 
 
 def missing(target: str) -> list[str]:
-    """What has to be installed before programs for a target run here."""
+    """Returns the programs that must be installed to run programs for a target."""
     return [
         need
         for need in EMULATORS[target].needs
@@ -68,8 +66,8 @@ def missing(target: str) -> list[str]:
 
 
 def record_walk(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Walks over flat ground with the controller and returns the inputs of every step in the
-    form that walker.c reads.
+    """Records a walk over flat ground and returns the inputs of every step in the form that
+    walker.c reads.
     """
     rows: list[list[float]] = []
     inputs, step = [entry for entry in described(fmu) if entry.causality == "input"], Fmu.step
@@ -99,7 +97,7 @@ def record_walk(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @cache
 def described(fmu: Path) -> list[Any]:
-    """The FMU's Real variables."""
+    """Returns the FMU's Real variables."""
     return [
         entry
         for entry in fmpy.read_model_description(str(fmu)).modelVariables
@@ -108,17 +106,17 @@ def described(fmu: Path) -> list[Any]:
 
 
 def pattern(value: float) -> str:
-    """The bits of a double in hexadecimal."""
+    """Returns the bits of a double in hexadecimal."""
     return f"{struct.unpack('<Q', struct.pack('<d', value))[0]:016x}"
 
 
 def number(word: str) -> float:
-    """The double of a pattern."""
+    """Returns the double with these bits."""
     return float(struct.unpack("<d", struct.pack("<Q", int(word, 16)))[0])
 
 
 def build_walker(target: str, folder: Path) -> Path:
-    """The driving program for a target."""
+    """Builds the calling program for a target."""
     program = folder / ("walker.exe" if "windows" in target else "walker")
     flags = (
         "-target",
@@ -157,7 +155,7 @@ def build_walker(target: str, folder: Path) -> Path:
 def run_walker(
     target: str, program: Path, library: Path, guid: str, resources: str, inputs: Path
 ) -> subprocess.CompletedProcess[str]:
-    """Repeats a recorded walk; what it prints are the outputs of every step."""
+    """Repeats a recorded walk; returns the outputs of every step."""
     emulator, environment = EMULATORS[target], dict(os.environ)
     if emulator.drive:
         environment |= {
@@ -184,7 +182,7 @@ def run_walker(
 
 
 def patient(target: str) -> None:
-    """Skips Windows where its system libraries were never built: they take minutes."""
+    """Skips Windows if its system libraries were never built, which takes minutes."""
     if (
         target == "x86_64-windows"
         and not EVERYTHING

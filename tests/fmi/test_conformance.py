@@ -1,5 +1,6 @@
-"""Conformance of an FMU's archive and documents: ours passes, and each kind of damage is found
-and named.
+"""Conformance of an FMU's archive and documents:
+
+exported FMUs have no problems, and each kind of damage is found and named.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def rewritten(
     change: Callable[[dict[str, bytes]], None],
     method: int = zipfile.ZIP_DEFLATED,
 ) -> Path:
-    """A copy of an FMU whose members were changed."""
+    """Copies an FMU with changed members."""
     with zipfile.ZipFile(source) as old:
         members = {name: old.read(name) for name in old.namelist()}
     change(members)
@@ -41,7 +42,7 @@ def rewritten(
 
 
 def replaced(old: str, new: str) -> Change:
-    """Puts new in place of the first old, which must be there."""
+    """Replaces the first `old`, which must exist, by `new`."""
 
     def change(data: bytes) -> bytes:
         assert old.encode() in data
@@ -64,7 +65,7 @@ def test_every_robot_s_fmu_conforms(plant_build: Path, tmp_path: Path, robot: st
     assert archive_problems(export_fmu(load_robot(robot), tmp_path / "robot.fmu")) == []
 
 
-def test_what_cmake_packs_conforms(athena_fmu: Path) -> None:
+def test_the_fmu_that_cmake_builds_conforms(athena_fmu: Path) -> None:
     assert archive_problems(athena_fmu) == []
 
 
@@ -234,9 +235,7 @@ def test_a_damaged_member_is_found(
         ("sources/src/new.c", "sources/src/new.c is not listed by CoSimulation"),
     ],
 )
-def test_what_should_not_be_there_is_found(
-    good: Path, tmp_path: Path, name: str, part: str
-) -> None:
+def test_unexpected_members_are_found(good: Path, tmp_path: Path, name: str, part: str) -> None:
     found = archive_problems(
         rewritten(good, tmp_path / "bad.fmu", lambda members: members.update({name: b"x"}))
     )
@@ -269,7 +268,9 @@ def test_a_flipped_bit_is_found(good: Path, tmp_path: Path) -> None:
     assert any("is damaged" in problem for problem in archive_problems(tmp_path / "flipped.fmu"))
 
 
-def test_libraries_of_every_platform_are_told_by_their_bytes(good: Path, tmp_path: Path) -> None:
+def test_libraries_of_every_platform_are_recognised_by_their_bytes(
+    good: Path, tmp_path: Path
+) -> None:
     symbols = b"\0".join(
         [
             b"",

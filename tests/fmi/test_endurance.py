@@ -1,9 +1,8 @@
-"""What must hold however often, in short: each trial of endurance.py in a process of its own, so
-that a crash is a failure of its test.
-"""
+"""Short trials of endurance.py, each in its own process, so that a crash fails one test only."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -12,13 +11,21 @@ import pytest
 
 SHORT = {"instances": 500, "libraries": 200, "threads": 20, "states": 500, "clock": 5000}
 SCRIPTS = Path(__file__).parent
-TIMEOUT = 600  # s: far beyond any of them on any machine; a call that hangs ends here
+SUPPORT = SCRIPTS.parent / "support"  # modules that the scripts import
+TIMEOUT = 600  # s, much longer than any trial; ends calls that hang
 
 
 def outcome(script: str, *arguments: str) -> str:
-    """What a script prints; fails with its last words unless it ends well."""
+    """Returns the output of a script; fails with its last lines unless it exits with 0."""
     command = [sys.executable, str(SCRIPTS / script), *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT)
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=TIMEOUT,
+        env=os.environ | {"PYTHONPATH": str(SUPPORT)},
+    )
     assert done.returncode == 0, (
         f"exit code {done.returncode}\n{done.stdout[-1000:]}{done.stderr[-3000:]}"
     )
@@ -26,14 +33,16 @@ def outcome(script: str, *arguments: str) -> str:
 
 
 @pytest.mark.parametrize(("trial", "count"), SHORT.items())
-def test_it_holds_however_often(plant_library: Path, trial: str, count: int) -> None:
+def test_a_trial_with_many_repetitions_succeeds(
+    plant_library: Path, trial: str, count: int
+) -> None:
     assert outcome("endurance.py", str(plant_library), trial, str(count)).startswith(trial)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_random_calls_keep_to_the_standard_s_state_machine(plant_library: Path, seed: int) -> None:
-    """Nothing crashes, a refused call changes nothing and says why, a reset instance is a new
-    one, byte for byte.
+    """Nothing crashes, refused calls change nothing and log a message, and a reset instance equals
+    a new one byte for byte.
     """
     counts = outcome("fuzz.py", str(plant_library), str(seed), "1500")
     assert "0:" in counts  # some were legal

@@ -1,5 +1,6 @@
-"""The FMU through the standard's C interface: legal order, values, stepping, log. Physics is
-tested elsewhere.
+"""FMI 2.0 through the standard's C interface:
+
+order of calls, values, stepping, log. Physics is tested elsewhere.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ H = 0.005  # s, communication step
 NAN, INF = math.nan, math.inf
 
 
-def test_the_bare_file_passes_fmpy_validation(athena_fmu: Path) -> None:
+def test_the_fmu_passes_fmpy_validation(athena_fmu: Path) -> None:
     assert fmpy.validation.validate_fmu(str(athena_fmu)) == []
 
 
-def test_the_bare_file_stands_still_in_fmpy(athena_fmu: Path) -> None:
+def test_the_fmu_stands_still_in_fmpy(athena_fmu: Path) -> None:
     # m: the statics agree with the plant's equilibrium far better than a foot's 0.66 mm sinkage
     settled = 1e-5
     result = fmpy.simulate_fmu(str(athena_fmu), output=["torso.position[3]", "torso.roll"])
@@ -73,7 +74,7 @@ def test_every_function_of_the_standard_is_exported(plant_library: Path) -> None
         ("fmi2CancelStep", ()),
     ],
 )
-def test_what_is_not_offered_is_an_error_with_a_message(
+def test_functions_that_are_not_offered_return_an_error_with_a_message(
     running: Plant, function: str, arguments: tuple[object, ...]
 ) -> None:
     assert running.call(function, *arguments) == ERROR
@@ -179,7 +180,7 @@ def test_an_impossible_experiment_is_refused(plant: Plant, start: float, stop: f
 
 
 @pytest.mark.parametrize("tolerance", [NAN, -1.0, 0.0, 1e9])
-def test_a_nonsensical_tolerance_is_ignored_with_a_warning(plant: Plant, tolerance: float) -> None:
+def test_an_invalid_tolerance_is_ignored_with_a_warning(plant: Plant, tolerance: float) -> None:
     assert plant.call("fmi2SetupExperiment", 1, tolerance, 0.0, 0, 0.0) == WARNING
     assert plant.real("solver.tolerance") == ATHENA.variable("solver.tolerance").start
 
@@ -241,7 +242,7 @@ def test_a_start_too_late_for_the_clock_is_refused(plant: Plant, start: float) -
 
 
 @pytest.mark.parametrize("size", [1e-300, 1e-16, 1e-8])
-def test_a_step_that_does_not_move_the_clock_is_done_at_once(plant: Plant, size: float) -> None:
+def test_a_step_that_does_not_change_the_clock_succeeds(plant: Plant, size: float) -> None:
     before = plant.initialize(start=1e9).everything()
     assert plant.step(1e9, size) == OK
     assert plant.everything() == before
@@ -262,7 +263,7 @@ def test_a_step_that_the_plant_cannot_take_is_discarded_and_changes_nothing(runn
     assert running.step(0.0, H) == OK
 
 
-def test_status_inquiries_answer_what_there_is_and_discard_the_rest(running: Plant) -> None:
+def test_status_functions_return_known_values_and_discard_others(running: Plant) -> None:
     status, flag, number = ctypes.c_int(), ctypes.c_int(7), ctypes.c_double()
     assert running.step(0.0, NAN) == ERROR
     assert running.call("fmi2GetStatus", DO_STEP_STATUS, ctypes.byref(status)) == OK
@@ -274,7 +275,7 @@ def test_status_inquiries_answer_what_there_is_and_discard_the_rest(running: Pla
     assert running.call("fmi2GetIntegerStatus", DO_STEP_STATUS, None) == DISCARD
 
 
-def test_a_reset_forgets_the_last_step_s_status(running: Plant) -> None:
+def test_a_reset_clears_the_status_of_the_last_step(running: Plant) -> None:
     status = ctypes.c_int()
     assert running.step(0.0, NAN) == ERROR
     assert running.call("fmi2Reset") == OK
@@ -282,7 +283,7 @@ def test_a_reset_forgets_the_last_step_s_status(running: Plant) -> None:
     assert status.value == OK
 
 
-def test_the_log_holds_what_was_asked_for(plant_library: Path) -> None:
+def test_the_log_contains_the_chosen_categories(plant_library: Path) -> None:
     with Plant(plant_library) as quiet, Plant(plant_library, logging=True) as talking:
         quiet.initialize()
         talking.initialize()
@@ -343,6 +344,6 @@ def test_every_declared_log_category_is_known_and_no_other(plant: Plant) -> None
     assert "logRumours" in plant.last_message
 
 
-def test_messages_cannot_be_mistaken_for_printf_formats(plant_library: Path) -> None:
+def test_messages_contain_no_printf_formats(plant_library: Path) -> None:
     with Plant(plant_library, guid="%s%n#r1#") as plant:
         assert "%%s%%n##r1##" in plant.last_message

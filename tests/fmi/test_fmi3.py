@@ -1,5 +1,6 @@
-"""FMI 3.0 through the standard's C interface: the same plant as through FMI 2.0, arrays, events,
-legal order, refusals, saved states.
+"""FMI 3.0 through the standard's C interface:
+
+the plant of FMI 2.0, arrays, events, order of calls, refusals, saved states.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ NAN, INF = math.nan, math.inf
 
 
 def dropped(plant: Plant3) -> Plant3:
-    """Above the ground, pushed, ready to step."""
+    """Returns an instance above the ground, pushed, ready to step."""
     assert (
         plant.set({"initial.position": [0.0, 0.0, DROP], "torso.push_force": [PUSH, 0.0, 0.0]})
         == OK
@@ -39,7 +40,9 @@ def dropped(plant: Plant3) -> Plant3:
 
 
 def to_end(plant: Plant3, end: float, *, size: float = H, enter: bool = False) -> list[float]:
-    """Steps to a regular grid's points, going on after early returns; the times of events."""
+    """Steps to the points of a regular grid, continuing after early returns; returns the times of
+    events.
+    """
     time, k, events = 0.0, 1, []
     while time < end:
         step = plant.step(time, k * size - time)
@@ -65,7 +68,7 @@ def test_every_function_of_the_standard_is_exported(plant_library: Path) -> None
     assert library.fmi3GetVersion().startswith(b"3.0")
 
 
-def test_what_is_declared_is_what_these_tests_hold_it_to() -> None:
+def test_the_declared_capabilities_are_those_that_are_tested() -> None:
     declared = CAPABILITIES | CO_SIMULATION | MODEL_EXCHANGE
     offered = {name for name, value in declared.items() if value == "true"} | set(EVENTS)
     assert offered == {
@@ -78,7 +81,6 @@ def test_what_is_declared_is_what_these_tests_hold_it_to() -> None:
     }
 
 
-# -------------------------------------------------------------------------------------------------------------
 # the same plant
 
 
@@ -127,7 +129,6 @@ def test_time_is_the_independent_variable(running3: Plant3) -> None:
     assert "time" in running3.last_message
 
 
-# -------------------------------------------------------------------------------------------------------------
 # arrays
 
 
@@ -166,7 +167,7 @@ def test_an_array_s_name_is_the_pattern_s_without_axes(pattern: str, name: str) 
     assert array_name(pattern) == name
 
 
-def test_elements_go_where_fmi_2_has_them(plant3: Plant3, plant: Plant) -> None:
+def test_elements_are_stored_in_the_order_of_fmi_2(plant3: Plant3, plant: Plant) -> None:
     ref = np.arange(18.0).reshape(6, 3) / 20.0
     assert plant3.set({"angle_ref": ref, "torso.push_force": [1.0, 2.0, 3.0]}) == OK
     state = plant3.save()
@@ -235,7 +236,9 @@ def test_parameters_are_fixed_after_initialisation(running3: Plant3) -> None:
     "kind", ["Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "UInt64", "String"]
 )
 @pytest.mark.parametrize("verb", ["Get", "Set"])
-def test_types_that_no_variable_has_take_none(running3: Plant3, verb: str, kind: str) -> None:
+def test_functions_for_other_types_accept_no_variables(
+    running3: Plant3, verb: str, kind: str
+) -> None:
     one = (ctypes.c_uint * 1)(0)
     assert running3.call(f"fmi3{verb}{kind}", None, 0, None, 0) == OK
     assert running3.call(f"fmi3{verb}{kind}", one, 1, ctypes.create_string_buffer(8), 1) == ERROR
@@ -247,7 +250,6 @@ def test_null_arrays_are_refused_unless_empty(running3: Plant3) -> None:
     assert "NULL" in running3.last_message
 
 
-# -------------------------------------------------------------------------------------------------------------
 # stepping
 
 
@@ -255,7 +257,7 @@ def test_null_arrays_are_refused_unless_empty(running3: Plant3) -> None:
     ("time", "size"),
     [(0.0, NAN), (NAN, H), (0.0, INF), (0.0, -H), (0.0, 0.0), (0.0, 1e6), (1.0, H), (INF, H)],
 )
-def test_a_senseless_step_is_refused_and_changes_nothing(
+def test_an_invalid_step_is_refused_and_changes_nothing(
     plant_library: Path, time: float, size: float
 ) -> None:
     with Plant3(plant_library, early=True) as plant:
@@ -303,17 +305,16 @@ def test_inputs_may_change_in_event_mode(plant_library: Path) -> None:
     assert velocity(10.0 * PUSH) > velocity(PUSH)
 
 
-def test_without_event_mode_there_is_none(running3: Plant3) -> None:
+def test_event_mode_is_refused_when_it_was_not_requested(running3: Plant3) -> None:
     assert running3.call("fmi3EnterEventMode") == ERROR
     assert "eventModeUsed" in running3.last_message
     assert running3.step(0.0, H) == (OK, False, False, False, H)
 
 
-# -------------------------------------------------------------------------------------------------------------
 # saved states
 
 
-def test_a_restored_state_goes_on_bit_for_bit_also_after_an_early_return(
+def test_a_restored_state_continues_bit_for_bit_also_after_an_early_return(
     plant_library: Path,
 ) -> None:
     with Plant3(plant_library, early=True) as plant, Plant3(plant_library, early=True) as other:
@@ -345,7 +346,7 @@ def test_damaged_bytes_are_refused(running3: Plant3) -> None:
     running3.free(state)
 
 
-def test_a_state_saved_in_event_mode_goes_on_where_there_is_none(
+def test_a_state_saved_in_event_mode_continues_in_an_instance_without_it(
     plant3: Plant3, plant_library: Path
 ) -> None:
     with Plant3(plant_library, events=True) as other:

@@ -1,5 +1,7 @@
-"""The FMI 3.0 FMU as a file: what fmpy and the standard's schemas say, runs by fmpy against FMI
-2.0, sources, terminals, derivatives.
+"""The FMI 3.0 FMU as a file:
+
+validation by fmpy and the standard's schemas, runs by fmpy compared with FMI 2.0, sources,
+terminals, derivatives.
 """
 
 from __future__ import annotations
@@ -45,7 +47,7 @@ def exported3(plant_build: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 
 def run2(path: Path, **options: Any) -> NDArray[np.float64]:
-    """The last row of an FMI 2.0 run, as run3's."""
+    """Returns the last row of an FMI 2.0 run."""
     result = fmpy.simulate_fmu(
         str(path),
         stop_time=STOP,
@@ -58,7 +60,7 @@ def run2(path: Path, **options: Any) -> NDArray[np.float64]:
 
 
 def run3(path: Path, **options: Any) -> NDArray[np.float64]:
-    """The last row of an FMI 3.0 run: the elements that SEEN2 names."""
+    """Returns the last row of an FMI 3.0 run: the elements that SEEN2 names."""
     result = fmpy.simulate_fmu(
         str(path),
         stop_time=STOP,
@@ -90,7 +92,7 @@ def test_documents_follow_the_standard_s_schemas(exported3: Path, member: str, s
     assert rules.validate(document), rules.error_log
 
 
-def test_the_archive_is_laid_out_as_fmi_3_has_it(exported3: Path) -> None:
+def test_the_archive_has_the_folders_of_fmi_3(exported3: Path) -> None:
     with zipfile.ZipFile(exported3) as archive:
         names = set(archive.namelist())
     library = f"binaries/{fmpy.platform_tuple}/hexapod{fmpy.sharedLibraryExtension}"
@@ -104,7 +106,7 @@ def test_the_archive_is_laid_out_as_fmi_3_has_it(exported3: Path) -> None:
     assert not names & {"sources/fmi/fmi2.c", "model.png"}  # of FMI 2
 
 
-def test_the_bare_file_stands_still_in_fmpy(exported3: Path) -> None:
+def test_the_fmu_stands_still_in_fmpy(exported3: Path) -> None:
     settled = 1e-5  # m
     height = fmpy.simulate_fmu(str(exported3), output=["torso.position"], stop_time=0.5)[
         "torso.position"
@@ -134,7 +136,7 @@ def test_early_returns_change_nothing_but_rounding(
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
 
 
-def test_a_foreign_solver_gets_the_same_from_both_versions(
+def test_another_solver_gets_equal_results_from_both_versions(
     exported3: Path, athena_fmu: Path
 ) -> None:
     options = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-6}
@@ -163,7 +165,6 @@ def test_terminals_hold_known_variables(exported3: Path) -> None:
     assert set(members) <= set(ARRAYS)
 
 
-# -------------------------------------------------------------------------------------------------------------
 # structure
 
 

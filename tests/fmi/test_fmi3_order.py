@@ -1,4 +1,4 @@
-"""FMI 3.0: instantiation, the standard's order of calls, what is not offered, reset."""
+"""FMI 3.0: instantiation, order of calls, functions that are not offered, reset."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ LEADS = {
 
 
 def mode_after(call: tuple[object, ...], mode: str, walk: str) -> str:
-    """The mode that a legal call leads to."""
+    """Returns the mode after a legal call."""
     name = str(call[0]).removeprefix("fmi3")
     if name == "ExitInitializationMode":
         return "run" if walk == "plain" else "event"
@@ -158,7 +158,7 @@ def mode_after(call: tuple[object, ...], mode: str, walk: str) -> str:
 
 
 @pytest.mark.parametrize("walk", WALKS)
-def test_calls_are_taken_in_the_standard_s_order_alone(plant_library: Path, walk: str) -> None:
+def test_calls_are_legal_in_the_standard_s_order_only(plant_library: Path, walk: str) -> None:
     kind, events, calls = WALKS[walk]
     mode, seen = "", set()
     with Plant3(plant_library, kind=kind, events=events) as plant:
@@ -190,7 +190,7 @@ NOT_OFFERED: tuple[tuple[object, ...], ...] = (
 
 
 @pytest.mark.parametrize("call", NOT_OFFERED, ids=lambda call: str(call[0]))
-def test_what_is_not_offered_is_an_error_with_a_message(
+def test_functions_that_are_not_offered_return_an_error_with_a_message(
     running3: Plant3, call: tuple[object, ...]
 ) -> None:
     assert running3.call(str(call[0]), *call[1:]) == ERROR
@@ -219,7 +219,7 @@ def test_there_are_no_clocks(running3: Plant3, function: str) -> None:
     assert running3.call(function, (ctypes.c_uint * 1)(0), 1, *places) == ERROR
 
 
-def test_reset_is_as_new(plant_library: Path) -> None:
+def test_a_reset_instance_equals_a_new_one(plant_library: Path) -> None:
     def saved(prepare: Callable[[Plant3], object]) -> bytes:
         with Plant3(plant_library) as plant:
             prepare(plant)
@@ -236,7 +236,7 @@ def test_reset_is_as_new(plant_library: Path) -> None:
     assert saved(used) == saved(lambda plant: None)
 
 
-def test_a_senseless_tolerance_is_only_a_warning(plant3: Plant3) -> None:
+def test_an_invalid_tolerance_is_a_warning(plant3: Plant3) -> None:
     assert plant3.enter_initialization(tolerance=-1.0) == WARNING
     assert plant3.call("fmi3ExitInitializationMode") == OK
 
@@ -244,9 +244,7 @@ def test_a_senseless_tolerance_is_only_a_warning(plant3: Plant3) -> None:
 @pytest.mark.parametrize(
     ("start", "stop"), [(NAN, None), (INF, None), (0.0, NAN), (1.0, 0.5), (1e12, None)]
 )
-def test_a_senseless_experiment_is_refused(
-    plant3: Plant3, start: float, stop: float | None
-) -> None:
+def test_an_invalid_experiment_is_refused(plant3: Plant3, start: float, stop: float | None) -> None:
     assert plant3.enter_initialization(start, stop) == ERROR
     assert "fmi3EnterInitializationMode" in plant3.last_message
     assert plant3.enter_initialization() == OK

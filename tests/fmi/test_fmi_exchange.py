@@ -1,4 +1,4 @@
-"""Model exchange, derivatives and dependencies: the FMU for solvers and tools of others."""
+"""Model exchange, derivatives and dependencies: the FMU with other solvers and tools."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class EventInfo(ctypes.Structure):
 
 @pytest.fixture
 def solved(plant_library: Path) -> Iterator[Plant]:
-    """An instance for model exchange, initialised: in event mode."""
+    """Returns an initialized instance for model exchange, in event mode."""
     with Plant(plant_library, kind=MODEL_EXCHANGE) as instance:
         yield instance.initialize()
 
@@ -65,7 +65,7 @@ def put_states(plant: Plant, x: Array) -> int:
 def directional(
     plant: Plant, unknowns: Sequence[str], knowns: Sequence[str], change: Sequence[float] | Array
 ) -> tuple[int, Array]:
-    """Status and derivatives of the unknowns."""
+    """Returns status and derivatives of the unknowns."""
     wanted, given = ATHENA.references(unknowns), ATHENA.references(knowns)
     result = doubles(np.full(len(wanted), np.nan))
     status = plant.call(
@@ -110,8 +110,7 @@ def output_rates(plant: Plant, names: Sequence[str]) -> Array:
     return np.array(result)
 
 
-# ---- a solver of others
-# ------------------------------------------------------------------------------------------------------
+# ---- other solvers
 
 THROWN = {
     "initial.position[3]": 0.15,
@@ -122,7 +121,7 @@ CONVERGED = 2e-9  # m, rad    both solvers at 1e-9; twelve touch-downs multiply 
 
 
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_a_solver_of_others_finds_the_same_motion(athena_fmu: Path, law: str) -> None:
+def test_another_solver_finds_the_same_motion(athena_fmu: Path, law: str) -> None:
     names = [
         *STATES[:7],
         *(f"{leg}.{joint}.angle" for leg in LEGS for joint in ("coxa", "femur", "tibia")),
@@ -144,9 +143,9 @@ def test_a_solver_of_others_finds_the_same_motion(athena_fmu: Path, law: str) ->
         np.testing.assert_allclose(theirs[name], ours[name], atol=CONVERGED, err_msg=name)
 
 
-def test_a_solver_of_others_measures_what_ours_does(athena_fmu: Path) -> None:
-    """fmpy calls fmi2CompletedIntegratorStep at every output; the measures are of the path
-    between these calls.
+def test_measures_with_another_solver_equal_those_of_co_simulation(athena_fmu: Path) -> None:
+    """fmpy calls fmi2CompletedIntegratorStep at every output; the measures follow the path between
+    these calls.
     """
     summed = ("positive_work", "negative_work", "torque_squared")
     names = [
@@ -189,7 +188,7 @@ def test_a_solver_of_others_measures_what_ours_does(athena_fmu: Path) -> None:
         assert sums[0] > 0.0, name
 
 
-def test_a_walk_s_commands_lead_a_solver_of_others_the_same_way(athena_fmu: Path) -> None:
+def test_the_commands_of_a_walk_give_the_same_path_with_another_solver(athena_fmu: Path) -> None:
     t = np.linspace(0.0, 0.2, 201)
     columns = {
         "time": t,
@@ -233,7 +232,6 @@ def test_a_walk_s_commands_lead_a_solver_of_others_the_same_way(athena_fmu: Path
 
 
 # ---- states and events
-# -------------------------------------------------------------------------------------------------------
 
 
 def test_the_states_are_the_variables_that_show_them(solved: Plant) -> None:
@@ -259,7 +257,7 @@ def test_states_that_are_set_are_shown(solved: Plant) -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
-def test_states_that_are_none_are_discarded_and_change_nothing(solved: Plant, bad: float) -> None:
+def test_invalid_states_are_discarded_and_change_nothing(solved: Plant, bad: float) -> None:
     assert solved.call("fmi2EnterContinuousTimeMode") == OK
     x, seen = fetched(solved, "fmi2GetContinuousStates", len(STATES)), solved.everything()
     for place, value in ((20, bad), (slice(3, 7), 0.0)):
@@ -308,8 +306,8 @@ def test_indicators_are_the_feet_s_penetrations_and_an_event_closes_a_foot(solve
 def test_feet_at_the_ground_s_surface_stand_on_it(
     plant_library: Path, athena_fmu: Path, depth: float, speed: float
 ) -> None:
-    """An event's indicator never contradicts the contact, so no foot is lost that starts, rests
-    or turns round within 0.1 nm.
+    """An event indicator agrees with the contact, so no foot is lost that starts, rests or reverses
+    within 0.1 nm of the ground.
     """
     with Plant(plant_library, kind=MODEL_EXCHANGE) as plant:
         plant.set_reals({"solver.tolerance": 1e-8})
@@ -427,7 +425,6 @@ def test_no_integrator_step_needs_an_event(solved: Plant) -> None:
 
 
 # ---- directional derivatives
-# -------------------------------------------------------------------------------------------------
 
 
 def test_derivatives_of_many_knowns_are_the_sum_of_each_one_s(running: Plant) -> None:
@@ -489,7 +486,6 @@ def test_a_direction_that_is_not_finite_is_refused(running: Plant) -> None:
 
 
 # ---- derivatives of inputs and outputs
-# ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("mode", [1, 3])
@@ -531,10 +527,10 @@ def test_an_input_that_moves_is_the_limit_of_one_that_is_set_often(
     )  # of order 2 in the step, which is longer in one piece
 
 
-def test_a_drive_goes_on_at_its_speed_while_another_s_angle_moves_by_itself(
+def test_a_kinematic_joint_keeps_its_speed_while_another_one_s_angle_has_a_rate(
     plant_library: Path,
 ) -> None:
-    """In kinematic mode a derivative of one angle_ref is no business of the others."""
+    """In kinematic mode a derivative of one angle_ref does not affect other joints."""
     angles = []
     for rates in ({}, {"LF.coxa.angle_ref": 0.1}):
         with Plant(plant_library) as plant:
@@ -549,7 +545,7 @@ def test_a_drive_goes_on_at_its_speed_while_another_s_angle_moves_by_itself(
     assert angles[0] == pytest.approx(angles[1], abs=1e-6)
 
 
-def test_a_moving_input_ends_where_it_has_moved_to_and_then_stays(running: Plant) -> None:
+def test_an_input_with_a_rate_keeps_its_value_at_the_end_of_the_step(running: Plant) -> None:
     assert set_rates(running, {"torso.push_force[1]": 100.0}) == OK
     assert running.step(0.0, 0.01) == OK
     assert running.real("torso.push_force[1]") == pytest.approx(1.0)
@@ -557,7 +553,7 @@ def test_a_moving_input_ends_where_it_has_moved_to_and_then_stays(running: Plant
     assert running.real("torso.push_force[1]") == pytest.approx(1.0)
 
 
-def test_rates_of_inputs_that_cannot_be_are_refused_whole(running: Plant) -> None:
+def test_invalid_rates_of_inputs_are_refused_together(running: Plant) -> None:
     before = running.everything()
     assert set_rates(running, {"torso.push_force[1]": 1.0, "torso.push_force[2]": np.nan}) == ERROR
     assert "derivative of torso.push_force[2]: got nan" in running.last_message
@@ -606,7 +602,6 @@ def test_rates_of_outputs_are_their_slopes_over_time(running: Plant) -> None:
 
 
 # ---- dependencies
-# ------------------------------------------------------------------------------------------------------------
 
 VARIANTS: tuple[dict[str, float], ...] = (
     {},
@@ -616,7 +611,7 @@ VARIANTS: tuple[dict[str, float], ...] = (
 
 
 def moved(library: Path, variant: dict[str, float], *, initialize: bool = True) -> Plant:
-    """An instance in a skew posture, moving, with all feet deep in soft ground."""
+    """Returns a moving instance in a skew posture, with all feet deep in soft ground."""
     plant, rng = Plant(library), np.random.default_rng(5)
     soft = {
         "contact.law": 5,
@@ -640,7 +635,7 @@ def moved(library: Path, variant: dict[str, float], *, initialize: bool = True) 
     return plant.initialize() if initialize else plant
 
 
-def test_what_unknowns_depend_on_is_what_the_description_says(plant_library: Path) -> None:
+def test_dependencies_of_unknowns_are_those_of_the_description(plant_library: Path) -> None:
     knowns = [*STATES, *INPUTS]
     seen = np.zeros((len(UNKNOWNS), len(knowns)), dtype=bool)
     for variant in VARIANTS:
@@ -667,16 +662,14 @@ def test_what_unknowns_depend_on_is_what_the_description_says(plant_library: Pat
 
 
 def kinds(names: Iterable[str]) -> set[str]:
-    """Names without their index."""
+    """Returns names without their index."""
     return {name.partition("[")[0] for name in names}
 
 
-def test_what_unknowns_depend_on_at_the_start_is_what_the_description_says(
+def test_initial_dependencies_of_unknowns_are_those_of_the_description(
     plant_library: Path,
 ) -> None:
-    """Each parameter is changed by itself; a kink may hide one direction of a change, so both
-    are tried.
-    """
+    """Each parameter is changed separately in both directions, since a kink may hide one."""
     names = [
         *(
             variable.name

@@ -1,5 +1,6 @@
-"""What importers really do, as far as test_fmi.py and test_export.py do not have it: odd
-arguments, odd clocks, odd endings.
+"""Behaviour of real importers that test_fmi.py and test_export.py do not cover:
+
+unusual arguments, clocks and ends.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ SETTABLE = {"Real": "fmi2SetReal", "Enumeration": "fmi2SetInteger", "Boolean": "
 
 @pytest.fixture
 def another(tmp_path: Path) -> tuple[str, Path]:
-    """GUID and resources of a robot that is not the compiled-in one."""
+    """Returns GUID and resources of a robot other than the compiled-in one."""
     interface = load_interface(load_robot("phantomx_mk4"))
     guid = render_fmi2(interface).guid
     folder = tmp_path / "größe 100% %41" / "resources"
@@ -38,7 +39,7 @@ def another(tmp_path: Path) -> tuple[str, Path]:
 
 
 def set_starts(plant: Plant) -> None:
-    """Every variable that has a start value, set to it, type by type."""
+    """Sets every variable with a start value to it, type by type."""
     for kind, function in SETTABLE.items():
         variables = [
             variable
@@ -111,7 +112,7 @@ def test_callbacks_may_all_be_missing(plant_library: Path) -> None:
     assert (
         library.fmi2DoStep(ctypes.c_void_p(instance), ctypes.c_double(0.0), ctypes.c_double(H), 1)
         == ERROR
-    )  # with nobody to tell
+    )  # without a logger
     library.fmi2FreeInstance(ctypes.c_void_p(instance))
 
 
@@ -191,9 +192,7 @@ def test_start_values_set_back_in_either_mode_change_nothing(
 def test_what_was_read_in_one_instance_can_be_set_in_another(
     running: Plant, plant_library: Path
 ) -> None:
-    """Importers keep start values in double or text; values of an instance survive the way back
-    bit for bit.
-    """
+    """Importers keep start values as double or text; values survive the conversion bit for bit."""
     names = [
         variable.name
         for variable in ATHENA.of_causality("input", "parameter")
@@ -256,10 +255,10 @@ def test_a_first_step_may_miss_the_start_time_by_its_last_bit(
 
 @pytest.mark.parametrize("summed", [True, False])
 @pytest.mark.parametrize(("size", "count"), [(1.0 / 60.0, 5000), (0.1, 3000)])
-def test_the_clock_is_the_importer_s_over_many_steps(
+def test_the_clock_follows_the_importer_over_many_steps(
     plant: Plant, size: float, count: int, summed: bool
 ) -> None:
-    """`make test-endurance` takes a million of them."""
+    """`make test-endurance` runs a million steps."""
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 1, count * size) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     assert plant.call("fmi2ExitInitializationMode") == OK
@@ -278,7 +277,7 @@ def test_a_clock_that_is_a_sum_of_a_million_steps_reaches_the_stop_time(
     for _ in range(1_000_000):
         total += size
     assert abs(total - 1e6 * size) > 1e-9 * size  # what an importer that sums is off by
-    start = total - size  # as if it had gone there
+    start = total - size  # as after a step to the stop time
     assert plant.call("fmi2SetupExperiment", 0, 0.0, start, 1, 1e6 * size) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     assert plant.call("fmi2ExitInitializationMode") == OK
@@ -305,7 +304,7 @@ def test_instances_are_freed_in_any_mode(plant_library: Path) -> None:
             assert [plant.call(function) for function in way] == [OK] * len(way)
 
 
-def test_states_taken_at_every_step_and_never_freed_cost_their_own_bytes_alone(
+def test_states_saved_at_every_step_take_only_the_memory_of_their_bytes(
     running: Plant,
 ) -> None:
     steps, states = 2000, []
@@ -323,7 +322,7 @@ def test_states_taken_at_every_step_and_never_freed_cost_their_own_bytes_alone(
         running.free(state)
 
 
-def test_a_state_may_be_freed_twice_or_not_be_there(running: Plant) -> None:
+def test_a_state_may_be_freed_twice_or_be_null(running: Plant) -> None:
     state = running.save()
     running.free(state)
     running.free(state)
@@ -347,8 +346,8 @@ def test_fmpy_runs_an_fmu_unpacked_anywhere(
     )
 
 
-def test_a_walk_goes_on_after_every_kind_of_refusal(running: Plant, plant_library: Path) -> None:
-    """An importer that carries on regardless gets what one without mistakes gets."""
+def test_a_walk_continues_after_every_kind_of_refusal(running: Plant, plant_library: Path) -> None:
+    """An importer that ignores errors gets the results of one without errors."""
     mistakes: list[Callable[[], int]] = [
         lambda: running.step(math.nan, H),
         lambda: running.step(0.0, -H),

@@ -1,4 +1,4 @@
-"""Saved states, reset, several instances: the FMU's bytes are its state."""
+"""Saved states, reset and several instances: the state is in the FMU's bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def plant(plant_library: Path) -> Iterator[Plant]:
 
 
 def walk(plant: Plant, first: int, last: int) -> list[list[float]]:
-    """Steps first..last - 1 under inputs that differ from step to step."""
+    """Takes steps first..last - 1 under inputs that differ from step to step."""
     trace = []
     for k in range(first, last):
         assert (
@@ -35,7 +35,7 @@ def walk(plant: Plant, first: int, last: int) -> list[list[float]]:
     return trace
 
 
-def test_a_restored_state_goes_on_bit_for_bit(plant: Plant) -> None:
+def test_a_restored_state_continues_bit_for_bit(plant: Plant) -> None:
     walk(plant, 0, 10)
     state = plant.save()
     first = walk(plant, 10, 20)
@@ -44,7 +44,7 @@ def test_a_restored_state_goes_on_bit_for_bit(plant: Plant) -> None:
     plant.free(state)
 
 
-def test_a_serialized_state_goes_on_in_another_instance_bit_for_bit(
+def test_a_serialized_state_continues_in_another_instance_bit_for_bit(
     plant: Plant, plant_library: Path
 ) -> None:
     walk(plant, 0, 10)
@@ -93,10 +93,8 @@ def test_a_single_damaged_byte_is_refused_and_changes_nothing(plant: Plant, plac
 
 @pytest.mark.parametrize("mask", [0x80, 0x40, 0x01])
 @pytest.mark.parametrize("places", [(207, 1207), (1207, 1215), (-1001, -9), (-17, -1)])
-def test_two_damaged_bytes_do_not_make_up_for_each_other(
-    plant: Plant, places: tuple[int, int], mask: int
-) -> None:
-    """Among them the last bytes of words, where signs are, and neighbours."""
+def test_two_damaged_bytes_do_not_cancel(plant: Plant, places: tuple[int, int], mask: int) -> None:
+    """Among them are the last bytes of words, which hold signs, and neighbours."""
     state = plant.save()
     data = bytearray(plant.serialize(state))
     for place in places:
@@ -133,7 +131,7 @@ def test_a_block_that_is_no_saved_state_is_refused(plant: Plant) -> None:
     plant.free(state)
 
 
-def test_a_reset_instance_is_as_good_as_new(plant: Plant, plant_library: Path) -> None:
+def test_a_reset_instance_equals_a_new_one(plant: Plant, plant_library: Path) -> None:
     assert plant.set_reals(PUSH) == OK
     walk(plant, 0, 20)
     assert plant.call("fmi2Reset") == OK
@@ -154,7 +152,7 @@ def test_a_reset_undoes_parameters(plant: Plant) -> None:
     assert plant.real("torso.mass") == mass
 
 
-def test_interleaved_instances_do_not_see_each_other(plant: Plant, plant_library: Path) -> None:
+def test_interleaved_instances_are_independent(plant: Plant, plant_library: Path) -> None:
     alone = walk(plant, 0, 20)
     with Plant(plant_library, name="a") as first, Plant(plant_library, name="b") as second:
         first.initialize()

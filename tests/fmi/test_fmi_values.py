@@ -1,5 +1,6 @@
-"""Values through the standard's C interface: what is refused, and that a refusal changes
-nothing.
+"""Values through the standard's C interface:
+
+which are refused, and that a refusal changes nothing.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ RELATED = [
 
 
 def started(plant: Plant) -> int:
-    """Status of the way into step mode."""
+    """Returns the status of the calls up to step mode."""
     assert plant.call("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0) == OK
     assert plant.call("fmi2EnterInitializationMode") == OK
     return plant.call("fmi2ExitInitializationMode")
@@ -140,7 +141,7 @@ def test_an_enumeration_takes_its_numbers_only(plant: Plant) -> None:
     assert plant.get_references("fmi2GetInteger", law) == (OK, [6])
 
 
-def test_empty_batches_are_fine_and_missing_arrays_are_not(running: Plant) -> None:
+def test_empty_batches_are_accepted_and_missing_arrays_are_refused(running: Plant) -> None:
     none, one = ctypes.c_size_t(0), ctypes.c_size_t(1)
     for kind in ("Real", "Integer", "Boolean", "String"):
         assert running.call(f"fmi2Get{kind}", None, none, None) == OK
@@ -153,7 +154,7 @@ def test_parameters_are_fixed_after_initialization(running: Plant) -> None:
     assert "fixed" in running.last_message
 
 
-def test_a_model_that_cannot_be_is_told_at_the_end_of_initialization_and_can_be_corrected(
+def test_an_invalid_model_is_refused_at_the_end_of_initialization_and_can_be_corrected(
     plant: Plant,
 ) -> None:
     assert plant.set_reals({"torso.inertia_zz": 1.0}) == OK

@@ -1,5 +1,5 @@
-"""`make test-importers` passes when every foreign tool that could be installed ran and agrees,
-and not else; adapters are made up here.
+"""`make test-importers` passes exactly when every other tool that could be installed ran and
+agrees. The adapters of these tests are scripts.
 """
 
 from __future__ import annotations
@@ -21,10 +21,7 @@ from tools.importers.packages import TOOLS, PackageRow
 from tools.importers.walk import STEP, Walk
 
 PYTHON = Path(sys.executable)
-HERE, NOWHERE = (
-    ("numpy",),
-    ("no-such-distribution",),
-)  # packages: one of this environment, and none of any
+INSTALLED, MISSING = ("numpy",), ("no-such-distribution",)  # packages of tools
 # each is called with FMU INPUTS NAMES OUTPUTS
 ADAPTERS = {
     "right": "import shutil, sys; shutil.copy(sys.argv[2], sys.argv[4])",
@@ -40,8 +37,8 @@ ADAPTERS = {
 FAILING = [name for name in ADAPTERS if name != "right"]
 
 
-class Told(Walk):
-    """A walk that needs no FMU: its reference is what it was told, whatever the times."""
+class ReplayedWalk(Walk):
+    """A walk without an FMU, whose replay returns the reference."""
 
     def replay(self, ends: NDArray[np.float64], steps: NDArray[np.float64]) -> Recording:
         return self.reference
@@ -57,7 +54,7 @@ def walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Walk:
         ("time", f"{PLANT}.x"), np.array([[STEP, 1.0], [2 * STEP, 2.0], [3 * STEP, 4.0]])
     )
     write_csv(reference, inputs)
-    return Told(
+    return ReplayedWalk(
         folder=tmp_path,
         fmu=none,
         inputs=inputs,
@@ -67,21 +64,21 @@ def walk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Walk:
     )
 
 
-def importers(walk: Walk, *adapters: str, of: Sequence[str] = HERE) -> list[Row]:
+def importers(walk: Walk, *adapters: str, of: Sequence[str] = INSTALLED) -> list[Row]:
     return [
-        compare.through(Importer(name, tuple(of), f"{name}.py", ""), walk, PYTHON)
+        compare.run_importer(Importer(name, tuple(of), f"{name}.py", ""), walk, PYTHON)
         for name in adapters
     ]
 
 
-def tools(walk: Walk, *adapters: str, of: Sequence[str] = HERE) -> list[PackageRow]:
+def tools(walk: Walk, *adapters: str, of: Sequence[str] = INSTALLED) -> list[PackageRow]:
     masters = [Recording(("time", "x"), walk.reference.data)] * 2
     outputs, none = walk.folder / "package.csv", walk.folder / "none"
     commands = [
         [PYTHON, walk.folder / f"{name}.py", none, walk.inputs, none, outputs] for name in adapters
     ]
     return [
-        packages.through(name, of, command, outputs, masters, ["x"])
+        packages.run_tool(name, of, command, outputs, masters, ["x"])
         for name, command in zip(adapters, commands, strict=True)
     ]
 
@@ -112,15 +109,15 @@ def test_a_tool_for_packages_that_was_installed_and_fails_does_not_pass(
     assert verdict(importers(walk, *RIGHT), tools(walk, "right", adapter), ours=[]) == 1
 
 
-def test_what_an_earlier_run_left_is_no_answer(walk: Walk) -> None:
+def test_outputs_of_an_earlier_run_are_ignored(walk: Walk) -> None:
     (walk.folder / "silent.csv").write_bytes(walk.inputs.read_bytes())
     (walk.folder / "package.csv").write_bytes(walk.inputs.read_bytes())
     assert not importers(walk, "silent")[0].agrees
     assert not tools(walk, "silent")[0].agrees
 
 
-def test_what_could_not_be_installed_passes_with_a_remark(walk: Walk) -> None:
-    absent, absent_tool = importers(walk, "crashes", of=NOWHERE), tools(walk, "crashes", of=NOWHERE)
+def test_tools_that_could_not_be_installed_pass_with_a_remark(walk: Walk) -> None:
+    absent, absent_tool = importers(walk, "crashes", of=MISSING), tools(walk, "crashes", of=MISSING)
     assert "could not be installed: no-such-distribution" in absent[0].remark
     assert "could not be installed" in absent_tool[0].trouble
     assert (
@@ -131,7 +128,7 @@ def test_what_could_not_be_installed_passes_with_a_remark(walk: Walk) -> None:
         )
         == 0
     )
-    without_rust = compare.through(
+    without_rust = compare.run_importer(
         Importer("crashes", (), "crashes.py", ""),
         walk,
         PYTHON,

@@ -1,4 +1,4 @@
-"""interface.toml: the contract's names, and nothing in the repository that contradicts it."""
+"""interface.toml: it contains the agreed names, and generated files agree with it."""
 
 from __future__ import annotations
 
@@ -28,25 +28,37 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 # the names that other tools rely on; L, J, i and I stand for legs, joints, indices and inertia
 # entries
 CONTRACT = {
-    "input": "L.J.angle_ref L.J.speed_ref L.J.torque_ref torso.push_force[3] torso.push_torque[3] L.J.acceleration_ref",
+    "input": (
+        "L.J.angle_ref L.J.speed_ref L.J.torque_ref torso.push_force[3] torso.push_torque[3] "
+        "L.J.acceleration_ref"
+    ),
     "output": "L.J.angle L.J.speed L.J.torque L.J.reaction_force[3] L.J.reaction_torque[3] "
-    "L.foot.force[3] L.foot.normal_force L.foot.tangential_force L.foot.position[3] L.foot.velocity[3] L.foot.slip_speed "
+    "L.foot.force[3] L.foot.normal_force L.foot.tangential_force L.foot.position[3] "
+    "L.foot.velocity[3] L.foot.slip_speed "
     "L.foot.bristle[3] L.foot.penetration L.foot.contact L.foot.impact_speed "
     "torso.position[3] torso.quaternion[4] torso.roll torso.pitch torso.yaw "
     "torso.velocity[3] torso.angular_velocity[3] imu.specific_force[3] imu.angular_velocity[3] "
-    "energy.kinetic energy.potential energy.actuator_work energy.dissipated energy.residual energy.push_work "
-    "constraint.position_error constraint.velocity_error solver.evaluations solver.steps solver.rejected solver.touchdowns "
-    "L.J.positive_work L.J.negative_work L.J.torque_squared L.foot.slip_distance L.foot.impulse L.foot.peak_force "
-    "L.foot.peak_force_rate L.foot.landing_rate L.foot.landings energy.contact_loss energy.friction_loss energy.gear_loss "
-    "feet.cone_time[31]",
+    "energy.kinetic energy.potential energy.actuator_work energy.dissipated energy.residual "
+    "energy.push_work "
+    "constraint.position_error constraint.velocity_error solver.evaluations solver.steps "
+    "solver.rejected solver.touchdowns "
+    "L.J.positive_work L.J.negative_work L.J.torque_squared L.foot.slip_distance "
+    "L.foot.impulse L.foot.peak_force "
+    "L.foot.peak_force_rate L.foot.landing_rate L.foot.landings energy.contact_loss "
+    "energy.friction_loss energy.gear_loss feet.cone_time[31]",
     "parameter": "torso.mass torso.com[3] torso.inertia_I "
     "L.J.mass L.J.length L.J.offset_y L.J.offset_z L.J.com[3] L.J.inertia_I L.J.axis[3] "
-    "L.hip_position[3] L.hip_yaw foot.radius contact.law contact.stiffness contact.restitution contact.damping_factor "
-    "contact.impact_speed_floor friction.law friction.mu friction.slope friction.presliding friction.bristle_damping "
-    "servo.mode servo.kp servo.kd servo.torque_max servo.speed_max servo.rotor_inertia servo.coulomb_friction "
+    "L.hip_position[3] L.hip_yaw foot.radius contact.law contact.stiffness "
+    "contact.restitution contact.damping_factor "
+    "contact.impact_speed_floor friction.law friction.mu friction.slope friction.presliding "
+    "friction.bristle_damping "
+    "servo.mode servo.kp servo.kd servo.torque_max servo.speed_max servo.rotor_inertia "
+    "servo.coulomb_friction "
     "baumgarte.alpha baumgarte.beta gravity[3] solver.method solver.step solver.tolerance "
-    "solver.step_max terrain.kind terrain.height terrain.incline terrain.heading initial.position[3] initial.quaternion[4] "
-    "initial.velocity[3] initial.angular_velocity[3] initial.L.J.angle initial.L.J.speed friction.mu_static friction.stribeck_speed",
+    "solver.step_max terrain.kind terrain.height terrain.incline terrain.heading "
+    "initial.position[3] initial.quaternion[4] "
+    "initial.velocity[3] initial.angular_velocity[3] initial.L.J.angle initial.L.J.speed "
+    "friction.mu_static friction.stribeck_speed",
 }
 
 
@@ -102,9 +114,7 @@ def test_no_two_variables_share_a_field_and_each_is_named_after_its_own() -> Non
         ] == [], variable.name
 
 
-def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nominal_that_is_not_zero() -> (
-    None
-):
+def test_every_variable_has_a_description_and_every_real_a_unit_and_a_nonzero_nominal() -> None:
     for variable in ATHENA.variables:
         assert variable.description, variable.name
         if variable.type == "Real":
@@ -121,7 +131,7 @@ def test_start_values_are_those_of_the_robot() -> None:
     assert ATHENA.variable("contact.law").start == 1
 
 
-def test_an_unknown_name_is_answered_with_the_nearest() -> None:
+def test_an_unknown_name_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(HexapodError, match=r"LF\.coxa\.angle_ref"):
         ATHENA.references(["LF.coxa.angel_ref"])
 
@@ -135,7 +145,7 @@ def test_a_robot_that_does_not_fit_its_variables_is_refused() -> None:
         load_interface(impossible)
 
 
-def test_the_guid_follows_every_number_of_the_robot() -> None:
+def test_the_guid_depends_on_every_number_of_the_robot() -> None:
     robot = load_robot("athena")
     heavier = dataclasses.replace(
         robot, torso=dataclasses.replace(robot.torso, mass=robot.torso.mass * (1 + 1e-15))
@@ -145,7 +155,7 @@ def test_the_guid_follows_every_number_of_the_robot() -> None:
     assert render_fmi2(load_interface(load_robot("athena"))).guid == GUID
 
 
-def test_the_guid_follows_every_unit_and_description() -> None:
+def test_the_guid_depends_on_every_unit_and_description() -> None:
     for change in ({"unit": "g"}, {"description": "other"}, {"maximum": 9.0}, {"reference": 9999}):
         first = dataclasses.replace(ATHENA.variables[0], **change)
         changed = dataclasses.replace(ATHENA, variables=(first, *ATHENA.variables[1:]))
@@ -158,7 +168,9 @@ def test_generated_files_are_what_the_generator_makes() -> None:
     assert process.returncode == 0, process.stdout + process.stderr
 
 
-def test_a_stale_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_not_up_to_date_is_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     generator = load_generator()
     monkeypatch.setattr(generator, "ROOT", tmp_path)
     for path, text in generator.stale_files().items():
@@ -173,7 +185,7 @@ def test_a_stale_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         changed.write_text(kept, encoding="utf-8")
 
 
-def test_the_model_description_tells_what_the_interface_says(athena_fmu: Path) -> None:
+def test_the_model_description_agrees_with_the_interface(athena_fmu: Path) -> None:
     description = fmpy.read_model_description(str(athena_fmu))
     assert description.guid == GUID
     for variable, told in zip(ATHENA.variables, description.modelVariables, strict=True):

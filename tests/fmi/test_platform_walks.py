@@ -1,5 +1,5 @@
-"""The FMU's binaries for all platforms that run here, under emulators too, walk the same recorded
-walk, bit for bit.
+"""The FMU's binaries for all platforms that run on this machine, under emulators too, repeat a
+recorded walk bit for bit.
 
 `make test-platforms` installs the emulators and skips nothing.
 """
@@ -31,8 +31,8 @@ from hexapod_cosim.models.robot import load_robot
 
 
 class Walk:
-    """A recorded walk, the FMU's resources below a folder with an awkward name, and what the
-    binary CMake built makes of the walk.
+    """A recorded walk, the FMU's resources in a folder with a special name, and the outputs of
+    CMake's binary.
     """
 
     def __init__(self, folder: Path, library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,13 +65,13 @@ def walk(plant_library: Path, tmp_path_factory: pytest.TempPathFactory) -> Walk:
 
 
 def runs_here(target: str) -> None:
-    """Skips what cannot run here; fails instead where everything was asked for."""
+    """Skips platforms that cannot run on this machine; fails if all are required."""
     if needs := missing(target):
         assert not EVERYTHING, f"{target} cannot run here: {', '.join(needs)} is missing"
         pytest.skip(f"no {', '.join(needs)}: make test-platforms installs it")
 
 
-def test_the_recorded_walk_is_one(walk: Walk) -> None:
+def test_the_recorded_walk_moves_the_robot(walk: Walk) -> None:
     steps = [
         list(map(number, walk.expected[k : k + 391])) for k in range(0, len(walk.expected), 391)
     ]

@@ -1,6 +1,6 @@
-"""Binaries for other platforms: what they are, what they show and need.
+"""Binaries for other platforms: format, exported functions and required libraries.
 
-The system libraries for Windows take the compiler two minutes the first time: `make test-platforms`
+The system libraries for Windows take two minutes to compile the first time. `make test-platforms`
 skips nothing.
 """
 
@@ -62,8 +62,8 @@ def system_of(target: str) -> str:
 
 @pytest.fixture(scope="session")
 def built() -> dict[str, bytes]:
-    """The plant's binaries by target, Windows only where it does not take minutes. Built at
-    once, from the cache if they are there.
+    """Returns the plant's binaries by target, built in parallel or taken from the cache; Windows
+    only where it does not take minutes.
     """
     quick = [target for target in TARGETS if target != "x86_64-windows"]
     with ThreadPoolExecutor() as pool:
@@ -125,12 +125,12 @@ def test_each_binary_is_for_its_machine(data: bytes, target: str) -> None:
     assert machine(parsed(data)) == MACHINES[target]
 
 
-def test_each_binary_shows_the_standard_s_functions_alone(data: bytes) -> None:
+def test_each_binary_exports_the_standard_s_functions_only(data: bytes) -> None:
     assert len(STANDARD) == 44 + 75
     assert exported(parsed(data)) == STANDARD
 
 
-def test_each_binary_needs_the_c_library_alone(data: bytes, target: str) -> None:
+def test_each_binary_requires_the_c_library_only(data: bytes, target: str) -> None:
     needed = libraries(parsed(data))
     assert needed
     assert [name for name in needed if not SYSTEM[system_of(target)].fullmatch(name)] == []
@@ -148,7 +148,7 @@ def test_no_path_of_this_machine_is_inside(data: bytes) -> None:
 
 
 def protections(binary: Any) -> tuple[bool, bool]:
-    """Whether relocations are read-only once done, and all done at load time."""
+    """Returns whether relocations become read-only, and whether all are done at load time."""
     relro = any(segment.type == lief.ELF.Segment.TYPE.GNU_RELRO for segment in binary.segments)
     flags = [
         str(entry)
@@ -177,7 +177,7 @@ def test_linux_binaries_run_with_glibc_2_17_and_are_read_only_where_they_can(
     assert not list(binary.symtab_symbols)
 
 
-def test_the_binary_that_cmake_builds_is_as_tight(plant_library: Path) -> None:
+def test_the_binary_that_cmake_builds_is_protected_too(plant_library: Path) -> None:
     binary: Any = lief.parse(str(plant_library))
     if binary.format != lief.Binary.FORMATS.ELF:
         pytest.skip("this machine's binaries are of another format")
@@ -193,8 +193,9 @@ def plant_sources() -> list[Path]:
 
 
 def compiled(folder: Path, sources: list[Path], *command: str) -> Any:
-    """Sources as an importer compiles them: no flags but those for a shared library, and some
-    optimisation.
+    """Compiles sources as an importer does:
+
+    with flags for a shared library and some optimisation only.
     """
     out = folder / "plain.so"
     plant = Path(
@@ -210,7 +211,7 @@ def compiled(folder: Path, sources: list[Path], *command: str) -> Any:
     return lief.parse(str(out))
 
 
-def test_names_stay_inside_however_an_importer_compiles_the_sources(tmp_path: Path) -> None:
+def test_internal_names_are_hidden_in_binaries_that_importers_compile(tmp_path: Path) -> None:
     compiler = shutil.which("cc") or shutil.which("gcc")
     assert compiler, "these tests need a C compiler"
     ours = {
@@ -222,8 +223,9 @@ def test_names_stay_inside_however_an_importer_compiles_the_sources(tmp_path: Pa
 
 
 def fused(binary: Any) -> int:
-    """Fused multiply-adds in the code for a 64-bit Arm: scalar (fmadd and its kin), vector
-    (fmla, fmls), vector by element.
+    """Returns the fused multiply-adds in code for 64-bit Arm:
+
+    scalar (fmadd and variants), vector (fmla, fmls), vector by element.
     """
     code = bytes(binary.get_section(".text").content)
     words = [
@@ -235,7 +237,7 @@ def fused(binary: Any) -> int:
     )
 
 
-def test_arm_compilers_fuse_no_arithmetic_of_ours_unasked(tmp_path: Path) -> None:
+def test_arm_compilers_do_not_fuse_our_arithmetic(tmp_path: Path) -> None:
     command = (*find_compiler().command, "-target", TARGETS["aarch64-linux"].triple)
     eager = tmp_path / "eager.c"
     eager.write_text(
@@ -245,7 +247,7 @@ def test_arm_compilers_fuse_no_arithmetic_of_ours_unasked(tmp_path: Path) -> Non
     assert fused(compiled(tmp_path, plant_sources(), *command)) == 0
 
 
-def test_the_same_sources_make_the_same_bytes_in_another_place(
+def test_the_same_sources_give_the_same_bytes_in_another_folder(
     built: dict[str, bytes], tmp_path: Path
 ) -> None:
     copied = {}
@@ -276,7 +278,7 @@ def test_each_version_of_the_standard_has_its_own_names() -> None:
         platforms.choose_platforms(["sources", "linux64"], fmi=2)
 
 
-def test_either_standard_s_names_do_for_either_version() -> None:
+def test_both_versions_accept_both_standards_names() -> None:
     assert platforms.choose_platforms(["win64", "darwin64"], fmi=3) == [
         "x86_64-windows",
         "x86_64-darwin",
@@ -296,7 +298,7 @@ def test_either_standard_s_names_do_for_either_version() -> None:
         platforms.choose_platforms(["win32"], fmi=3)
 
 
-def test_a_universal_binary_holds_both_processors_whole(built: dict[str, bytes]) -> None:
+def test_a_universal_binary_contains_both_binaries_unchanged(built: dict[str, bytes]) -> None:
     parts = [built["x86_64-darwin"], built["aarch64-darwin"]]
     joined = join_mach_o(parts)
     fat: Any = lief.MachO.parse(list(joined))

@@ -1,5 +1,7 @@
-"""The plant built for tests: one incremental CMake build in build/test, also installed to where
-the exporter packs from.
+"""Builds the plant for tests:
+
+one incremental CMake build in build/test, which is also installed to build/plant, where the
+exporter finds it.
 """
 
 from __future__ import annotations
@@ -19,12 +21,13 @@ PACKED = ROOT / "build" / "plant" if PRESET == "test" else BUILD / "plant"
 
 
 class BuildError(Exception):
-    """What CMake or the compiler said."""
+    """The build failed; the message is that of CMake or the compiler."""
 
 
 def built() -> Path:
-    """build/test, up to date; also installed to build/plant. Of the processes of one test run
-    the first builds. Raises BuildError.
+    """Builds build/test, installs it to build/plant and returns its folder.
+
+    In a test run of several processes the first one builds. Raises BuildError.
     """
     BUILD.parent.mkdir(exist_ok=True)
     session, last = (
@@ -40,17 +43,15 @@ def built() -> Path:
 
 def _build() -> None:
     if _configure().returncode != 0:
-        shutil.rmtree(
-            BUILD, ignore_errors=True
-        )  # configured by a CMake, Python or generator that is gone
+        shutil.rmtree(BUILD, ignore_errors=True)  # its CMake, Python or generator is missing
         _succeed(_configure())
     _succeed(_cmake("--build", "--preset", PRESET))
     _succeed(_cmake("--install", str(BUILD), "--prefix", str(PACKED)))
 
 
 def shared_library(build: Path, component: str, name: str) -> Path:
-    """A shared library of a component's folder in the build, whatever this system ends its name
-    with.
+    """Returns a shared library of a component's folder in the build, whatever its suffix on this
+    system.
     """
     return next((build / component).glob(f"{name}.[sd]*"))
 
@@ -68,14 +69,16 @@ def _cmake(*arguments: str) -> subprocess.CompletedProcess[str]:
     environment = os.environ | {
         "PATH": _search_path(),
         "LD_PRELOAD": "",
-    }  # sanitizers are for the tests, not for the build
+    }  # sanitizers are for the tests only
     return subprocess.run(
         [cmake, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, check=False
     )
 
 
 def _search_path() -> str:
-    """PATH with the running Python's scripts in front: the environment need not be activated."""
+    """Returns PATH with the running Python's scripts first, so that the environment need not be
+    active.
+    """
     return os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
 
 

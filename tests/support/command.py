@@ -1,4 +1,4 @@
-"""The hexapod command in this process, and what tests of it share."""
+"""Runs the hexapod command in the test process."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def settings(*pairs: str) -> list[str]:
 
 
 def assert_refused(outcome: tuple[int, str, str], *parts: str) -> None:
-    """Exit code not 0, nothing on stdout, one paragraph without a traceback on stderr that holds
-    the parts.
+    """Asserts that the exit code is not 0, stdout is empty, and stderr is one paragraph without a
+    traceback that contains the parts.
     """
     code, out, err = outcome
     assert code not in (0, None)

@@ -1,4 +1,4 @@
-"""Controllers with hand-made gains, and what drives them in tests."""
+"""Controllers with hand-made gains, and functions that run them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def run(
     first: int = 0,
     measurement: Measurement | None = None,
 ) -> np.ndarray:
-    """(steps, 3, 6, 3) angle_ref, speed_ref and torque_ref of consecutive steps."""
+    """Returns angle_ref, speed_ref and torque_ref of consecutive steps, shape (steps, 3, 6, 3)."""
     found = []
     for k in range(first, first + steps):
         out = controller.step(k * PERIOD, command, measurement or Measurement())
@@ -43,8 +43,8 @@ def run(
 
 
 def squeezed(generator: np.random.Generator | None = None) -> Measurement:
-    """A measurement with all feet on the ground, unequal forces, joints off the stance and a
-    torso that leans.
+    """Returns a measurement with all feet on the ground, unequal forces, joints off the stance and
+    an inclined torso.
     """
     generator = generator or np.random.default_rng(4)
     measurement = Measurement(contact=np.ones(6, dtype=bool))
@@ -55,8 +55,9 @@ def squeezed(generator: np.random.Generator | None = None) -> Measurement:
 
 
 def obey(controller: Controller, command: BodyCommand, steps: int) -> np.ndarray:
-    """As `run`, of a robot that does all that is planned: its feet feel the planned shares, its
-    joints are where they were told to be.
+    """Runs a controller of a robot that follows every plan:
+
+    its feet carry the planned shares and its joints are at their commanded angles.
     """
     measurement, compliant, found = (
         Measurement(angle=controller.stance.copy()),

@@ -1,6 +1,4 @@
-"""The FMI 3.0 side of the FMU's shared library through bare ctypes: statuses as they come,
-messages as they are logged.
-"""
+"""Calls the FMU's FMI 3.0 functions through ctypes and records statuses and messages."""
 
 from __future__ import annotations
 
@@ -29,7 +27,7 @@ _LOGGER = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p,
 
 
 class Step(NamedTuple):
-    """What fmi3DoStep tells."""
+    """The results of fmi3DoStep."""
 
     status: int
     event: bool
@@ -83,18 +81,19 @@ class Plant3:
 
     @property
     def last_message(self) -> str:
-        """Text of the last message."""
+        """Returns the text of the last message."""
         return self.messages[-1][2]
 
     def call(self, function: str, *arguments: object) -> int:
-        """Calls a function of the instance and returns its status. Floats go as double, bools as
-        bool, ints as size_t.
+        """Calls a function of the instance and returns its status.
+
+        Floats are passed as double, bools as bool, ints as size_t.
         """
         converted = [_argument(value) for value in arguments]
         return int(getattr(self._library, function)(ctypes.c_void_p(self.handle), *converted))
 
     def initialize(self, *, start: float = 0.0) -> Plant3:
-        """To step mode, or to event mode where it is used, with everything at its default."""
+        """Enters step mode, or event mode where it is used, with default values."""
         assert self.enter_initialization(start) == OK
         assert self.call("fmi3ExitInitializationMode") == OK
         return self
@@ -102,12 +101,12 @@ class Plant3:
     def enter_initialization(
         self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None
     ) -> int:
-        """fmi3EnterInitializationMode."""
+        """Calls fmi3EnterInitializationMode."""
         given = [tolerance is not None, tolerance or 0.0, start, stop is not None, stop or 0.0]
         return self.call("fmi3EnterInitializationMode", *given)
 
     def step(self, time: float, size: float) -> Step:
-        """fmi3DoStep."""
+        """Calls fmi3DoStep."""
         flags, reached = [ctypes.c_bool() for _ in range(3)], ctypes.c_double()
         status = self.call(
             "fmi3DoStep",
@@ -121,7 +120,7 @@ class Plant3:
         return Step(status, event, terminate, early, reached.value)
 
     def update(self) -> tuple[int, list[bool]]:
-        """fmi3UpdateDiscreteStates: the status and its flags."""
+        """Calls fmi3UpdateDiscreteStates; returns the status and the flags."""
         flags, time = [ctypes.c_bool(True) for _ in range(5)], ctypes.c_double()
         status = self.call(
             "fmi3UpdateDiscreteStates", *map(ctypes.byref, flags), ctypes.byref(time)
@@ -129,7 +128,7 @@ class Plant3:
         return status, [flag.value for flag in flags]
 
     def get_raw(self, kind: str, references: Sequence[int], count: int) -> tuple[int, list[Any]]:
-        """A getter by references: status and values."""
+        """Calls a getter with references; returns status and values."""
         ctype = next(ctype for name, ctype in TYPES.values() if name == kind)
         values = (ctype * count)()
         return self.call(
@@ -137,7 +136,7 @@ class Plant3:
         ), list(values)
 
     def set_raw(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> int:
-        """A setter by references."""
+        """Calls a setter with references."""
         ctype = next(ctype for name, ctype in TYPES.values() if name == kind)
         return self.call(
             f"fmi3Set{kind}",
@@ -148,7 +147,7 @@ class Plant3:
         )
 
     def get(self, *names: str) -> list[NDArray[Any]]:
-        """Values of variables of one type, as arrays."""
+        """Returns the values of variables of one type, as arrays."""
         chosen = [ARRAYS[name] for name in names]
         status, values = self.get_raw(
             TYPES[chosen[0].first.type][0], [array.reference for array in chosen], _size(chosen)
@@ -169,24 +168,24 @@ class Plant3:
         )
 
     def everything(self) -> NDArray[np.float64]:
-        """All Float64 variables, one after the other."""
+        """Returns all Float64 variables."""
         names = [name for name, array in ARRAYS.items() if array.first.type == "Real"]
         return np.concatenate([part.ravel() for part in self.get(*names)])
 
     def row(self, function: str, n: int) -> NDArray[np.float64]:
-        """What a function of model exchange gives: n doubles."""
+        """Calls a function of model exchange that returns n doubles."""
         place = (ctypes.c_double * n)()
         assert self.call(function, place, n) == OK, self.last_message
         return np.array(place)
 
     def save(self) -> ctypes.c_void_p:
-        """fmi3GetFMUState."""
+        """Calls fmi3GetFMUState."""
         state = ctypes.c_void_p()
         assert self.call("fmi3GetFMUState", ctypes.byref(state)) == OK
         return state
 
     def serialize(self, state: ctypes.c_void_p) -> bytes:
-        """The bytes of a saved state."""
+        """Returns the bytes of a saved state."""
         size = ctypes.c_size_t()
         assert self.call("fmi3SerializedFMUStateSize", state, ctypes.byref(size)) == OK
         data = ctypes.create_string_buffer(size.value)
@@ -194,12 +193,12 @@ class Plant3:
         return data.raw
 
     def deserialize(self, data: bytes) -> tuple[int, ctypes.c_void_p]:
-        """Status and state."""
+        """Returns status and state."""
         state = ctypes.c_void_p()
         return self.call("fmi3DeserializeFMUState", data, len(data), ctypes.byref(state)), state
 
     def free(self, state: ctypes.c_void_p) -> None:
-        """fmi3FreeFMUState."""
+        """Calls fmi3FreeFMUState."""
         assert self.call("fmi3FreeFMUState", ctypes.byref(state)) == OK
         assert state.value is None
 

@@ -1,6 +1,4 @@
-"""The FMU's shared library through bare ctypes: statuses as they come, messages as they are
-logged.
-"""
+"""Calls the FMU's FMI 2.0 functions through ctypes and records statuses and messages."""
 
 from __future__ import annotations
 
@@ -80,12 +78,13 @@ class Plant:
 
     @property
     def last_message(self) -> str:
-        """Text of the last message."""
+        """Returns the text of the last message."""
         return self.messages[-1][2]
 
     def call(self, function: str, *arguments: object) -> int:
-        """Calls a function of the instance and returns its status. Floats go as double, ints as
-        int.
+        """Calls a function of the instance and returns its status.
+
+        Floats are passed as double, ints as int.
         """
         converted = [
             ctypes.c_double(value) if isinstance(value, float) else value for value in arguments
@@ -93,24 +92,24 @@ class Plant:
         return int(getattr(self._library, function)(ctypes.c_void_p(self.component), *converted))
 
     def initialize(self, *, start: float = 0.0) -> Plant:
-        """To step mode, with everything at its default."""
+        """Enters step mode with default values."""
         assert self.call("fmi2SetupExperiment", 0, 0.0, start, 0, 0.0) == OK
         assert self.call("fmi2EnterInitializationMode") == OK
         assert self.call("fmi2ExitInitializationMode") == OK
         return self
 
     def step(self, time: float, size: float) -> int:
-        """fmi2DoStep."""
+        """Calls fmi2DoStep."""
         return self.call("fmi2DoStep", float(time), float(size), 1)
 
     def set_reals(self, values: dict[str, float]) -> int:
-        """fmi2SetReal by name, one batch."""
+        """Sets Reals by name in one call."""
         return self.set_references("fmi2SetReal", ATHENA.references(values), list(values.values()))
 
     def set_references(
         self, function: str, references: Sequence[int], values: Sequence[float]
     ) -> int:
-        """A setter by reference."""
+        """Calls a setter with references."""
         n = len(references)
         array = (
             (ctypes.c_double * n)(*values)
@@ -120,36 +119,36 @@ class Plant:
         return self.call(function, (ctypes.c_uint * n)(*references), ctypes.c_size_t(n), array)
 
     def get_references(self, function: str, references: Sequence[int]) -> tuple[int, list[float]]:
-        """A getter by reference: status and values."""
+        """Calls a getter with references; returns status and values."""
         n = len(references)
         values = ((ctypes.c_double if function == "fmi2GetReal" else ctypes.c_int) * n)()
         status = self.call(function, (ctypes.c_uint * n)(*references), ctypes.c_size_t(n), values)
         return status, list(values)
 
     def reals(self, names: Iterable[str]) -> list[float]:
-        """Values by name."""
+        """Returns Reals by name."""
         status, values = self.get_references("fmi2GetReal", ATHENA.references(names))
         assert status == OK, self.last_message
         return values
 
     def real(self, name: str) -> float:
-        """One value by name."""
+        """Returns a Real by name."""
         return self.reals([name])[0]
 
     def everything(self) -> list[float]:
-        """All Real variables."""
+        """Returns all Real variables."""
         return self.reals(
             [variable.name for variable in ATHENA.variables if variable.type == "Real"]
         )
 
     def save(self) -> ctypes.c_void_p:
-        """fmi2GetFMUstate."""
+        """Calls fmi2GetFMUstate."""
         state = ctypes.c_void_p()
         assert self.call("fmi2GetFMUstate", ctypes.byref(state)) == OK
         return state
 
     def serialize(self, state: ctypes.c_void_p) -> bytes:
-        """The bytes of a saved state."""
+        """Returns the bytes of a saved state."""
         size = ctypes.c_size_t()
         assert self.call("fmi2SerializedFMUstateSize", state, ctypes.byref(size)) == OK
         data = ctypes.create_string_buffer(size.value)
@@ -157,14 +156,14 @@ class Plant:
         return data.raw
 
     def deserialize(self, data: bytes) -> tuple[int, ctypes.c_void_p]:
-        """Status and state."""
+        """Returns status and state."""
         state = ctypes.c_void_p()
         return self.call(
             "fmi2DeSerializeFMUstate", data, ctypes.c_size_t(len(data)), ctypes.byref(state)
         ), state
 
     def free(self, state: ctypes.c_void_p) -> None:
-        """fmi2FreeFMUstate."""
+        """Calls fmi2FreeFMUstate."""
         assert self.call("fmi2FreeFMUstate", ctypes.byref(state)) == OK
         assert state.value is None
 

@@ -1,4 +1,4 @@
-"""Gains made by hand, so that what runs is tested apart from what is designed."""
+"""Hand-made gains, so that tests of the controller do not depend on the design."""
 
 from __future__ import annotations
 
@@ -44,14 +44,17 @@ HOLD = HoldGains(
 
 
 def weight(robot: Robot) -> float:
-    """N"""
+    """Returns the robot's weight [N]."""
     return robot.total_mass * math.hypot(*robot.gravity)
 
 
 def suspension(
     robot: Robot, *, deflection: float = 0.003, frequency: float = 5.0
 ) -> SuspensionGains:
-    """Critically damped: so far under a third of the weight [m], at this natural frequency [Hz]."""
+    """Returns a critically damped suspension:
+
+    its deflection under a third of the weight [m], its natural frequency [Hz].
+    """
     stiffness, omega = weight(robot) / TRIPOD_LEGS / deflection, 2.0 * math.pi * frequency
     return SuspensionGains(
         mass=stiffness / omega**2, damping=2.0 * stiffness / omega, stiffness=stiffness, limit=0.015
@@ -59,7 +62,7 @@ def suspension(
 
 
 def make_gains(robot: Robot, *, period: float = PERIOD) -> Gains:
-    """A plausible set for this robot and period."""
+    """Returns plausible gains for a robot and period."""
     servo = robot.servo
     return Gains(
         robot=robot.name,

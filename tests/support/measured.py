@@ -1,5 +1,5 @@
-"""What the plant measures, measured again: a walk driven in steps of 0.1 ms, and sums over
-samples of force, velocity, torque, speed.
+"""Repeats a walk in steps of 0.1 ms and calculates the plant's measures from samples of force,
+velocity, torque and speed.
 """
 
 from __future__ import annotations
@@ -32,11 +32,12 @@ QUANTITIES = {
 
 @dataclass(frozen=True)
 class Samples:
-    """A walk on flat ground in intervals of 0.1 ms: at their begins, under the new command, and
-    at their ends, under the same one.
+    """A walk on flat ground in intervals of 0.1 ms:
+
+    values at their starts, under the new command, and at their ends, under the same command.
     """
 
-    time: Array  # s    (n,) of the begins
+    time: Array  # s    (n,) starts of the intervals
     torque: Array  # N m    (2, n, 18)
     speed: Array  # rad/s    (2, n, 18)
     normal: Array  # N    (2, n, 6)
@@ -44,15 +45,15 @@ class Samples:
     velocity: Array  # m/s    (2, n, 6, 3)
 
     def after(self, time: float) -> Samples:
-        """The intervals from a time [s] on."""
+        """Returns the intervals after a time [s]."""
         k = int(np.searchsorted(self.time, time - 0.5 * FINE))
         parts = (self.torque, self.speed, self.normal, self.tangential, self.velocity)
         return Samples(self.time[k:], *(part[:, k:] for part in parts))
 
 
 def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Samples:
-    """Drives the scenario's plant again by the recorded commands, each held for a macro-step;
-    from a time [s] on samples are kept.
+    """Repeats a scenario on the plant with the recorded commands, each held for a macro-step;
+    returns samples after a time [s].
     """
     names = [name for names in QUANTITIES.values() for name in names]
     joints = [name for names in COMMANDED.values() for name in names]
@@ -91,27 +92,26 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
 
 
 def integral(values: Array) -> Array:
-    """Of (2, n, m) values at the ends of the intervals, over time: the trapezoidal rule."""
+    """Integrates values (2, n, m) at the ends of the intervals by the trapezoidal rule."""
     return np.asarray(0.5 * FINE * values.sum(axis=(0, 1)))
 
 
 def slipped(samples: Samples, weight: float) -> float:
-    """Way [m] of all feet along flat ground under load."""
+    """Returns the distance [m] that all feet slide under load on flat ground."""
     speed = np.linalg.norm(samples.velocity[..., :2], axis=-1)
     return float(integral(np.where(samples.normal > LOADED * weight, speed, 0.0)).sum())
 
 
 def driven(samples: Samples) -> float:
-    """Positive work [J] of all motors."""
+    """Returns the positive work [J] of all motors."""
     return float(integral(np.maximum(samples.torque * samples.speed, 0.0)).sum())
 
 
 def landing_rates(samples: Samples, *, apart: float, after: float) -> list[float]:
-    """Largest rise [N/s] over 1 ms of each landing in the 20 ms after its touch-downs, of landings
-    after a time [s].
+    """Returns the largest rise [N/s] over 1 ms of each landing in the 20 ms after its touch-downs.
 
-    Touch-downs of a foot less than `apart` [s] after another are one landing. Before a touch-down
-    there is no force.
+    Only landings after a time [s] are returned. Touch-downs of a foot less than `apart` [s] apart
+    are one landing. Before a touch-down there is no force.
     """
     found: list[float] = []
     for begin, end in samples.normal.transpose(2, 0, 1):

@@ -1,4 +1,4 @@
-"""How much memory this process holds."""
+"""Measures this process's memory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ STATM = Path("/proc/self/statm")
 
 
 def resident() -> int:
-    """Bytes in memory now (where the system tells; the most so far elsewhere)."""
+    """Returns the resident memory [bytes]; its maximum so far where the system does not report the
+    present value.
+    """
     gc.collect()
     if STATM.exists():
         return int(STATM.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")

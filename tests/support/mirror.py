@@ -1,5 +1,6 @@
-"""hexapod.h in ctypes: its structures, constants and statuses. test_plant_functions.py compares
-them with the compiler's layout.
+"""Mirrors the structures, constants and statuses of hexapod.h in ctypes.
+
+test_plant_functions.py compares them with the compiler's layout.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ LegVectors, JointVectors = (Real * 3) * LEGS, ((Real * 3) * JOINTS) * LEGS
 
 
 def record(name: str, *fields: tuple[str, Any]) -> type[ct.Structure]:
-    """A structure type with these fields."""
+    """Makes a structure type with these fields."""
     return type(name, (ct.Structure,), {"_fields_": list(fields)})
 
 
 def reals(names: str) -> list[tuple[str, Any]]:
-    """Fields of one double each, by names between spaces."""
+    """Returns fields of type double, from names separated by spaces."""
     return [(name, Real) for name in names.split()]
 
 
@@ -160,7 +161,8 @@ HxOutput = record(
         record(
             "EnergyOutput",
             *reals(
-                "kinetic potential actuator_work push_work dissipated contact_loss friction_loss gear_loss residual"
+                "kinetic potential actuator_work push_work dissipated contact_loss "
+                "friction_loss gear_loss residual"
             ),
         ),
     ),

@@ -1,5 +1,6 @@
-"""The C controller from Python: one instance that steps like `Controller`, set up through the C
-library's own table of ranges.
+"""Calls the C controller from Python:
+
+one instance with the interface of `Controller`, set up through the C library's table of ranges.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ HxControllerOutput = record(
 
 
 class NativeError(Exception):
-    """A call that the controller refused: its status and message."""
+    """A call failed: its status and message."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
@@ -58,7 +59,7 @@ class NativeError(Exception):
 
 
 def bound(core: ct.CDLL) -> ct.CDLL:
-    """The library with its functions' types declared; harmless to repeat."""
+    """Declares the types of the library's functions; may be called repeatedly."""
     controller, status, ranges = ct.c_void_p, ct.c_int, [ct.POINTER(ct.POINTER(HxRange))]
     signatures: dict[str, tuple[Any, list[Any]]] = {
         "hx_controller_definition_default": (None, [ct.c_void_p]),
@@ -89,14 +90,14 @@ def bound(core: ct.CDLL) -> ct.CDLL:
 
 
 def ranges_of(core: ct.CDLL, member: str) -> dict[str, Any]:
-    """The C library's table for "definition" or "input" by variable names."""
+    """Returns the C library's table for "definition" or "input" by variable names."""
     table = ct.POINTER(HxRange)()
     count = getattr(core, f"hx_controller_{member}_ranges")(ct.byref(table))
     return {table[k].name.decode(): table[k] for k in range(count)}
 
 
 class Definition:
-    """The bytes of an hxControllerDefinition, written by variable names."""
+    """The bytes of an hxControllerDefinition, set by variable names."""
 
     def __init__(self, core: ct.CDLL, setup: ControllerSetup) -> None:
         self.ranges = ranges_of(core, "definition")
@@ -113,7 +114,7 @@ class Definition:
 
 
 class NativeController:
-    """One C controller. `step` is that of `Controller`; `out` holds the last commands."""
+    """A C controller. `step` is that of `Controller`; `out` holds the last commands."""
 
     def __init__(self, core: ct.CDLL, setup: ControllerSetup, *, start: float = 0.0) -> None:
         self._core, self.period, self.definition = (
@@ -133,16 +134,16 @@ class NativeController:
             raise NativeError(status, self._core.hx_controller_message(self._handle).decode())
 
     def reset(self, t: float = 0.0) -> None:
-        """To the start, by the definition as it stands."""
+        """Resets the controller with the present definition."""
         self._checked(self._core.hx_controller_reset(self._handle, self.definition.bytes, t))
 
     def output(self) -> Any:
-        """Of the input as it stands, at the present time."""
+        """Calculates the output for the present input and time."""
         self._core.hx_controller_output(self._handle, ct.byref(self.input), ct.byref(self.out))
         return self.out
 
     def go(self, t_end: float, *, rate: Any = None) -> None:
-        """To t_end under the input as it stands, which changes at a rate [1/s]."""
+        """Steps to t_end [s] with the present input, which changes at a rate [1/s]."""
         self._checked(
             self._core.hx_controller_step(
                 self._handle, ct.byref(self.input), None if rate is None else ct.byref(rate), t_end
@@ -150,7 +151,7 @@ class NativeController:
         )
 
     def sense(self, command: BodyCommand, measurement: Measurement) -> None:
-        """Sets the input."""
+        """Sets the input from command and measurement."""
         values = (
             command.vx,
             command.vy,
@@ -165,7 +166,7 @@ class NativeController:
         self.input.quaternion[:] = measurement.quaternion.tolist()
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> Any:
-        """The joint commands for [t, t + period): the outputs at t, after which time goes on."""
+        """Returns the joint commands for [t, t + period) and steps over the period."""
         self.sense(command, measurement)
         out = self.output()
         self.go(t + self.period)
@@ -176,16 +177,16 @@ class NativeController:
         return float(self._core.hx_controller_time(self._handle))
 
     def save(self) -> bytes:
-        """A saved state."""
+        """Returns the state."""
         state = ct.create_string_buffer(self._core.hx_controller_state_size())
         self._core.hx_controller_get_state(self._handle, state)
         return state.raw
 
     def restore(self, state: bytes) -> None:
-        """Goes back to a saved state."""
+        """Restores a state returned by save()."""
         self._checked(self._core.hx_controller_set_state(self._handle, state, len(state)))
 
 
 def commands(out: Any) -> np.ndarray:
-    """(4, 6, 3) angle_ref, speed_ref, torque_ref and acceleration_ref, copied."""
+    """Returns copies of angle_ref, speed_ref, torque_ref and acceleration_ref, shape (4, 6, 3)."""
     return np.array([np.ctypeslib.as_array(getattr(out, name)) for name in COMMANDS])

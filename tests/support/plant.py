@@ -1,5 +1,6 @@
-"""The C plant from Python: `Plant` around one instance, robots made into definitions, and calls
-of the probe's functions.
+"""Calls the C plant from Python:
+
+instances, definitions of robots, and internal functions through the probe.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from hexapod_cosim.models.records import Array
 
 
 class PlantError(Exception):
-    """A call that the plant refused: its status and message."""
+    """A call failed: its status and message."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
@@ -49,7 +50,7 @@ class PlantError(Exception):
 
 
 def bound(core: ct.CDLL) -> ct.CDLL:
-    """The library with its functions' types declared; harmless to repeat."""
+    """Declares the types of the library's functions; may be called repeatedly."""
     plant, status = ct.c_void_p, ct.c_int
     signatures: dict[str, tuple[Any, list[Any]]] = {
         "hx_version": (ct.c_char_p, []),
@@ -98,12 +99,12 @@ def bound(core: ct.CDLL) -> ct.CDLL:
 
 
 def pointer(array: Array) -> Any:
-    """double * of a contiguous array; the array must outlive its use."""
+    """Returns a double * to a contiguous array, which must outlive its use."""
     return array.ctypes.data_as(Doubles)
 
 
 def passed(argument: Any) -> Any:
-    """An argument of a probe function as C takes it."""
+    """Converts an argument of a probe function to C."""
     if isinstance(argument, np.ndarray):
         return pointer(np.ascontiguousarray(argument))
     if isinstance(argument, ct.Structure):
@@ -114,20 +115,20 @@ def passed(argument: Any) -> Any:
 
 
 def probed(function: Any, *arguments: Any, size: int) -> Array:
-    """The `size` doubles that a probe function writes into its last argument."""
+    """Calls a probe function and returns the `size` doubles that it writes to its last argument."""
     out = np.full(size, np.nan)
     function(*map(passed, arguments), pointer(out))
     return out
 
 
 def asked(function: Any, *arguments: Any) -> float:
-    """The double that a probe function returns."""
+    """Calls a probe function and returns its double."""
     function.restype = Real
     return float(function(*map(passed, arguments)))
 
 
 def put(target: Any, values: Any) -> None:
-    """Copies numbers, nested as the ctypes array is, into it."""
+    """Copies nested numbers into a ctypes array of the same shape."""
     for index, value in enumerate(values):
         if isinstance(value, Iterable):
             put(target[index], value)
@@ -136,12 +137,12 @@ def put(target: Any, values: Any) -> None:
 
 
 def flat(record: Any) -> Array:
-    """The doubles of a structure that has nothing else (copied)."""
+    """Returns a copy of a structure of doubles as an array."""
     return np.frombuffer(bytes(record))
 
 
 def seen(value: Any) -> Any:
-    """A structure as a namespace, arrays in it as numpy arrays (copies)."""
+    """Returns a copy of a structure as a namespace, with arrays as numpy arrays."""
     if isinstance(value, ct.Structure):
         names = [field[0] for field in value._fields_]
         return SimpleNamespace(**{name: seen(getattr(value, name)) for name in names})
@@ -149,10 +150,10 @@ def seen(value: Any) -> Any:
 
 
 def definition(robot: Robot, **initial: Any) -> Any:
-    """The HxDefinition of a robot, whether or not it could exist.
+    """Returns the HxDefinition of a robot, which need not be valid.
 
-    initial: position, quaternion, velocity, angular_velocity, angle, speed; at rest in the stance 1
-    m up unless given.
+    initial: position, quaternion, velocity, angular_velocity, angle, speed. By default the robot is
+    at rest in its stance, 1 m above the ground.
     """
     d: Any = HxDefinition()
     d.torso.mass = robot.torso.mass
@@ -207,7 +208,7 @@ def _put_settings(d: Any, robot: Robot) -> None:
 
 
 def inputs(command: Command) -> Any:
-    """The HxInput of a command; its age is the plant's business."""
+    """Returns the HxInput of a command."""
     i: Any = HxInput()
     for name in (
         "angle_ref",
@@ -222,7 +223,7 @@ def inputs(command: Command) -> Any:
 
 
 class Plant:
-    """One plant of a robot. Refused calls raise PlantError; the plant is then as it was."""
+    """A plant of a robot. Failed calls raise PlantError and leave the plant unchanged."""
 
     def __init__(self, core: ct.CDLL, robot: Robot, **initial: Any) -> None:
         self.core = bound(core)
@@ -239,32 +240,34 @@ class Plant:
 
     @property
     def message(self) -> str:
-        """Of the last failure."""
+        """The message of the last failure."""
         return bytes(self.core.hx_plant_message(self.handle)).decode()
 
     @property
     def time(self) -> float:
-        """s"""
+        """The present time [s]."""
         return float(self.core.hx_plant_time(self.handle))
 
     def reset(self, start: Any, t: float = 0.0) -> None:
-        """Puts the robot of an HxDefinition at its start."""
+        """Resets the plant with an HxDefinition."""
         self._check(self.core.hx_plant_reset(self.handle, start, t))
 
     def hold(self) -> Command:
-        """The command that holds the stance."""
+        """Returns the command that holds the stance."""
         return Command(angle_ref=self.robot.stance)
 
     def step(self, t_end: float, command: Command | None = None) -> None:
-        """Integrates to t_end [s] under a command (default: hold the stance)."""
+        """Steps to t_end [s] under a command, by default that of the stance."""
         self._check(self.core.hx_plant_step(self.handle, inputs(command or self.hold()), t_end))
 
     def step_ramp(self, t_end: float, command: Command, rate: Command) -> None:
-        """Integrates to t_end [s] under a command that changes at a rate, per second."""
+        """Steps to t_end [s] under a command that changes at a rate [1/s]."""
         self._check(self.core.hx_plant_step_ramp(self.handle, inputs(command), inputs(rate), t_end))
 
     def step_to_event(self, t_end: float, command: Command, *, stop: bool = True) -> bool:
-        """Integrates to t_end [s], or to the next event if `stop`; whether there was one."""
+        """Steps to t_end [s], with `stop` to the next event at most; returns whether there was an
+        event.
+        """
         event = ct.c_int()
         self._check(
             self.core.hx_plant_step_to_event(self.handle, inputs(command), t_end, stop, event)
@@ -272,28 +275,28 @@ class Plant:
         return bool(event.value)
 
     def output_record(self, command: Command | None = None) -> Any:
-        """The HxOutput of the present state under a command."""
+        """Returns the HxOutput of the present state under a command."""
         result = HxOutput()
         self.core.hx_plant_output(self.handle, inputs(command or self.hold()), result)
         return result
 
     def output(self, command: Command | None = None) -> Any:
-        """The same as a namespace of floats and arrays."""
+        """Returns the output as a namespace of floats and arrays."""
         return seen(self.output_record(command))
 
     def save(self) -> bytes:
-        """The plant's bytes."""
+        """Returns the plant's state as bytes."""
         buffer = ct.create_string_buffer(self.core.hx_plant_state_size())
         self.core.hx_plant_get_state(self.handle, buffer)
         return buffer.raw
 
     def restore(self, saved: bytes) -> None:
-        """Takes a saved plant's bytes."""
+        """Restores a state returned by save()."""
         self._check(self.core.hx_plant_set_state(self.handle, saved, len(saved)))
 
     @property
     def bodies(self) -> Array:
-        """(19, 13)"""
+        """Returns the bodies, shape (19, 13)."""
         body = np.zeros((BODIES, BODY_STATE))
         self.core.hx_plant_get_bodies(self.handle, pointer(body))
         return body
@@ -304,7 +307,7 @@ class Plant:
 
     @property
     def coordinates(self) -> Array:
-        """(70,) torso, angles, speeds, work, bristles."""
+        """Returns torso, angles, speeds, work and bristles, shape (70,)."""
         x = HxCoordinates()
         self.core.hx_plant_get_coordinates(self.handle, x)
         return flat(x)
@@ -318,14 +321,14 @@ class Plant:
         )
 
     def rates(self, command: Command | None = None) -> Array:
-        """(70,) d/dt of the coordinates under a command."""
+        """Returns the time derivatives of the coordinates under a command, shape (70,)."""
         dx = HxCoordinates()
         self.core.hx_plant_rates(self.handle, inputs(command or self.hold()), dx)
         return flat(dx)
 
     def tangent(self, command: Command, d_input: Array, dx: Array) -> tuple[Array, Any]:
-        """What a change of the input (60,) and of the coordinates (70,) makes of the rates (70,)
-        and of the HxOutput.
+        """Returns derivatives of the rates (70,) and of the HxOutput along a change of the input
+        (60,) and of the coordinates (70,).
         """
         change, d_rate, d_output = (
             HxInput.from_buffer_copy(d_input.tobytes()),
@@ -341,8 +344,9 @@ class Plant:
         return flat(d_rate), d_output
 
     def accelerations(self, command: Command | None = None) -> Accelerations:
-        """Eq. 1 solved at the present state; the gear torque, which the plant does not tell, is
-        left at 0.
+        """Solves eq.
+
+        1 at the present state; the gear torque, which the plant does not output, is left at 0.
         """
         dv, multipliers = np.zeros((BODIES, 6)), np.zeros((BODIES - 1, MULTIPLIERS))
         drive, gear = np.zeros((LEGS, JOINTS)), np.zeros((LEGS, JOINTS))

@@ -71,14 +71,14 @@ MARGIN = 0.25  # 1    of the hips' height, from the centre of mass to a tripod's
 
 
 def draw_robot(number: int, folder: Path) -> tuple[Path, Robot]:
-    """The robot of this number, written to a file of the folder, and as it is read from there."""
+    """Draws the robot of this number, writes it to a file in the folder and loads it from there."""
     path = folder / f"random_{number}.toml"
     path.write_text(to_toml(draw_table(number)), encoding="utf-8")
     return path, load_robot(path)
 
 
 def walk_of(robot: Robot, path: Path, control: str) -> Scenario:
-    """The walk that it is asked for."""
+    """Returns the scenario that the robot must walk."""
     speed, duration = (
         robot.gait.stride / robot.gait.period,
         round(CYCLES * robot.gait.period / PERIOD) * PERIOD,
@@ -94,7 +94,7 @@ def walk_of(robot: Robot, path: Path, control: str) -> Scenario:
 
 
 def draw_table(number: int) -> dict[str, Any]:
-    """The tables of its robot file."""
+    """Draws the tables of the robot's file."""
     draw = np.random.default_rng((SEED, number))
     mass = math.exp(draw.uniform(math.log(0.5), math.log(30.0)))
     length = (
@@ -146,7 +146,9 @@ def _read(table: Mapping[str, Any]) -> Robot:
 
 
 def _links(draw: Draw, length: float) -> tuple[dict[str, float], float]:
-    """Lengths [m] and directions [rad] of a leg's links, and the hips' height over the feet [m]."""
+    """Draws lengths [m] and directions [rad] of a leg's links; returns the hips' height over the
+    feet [m] too.
+    """
     parts = np.array([6.0, 10.0, 16.0]) * draw.uniform(0.8, 1.2, 3)
     coxa, femur, tibia = (length * parts / parts.sum()).tolist()
     rise, fall = np.radians(draw.uniform([10.0, 70.0], [35.0, 90.0])).tolist()
@@ -155,7 +157,7 @@ def _links(draw: Draw, length: float) -> tuple[dict[str, float], float]:
 
 
 def _legs(draw: Draw, length: float, links: Mapping[str, float]) -> dict[str, Any]:
-    """The legs without their masses."""
+    """Draws the legs without their masses."""
     along, across, middle = (
         draw.uniform([0.8, 0.4, 0.0], [1.3, 0.8, 0.15]) * length / [2.0, 2.0, 1.0]
     )
@@ -182,7 +184,7 @@ def _legs(draw: Draw, length: float, links: Mapping[str, float]) -> dict[str, An
 
 
 def _joints(links: Mapping[str, float], rise: float) -> dict[str, Any]:
-    """A leg's joints."""
+    """Draws a leg's joints."""
     axes, least, most = (
         ([0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]),
         (-1.0, -1.8, -0.8),
@@ -213,14 +215,14 @@ def _gait(draw: Draw, height: float) -> dict[str, Any]:
 
 
 def _torso(draw: Draw, length: float, mass: float, legs: Mapping[str, Any]) -> dict[str, Any]:
-    """A box between the hips."""
+    """Makes a box between the hips."""
     hips = np.array([leg["hip_position"] for leg in legs.values()])
     size = [*(hips.max(axis=0) - hips.min(axis=0))[:2].tolist(), 0.25 * length]
     return {"mass": draw.uniform(0.35, 0.6) * mass, "size": size, "com": [0.0, 0.0, 0.0]}
 
 
 def _load(draw: Draw, table: dict[str, Any], length: float, mass: float) -> None:
-    """Masses, centres of mass and inertias of the links, and the torso's centre of mass."""
+    """Draws masses, centres of mass and inertias of the links, and the torso's centre of mass."""
     left = (mass - table["torso"]["mass"]) / 6.0
     parts = np.array([19.0, 20.0, 11.0]) * draw.uniform(0.8, 1.2, 3)
     for leg in table["legs"].values():
@@ -245,13 +247,13 @@ def _load(draw: Draw, table: dict[str, Any], length: float, mass: float) -> None
 
 
 def hip_height(robot: Robot) -> float:
-    """m    mean, above the feet's centres in the stance"""
+    """Returns the mean height of the hips above the feet's centres in the stance [m]."""
     legs = LegSolver(robot)
     return float((legs.hip[2] - legs.forward(robot.stance)[:, 2]).mean())
 
 
 def centre_of_mass(robot: Robot) -> Array:
-    """m    (2,) of the whole robot in its stance, torso frame"""
+    """Returns the centre of mass of the robot in its stance, torso frame, shape (2,) [m]."""
     level, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     body = body_states(robot, still, level, still, still, robot.stance, np.zeros((6, 3)))
     return np.asarray(
@@ -260,9 +262,8 @@ def centre_of_mass(robot: Robot) -> Array:
 
 
 def tripod_margin(robot: Robot) -> float:
-    """m    least distance of the centre of mass from the edges of either tripod
-
-    While the body makes its way over it.
+    """Returns the least distance [m] of the centre of mass from the edges of either tripod while
+    the body moves over it.
     """
     feet, centre = LegSolver(robot).forward(robot.stance)[:, :2], centre_of_mass(robot)
     way = 0.5 * robot.gait.stride * robot.gait.duty
@@ -271,7 +272,7 @@ def tripod_margin(robot: Robot) -> float:
 
 
 def _inside(corners: Array, point: Array) -> float:
-    """m    distance of a point from the nearest edge of a triangle, negative outside of it"""
+    """Returns the distance [m] of a point from the nearest edge of a triangle, negative outside."""
     edges, arms = np.roll(corners, -1, axis=0) - corners, point - corners
     turned = edges[:, 0] * arms[:, 1] - edges[:, 1] * arms[:, 0]
     area = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
@@ -279,7 +280,9 @@ def _inside(corners: Array, point: Array) -> float:
 
 
 def tripod_forces(robot: Robot) -> Array:
-    """N    (2, 6) vertical forces on the feet of either tripod that carry the robot at rest"""
+    """Returns vertical forces [N] on the feet of either tripod that carry the robot at rest, shape
+    (2, 6).
+    """
     feet, centre = LegSolver(robot).forward(robot.stance)[:, :2], centre_of_mass(robot)
     forces = np.zeros((2, 6))
     for row, tripod in zip(forces, TRIPODS, strict=True):
@@ -289,7 +292,7 @@ def tripod_forces(robot: Robot) -> Array:
 
 
 def _servo(draw: Draw, robot: Robot, height: float) -> dict[str, Any]:
-    """Servos that carry the robot, hold it up and can follow its walk."""
+    """Draws servos that can carry the robot and follow its walk."""
     vertical, forces = LegSolver(robot).jacobian(robot.stance)[:, 2], tripod_forces(robot)
     static = float(np.abs(forces[:, :, None] * vertical).max())
     sag = float((forces * (vertical**2).sum(axis=1)).max())  # m    of the worst leg, times kp
@@ -313,7 +316,7 @@ def _servo(draw: Draw, robot: Robot, height: float) -> dict[str, Any]:
 
 
 def fastest_joint(robot: Robot) -> float:
-    """rad/s    of the planned walk at its full speed"""
+    """Returns the largest joint speed [rad/s] of the planned walk at full speed."""
     quick = replace(robot, servo=replace(robot.servo, speed_max=1e3))
     controller, measurement = Controller(quick, period=PERIOD, gait=make_gait(quick)), Measurement()
     command, steps = (

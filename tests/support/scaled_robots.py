@@ -1,6 +1,6 @@
-"""A robot of the same shape and density, so many times as large: Froude's similarity.
+"""Robots of the same shape and density in other sizes (Froude's similarity).
 
-Lengths go with l, masses with l^3, times with sqrt(l).
+Lengths are multiplied by l, masses by l^3, times by sqrt(l).
 """
 
 from __future__ import annotations
@@ -8,83 +8,32 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hexapod_cosim.models import Robot
-from hexapod_cosim.models.records import Leg, Link, Vector3, Vector6
+from hexapod_cosim.models.records import Contact, Friction, Leg, Link, Servo, Vector3, Vector6
 
 
 def scaled_robot(robot: Robot, by: float) -> Robot:
-    """Its motion is the robot's, with times sqrt(by) times as long.
+    """Returns a robot whose motion is similar, with times multiplied by sqrt(by).
 
-    Forces go with by^3, torques with by^4, moduli of elasticity with by.
+    Forces are multiplied by by^3, torques by by^4, moduli of elasticity by by.
     """
     time = by**0.5
-
-    def long(values: Vector3) -> Vector3:
-        x, y, z = values
-        return by * x, by * y, by * z
-
-    def heavy(inertia: Vector6) -> Vector6:
-        xx, yy, zz, xy, xz, yz = (by**5 * value for value in inertia)
-        return xx, yy, zz, xy, xz, yz
-
-    def link(of: Link) -> Link:
-        return replace(
-            of, mass=by**3 * of.mass, com=long(of.com), inertia=heavy(of.inertia),
-            length=by * of.length, offset_y=by * of.offset_y, offset_z=by * of.offset_z,
-        )  # fmt: skip
-
-    def leg(of: Leg) -> Leg:
-        coxa, femur, tibia = of.links
-        return replace(
-            of, hip_position=long(of.hip_position), links=(link(coxa), link(femur), link(tibia))
-        )
-
-    torso, servo, contact, friction, gait = (
-        robot.torso,
-        robot.servo,
-        robot.contact,
-        robot.friction,
-        robot.gait,
-    )
+    torso, foot, baumgarte, gait = robot.torso, robot.foot, robot.baumgarte, robot.gait
     return replace(
         robot,
         name=f"{robot.name}_times_{by:g}",
         torso=replace(
             torso,
             mass=by**3 * torso.mass,
-            size=long(torso.size),
-            com=long(torso.com),
-            inertia=heavy(torso.inertia),
+            size=_scaled_vector(torso.size, by),
+            com=_scaled_vector(torso.com, by),
+            inertia=_scaled_inertia(torso.inertia, by),
         ),
-        legs=tuple(map(leg, robot.legs)),
-        foot=replace(
-            robot.foot, radius=by * robot.foot.radius, youngs_modulus=by * robot.foot.youngs_modulus
-        ),
-        # K of F = K d^1.5: sqrt(R) E
-        contact=replace(
-            contact,
-            stiffness=by**1.5 * contact.stiffness,
-            damping_factor=contact.damping_factor / time,
-            impact_speed_floor=contact.impact_speed_floor * time,
-        ),
-        friction=replace(
-            friction,
-            slope=friction.slope / time,
-            presliding=by * friction.presliding,
-            bristle_damping=time * friction.bristle_damping,
-        ),
-        servo=replace(
-            servo,
-            kp=by**4 * servo.kp,
-            kd=by**4 * time * servo.kd,
-            torque_max=by**4 * servo.torque_max,
-            speed_max=servo.speed_max / time,
-            rotor_inertia=by**5 * servo.rotor_inertia,
-            coulomb_friction=by**4 * servo.coulomb_friction,
-            torque_continuous=by**4 * servo.torque_continuous,
-        ),
-        baumgarte=replace(
-            robot.baumgarte, alpha=robot.baumgarte.alpha / time, beta=robot.baumgarte.beta / time
-        ),
+        legs=tuple(_scaled_leg(leg, by) for leg in robot.legs),
+        foot=replace(foot, radius=by * foot.radius, youngs_modulus=by * foot.youngs_modulus),
+        contact=_scaled_contact(robot.contact, by),
+        friction=_scaled_friction(robot.friction, by),
+        servo=_scaled_servo(robot.servo, by),
+        baumgarte=replace(baumgarte, alpha=baumgarte.alpha / time, beta=baumgarte.beta / time),
         solver=replace(
             robot.solver, step=time * robot.solver.step, step_max=time * robot.solver.step_max
         ),
@@ -94,4 +43,65 @@ def scaled_robot(robot: Robot, by: float) -> Robot:
             stride=by * gait.stride,
             step_height=by * gait.step_height,
         ),
+    )
+
+
+def _scaled_vector(values: Vector3, by: float) -> Vector3:
+    x, y, z = values
+    return by * x, by * y, by * z
+
+
+def _scaled_inertia(inertia: Vector6, by: float) -> Vector6:
+    xx, yy, zz, xy, xz, yz = (by**5 * value for value in inertia)
+    return xx, yy, zz, xy, xz, yz
+
+
+def _scaled_leg(leg: Leg, by: float) -> Leg:
+    coxa, femur, tibia = (_scaled_link(link, by) for link in leg.links)
+    return replace(
+        leg, hip_position=_scaled_vector(leg.hip_position, by), links=(coxa, femur, tibia)
+    )
+
+
+def _scaled_link(link: Link, by: float) -> Link:
+    return replace(
+        link,
+        mass=by**3 * link.mass,
+        com=_scaled_vector(link.com, by),
+        inertia=_scaled_inertia(link.inertia, by),
+        length=by * link.length,
+        offset_y=by * link.offset_y,
+        offset_z=by * link.offset_z,
+    )
+
+
+def _scaled_contact(contact: Contact, by: float) -> Contact:
+    """The stiffness K of F = K d^1.5 is proportional to sqrt(R) E."""
+    return replace(
+        contact,
+        stiffness=by**1.5 * contact.stiffness,
+        damping_factor=contact.damping_factor / by**0.5,
+        impact_speed_floor=contact.impact_speed_floor * by**0.5,
+    )
+
+
+def _scaled_friction(friction: Friction, by: float) -> Friction:
+    return replace(
+        friction,
+        slope=friction.slope / by**0.5,
+        presliding=by * friction.presliding,
+        bristle_damping=by**0.5 * friction.bristle_damping,
+    )
+
+
+def _scaled_servo(servo: Servo, by: float) -> Servo:
+    return replace(
+        servo,
+        kp=by**4 * servo.kp,
+        kd=by**4 * by**0.5 * servo.kd,
+        torque_max=by**4 * servo.torque_max,
+        speed_max=servo.speed_max / by**0.5,
+        rotor_inertia=by**5 * servo.rotor_inertia,
+        coulomb_friction=by**4 * servo.coulomb_friction,
+        torque_continuous=by**4 * servo.torque_continuous,
     )

@@ -1,4 +1,4 @@
-"""The force laws of a robot that is planned to stand in its stance, on all legs or some."""
+"""The force laws of a robot that stands in its stance on all legs or some."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WEIGHT = weight(ROBOT)  # N
 GAINS = make_gains(ROBOT)
 HOME = LegSolver(ROBOT).forward(ROBOT.stance)[:, :2] @ np.array([1.0, 1.0j])
 ALL = "111111"
-RAISED = 0.03  # m    a foot in mid-swing: beyond doubt in the air
+RAISED = 0.03  # m    height of a foot in mid-swing
 
 
 @cache
@@ -49,7 +49,7 @@ class Laws(Compliance):
 def make_laws(
     robot: Robot = ROBOT, *, gains: Gains | None = None, parts: Parts | None = None
 ) -> Laws:
-    """The laws at rest, with no plan yet."""
+    """Returns the laws at rest, without a plan."""
     gait, gains = make_gait(robot), make_gains(robot) if gains is None else gains
     return Laws(
         gains,
@@ -71,8 +71,8 @@ def plan(
     rise: float = 0.0,
     hurried: bool = False,
 ) -> None:
-    """Plans a step in which these legs stand and the others are in the air, so high [m] and
-    rising so fast [m/s].
+    """Plans a step in which these legs stand and the others are in the air, at a height [m] and a
+    vertical speed [m/s].
     """
     still = rest(robot)
     stands = np.array([flag == "1" for flag in standing])
@@ -91,12 +91,12 @@ def plan(
 
 
 def shared(laws: Laws) -> np.ndarray:
-    """(6, 3) the planned forces."""
+    """Returns the planned forces, shape (6, 3)."""
     return laws.planned.shares.forces()
 
 
 def squeezing(size: float = 2.0) -> np.ndarray:
-    """(6, 3) all feet carry alike, the middle ones are pushed apart."""
+    """Returns forces (6, 3): equal loads on all feet, the middle ones pushed apart."""
     force = np.zeros((6, 3))
     force[:, 2] = WEIGHT / 6.0
     force[1, 1], force[4, 1] = size, -size
@@ -112,7 +112,7 @@ def run(
     standing: str = ALL,
     height: float = RAISED,
 ) -> None:
-    """Takes so many steps under the same plan and forces."""
+    """Takes a number of steps under the same plan and forces."""
     plan(laws, robot=robot, standing=standing, height=height)
     for _ in range(steps):
         laws.feel(force)

@@ -1,5 +1,5 @@
-"""Robots, motions and commands for the plant's tests: random but seeded, and as general as the
-equations allow.
+"""Random but seeded robots, motions and commands for the plant's tests, as general as the equations
+allow.
 """
 
 from __future__ import annotations
@@ -22,9 +22,7 @@ MACRO = 0.004  # s  of a trail
 
 
 def changed(robot: Robot, **sections: dict[str, Any]) -> Robot:
-    """The robot with fields of some of its sections replaced: changed(robot, servo={"mode":
-    "torque"}).
-    """
+    """Replaces fields of sections of a robot: changed(robot, servo={"mode": "torque"})."""
     return replace(
         robot,
         **{name: replace(getattr(robot, name), **fields) for name, fields in sections.items()},
@@ -32,7 +30,7 @@ def changed(robot: Robot, **sections: dict[str, Any]) -> Robot:
 
 
 def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
-    """The robot with fields of one link of every leg replaced."""
+    """Replaces fields of one link of every leg."""
     legs = []
     for leg in robot.legs:
         links = list(leg.links)
@@ -42,9 +40,7 @@ def with_links(robot: Robot, joint: int, **fields: Any) -> Robot:
 
 
 def scaled(robot: Robot, size: float) -> Robot:
-    """The robot with every length in proportion, and inertias with lengths squared; masses are
-    kept.
-    """
+    """Multiplies every length of a robot, and inertias by its square; masses stay the same."""
 
     def lengths(values: Vector3) -> Vector3:
         return (size * values[0], size * values[1], size * values[2])
@@ -76,8 +72,9 @@ def scaled(robot: Robot, size: float) -> Robot:
 
 
 def lopsided(seed: int = 0) -> Robot:
-    """A robot no two parts of which are alike: skew axes, offsets, products of inertia, a centre
-    of mass off the torso's origin.
+    """Returns a robot without symmetries:
+
+    skew axes, offsets, products of inertia, a centre of mass away from the torso's origin.
     """
     robot, rng = load_robot("phantomx_mk4"), np.random.default_rng(seed)
     torso = replace(
@@ -114,9 +111,7 @@ def _lopsided_link(link: Link, rng: np.random.Generator) -> Link:
 
 
 def random_inertia(rng: np.random.Generator, mass: float, size: float) -> Vector6:
-    """Entries xx yy zz xy xz yz of the inertia of a random cloud of mass points of this size
-    [m].
-    """
+    """Returns xx yy zz xy xz yz of a random cloud of mass points of this size [m]."""
     points = rng.normal(0.0, size, (8, 3))
     second = mass / 8.0 * points.T @ points
     J = np.trace(second) * np.eye(3) - second
@@ -124,8 +119,8 @@ def random_inertia(rng: np.random.Generator, mass: float, size: float) -> Vector
 
 
 def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
-    """Initial state near the stance, moving, three of its feet in the ground, the third by half
-    a millimetre.
+    """Returns a moving initial state near the stance with three feet in the ground, the third by
+    0.5 mm.
     """
     rng = np.random.default_rng(seed)
     pose = {
@@ -141,7 +136,7 @@ def random_pose(robot: Robot, seed: int) -> dict[str, Array]:
 
 
 def lift(robot: Robot, body: Array) -> float:
-    """How far up [m] bodies must go for the third deepest foot to be half a millimetre in the
+    """Returns how far [m] bodies must be raised for the third deepest foot to be 0.5 mm in the
     ground.
     """
     depth = sorted(foot.penetration for foot in foot_contacts(robot, body))
@@ -149,8 +144,8 @@ def lift(robot: Robot, body: Array) -> float:
 
 
 def random_bodies(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
-    """(19, 13) bodies of a random pose, pulled off their joints by about `drift` (m, m/s and so
-    on).
+    """Returns bodies (19, 13) of a random pose, moved off their joints by about `drift` (m, m/s,
+    ...).
     """
     body = body_states(robot, **random_pose(robot, seed))
     body = body + drift * np.random.default_rng(seed + 500).normal(0.0, 1.0, body.shape)
@@ -160,8 +155,8 @@ def random_bodies(robot: Robot, seed: int, *, drift: float = 0.0) -> Array:
 
 
 def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:
-    """A command near the stance, some of whose torques are beyond the servos' limit; pushes in
-    every direction.
+    """Returns a command near the stance with pushes in all directions, some of whose torques exceed
+    the servos' limit.
     """
     rng = np.random.default_rng(seed + 1000)
     return Command(
@@ -175,8 +170,8 @@ def random_command(robot: Robot, seed: int, *, size: float = 1.0) -> Command:
 
 
 def landing(robot: Robot, seed: int = 3) -> dict[str, Array]:
-    """A start with the lowest foot 2 mm above the ground, falling: feet touch down one after the
-    other within some 50 ms.
+    """Returns a start with the lowest foot 2 mm above the ground, falling; feet touch down one
+    after the other within about 50 ms.
     """
     pose = random_pose(robot, seed) | {"velocity": np.array([0.1, 0.0, -0.5])}
     clearance = -max(foot.penetration for foot in foot_contacts(robot, body_states(robot, **pose)))
@@ -185,7 +180,7 @@ def landing(robot: Robot, seed: int = 3) -> dict[str, Array]:
 
 
 def trail(plant: Plant, count: int, *, first: int = 0) -> list[bytes]:
-    """The plant's bytes after each of some macro-steps with a different command each."""
+    """Returns the plant's state after each of some macro-steps with different commands."""
     saved = []
     for k in range(first, first + count):
         plant.step((k + 1) * MACRO, random_command(plant.robot, k, size=0.2))
@@ -194,7 +189,7 @@ def trail(plant: Plant, count: int, *, first: int = 0) -> list[bytes]:
 
 
 def distance(a: Any, b: Any) -> float:
-    """Largest difference of two arrays over the largest entry of the second, or over 1 where
-    that is less.
+    """Returns the largest difference of two arrays, divided by the largest element of the second if
+    that exceeds 1.
     """
     return float(np.max(np.abs(np.subtract(a, b)))) / max(1.0, float(np.max(np.abs(b))))

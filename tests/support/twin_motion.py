@@ -1,5 +1,5 @@
-"""A planned motion of the multibody twin: what force and torque it needs, body by body, by
-virtual work.
+"""Forces and torques that a planned motion of the multibody twin requires, calculated body by body
+by virtual work.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from hexapod_cosim.models.kinematics import (
     rotation_matrix,
 )
 
-HIGH = 1.0  # m    of the twin over the ground: what its feet feel is given, not found
+HIGH = 1.0  # m    height of the twin over the ground: foot forces are prescribed, not calculated
 NONE = np.full(6, np.nan)  # no foot in contact
 X, Y, Z = np.eye(3)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Rows are steps: where the torso's origin is on the ground, how it is turned, and the
-    joints.
+    """A motion:
+
+    the torso's position over the ground and attitude, and the joints. Rows are time steps.
     """
 
     period: float  # s    between rows
@@ -36,7 +37,7 @@ class Motion:
     speed: np.ndarray  # rad/s
 
     def bodies(self, robot: Robot, at: int) -> np.ndarray:
-        """(19, 13) at rest there."""
+        """Returns the bodies at rest at row k, shape (19, 13)."""
         height, roll, pitch = self.posture[at]
         turn = quaternion_product(axis_quaternion(Y, pitch), axis_quaternion(X, roll))
         turn = quaternion_product(axis_quaternion(Z, self.yaw[at]), turn)
@@ -48,7 +49,9 @@ class Motion:
 
 
 def velocities(robot: Robot, body: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """(114, 24) of all bodies by the torso's v and w and the joints' speeds."""
+    """Returns velocities of all bodies per unit of the torso's v and w and of the joints' speeds,
+    shape (114, 24).
+    """
     still = (robot, body[0, :3], body[0, 3:7])
     moving = (
         body_states(*still, unit[:3], unit[3:6], angle, unit[6:].reshape(6, 3))
@@ -58,7 +61,7 @@ def velocities(robot: Robot, body: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def turned_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(n, 3) rotation vectors from one set of quaternions (n, 4) to the next."""
+    """Returns rotation vectors (n, 3) from one set of quaternions (n, 4) to the next."""
     found = []
     for p, q in zip(before, after, strict=True):
         w, *xyz = quaternion_product(q, p * [1.0, -1.0, -1.0, -1.0])
@@ -72,8 +75,10 @@ def turned_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def twin_needs(robot: Robot, motion: Motion, at: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(24,) force and moment at the torso's centre of mass and torques of the joints; the bodies
-    (19, 13); their velocities (114, 24).
+    """Returns the required generalised forces, bodies and velocities.
+
+    The forces (24,) are force and moment at the torso's centre of mass and torques of the joints;
+    the bodies are (19, 13), their velocities (114, 24).
     """
     before, body, after = (motion.bodies(robot, k) for k in (at - 1, at, at + 1))
     dv = np.zeros((19, 6))

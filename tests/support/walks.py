@@ -26,14 +26,14 @@ PARAMETERS = {
 }
 SERVO = replace(ROBOT.servo, torque_continuous=1.2, motor_constant=0.8)
 WEIGHT = robot_weight(PARAMETERS)
-DISTANCE = SPEED * PERIOD * (CYCLES - 2)  # m    in the judged cycles
+DISTANCE = SPEED * PERIOD * (CYCLES - 2)  # m    in the cycles of the metrics
 
 
 class Walk:
-    """A synthetic recording: everything zero until a test says otherwise; the torso moves along x
-    at the commanded speed.
+    """A synthetic recording, zero unless a test sets values; the torso moves along x at the
+    commanded speed.
 
-    h: between rows [s]; planned: whether the controller tells where it plans the feet.
+    h: time between rows [s]. planned: whether the controller outputs the planned feet.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Walk:
         self.data[:, self.names.index(name)] = values
 
     def grow(self, name: str, rate: Numbers | float) -> None:
-        """A cumulative output whose rate is known at the rows."""
+        """Sets a cumulative output from its rate at the rows."""
         rates = np.broadcast_to(np.asarray(rate, dtype=float), self.time.shape)
         self.set(name, running_integral(self.time, rates))
 

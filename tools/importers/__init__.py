@@ -1,1 +1,1 @@
-"""The plant FMU through importers that no one here wrote."""
+"""Runs the plant FMU with other tools (importers) and compares their results with fmpy's."""

@@ -1,9 +1,10 @@
-"""`python -m tools.importers.compare`: the same recorded walk through importers that no one here
-wrote, and how far each is from fmpy.
+"""Runs a recorded walk with other importers and compares their outputs with fmpy's.
 
-Everything lies in build/importers: an environment of the importers' own, the walk, each importer's
-answers. An importer that cannot be installed on this machine is named with the reason; one that was
-installed has to run and agree, or the exit code says so.
+usage: python -m tools.importers.compare
+
+All files are in build/importers: the importers' virtual environment, the walk, each importer's
+outputs. An importer that cannot be installed is listed with the reason. The exit code is 1 if an
+installed importer fails or does not agree.
 """
 
 from __future__ import annotations
@@ -37,23 +38,22 @@ from tools.importers.walk import STEP, Walk, record
 HERE = Path(__file__).resolve().parent
 ADAPTERS = HERE / "adapters"
 BUILD = HERE.parents[1] / "build" / "importers"
-DURATION = 3.0  # s    three gait cycles and a half
-# a last bit in when a step ends, carried through touch-downs; steepest rises of forces hold second
-# differences of depths
+DURATION = 3.0  # s, three and a half gait cycles
+# largest difference due to the last bits of communication points; second differences of depths in
+# the rise of forces amplify it
 ROUND_OFF = 2e-9
-# SI     an output that never gets larger is judged by this: residuals are themselves round-off
-SMALL = 1e-3
+SMALL = 1e-3  # SI, scale of outputs that never exceed it, such as residuals
 FMI_SIM = "0.7.0"
 
 
 @dataclass(frozen=True)
 class Importer:
-    """A program that walks: `adapter` FMU INPUTS NAMES OUTPUTS."""
+    """An importer and its adapter, a program with the arguments FMU INPUTS NAMES OUTPUTS."""
 
     name: str
-    packages: tuple[str, ...]  # of PyPI, itself first; (): of crates.io
+    packages: tuple[str, ...]  # on PyPI, its own first; empty: on crates.io
     adapter: str
-    given: str  # how it takes inputs
+    given: str  # how it receives inputs
 
 
 IMPORTERS = (
@@ -69,11 +69,13 @@ IMPORTERS = (
 
 @dataclass(frozen=True)
 class Row:
-    """What came of an importer. Differences are the largest of all outputs and times, each of its
-    output's largest value.
+    """The result of an importer.
 
-    difference: from fmpy;  own: from fmpy told the importer's own times, to the last bit;  missing:
-    it could not be installed.
+    Differences are the largest of all outputs and times, relative to the output's largest value.
+
+    difference: from fmpy.
+    own: from fmpy with the importer's communication points, to the last bit.
+    missing: whether the importer could not be installed.
     """
 
     name: str
@@ -86,12 +88,12 @@ class Row:
 
     @property
     def agrees(self) -> bool:
-        """It ran, and what is left is round-off."""
+        """Whether the importer ran and differs by round-off only."""
         return self.difference is not None and self.difference <= ROUND_OFF
 
 
 def main() -> int:
-    """Prints the table; returns the exit code."""
+    """Runs the comparison and prints the tables; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--duration", type=float, default=DURATION, help="of the walk [s]")
     duration = parser.parse_args().duration
@@ -100,7 +102,7 @@ def main() -> int:
     ours = row("hexapod's master", package_version(), "as recorded", walk.recorded, walk)
     missing = install_fmi_sim(python)
     rows = [
-        through(importer, walk, python, missing="" if importer.packages else missing)
+        run_importer(importer, walk, python, missing="" if importer.packages else missing)
         for importer in IMPORTERS
     ]
     show([ours, *rows], walk)
@@ -112,8 +114,9 @@ def main() -> int:
 def verdict(
     importers: Sequence[Row], tools: Sequence[PackageRow], *, ours: Sequence[Outcome]
 ) -> int:
-    """Says what is not good enough, and returns the exit code. Masters of our own (`ours`) have
-    to agree, whatever can be installed.
+    """Prints the failures and returns the exit code.
+
+    The project's own masters (`ours`) must agree; other tools may be missing.
     """
     wrong = [f"{one.name} does not agree" for one in ours if not one.agrees]
     wrong += shortcomings("importers", importers, wanted=len(IMPORTERS)) + shortcomings(
@@ -125,30 +128,21 @@ def verdict(
 
 
 def environment() -> Path:
-    """Python of the importers' environment, made or brought up to date."""
+    """Creates or updates the importers' virtual environment; returns its Python."""
     folder, requirements = BUILD / "venv", HERE / "requirements.txt"
-    subprocess.run([sys.executable, str(HERE.parent / "make_venv.py"), str(folder)], check=True)
+    subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
     python = folder / "bin" / "python"
     for line in requirements.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):
-            subprocess.run(
-                [
-                    str(python),
-                    "-m",
-                    "pip",
-                    "install",
-                    "--quiet",
-                    "--disable-pip-version-check",
-                    line,
-                ],
-                check=False,
-            )
+            options = ["--quiet", "--disable-pip-version-check"]
+            subprocess.run([str(python), "-m", "pip", "install", *options, line], check=False)
     return python
 
 
 def install_fmi_sim(python: Path) -> str:
-    """fmi-sim from crates.io; returns "", or why it cannot be had. To build it takes libclang,
-    which PyPI has, and gcc's headers.
+    """Builds fmi-sim from crates.io, with libclang from PyPI and gcc's headers.
+
+    Returns "", or the reason why it cannot be installed.
     """
     folder = BUILD / "cargo"
     if (folder / "bin" / "fmi-sim").exists():
@@ -179,8 +173,8 @@ def install_fmi_sim(python: Path) -> str:
     return "" if done.returncode == 0 else last_lines(done.stderr)
 
 
-def through(importer: Importer, walk: Walk, python: Path, *, missing: str = "") -> Row:
-    """The walk through one importer; `missing`: why it could not be installed, if that is known."""
+def run_importer(importer: Importer, walk: Walk, python: Path, *, missing: str = "") -> Row:
+    """Runs the walk with one importer; `missing`: why it could not be installed, if known."""
     missing = missing or not_installed(importer.packages, python)
     if missing:
         return Row(importer.name, "", importer.given, None, None, missing, missing=True)
@@ -195,23 +189,21 @@ def through(importer: Importer, walk: Walk, python: Path, *, missing: str = "") 
 
 
 def row(name: str, release: str, given: str, found: Recording, walk: Walk) -> Row:
-    """An importer's answers, judged."""
-    difference, worst = judged(found, walk.reference)
-    lengths = (
-        np.full(len(found.time), STEP),
-        np.diff(found.time, prepend=0.0),
-    )  # importers pass h, or the difference of their times
-    whole = len(found.time) == len(walk.reference.time)
+    """Compares an importer's outputs with fmpy's."""
+    difference, worst = largest_difference(found, walk.reference)
+    # importers pass the step size, or the difference of their times
+    lengths = (np.full(len(found.time), STEP), np.diff(found.time, prepend=0.0))
+    complete = len(found.time) == len(walk.reference.time)
     own = (
-        min(judged(found, walk.replay(found.time, steps))[0] for steps in lengths)
-        if whole and np.isfinite(found.time).all()
+        min(largest_difference(found, walk.replay(found.time, steps))[0] for steps in lengths)
+        if complete and np.isfinite(found.time).all()
         else None
     )
     return Row(name, release, given, difference, own, worst)
 
 
-def judged(found: Recording, reference: Recording) -> tuple[float, str]:
-    """The largest difference of all outputs and times, of the output's largest value, and where."""
+def largest_difference(found: Recording, reference: Recording) -> tuple[float, str]:
+    """Returns the largest relative difference of all outputs and times, and the output's name."""
     names = reference.names[1:]
     lacking = set(names).difference(found.names)
     if lacking:
@@ -226,7 +218,7 @@ def judged(found: Recording, reference: Recording) -> tuple[float, str]:
 
 
 def show(rows: list[Row], walk: Walk) -> None:
-    """Prints the table."""
+    """Prints the table of importers."""
     count = walk.reference.data.shape[0] * (walk.reference.data.shape[1] - 1)
     title = f"{len(walk.reference.time)} steps of {STEP:g} s, {count} values, against fmpy"
     table = Table(
@@ -240,7 +232,12 @@ def show(rows: list[Row], walk: Walk) -> None:
     )
     for one in rows:
         table.add_row(
-            one.name, one.version, one.given, shown(one.difference), shown(one.own), one.remark
+            one.name,
+            one.version,
+            one.given,
+            format_difference(one.difference),
+            format_difference(one.own),
+            one.remark,
         )
     Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
 
@@ -255,14 +252,14 @@ def show_packages(rows: list[PackageRow]) -> None:
         table.add_row(
             one.name,
             one.version,
-            shown(one.prompt),
-            shown(one.late) if not one.trouble else one.trouble,
+            format_difference(one.on_time),
+            format_difference(one.late) if not one.trouble else one.trouble,
         )
     Console(width=max(150, shutil.get_terminal_size().columns)).print(table)
 
 
-def shown(difference: float | None) -> str:
-    """A difference, or what stands for it."""
+def format_difference(difference: float | None) -> str:
+    """Formats a difference."""
     return (
         "not run"
         if difference is None

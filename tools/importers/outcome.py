@@ -1,6 +1,4 @@
-"""What came of tools that no one here wrote: their answers, why there are none, and whether that
-is good enough.
-"""
+"""Runs adapters of other tools and checks the results."""
 
 from __future__ import annotations
 
@@ -17,18 +15,18 @@ LAST_LINES = 3
 
 
 class Outcome(Protocol):
-    """A row of a table."""
+    """The result of a tool: a row of a table."""
 
     @property
     def name(self) -> str: ...
     @property
-    def missing(self) -> bool: ...  # the tool could not be installed on this machine
+    def missing(self) -> bool: ...  # whether the tool could not be installed
     @property
-    def agrees(self) -> bool: ...  # it ran, and its answers are the expected ones
+    def agrees(self) -> bool: ...  # whether it ran with the expected outputs
 
 
 def version(distribution: str, python: Path) -> str:
-    """Of a package in the tools' environment; "" if it is not there."""
+    """Returns the version of a package in the tools' environment; "" without the package."""
     code = f"from importlib.metadata import version; print(version({distribution!r}))"
     return subprocess.run(
         [str(python), "-c", code], capture_output=True, text=True, check=False
@@ -36,13 +34,16 @@ def version(distribution: str, python: Path) -> str:
 
 
 def not_installed(distributions: Iterable[str], python: Path) -> str:
-    """Which packages of a tool could not be installed, "" when it can run."""
+    """Returns a message about missing packages of a tool; "" if there are none."""
     lacking = [name for name in distributions if not version(name, python)]
     return f"could not be installed: {', '.join(lacking)}" if lacking else ""
 
 
 def answers(command: Sequence[str | Path], outputs: Path) -> tuple[Recording | None, str]:
-    """What an adapter wrote, or None and what it said; what an earlier one wrote does not count."""
+    """Runs an adapter; returns its outputs, or None and its error message.
+
+    An output file of an earlier run is deleted first.
+    """
     outputs.unlink(missing_ok=True)
     done = subprocess.run(
         [str(word) for word in command], capture_output=True, text=True, check=False
@@ -52,17 +53,18 @@ def answers(command: Sequence[str | Path], outputs: Path) -> tuple[Recording | N
     try:
         return read_csv(outputs), ""
     except HexapodError as error:
-        return None, f"failed: it ended well and left no answers: {error}"
+        return None, f"failed: it exited with 0 but wrote no outputs: {error}"
 
 
 def last_lines(text: str) -> str:
-    """The end of what a program said, in one line."""
+    """Returns the last lines of a program's messages in one line."""
     return " / ".join(text.strip().splitlines()[-LAST_LINES:])
 
 
 def shortcomings(kind: str, outcomes: Collection[Outcome], *, wanted: int) -> list[str]:
-    """Why the outcomes of foreign tools are not good enough, a sentence each: all that could be
-    installed agree, and none is left out.
+    """Returns the failures of other tools, one sentence each.
+
+    All tools that could be installed must agree, and none may be left out.
     """
     found = [f"{one.name} does not agree" for one in outcomes if not (one.missing or one.agrees)]
     settled = sum(one.missing or one.agrees for one in outcomes)

@@ -1,5 +1,5 @@
-"""A package of plant and controller run by the plainest of masters, in both orders that tools
-know, to compare them with.
+"""Runs a package of plant and controller with a minimal master, in both orders of data exchange
+that tools use.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hexapod_cosim.cosim.master.recorder import Recording
 
 
 @dataclass(frozen=True)
-class Wire:
+class Connections:
     """All connections of one type from one component to another."""
 
     start: str
@@ -27,37 +27,37 @@ class Wire:
     target: FmuBlock
 
     def transfer(self) -> None:
-        """Outputs as they are now become inputs."""
+        """Sets the inputs to the present outputs."""
         self.source.get()
         self.target.values[:] = self.source.values
         self.target.set()
 
 
 @dataclass(frozen=True)
-class Running:
-    """An initialised package."""
+class InitialisedPackage:
+    """The components and connections of an initialized package."""
 
     components: dict[str, Fmu]
-    wires: list[Wire]
+    connections: list[Connections]
 
-    def settle(self, order: Sequence[str]) -> None:
-        """Hands outputs on, component after component: the later ones answer what the earlier
-        ones put out just now.
+    def transfer_in_order(self, order: Sequence[str]) -> None:
+        """Transfers outputs of one component after the other, so that later components use the
+        present outputs of earlier ones.
         """
         for name in order:
-            for wire in self.wires:
-                if wire.start == name:
-                    wire.transfer()
+            for connection in self.connections:
+                if connection.start == name:
+                    connection.transfer()
 
-    def swap(self) -> None:
-        """Reads all outputs, then sets all inputs: every component answers what it was told a
-        step ago.
+    def transfer_at_once(self) -> None:
+        """Reads all outputs, then sets all inputs, so that every component uses the outputs of the
+        step before.
         """
-        for wire in self.wires:
-            wire.source.get()
-        for wire in self.wires:
-            wire.target.values[:] = wire.source.values
-            wire.target.set()
+        for connection in self.connections:
+            connection.source.get()
+        for connection in self.connections:
+            connection.target.values[:] = connection.source.values
+            connection.target.set()
 
 
 def run(
@@ -67,12 +67,12 @@ def run(
     step: float,
     steps: int,
     order: Sequence[str],
-    at_once: bool,
+    in_order: bool,
 ) -> Recording:
-    """Rows of `names` (component.variable) after each step.
+    """Runs a package; returns rows of `names` (component.variable) after each step.
 
-    at_once: controllers answer the outputs of the same communication point, in `order`; else those
-    of the point before, but for the first.
+    With `in_order`, inputs are set in the order of the components to outputs of the same
+    communication point; else to those of the point before, except at the first.
     """
     rows = []
     with opened(package, end=step * steps) as running:
@@ -80,24 +80,24 @@ def run(
             running.components[name.partition(".")[0]].block([name.partition(".")[2]])
             for name in names
         ]
-        running.settle(order)
+        running.transfer_in_order(order)
         for k in range(steps):
             for component in running.components.values():
                 component.step(k * step, step)
             for block in seen:
                 block.get()
             rows.append([(k + 1) * step, *(float(block.values[0]) for block in seen)])
-            if at_once:
-                running.settle(order)
+            if in_order:
+                running.transfer_in_order(order)
             else:
-                running.swap()
+                running.transfer_at_once()
     return Recording(("time", *names), np.array(rows))
 
 
 @contextmanager
-def opened(package: Path, *, end: float) -> Iterator[Running]:
-    """A package's components with its parameter sets in place, initialised at time 0, to run
-    until `end` [s].
+def opened(package: Path, *, end: float) -> Iterator[InitialisedPackage]:
+    """Yields a package's components with its parameter sets, initialized at time 0 for a run until
+    `end` [s].
     """
     described = read_ssd(str(package))
     with ExitStack() as stack:
@@ -123,21 +123,23 @@ def opened(package: Path, *, end: float) -> Iterator[Running]:
             (one.startElement, one.startConnector, one.endElement, one.endConnector)
             for one in described.system.connections
         ]
-        wires = list(wired(components, ends))
+        connections = list(grouped_connections(components, ends))
         for fmu in components.values():
             fmu.initialise(0.0, end)
-        yield Running(components, wires)
+        yield InitialisedPackage(components, connections)
 
 
-def wired(components: dict[str, Fmu], ends: Sequence[tuple[str, str, str, str]]) -> Iterator[Wire]:
-    """Connections by pair of components and type."""
+def grouped_connections(
+    components: dict[str, Fmu], ends: Sequence[tuple[str, str, str, str]]
+) -> Iterator[Connections]:
+    """Yields the connections, grouped by pair of components and type."""
     groups: dict[tuple[str, str, str], list[tuple[str, str]]] = {}
     for start, output, end, entry in ends:
         groups.setdefault((start, end, components[start].variables[output].type), []).append(
             (output, entry)
         )
     for (start, end, _), names in groups.items():
-        yield Wire(
+        yield Connections(
             start,
             components[start].block([name for name, _ in names]),
             components[end].block([name for _, name in names]),

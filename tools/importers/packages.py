@@ -1,5 +1,5 @@
-"""The same package through tools that no one here wrote, against the Python master: on time, and
-with measurements a period late.
+"""Runs a package with other tools and compares it with the Python master, with present measurements
+and with those of one period before.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from hexapod_cosim.cosim.master.fmu import Fmu
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.run.controller_setup import make_setup
 from hexapod_cosim.models import load_robot
-from tools.importers.late import walk
+from tools.importers.delayed import walk
 from tools.importers.outcome import answers, not_installed, version
 from tools.importers.package import run
 
 ADAPTERS = Path(__file__).resolve().parent / "adapters"
 PERIOD = 0.005  # s
-# the controllers' last bits, which the servos' stiffness and the ground's turn into forces
-SAME = 1e-9
-SMALL = 1e-3  # SI    an output that never gets larger is judged by this
-# that inputs do not reach at once: some tools show outputs before they set the next inputs, some
-# after
-JUDGED = (
+# largest relative difference due to the last bits of the commands, which stiff servos and the
+# ground amplify
+ROUND_OFF = 1e-9
+SMALL = 1e-3  # SI, scale of outputs that never exceed it
+# outputs without direct feed-through, since tools read outputs before or after they set inputs
+COMPARED = (
     "torso.position",
     "torso.quaternion",
     "torso.velocity",
@@ -45,36 +45,39 @@ TOOLS = (
 
 @dataclass(frozen=True)
 class PackageRow:
-    """What came of a tool: the largest difference of all judged outputs and times, each of its
-    largest value, from either order.
+    """The result of a tool: largest differences of all compared outputs and times, relative to the
+    output's largest value.
+
+    on_time: from the Python master with present measurements.
+    late: from the Python master with measurements of one period before.
     """
 
     name: str
     version: str
-    prompt: float | None
+    on_time: float | None
     late: float | None
     trouble: str = ""
-    missing: bool = False  # it could not be installed
+    missing: bool = False  # whether it could not be installed
 
     @property
     def agrees(self) -> bool:
-        """It ran, and gave the walk of one of the orders."""
+        """Whether the tool ran and gave one of the two walks."""
         return any(
-            difference is not None and difference <= SAME for difference in (self.prompt, self.late)
+            difference is not None and difference <= ROUND_OFF
+            for difference in (self.on_time, self.late)
         )
 
 
 def compare_packages(
     folder: Path, python: Path, *, duration: float
 ) -> tuple[list[PackageRow], list[PackageRow]]:
-    """Packs the compliant walk and runs it through plain masters and foreign tools; `python`: of
-    the tools' environment.
+    """Exports the compliant walk and runs it with the minimal master and with other tools.
+
+    python: of the tools' virtual environment.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    setup, steps = (
-        make_setup(load_robot("athena"), control="compliant", period=PERIOD),
-        round(duration / PERIOD),
-    )
+    setup = make_setup(load_robot("athena"), control="compliant", period=PERIOD)
+    steps = round(duration / PERIOD)
     package = export_package(setup, folder / "athena.ssp", stop=duration)
     with zipfile.ZipFile(package) as archive:
         plant = Path(archive.extract("resources/plant.fmu", folder))
@@ -83,11 +86,11 @@ def compare_packages(
     ]
     with Fmu(plant) as fmu:
         outputs = fmu.names("output")
-    names = [name for name in outputs if any(part in name for part in JUDGED)]
+    names = [name for name in outputs if any(part in name for part in COMPARED)]
     wanted = folder / "names.txt"
     wanted.write_text("\n".join(f"{PLANT}.{name}" for name in names), encoding="utf-8")
     rows = []
-    for name, at_once in (
+    for name, in_order in (
         ("plain master, plant before controller", True),
         ("plain master, both at once", False),
     ):
@@ -97,9 +100,9 @@ def compare_packages(
             step=PERIOD,
             steps=steps,
             order=(PLANT, CONTROLLER),
-            at_once=at_once,
+            in_order=in_order,
         )
-        rows.append(PackageRow(name, package_version(), *judged(found, masters, names)))
+        rows.append(PackageRow(name, package_version(), *largest_difference(found, masters, names)))
     tools = []
     for name, needs, adapter in TOOLS:
         answered = folder / f"{name}.csv"
@@ -111,11 +114,11 @@ def compare_packages(
             answered,
             str(steps),
         ]
-        tools.append(through(name, needs, command, answered, masters, names))
+        tools.append(run_tool(name, needs, command, answered, masters, names))
     return rows, tools
 
 
-def through(
+def run_tool(
     name: str,
     needs: Sequence[str],
     command: Sequence[str | Path],
@@ -123,8 +126,15 @@ def through(
     masters: Sequence[Recording],
     names: Sequence[str],
 ) -> PackageRow:
-    """A package through one tool, judged. needs: packages of PyPI, itself first; command: its
-    adapter's, after the environment's Python.
+    """Runs a package with one tool and compares the outputs.
+
+    Args:
+        name: of the tool.
+        needs: packages on PyPI, the tool's own first.
+        command: Python of the environment, the adapter and its arguments.
+        outputs: the file that the adapter writes.
+        masters: recordings of the Python master, on time and late.
+        names: of the compared outputs.
     """
     python = Path(command[0])
     missing = not_installed(needs, python)
@@ -134,15 +144,13 @@ def through(
     found, said = answers(command, outputs)
     if found is None:
         return PackageRow(name, release, None, None, said)
-    return PackageRow(name, release, *judged(found, masters, names))
+    return PackageRow(name, release, *largest_difference(found, masters, names))
 
 
-def judged(
+def largest_difference(
     found: Recording, masters: Sequence[Recording], names: Sequence[str]
 ) -> tuple[float, float]:
-    """The largest difference from each master, of the output's largest value; none there is:
-    infinite.
-    """
+    """Returns the largest relative difference from each master; infinite for missing outputs."""
     wanted = [f"{PLANT}.{name}" for name in names]
     if not set(wanted) <= set(found.names) or len(found.time) != len(masters[0].time):
         return np.inf, np.inf
@@ -151,4 +159,4 @@ def judged(
         float((np.abs(theirs - one).max(axis=0) / np.maximum(np.abs(one).max(axis=0), SMALL)).max())
         for one in ours
     )
-    return on_time, late  # NaN, of values that are none, agrees with nothing
+    return on_time, late  # NaN does not agree

@@ -1,5 +1,5 @@
-"""The walk that every importer repeats: joint commands recorded from a compliant walk, and what
-fmpy's own simulator makes of them.
+"""Records the walk that every importer repeats: joint commands of a compliant walk, and the outputs
+of fmpy's simulator under these commands.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ STEP = 0.005  # s
 
 @dataclass(frozen=True, kw_only=True)
 class Walk:
-    """Files in one folder, and the answers expected of an importer.
+    """Files in one folder, and the expected outputs of an importer.
 
-    `reference`: a row per communication point after the first, columns of `outputs`; `recorded`:
-    the same as our own master saw them.
+    reference: fmpy's outputs, a row for each communication point after the first.
+    recorded: the outputs of the project's own master.
     """
 
     folder: Path
     fmu: Path
-    inputs: Path  # CSV: time and the commands set then, which hold until the next row
-    wanted: Path  # names of the outputs to read, one a line
+    inputs: Path  # CSV: time and commands, which hold until the next row
+    wanted: Path  # names of the outputs to read, one on each line
     reference: Recording
     recorded: Recording
 
     @property
     def unpacked(self) -> Path:
-        """The FMU's contents as a folder, for importers that take one."""
+        """The FMU unpacked to a folder, for importers that require one."""
         place = self.folder / "unpacked"
         if not place.exists():
             with zipfile.ZipFile(self.fmu) as archive:
@@ -49,8 +49,11 @@ class Walk:
         return place
 
     def replay(self, ends: NDArray[np.float64], steps: NDArray[np.float64]) -> Recording:
-        """The walk on an importer's own communication points: `ends` and lengths of its `steps`,
-        (steps,) each [s].
+        """Repeats the walk with an importer's communication points.
+
+        Args:
+            ends: of the steps, shape (steps,) [s].
+            steps: sizes, shape (steps,) [s].
         """
         commands, outputs = read_csv(self.inputs), self.reference.names[1:]
         rows = []
@@ -75,8 +78,8 @@ class Walk:
 
 
 def record(folder: Path, *, duration: float, robot: str = "athena") -> Walk:
-    """Walks under compliant control for `duration` [s] and writes FMU, commands and names of
-    outputs into a folder.
+    """Simulates a compliant walk for `duration` [s] and writes FMU, commands and names of outputs
+    to a folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
     fmu = export_fmu(load_robot(robot), folder / f"{robot}.fmu")
@@ -109,8 +112,8 @@ def record(folder: Path, *, duration: float, robot: str = "athena") -> Walk:
 
 
 def through_fmpy(fmu: Path, commands: Recording, outputs: list[str]) -> Recording:
-    """fmpy's simulate_fmu: commands and communication points on the same grid, so that each
-    command holds over its step.
+    """Runs fmpy's simulate_fmu; commands and communication points are on the same grid, so that
+    each command holds over its step.
     """
     signals = np.array(
         [tuple(row) for row in commands.data], dtype=[(name, np.float64) for name in commands.names]

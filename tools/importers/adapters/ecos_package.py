@@ -1,7 +1,9 @@
-"""A package through Ecos: usage: ecos_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS.
+"""Runs a package with Ecos.
 
-NAMES: component.variable, one a line. Ecos reads the package as it is; step and parameter set it
-has to be told.
+usage: ecos_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS
+
+NAMES: component.variable, one on each line. Ecos needs the step size and the name of the parameter
+set.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ PARAMETER_SET = "start"
 
 
 def main() -> None:
-    """Walks."""
+    """Runs the walk and writes the outputs."""
     package, wanted, outputs, steps = sys.argv[1:]
     EcosLib.set_log_level("err")
     names = Path(wanted).read_text(encoding="utf-8").split("\n")

@@ -1,7 +1,8 @@
-"""A recorded walk through Ecos (fmi4c inside): usage: ecos_walk.py FMU INPUTS.csv NAMES.txt
-OUTPUTS.csv.
+"""Repeats a recorded walk with Ecos, which uses fmi4c.
 
-Inputs are set before each step and hold over it; outputs are read after the step.
+usage: ecos_walk.py FMU INPUTS.csv NAMES.txt OUTPUTS.csv
+
+Inputs are set before each step and constant over it; outputs are read after the step.
 """
 
 from __future__ import annotations
@@ -12,16 +13,15 @@ from pathlib import Path
 
 from columns import read_columns, write_columns
 
-# the library is linked to oneTBB, which PyPI's package `tbb` puts into the environment's lib, where
-# no loader looks
+# Ecos requires oneTBB, which PyPI's package `tbb` installs where the loader does not look
 ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), mode=ctypes.RTLD_GLOBAL)
 
-# needs the library above
+# requires oneTBB
 from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E402
 
 
 def main() -> None:
-    """Walks."""
+    """Runs the walk and writes the outputs."""
     fmu, inputs, wanted, outputs = sys.argv[1:]
     EcosLib.set_log_level("err")
     (_, *driven), rows = read_columns(inputs)
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def read(simulation: EcosSimulation, name: str) -> float:
-    """A value of any type."""
+    """Returns a Real or Boolean as a float."""
     try:
         return float(simulation.get_real(name))
     except Exception:  # the binding's only error type

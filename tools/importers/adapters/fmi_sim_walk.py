@@ -1,8 +1,9 @@
-"""A recorded walk through fmi-sim, in Rust: usage: fmi_sim_walk.py FMU INPUTS.csv NAMES.txt
-OUTPUTS.csv.
+"""Repeats a recorded walk with fmi-sim, a program in Rust.
 
-fmi-sim reads the commands itself, draws straight lines between rows and asks at communication
-points, which are the rows; all outputs it writes are seen before the next inputs are set.
+usage: fmi_sim_walk.py FMU INPUTS.csv NAMES.txt OUTPUTS.csv
+
+fmi-sim reads the commands, interpolates between rows and sets them at communication points, which
+are the times of the rows. It reads outputs before it sets the next inputs.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ FLAGS = {"true": 1.0, "false": 0.0}
 
 
 def main() -> None:
-    """Walks."""
+    """Runs the walk and writes the outputs."""
     fmu, inputs, wanted, outputs = sys.argv[1:]
     times = [row[0] for row in read_columns(inputs)[1]]
     step = repr(times[1] - times[0])
@@ -46,7 +47,7 @@ def main() -> None:
 
 
 def number(text: str) -> float:
-    """A value of any type."""
+    """Parses a number or Boolean."""
     return FLAGS[text] if text in FLAGS else float(text)
 
 

@@ -1,7 +1,9 @@
-"""A package through libcosim: usage: libcosim_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS.
+"""Runs a package with libcosim.
 
-NAMES: component.variable, one a line. libcosim reads a package's folder, takes the step from it,
-and applies its parameter sets by itself.
+usage: libcosim_package.py PACKAGE.ssp NAMES.txt OUTPUTS.csv STEPS
+
+NAMES: component.variable, one on each line. libcosim reads step size and parameter sets from the
+unpacked package.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ NANOSECONDS = 1e9
 
 
 def main() -> None:
-    """Walks."""
+    """Runs the walk and writes the outputs."""
     package, wanted, outputs, steps = sys.argv[1:]
     log_output_level(CosimLogLevel.ERROR)
     names = Path(wanted).read_text(encoding="utf-8").split("\n")

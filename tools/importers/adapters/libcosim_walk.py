@@ -1,8 +1,9 @@
-"""A recorded walk through libcosim (FMI Library inside): usage: libcosim_walk.py FMU INPUTS.csv
-NAMES.txt OUTPUTS.csv.
+"""Repeats a recorded walk with libcosim, which uses FMI Library.
 
-Inputs go in through an override manipulator before each step and hold over it; outputs are what its
-observer saw after the step.
+usage: libcosim_walk.py FMU INPUTS.csv NAMES.txt OUTPUTS.csv
+
+Inputs are set by an override manipulator before each step and constant over it; outputs are read by
+an observer after the step.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ NANOSECONDS = 1e9
 
 
 def main() -> None:
-    """Walks."""
+    """Runs the walk and writes the outputs."""
     fmu, inputs, wanted, outputs = sys.argv[1:]
     log_output_level(CosimLogLevel.ERROR)
     (_, *driven), rows = read_columns(inputs)

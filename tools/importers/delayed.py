@@ -1,5 +1,5 @@
-"""The Python master and controller on a package's walk, on time and with measurements that are
-one period old.
+"""Runs a package's walk with the Python master and controller, with present measurements or with
+those of one period before.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.schedule import make_schedule
 
 
-class Late:
-    """Answers each time with the measurements of the period before, but for the first; what it
-    remembers it takes from the present ones.
+class DelayedController:
+    """A controller whose commands follow from the measurements of the period before.
 
-    So does a controller FMU whose inputs are set after its outputs were read: its laws go on with
-    every measurement, its answers come late.
+    Its state follows from the present measurements. It is equivalent to a controller FMU whose
+    inputs are set after its outputs were read.
     """
 
     def __init__(self, controller: Controller) -> None:
@@ -31,10 +30,12 @@ class Late:
         self._before: Measurement | None = None
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """The joint commands for [t, t + period)."""
+        """Returns the joint commands for [t, t + period)."""
         state = self.controller.save()
-        shown = self.controller.step(t, command, self._before or measurement)
-        answer = JointCommand(**{name: np.array(value) for name, value in vars(shown).items()})
+        format_difference = self.controller.step(t, command, self._before or measurement)
+        answer = JointCommand(
+            **{name: np.array(value) for name, value in vars(format_difference).items()}
+        )
         self.controller.restore(state)
         self.controller.step(t, command, measurement)
         self._before = copy(measurement)
@@ -42,23 +43,23 @@ class Late:
 
 
 def copy(measurement: Measurement) -> Measurement:
-    """Values as they are now."""
+    """Copies a measurement."""
     return Measurement(**{name: np.array(value) for name, value in vars(measurement).items()})
 
 
 def walk(
     setup: ControllerSetup, fmu: Path, *, duration: float, overrides: list[str], late: bool
 ) -> Recording:
-    """Rows after each step, under the Python controller of this set-up."""
+    """Simulates the walk with the setup's Python controller; returns rows after each step."""
     settings = [f"duration={duration}", f"macro_step={setup.period}", *overrides]
     schedule = make_schedule(load_scenario("walk_flat", overrides=settings))
     controller = setup.build()
-    judged: JointController = Late(controller) if late else controller
+    largest_difference: JointController = DelayedController(controller) if late else controller
     with Fmu(fmu) as plant:
         plant.initialise(0.0, duration)
         signals = Signals(plant)
         recorder = Recorder(signals, schedule.times, schedule.rows)
-        outcome = run(plant, signals, judged, schedule, recorder, h=setup.period)
+        outcome = run(plant, signals, largest_difference, schedule, recorder, h=setup.period)
     if outcome.cause is not None:
         raise outcome.cause
     return outcome.recording.rows(slice(1, None))

@@ -1,8 +1,8 @@
-"""A robot as a picture: model.png and the icon of its FMU, drawn from the masses' own geometry.
+"""Draws a robot for model.png and the icon of its FMU.
 
-Rays parallel to the line of sight meet capsules (links) and a box (torso) in closed form.
-Everything stands in camera axes: x right, y up, z towards the eye, so that a pixel's ray is a line
-along z and the nearest surface the one with the largest z.
+Links are capsules, the torso is a box; their intersections with rays parallel to the line of sight
+are calculated in closed form. All coordinates are in camera axes (x right, y up, z towards the
+eye), so that a pixel's ray is a line along z and the visible surface the one with the largest z.
 """
 
 from __future__ import annotations
@@ -21,18 +21,14 @@ from hexapod_cosim.models.kinematics import body_states, rotation_matrix
 from hexapod_cosim.models.records import Array, Robot
 from hexapod_cosim.models.statics import settled
 
-AZIMUTH, ELEVATION = (
-    math.radians(-52.0),
-    math.radians(27.0),
-)  # of the eye: from the front, left, above
-LIGHT = np.array([0.35, 0.55, 1.0]) / np.linalg.norm(
-    [0.35, 0.55, 1.0]
-)  # towards the lamp, world axes
-AMBIENT, SHADOW = 0.38, 0.34  # share of light everywhere; opacity of the deepest shadow
-SAMPLES = 2  # per pixel, each way
-PENUMBRA = 1.35  # a shadow fades out at this many radii
-MARGIN = 1.08  # of the picture around the robot
-THICKNESS = (0.30, 0.24, 0.17)  # radius of coxa, femur, tibia, of the coxa's length
+AZIMUTH, ELEVATION = math.radians(-52.0), math.radians(27.0)  # of the eye
+# unit vector towards the light, world axes
+LIGHT = np.array([0.35, 0.55, 1.0]) / np.linalg.norm([0.35, 0.55, 1.0])
+AMBIENT, SHADOW = 0.38, 0.34  # share of ambient light; opacity of the deepest shadow
+SAMPLES = 2  # per pixel and direction
+PENUMBRA = 1.35  # radii at which a shadow has faded out
+MARGIN = 1.08  # size of the picture relative to the robot
+THICKNESS = (0.30, 0.24, 0.17)  # radius of coxa, femur, tibia relative to the coxa's length
 COLOURS = {
     "torso": (62, 92, 128),
     "coxa": (70, 74, 82),
@@ -41,12 +37,12 @@ COLOURS = {
 }
 
 Points = NDArray[np.float64]  # (3, height, width)
-Extent = tuple[Array, Array]  # lower left and upper right corner of what a shape covers
+Extent = tuple[Array, Array]  # lower left and upper right corner of a shape
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """All points within a radius of a line from start to end [m]."""
+    """The points within a radius of the line from start to end [m]."""
 
     start: Array
     end: Array
@@ -54,20 +50,20 @@ class Capsule:
     colour: tuple[int, int, int]
 
     def extent(self, radii: float = 1.0) -> Extent:
-        """What it covers of the picture, thickened."""
+        """Returns the corners of the capsule with its radius multiplied by `radii`."""
         ends, reach = np.array([self.start[:2], self.end[:2]]), radii * self.radius
         return ends.min(axis=0) - reach, ends.max(axis=0) + reach
 
     def distance(self, point: Points) -> Array:
-        """From points to the axis [m]."""
+        """Returns the distance of points from the axis [m]."""
         share = (
             np.tensordot(self.end - self.start, point - _column(self.start), axes=1) / self._square
         )
         return np.asarray(np.linalg.norm(self._from_axis(point, share), axis=0))
 
     def meet(self, x: Array, y: Array) -> tuple[Array, Points]:
-        """Height z at which rays meet the surface, -inf where they do not, and the normals
-        there.
+        """Returns the height z at which rays meet the surface (-inf where they miss it) and the
+        surface's normals.
         """
         z = self._side(x, y)
         for centre in (self.start, self.end):
@@ -80,18 +76,20 @@ class Capsule:
 
     @property
     def _square(self) -> float:
+        """The squared length of the axis [m^2]; 1 for a sphere."""
         return float(np.sum((self.end - self.start) ** 2)) or 1.0
 
     def _from_axis(self, point: Points, share: Array) -> Points:
+        """Returns the vectors from the axis to points; share: position along the axis, 0 to 1."""
         return (
             point - _column(self.start) - _column(self.end - self.start) * np.clip(share, 0.0, 1.0)
         )
 
     def _side(self, x: Array, y: Array) -> Array:
-        """The cylinder between the ends: |p - a|^2 - (d.(p - a))^2 / d.d = r^2, quadratic in z."""
+        """Returns z on the cylinder: |p - a|^2 - (d.(p - a))^2 / d.d = r^2, quadratic in z."""
         axis = (self.end - self.start) / math.sqrt(self._square)
         flat = 1.0 - axis[2] ** 2
-        if flat < 1e-9:  # seen end on: the spheres cover it
+        if flat < 1e-9:  # seen from the end, where the spheres hide it
             return np.full_like(x, -np.inf)
         u, v = x - self.start[0], y - self.start[1]
         along = axis[0] * u + axis[1] * v
@@ -103,7 +101,7 @@ class Capsule:
 
 @dataclass(frozen=True)
 class Box:
-    """A box with its middle, its axes as columns and its half edges [m]."""
+    """A box: centre [m], axes as columns, half of its edges [m]."""
 
     centre: Array
     axes: Array
@@ -111,12 +109,12 @@ class Box:
     colour: tuple[int, int, int]
 
     def extent(self) -> Extent:
-        """What it covers of the picture."""
+        """Returns the corners of the box."""
         reach = np.abs(self.axes[:2]) @ self.half
         return self.centre[:2] - reach, self.centre[:2] + reach
 
     def meet(self, x: Array, y: Array) -> tuple[Array, Points]:
-        """As Capsule.meet: the last slab that a ray from the eye enters."""
+        """As Capsule.meet: z where a ray from the eye enters the last of the three slabs."""
         offset = np.stack([x - self.centre[0], y - self.centre[1]])
         across = np.tensordot(self.axes.T[:, :2], offset, axes=1)  # (3, height, width)
         slope = np.where(np.abs(self.axes[2]) < 1e-12, 1e-12, self.axes[2])
@@ -133,18 +131,21 @@ Shape = Box | Capsule
 
 
 def _column(vector: Array) -> Points:
+    """Reshapes a vector (3,) to (3, 1, 1)."""
     return vector[:, None, None]
 
 
 def _sphere(x: Array, y: Array, centre: Array, radius: float) -> Array:
+    """Returns the height z at which rays meet a sphere; -inf where they miss it."""
     square = radius**2 - (x - centre[0]) ** 2 - (y - centre[1]) ** 2
     return np.where(square > 0.0, centre[2] + np.sqrt(np.fmax(square, 0.0)), -np.inf)
 
 
 @lru_cache(maxsize=8)
 def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
-    """The robot standing on the ground as a PNG with a transparent background. Raises RobotError
-    when it cannot stand.
+    """Draws the standing robot as a PNG with a transparent background.
+
+    Width and height are in pixels. Raises RobotError when the robot cannot stand.
     """
     camera = _camera()
     capsules, box = _shapes(robot, camera)
@@ -161,7 +162,7 @@ def draw_robot(robot: Robot, *, width: int, height: int) -> bytes:
 
 
 def _camera() -> Array:
-    """Camera axes (rows) in world axes."""
+    """Returns the camera axes (rows) in world axes."""
     toward = np.array(
         [
             math.cos(ELEVATION) * math.cos(AZIMUTH),
@@ -174,7 +175,7 @@ def _camera() -> Array:
 
 
 def _shapes(robot: Robot, camera: Array) -> tuple[list[Capsule], Box]:
-    """Links and torso of the standing robot, in camera axes."""
+    """Returns links and torso of the standing robot in camera axes."""
     position, quaternion, angle = settled(robot)
     bodies = body_states(
         robot, position, quaternion, np.zeros(3), np.zeros(3), angle, np.zeros_like(angle)
@@ -198,7 +199,7 @@ def _shapes(robot: Robot, camera: Array) -> tuple[list[Capsule], Box]:
 
 
 def _grid(capsules: Sequence[Capsule], box: Box, width: int, height: int) -> tuple[Array, Array]:
-    """Camera coordinates of samples, row 0 on top, so that the whole robot is seen."""
+    """Returns camera coordinates of samples around the whole robot; row 0 is at the top."""
     shapes: list[Shape] = [box, *capsules]
     extents = np.array([shape.extent() for shape in shapes])
     low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
@@ -210,8 +211,8 @@ def _grid(capsules: Sequence[Capsule], box: Box, width: int, height: int) -> tup
 
 
 def _shade(capsules: Sequence[Capsule], box: Box, camera: Array, x: Array, y: Array) -> Array:
-    """Colours (height, width, 4) of 0 to 1: shadows on the ground, over them the nearest
-    surfaces.
+    """Returns colours (height, width, 4) from 0 to 1: the nearest surfaces, and shadows on the
+    ground.
     """
     colour = np.zeros((*x.shape, 4))
     colour[..., 3] = SHADOW * _shadow(capsules, box, camera, x, y)
@@ -234,7 +235,7 @@ def _shade(capsules: Sequence[Capsule], box: Box, camera: Array, x: Array, y: Ar
 
 
 def _window(extent: Extent, x: Array, y: Array) -> tuple[slice, slice]:
-    """The rows and columns of samples within an extent."""
+    """Returns the rows and columns of samples within an extent."""
     (left, bottom), (right, top) = extent
     rows = np.searchsorted(-y[:, 0], [-top, -bottom])
     columns = np.searchsorted(x[0], [left, right])
@@ -242,7 +243,7 @@ def _window(extent: Extent, x: Array, y: Array) -> tuple[slice, slice]:
 
 
 def _shadow(capsules: Iterable[Capsule], box: Box, camera: Array, x: Array, y: Array) -> Array:
-    """How much of the lamp's light the ground under a sample lacks, softened at the edges."""
+    """Returns the depth of the shadow on the ground at each sample, from 0 to 1."""
     up, lamp = camera[:, 2], camera @ LIGHT
     spine = box.axes[:, 0] * (box.half[0] - box.half[1])
     body = Capsule(box.centre - spine, box.centre + spine, float(box.half[1]), box.colour)
