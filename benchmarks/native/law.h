@@ -60,8 +60,7 @@ static inline double law_within(double x, double low, double high) {
   return x < low ? low : x > high ? high : x;
 }
 
-/* Returns the torque of a motor within its torque-speed line and of the gear's dry friction [N m].
- */
+/* Returns the torque of motor (torque-speed line) and gear (dry friction) [N m]. */
 static inline double law_servo(const Law *law, double angle, double speed, double angle_ref,
                                double speed_ref, double torque_ref) {
   const double wanted = law->kp * (angle_ref - angle) + law->kd * (speed_ref - speed) + torque_ref;
