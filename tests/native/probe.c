@@ -19,9 +19,7 @@
     "-Wmissing-prototypes" /* called from Python only: there is no header */
 #endif
 
-/* ---- layout
- * -------------------------------------------------------------------------------------------------------------
- */
+/* ---- layout ---- */
 
 typedef struct {
   const char *name;
@@ -156,9 +154,7 @@ HX_API const char *hx_probe_field(size_t i, size_t *offset, size_t *size) {
 
 HX_API int hx_probe_lanes(void) { return HX_LANES; }
 
-/* ---- lanes, vectors
- * -------------------------------------------------------------------------------------------------------
- */
+/* ---- lanes, vectors ---- */
 
 static void put3(hxVec3 a, int lane, double *out) {
   out[0] = hx_lane(a.x, lane), out[1] = hx_lane(a.y, lane), out[2] = hx_lane(a.z, lane);
@@ -255,9 +251,7 @@ HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3
   }
 }
 
-/* ---- laws
- * --------------------------------------------------------------------------------------------------------------------
- */
+/* ---- laws ---- */
 
 HX_API double hx_probe_exact_restitution_chi(double e) { return hx_exact_restitution_chi(e); }
 
@@ -309,9 +303,7 @@ HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
   return touchdowns;
 }
 
-/* ---- the plant as it is now
- * ----------------------------------------------------------------------------------------------------
- */
+/* ---- the plant as it is now ---- */
 
 static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplicit *implicit,
                      hxWork *work, hxRate *rate) {
@@ -442,7 +434,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   hxPlantMotion rate;
   for (int k = 0; k <= i; ++k)
     if (!hx_kernels[k]) return NULL;
-  if (!hx_kernels[i]->runs_here()) return NULL;
+  if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);

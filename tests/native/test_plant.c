@@ -45,7 +45,7 @@ static hxDefinition falling_robot(void) {
   return robot;
 }
 
-/* ---- laws ----------------------------------------------------------------------------------- */
+/* ---- laws ---- */
 
 static void standing_feet_carry_the_weight(void) {
   hxPlant *plant = hx_plant_create();
@@ -136,7 +136,7 @@ static void tangents_are_differences(void) {
   hx_plant_destroy(plant);
 }
 
-/* ---- the same bits -------------------------------------------------------------------------- */
+/* ---- the same bits ---- */
 
 static void a_saved_state_goes_on_as_it_would_have(void) {
   hxPlant *one = hx_plant_create(), *two = hx_plant_create();
@@ -183,7 +183,7 @@ static void stops_at_touch_downs_leave_no_trace(void) {
   hx_plant_destroy(through), hx_plant_destroy(stopping);
 }
 
-/* ---- refusals ------------------------------------------------------------------------------- */
+/* ---- refusals ---- */
 
 static void bad_input_changes_nothing(void) {
   hxPlant *plant = hx_plant_create();
@@ -222,7 +222,7 @@ static void bad_input_changes_nothing(void) {
   hx_plant_destroy(plant);
 }
 
-/* ---- every choice --------------------------------------------------------------------------- */
+/* ---- every choice ---- */
 
 static void moves(hxPlant *plant, const hxDefinition *robot) {
   double body[HX_BODIES][HX_BODY_STATE];
