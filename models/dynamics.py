@@ -164,11 +164,10 @@ def mass_matrix(robot: Robot, body: Array) -> Array:
 def applied_forces(
     robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
 ) -> Array:
-    """(19, 6) force and torque on each body at its centre of mass: gravity, gyroscopic, contact,
-    push; no servo.
+    """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
-    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact; bristle: (6, 3)
-    their deflection [m], slack unless given.
+    damping: (6,) of the contacts [s/m], nan for open feet. bristle: deflections (6, 3) [m], 0 by
+    default.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
@@ -183,8 +182,9 @@ def applied_forces(
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
-    """(6, 3) motor torque (0 in kinematic mode, where it is a multiplier) and (6, 3) gear torque
-    on the child [N m].
+    """Returns motor torque (6, 3) and gear torque (6, 3) on the child [N m].
+
+    The motor torque is 0 in kinematic mode, where it is a multiplier.
     """
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     gear = gear_friction(robot.servo, speed)
@@ -196,9 +196,9 @@ def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, A
 
 
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
-    """(6, 3) s.(dw_j - dw_i) [rad/s2] that keeps a kinematically driven joint on its command.
+    """Returns the acceleration s.(dw_j - dw_i) (6, 3) of kinematic drives [rad/s2] (eq. 13).
 
-    The command is q_ref + qd_ref s + qdd_ref s^2/2, s its age; with Baumgarte's terms (eq. 13).
+    The drives follow q_ref + qd_ref s + qdd_ref s^2/2, s the command's age, with Baumgarte terms.
     """
     alpha, beta, age = robot.baumgarte.alpha, robot.baumgarte.beta, command.age
     speed_ref = command.speed_ref + command.acceleration_ref * age
