@@ -129,7 +129,7 @@ def bristle_rate(friction: Friction, slip: Array, bristle: Array) -> Array:
 
 
 def sliding_friction(friction: Friction, sliding: float) -> float:
-    """Returns mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) of a foot that slides at p [m/s] (eq. 18)."""
+    """Returns mu(p) = mu + (mu_s - mu)/(1 + (p/v_s)^2) for sliding at p [m/s] (eq. 18)."""
     above = max(friction.mu_static - friction.mu, 0.0)
     return friction.mu + above / (1.0 + (sliding / friction.stribeck_speed) ** 2)
 
@@ -245,7 +245,7 @@ def foot_force(
 
 
 def standing_damping(robot: Robot, body: Array) -> Array:
-    """Returns the damping (6,) [s/m] at impact speed 0 of feet in the ground; nan for other feet."""
+    """Returns the damping (6,) [s/m] at impact speed 0; nan for feet above the ground."""
     slow = contact_damping(robot.contact, 0.0)
     return np.array(
         [slow if foot.penetration > 0.0 else math.nan for foot in foot_contacts(robot, body)]

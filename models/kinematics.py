@@ -85,7 +85,7 @@ def unit_axis(axis: tuple[float, ...]) -> Array:
 
 @dataclass(frozen=True)
 class JointModel:
-    """Constants of the joint between parent i and child j. Vectors fixed in a body are in its axes."""
+    """Constants of the joint between parent i and child j; vectors are in body axes."""
 
     parent: int  # body number
     child: int
@@ -187,7 +187,7 @@ def body_states(
 
 
 def _child_state(joint: JointModel, parent: Array, q: float, qd: float) -> Array:
-    """Returns the child's state (13,) from the parent's, the joint's angle [rad] and speed [rad/s]."""
+    """Returns the child's state (13,) at a joint angle [rad] and speed [rad/s]."""
     r_i, p_i, v_i, w_i = split(parent)
     p_j = quaternion_product(quaternion_product(p_i, joint.zero), axis_quaternion(joint.s_j, q))
     sP_i, sP_j = rotation_matrix(p_i) @ joint.point_i, rotation_matrix(p_j) @ joint.point_j

@@ -56,7 +56,7 @@ def method_step(method: Method, stage: Stage, y_0: Array, h: float) -> tuple[Arr
 
 
 def _lower(rows: Sequence[Sequence[float]]) -> Array:
-    """Returns the (s, s) matrix whose row i contains the i numbers of rows[i] left of the diagonal."""
+    """Returns the (s, s) matrix with the i numbers of rows[i] left of the diagonal of row i."""
     matrix = np.zeros((len(rows), len(rows)))
     for i, row in enumerate(rows):
         matrix[i, : len(row)] = row

@@ -57,7 +57,7 @@ class Torso:
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """A moving segment. Its frame lies at its own joint and equals the parent's frame at angle 0."""
+    """A moving segment. Its frame lies at its joint and equals the parent's at angle 0."""
 
     mass: Annotated[float, Number("kg", above=0.0)]
     length: Annotated[float, Number("m")]  # next joint (tibia: foot centre) along x
@@ -197,7 +197,7 @@ def _plain(content: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Robot:
-    """A six-legged robot with its laws and settings; `source` gives the provenance of its numbers."""
+    """A six-legged robot with its laws and settings; `source` gives the numbers' provenance."""
 
     name: str
     gravity: Annotated[Vector3, Vector("m/s2", 3)]
