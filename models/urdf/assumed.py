@@ -1,4 +1,4 @@
-"""Computes defaults for data that a URDF lacks, scaled from the ATHENA-like robot (assumed.toml)."""
+"""Computes defaults for data that a URDF lacks, scaled from the ATHENA-like robot."""
 
 from __future__ import annotations
 

@@ -119,8 +119,8 @@ def _chain(branch: Branch, where: str) -> tuple[Branch, Branch, Branch]:
     while chain[-1].body.branches:
         body = chain[-1].body
         if len(body.branches) > 1 or len(chain) == len(JOINT_NAMES):
-            names = ", ".join(item.joint.name for item in body.branches)
-            got = f"{names} on link {body.name!r}, joint {len(chain) + 1} of the leg"
+            found = ", ".join(item.joint.name for item in body.branches)
+            got = f"{found} on link {body.name!r}, joint {len(chain) + 1} of the leg"
             fix = "make the others fixed"
             raise RobotError(
                 "a leg that is no chain of three joints",

@@ -1,7 +1,4 @@
-"""Reads the attributes of a URDF's elements: numbers, rotations and positions.
-
-Raises RobotError, which names the element.
-"""
+"""Reads the attributes of a URDF's elements. Raises RobotError, which names the element."""
 
 from __future__ import annotations
 
@@ -142,7 +139,7 @@ def _quarter_turn(value: float, word: str) -> float:
 
 
 def origin(element: ET.Element, where: str) -> tuple[Array, Array, list[float]]:
-    """Returns rotation (3, 3), position (3,) [m] and roll, pitch, yaw [rad] of the element's frame."""
+    """Returns rotation (3, 3), position (3,) [m] and roll, pitch, yaw [rad] of the element."""
     origin = element.find("origin")
     if origin is not None and origin.get("quat_xyzw"):
         raise RobotError(

@@ -56,8 +56,7 @@ def rises(forces: Array) -> Array:
     return np.asarray((late - early) / 1e-3)
 
 
-# ---- closed forms
-# -----------------------------------------------------------------------------------------------------------
+# ---- closed forms ----
 
 
 @pytest.mark.parametrize("e", [0.3, 0.7])
@@ -190,8 +189,7 @@ def test_gears_take_the_energy_of_joints_that_spin_down(core: ct.CDLL) -> None:
     assert energy.gear_loss > 0.5 * before
 
 
-# ---- sums over a walk
-# --------------------------------------------------------------------------------------------------------
+# ---- sums over a walk ----
 
 
 @pytest.fixture(scope="module", params=["tanh", "bristle"])
@@ -326,8 +324,7 @@ def test_measures_come_back_with_a_saved_state(core: ct.CDLL, robot: Robot) -> N
     assert ends[0] == ends[1]
 
 
-# ---- the books
-# ---------------------------------------------------------------------------------------------------------------
+# ---- the books ----
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("rosw3", 1e-4), ("ros2", 0.1)])

@@ -164,7 +164,8 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     (
         "friction.mu_static",
         0.8,
-        r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with this friction\.law; the bristle law alone",
+        r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with this friction\.law; "
+        r"the bristle law alone",
     ),
     ("friction.stribeck_speed", 0.0, r"friction\.stribeck_speed: got 0, expected 1e-06 to 100 m/s"),
     ("servo.mode", 4, r"servo\.mode: got 4, expected 1 to 3"),
@@ -256,7 +257,8 @@ def test_no_call_runs_on_for_ever(core: ct.CDLL, settings: dict[str, float]) -> 
     before = plant.save()
     with pytest.raises(
         PlantError,
-        match=r"gives up|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, expected at most",
+        match=r"gives up|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, "
+        r"expected at most",
     ):
         plant.step(0.1, Command(angle_ref=plant.robot.stance, push_force=np.array([1e8, 0.0, 0.0])))
     assert plant.save() == before
