@@ -260,8 +260,8 @@ def _limits(
 ) -> tuple[ET.Element | None, float, float]:
     limit = element.find("limit")
     if kind == "revolute" and limit is None:
-        element = '<limit lower="..." upper="..." effort="..." velocity="..."/>'
-        fix = f"add {element}, or make it continuous"
+        example = '<limit lower="..." upper="..." effort="..." velocity="..."/>'
+        fix = f"add {example}, or make it continuous"
         raise RobotError(
             "a revolute joint without limits", expected="<limit>", fix=fix, where=where
         )

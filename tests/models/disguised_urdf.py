@@ -1,5 +1,5 @@
-"""Random robots, and any robot as a URDF in other words: other frames, signs, parts, names and
-order.
+"""Provides random robots, and any robot as an equivalent URDF with other frames, signs, parts and
+names.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A URDF as others write them, by hand, and the robot it is in our own words."""
+"""Provides a URDF as other authors write them, and the same robot in this project's format."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ tibia.stance = 1.8
 
 
 def spider_urdf(names: Iterable[str] = NUMBERS) -> str:
-    """With these legs."""
+    """Returns the URDF with these legs."""
     return BODY.format(legs="".join(_spider_leg(name) for name in names))
 
 

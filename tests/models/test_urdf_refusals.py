@@ -1,4 +1,4 @@
-"""What a URDF cannot be: each refused with file, element, what was got and what to do."""
+"""Tests that invalid URDFs are rejected with file, element, got value and fix."""
 
 from __future__ import annotations
 

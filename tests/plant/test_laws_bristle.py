@@ -1,6 +1,4 @@
-"""Feet that stick: what the bristle law promises of a block on an incline, of pushes, and of a
-walk.
-"""
+"""Tests the bristle law: a block on an incline, pushes, and a walk."""
 
 from __future__ import annotations
 
@@ -85,8 +83,8 @@ def test_turning_slip_and_bristle_turns_the_force() -> None:
 
 
 def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
-    """C1 in the deflection: slopes on either side of break-away and of the presliding agree to
-    first order in the distance.
+    """The rate is C1 in the deflection: slopes on either side of the spring limit and of the
+    presliding agree to first order in the distance.
     """
     x_axis = np.array([1.0, 0.0, 0.0])
     for share in (SPRING_LIMIT, 1.0):
@@ -109,7 +107,9 @@ def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
 
 
 def given(share: float) -> float:
-    """Of the presliding: where a share of the limit is held, u (3 - u^2)/2 = share."""
+    """Returns the deflection over the presliding that holds a share of the limit: u (3 - u^2)/2 =
+    share.
+    """
     return 2.0 * math.sin(math.asin(share) / 3.0)
 
 
@@ -173,7 +173,7 @@ def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
 
 
 def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
-    """Pushed aside and let go below break-away, slowly: the books show the loan, and its return."""
+    """A slow push below the spring limit: the energy audit shows the stored energy and its return."""
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
     plant = laid(core, robot, np.eye(4)[0])
     plant.step(1.0)
@@ -230,8 +230,8 @@ def test_a_walk_converges_in_proportion_to_the_tolerance(core: ct.CDLL) -> None:
 
 
 def test_a_stuck_leg_does_not_ring(core: ct.CDLL) -> None:
-    """Pushed and let go, the standing robot is quiet after a fifth of a second: its bristles
-    damp what its servos leave.
+    """After a push the standing robot is at rest within a fifth of a second, because bristles damp
+    the motion that the servos leave.
     """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=ACCURATE)
     plant, speeds = stood(core, robot), []

@@ -1,8 +1,7 @@
-"""What the plant measures of its own steps: works, losses, slip, impulses and peaks, against closed
-forms and independent sums.
+"""Tests the measurements of the plant against closed forms and independent sums.
 
-Where a robot falls flat with its joints locked it is a point mass on a contact of six times a
-foot's stiffness (test_laws_impact.py).
+A robot with locked joints that falls flat is a point mass on a contact of six times a foot's
+stiffness (test_laws_impact.py).
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ CLOSED = 1e-3  # relative: paths between the ends of steps at a tolerance of 1e-
 
 
 def weight(robot: Robot) -> float:
-    """N"""
+    """Returns the robot's weight [N]."""
     return G * (robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links))
 
 

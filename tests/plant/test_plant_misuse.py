@@ -1,6 +1,4 @@
-"""Misuse of the plant: every bad call is told what it gave and what was expected, and leaves the
-plant as it was.
-"""
+"""Tests misuse of the plant: messages tell got and expected values, and the plant does not change."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from hexapod_cosim.models.dynamics import Command
 
 
 def refused(plant: Plant, call: Callable[[], Any], status: int, pattern: str) -> None:
-    """The call fails with this status and message, and the plant is as it was."""
+    """Asserts that the call fails with this status and message and that the plant does not change."""
     before = plant.save()
     with pytest.raises(PlantError, match=pattern) as caught:
         call()
@@ -250,8 +248,8 @@ def test_every_status_has_a_name(core: ct.CDLL) -> None:
 
 @pytest.mark.parametrize("settings", [{}, {"step": 1e-7}])
 def test_no_call_runs_on_for_ever(core: ct.CDLL, settings: dict[str, float]) -> None:
-    """An absurd push under error control, a step far too small without it: refused within a
-    bounded number of evaluations.
+    """An extreme push with error control, and a far too small step, fail within a bounded number of
+    evaluations.
     """
     plant = Plant(core, changed(load_robot("athena"), solver=settings))
     before = plant.save()
