@@ -107,9 +107,7 @@ def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
 
 
 def given(share: float) -> float:
-    """Returns the deflection over the presliding that holds a share of the limit: u (3 - u^2)/2 =
-    share.
-    """
+    """Returns the deflection over the presliding for a share of the limit: u (3 - u^2)/2."""
     return 2.0 * math.sin(math.asin(share) / 3.0)
 
 
@@ -173,7 +171,7 @@ def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
 
 
 def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
-    """A slow push below the spring limit: the energy audit shows the stored energy and its return."""
+    """A slow push below the spring limit stores energy and returns it (energy audit)."""
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
     plant = laid(core, robot, np.eye(4)[0])
     plant.step(1.0)

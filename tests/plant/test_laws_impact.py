@@ -43,7 +43,7 @@ def changed_gravity(robot: Robot, gravity: float) -> Robot:
 
 
 def above(robot: Robot, clearance: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Returns the torso's position in the level stance with all feet this far [m] above the ground."""
+    """Returns the torso's position in the level stance at a height of the feet [m]."""
     feet = foot_contacts(
         robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, robot.stance, np.zeros((6, 3)))
     )

@@ -58,7 +58,7 @@ def free(**solver: Any) -> Robot:
 def test_linear_momentum_changes_by_the_weight_alone_to_rounding(
     core: ct.CDLL, mode: str, method: str
 ) -> None:
-    """This holds with any servo torque, because every method preserves linear invariants exactly."""
+    """With locked joints and level legs the principal axes are by symmetry the torso's."""
     robot = changed(load_robot("phantomx_mk4"), servo={"mode": mode}, solver={"method": method})
     plant = tumbling(core, robot)
     before = momentum(robot, plant.bodies)[0]
@@ -151,8 +151,9 @@ HEAVY = (1e6, 1e6, 1e6, 0.0, 0.0, 0.0)
 
 
 def pendulums() -> Robot:
-    """Returns six 1 kg bobs on 1 m tibias; coxas and femurs are too heavy to move, their joints lie
-    at the hips.
+    """Returns six 1 kg bobs on 1 m tibias.
+
+    Coxas and femurs are too heavy to move, and their joints lie at the hips.
     """
     robot = changed(
         load_robot("athena"),

@@ -1,4 +1,4 @@
-"""Tests long walks: the energy audit, the joints, and independence of stiff laws and leg numbers."""
+"""Tests long walks: energy audit, joints, independence of stiff laws and leg numbers."""
 
 from __future__ import annotations
 

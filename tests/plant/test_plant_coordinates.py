@@ -41,7 +41,10 @@ VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 
 
 def smooth(robot: Robot) -> Robot:
-    """Returns a robot far from kinks: servos below their limits, and contacts with permanent force."""
+    """Returns a robot far from kinks.
+
+    Its servos stay below their limits, and its contacts are permanent.
+    """
     gentle = changed(robot, servo={"torque_max": 1e4, "speed_max": 1e4})
     return (
         gentle

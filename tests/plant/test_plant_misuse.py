@@ -1,4 +1,4 @@
-"""Tests misuse of the plant: messages tell got and expected values, and the plant does not change."""
+"""Tests misuse of the plant: its messages, and that the plant does not change."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hexapod_cosim.models.dynamics import Command
 
 
 def refused(plant: Plant, call: Callable[[], Any], status: int, pattern: str) -> None:
-    """Asserts that the call fails with this status and message and that the plant does not change."""
+    """Asserts that the call fails with this status and message and changes nothing."""
     before = plant.save()
     with pytest.raises(PlantError, match=pattern) as caught:
         call()
