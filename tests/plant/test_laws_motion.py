@@ -58,7 +58,7 @@ def free(**solver: Any) -> Robot:
 def test_linear_momentum_changes_by_the_weight_alone_to_rounding(
     core: ct.CDLL, mode: str, method: str
 ) -> None:
-    """With locked joints and level legs the principal axes are by symmetry the torso's."""
+    """This holds with any servo torque; every method preserves linear invariants exactly."""
     robot = changed(load_robot("phantomx_mk4"), servo={"mode": mode}, solver={"method": method})
     plant = tumbling(core, robot)
     before = momentum(robot, plant.bodies)[0]
