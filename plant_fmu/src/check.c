@@ -19,6 +19,7 @@ static int is_inertia(const double I[6]) {
          p[2] >= 0.0 && minor >= 0.0 && det >= 0.0;
 }
 
+/* Fails for an impossible inertia. */
 static void check_inertia(hxChecker *c, const char *name, const double inertia[6]) {
   if (!is_inertia(inertia))
     hx_check_fail(c, name, inertia[0],
@@ -26,6 +27,7 @@ static void check_inertia(hxChecker *c, const char *name, const double inertia[6
                   "sum of the others");
 }
 
+/* Fails for a vector of n numbers without length. */
 static void check_not_zero(hxChecker *c, const char *name, const double *x, int n,
                            const char *expected) {
   double square = 0.0;
@@ -33,6 +35,7 @@ static void check_not_zero(hxChecker *c, const char *name, const double *x, int 
   if (!(square > 1e-12)) hx_check_fail(c, name, sqrt(square), expected);
 }
 
+/* Checks inertias, axes and lengths of all links. */
 static void check_legs(hxChecker *c, const hxDefinition *d) {
   char name[32];
   for (int leg = 0; leg < HX_LEGS; ++leg) {

@@ -20,6 +20,7 @@ double hx_exact_restitution_chi(double e) {
   return 0.5 * (low + high);
 }
 
+/* The constants chi of the laws (eq. 14); hertz and constant: damping, s/m. */
 static double exact(const hxDefinition *d) {
   return hx_exact_restitution_chi(d->contact.restitution);
 }
@@ -60,6 +61,7 @@ const hxContactRow *hx_contact(int law) {
                                                                                : NULL;
 }
 
+/* Closes a foot and fixes its damping by the impact speed, m/s. */
 static void close_foot(const hxModel *model, hxContactState *contact, int leg,
                        double impact_speed) {
   contact->closed[leg] = 1.0;

@@ -25,6 +25,7 @@ static uint64_t checksum(const hxSavedPlant *saved) {
   return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSavedPlant, model));
 }
 
+/* Sets the plant's message and returns the status. */
 static hxStatus fail(hxPlant *plant, hxStatus status, const char *text) {
   snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);
   return status;
@@ -182,6 +183,7 @@ void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x) {
  * solver's trial step. */
 static const double largest_coordinate = 1e9, largest_angle = 1e5;
 
+/* Returns whether coordinates are a state of the robot. */
 static int are_valid_coordinates(const hxCoordinates *x) {
   const double *p = x->quaternion;
   return largest(0.0, x, HX_COORDINATES) <= largest_coordinate &&

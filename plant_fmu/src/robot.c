@@ -35,6 +35,7 @@ static void rotate(const double p[4], const double a[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = a[i] + 2.0 * (p[0] * t[i] + s[i]);
 }
 
+/* Copies the position of the next joint or the foot in link axes. */
 static void link_tip(const hxLink *link, double tip[3]) {
   tip[0] = link->length;
   tip[1] = link->offset_y;
@@ -120,6 +121,7 @@ static void inertia_in_frame(const double S[6], const double p[4], double out[6]
   }
 }
 
+/* Computes the constants of a leg's joint in slots: all vectors in joint axes. */
 static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int joint, int slot) {
   const hxLink *link = &d->leg[leg].link[joint];
   double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], axis[3],
@@ -146,6 +148,7 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
 }
 
+/* Computes a point and the normal of the ground. */
 static void compile_ground(hxModel *model, const hxDefinition *d) {
   const double incline = d->terrain.kind == HX_TERRAIN_SLOPE ? d->terrain.incline : 0.0;
   model->ground_point[0] = model->ground_point[1] = 0.0;
@@ -170,6 +173,7 @@ static double weight_of(const hxDefinition *d) {
                      d->gravity[2] * d->gravity[2]);
 }
 
+/* Copies laws and settings, with derived constants. */
 static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->foot_radius = d->foot_radius;
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;

@@ -292,6 +292,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   hxForce6 p[HX_PACKS];
   const int reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
   hx_dynamics_forces(model, contact, command, t, motion, reactions, work);
+  /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
     leg_response(implicit, motion, pack, &work->pack[pack]);
@@ -314,6 +315,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
       sweep_motion(&work->pack[pack].joint[joint], &a);
     if (reactions) leg_multipliers(model, implicit, pack, &work->pack[pack]);
   }
+  /* dy/dt, or k/h of the stage */
   store_torso_rate(model, motion, implicit, work, rate);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint)

@@ -8,6 +8,7 @@
 
 static const double first_step_size = 1e-4; /* s  first step after a reset */
 
+/* The functions of kernel.h's table, which describes them. */
 static void kernel_start(const hxModel *model, double t, hxState *state) {
   static const hxCommand no_command;
   hxWork work;

@@ -100,6 +100,7 @@ static inline void combine(const hxModel *model, double *out, const double *base
               HX_BRISTLE_SIZE);
 }
 
+/* Returns the larger number; a if b is NaN. */
 static inline double larger_of(double a, double b) { return b > a ? b : a; }
 
 /* Returns the largest error over scale and tolerance (eq. 22). NaN is ignored; advance() checks
@@ -176,6 +177,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxWork work;
   hxCommand now;
   memset(&trial->impulses, 0, sizeof trial->impulses);
+  /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
     const double t = start->t + m->c[i] * h;
     if (i > 0) {
@@ -190,6 +192,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     hx_add_impulses(model, command, stage, &work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
+  /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
   memcpy(trial->y.bristle, start->y->bristle, sizeof trial->y.bristle);
   combine(model, trial->y.y, start->y->y, h, m->b, k, m->stages, HX_TURN_SIZE);
   trial->error = 0.0;
@@ -390,6 +393,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
     /* a step limited by the end of the interval must not reduce the next step */
     *next_step = state->next_step = h < h_max ? next : fmax(next, state->next_step);
   }
+  /* shorten the step to the first touch-down, measure it, switch contacts */
   hxMoment end;
   hxFeet feet;
   memset(&end, 0, sizeof end);

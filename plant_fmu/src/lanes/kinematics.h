@@ -25,6 +25,7 @@ typedef struct {
   hxReal phi[2], dphi[2];
 } hxConstraint;
 
+/* These functions read vectors, quaternions and orientations of the torso and of links. */
 static inline hxVec3 hx_torso_vec3(const hxPlantMotion *motion, int row) {
   return hx_splat_vec3(&motion->torso[row]);
 }

@@ -116,6 +116,7 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
 
 /* ---- works and losses (eq. 27) ---- */
 
+/* Returns the mean of two values. */
 static inline hxReal mean_of(const double *from, const double *to) {
   return 0.5 * (hx_load(from) + hx_load(to));
 }
@@ -264,6 +265,7 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   hxReal impulse = zero, slipped = zero;
   const hxReal bends = path->h < shortest_bend ? zero : per_step * per_step;
   hxReal last_force = zero, last_speed = zero;
+  /* impulse, peaks and slip under load by Simpson's rule (eq. 28) */
   for (int node = 0; node <= INTERVALS; ++node) {
     const double x = (double)node / INTERVALS;
     const hxCubic depth = cubic(delta, slope_from, rise, slope_to, x);

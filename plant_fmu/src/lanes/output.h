@@ -7,6 +7,7 @@
 #include "measure.h"
 #endif
 
+/* Copies one lane of a vector. */
 static void get3(hxVec3 a, int lane, hxNumber out[3]) {
   out[0] = hx_lane(a.x, lane);
   out[1] = hx_lane(a.y, lane);
@@ -19,6 +20,7 @@ static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
   return &work->pack[leg / HX_LANES];
 }
 
+/* Returns the kinetic energy of a body, J. */
 static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) {
   return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w)));
 }
@@ -77,6 +79,7 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
 
+/* Returns the size of the tangential force, N. */
 static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, int lane) {
   const hxVec3 grip = foot->bristle.grip;
   return hx_lane(has_bristles(model) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
@@ -84,6 +87,7 @@ static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, i
                  lane);
 }
 
+/* Fills a foot's outputs. */
 static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot,
                       hxVec3 tibia, int lane, int leg, hxOutput *o) {
   get3(foot->force, lane, o->foot.force[leg]);
@@ -104,6 +108,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
   o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
 }
 
+/* Fills the outputs of torso and IMU. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
   const hxMat3 R = work->torso.axes;
@@ -138,6 +143,7 @@ static void fill_constraint(const hxModel *model, const hxPlantMotion *motion, h
   o->constraint.velocity_error = hx_lane(hx_sqrt(hx_sum_legs(velocity)), 0);
 }
 
+/* Fills the energies and the audit's error. */
 static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work,
                         hxOutput *o) {
   const hxPlantMotion *m = &state->motion;

@@ -44,10 +44,12 @@ typedef struct {
   hxMotion6 x, v;
 } hxShift;
 
+/* Returns dx and dv of a body with velocity v. */
 static inline hxShift shift(double z, hxMotion6 v, hxMotion6 s_x, hxMotion6 s_v) {
   return (hxShift){hx_motion_add_scaled(s_x, hx_splat(z), hx_motion_add(v, s_v)), s_v};
 }
 
+/* Returns the shift of a link. */
 static inline hxShift link_shift(const hxImplicit *implicit, const hxPlantMotion *motion, int joint,
                                  int slot) {
   const hxPlantMotion *s = &implicit->change->motion;
@@ -56,6 +58,7 @@ static inline hxShift link_shift(const hxImplicit *implicit, const hxPlantMotion
   return shift(implicit->z, link_velocity(motion, joint, slot), s_x, link_velocity(s, joint, slot));
 }
 
+/* Returns the shift of the torso. */
 static inline hxShift torso_shift(const hxImplicit *implicit, const hxPlantMotion *motion) {
   const hxPlantMotion *s = &implicit->change->motion;
   const hxMotion6 s_x = {hx_splat_vec3(implicit->change->torso_turn), hx_torso_vec3(s, HX_R)};
@@ -80,6 +83,7 @@ static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion 
     push_tibia(leg, contact_point(leg), leg->response);
     return;
   }
+  /* later stages: shifts of joints and contact point, then their forces */
   hxShift i = torso_shift(implicit, motion), j = i;
   for (int joint = 0; joint < HX_JOINTS; ++joint, i = j) {
     hxJointWork *work = &leg->joint[joint];

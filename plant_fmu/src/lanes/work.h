@@ -66,6 +66,7 @@ typedef union {
   };
 } hxRate;
 
+/* Returns whether the friction law is the bristle law. */
 static inline int has_bristles(const hxModel *model) {
   return model->friction_law == HX_FRICTION_BRISTLE;
 }
