@@ -89,7 +89,7 @@ def assume_stances(legs: Mapping[str, Table]) -> list[str]:
 
 
 class _Plane:
-    """A leg of the controller's pattern in its own plane (equations: controller/walk/kinematics.py)."""
+    """A leg of the controller's pattern in its own plane (see controller/walk/kinematics.py)."""
 
     def __init__(self, leg: Table) -> None:
         tips = [
