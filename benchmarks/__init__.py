@@ -1,5 +1,6 @@
-"""Benchmarks of the plant and of its peers; `python -m benchmarks.run`. What may be compared,
-and why: README.md here.
+"""Benchmarks of the plant and of other engines (peers): `python -m benchmarks.run`.
+
+benchmarks/README.md says what may be compared, and why.
 """
 
 import sys
@@ -8,6 +9,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / "build" / "bench"
 
-# hexapod.h's structures in ctypes stand once, beside the tests that compare them with the
-# compiler's layout
+# the ctypes structures of hexapod.h are among the tests, which compare them with the compiler's
+# layout
 sys.path.append(str(ROOT / "tests" / "support"))

@@ -1,11 +1,11 @@
-"""How many walks a minute: the compiled controller and the Python one, on one process and on all,
-and what a run costs beside its loop.
+"""Measures walks per minute, with the compiled and the Python controller, and costs per run.
 
 usage: python -m benchmarks.batch [--walks N] [--memory-runs N]
 
-Walks are `walk_flat`, 10 s, each with variations of its own. Prints a table and writes
-benchmarks/results/<machine>/batch.csv. Nothing is asserted: machines are noisy, and what else runs
-on this one is in every wall time; processor time tells less of that.
+Rates are measured with one process and with all processors. Every walk is `walk_flat`, 10 s, with
+its own variations. Prints a table and writes benchmarks/results/<machine>/batch.csv. Nothing is
+asserted: machines are noisy, and other programs lengthen every wall time; processor time depends
+less on them.
 """
 
 from __future__ import annotations
@@ -32,19 +32,17 @@ from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from hexapod_cosim.cosim.scenario.variation import STANDARD
 
-FAST = (
-    "solver.method=ros2",
-    "solver.tolerance=0.01",
-)  # docs/architecture.md says what it costs in accuracy
+# docs/architecture.md says what these settings cost in accuracy
+FAST = ("solver.method=ros2", "solver.tolerance=0.01")
 SETTINGS: dict[str, tuple[str, ...]] = {"default solver": (), "fast solver": FAST}
 CONTROLS = ("compliant", "kinematic")
-WARM = 4  # walks after which everything that is made once has been made
-PYTHON_WALKS = 8  # are enough of these
-ONCE = 1e6  # bytes in a MB
+WARM = 4  # walks that are not measured, because they also build FMUs and caches
+PYTHON_WALKS = 8  # measured walks of the slower Python controller
+MEGABYTE = 1e6  # bytes
 
 
 def scenarios(control: str, settings: Sequence[str], count: int) -> list[Scenario]:
-    """So many walks that differ by their seeds."""
+    """Returns `count` walks that differ by their seeds."""
     scenario = load_scenario("walk_flat", overrides=[f"control={control}", *settings])
     return [replace(scenario, seed=seed, variation=STANDARD) for seed in range(count)]
 
@@ -52,7 +50,7 @@ def scenarios(control: str, settings: Sequence[str], count: int) -> list[Scenari
 def per_minute(
     plans: Sequence[Scenario], gains: Gains | None, *, workers: int, compiled: bool
 ) -> float:
-    """Walks a minute once all workers are at work: from the first result on."""
+    """Returns walks per minute, measured after all workers have started."""
     times = []
     with closing(run_batch(plans, gains=gains, workers=workers, compiled=compiled)) as runs:
         for summary in runs:
@@ -63,8 +61,8 @@ def per_minute(
 
 
 def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
-    """Medians of one process' runs [ms of processor time], the loop's and what is beside it;
-    bytes of what a run sends back.
+    """Returns median times of the runs of one process: whole run, loop and overhead [ms of
+    processor time], and the size of a run's summary [bytes].
     """
     totals, loops = [], []
     with Walker() as walker:
@@ -75,10 +73,10 @@ def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
             loops.append(1e3 * walker.loop_time)
     overheads = [total - loop for total, loop in zip(totals, loops, strict=True)][WARM:]
     found = {"run": totals[WARM:], "loop": loops[WARM:], "overhead": overheads}
-    told: dict[str, float] = {
+    medians: dict[str, float] = {
         f"{name}_ms": round(statistics.median(values), 2) for name, values in found.items()
     }
-    return told | {
+    return medians | {
         "best_run_ms": round(min(totals), 2),
         "best_overhead_ms": round(min(overheads), 2),
         "bytes": len(pickle.dumps(summary)),
@@ -86,7 +84,7 @@ def costs(plans: Sequence[Scenario], gains: Gains | None) -> dict[str, float]:
 
 
 def measured(count: int) -> Iterator[dict[str, Any]]:
-    """A row for each control and setting of the solver, one for each control in Python."""
+    """Yields a row for each control and solver setting, and one for each control in Python."""
     most = processor_count()
     for control in CONTROLS:
         gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
@@ -120,19 +118,21 @@ def measured(count: int) -> Iterator[dict[str, Any]]:
 
 
 def growth(count: int) -> tuple[float, float]:
-    """MB that this process holds after a tenth of so many runs, and after all of them."""
+    """Returns the memory of this process after a tenth of `count` runs and after all of them
+    [MB].
+    """
     plans = scenarios("kinematic", (*FAST, "duration=1"), count)
     marks = []
     with Walker() as walker:
         for k, plan in enumerate(plans, start=1):
             walker.summary(plan)
             if k in (count // 10, count):
-                marks.append(resident() / ONCE)
+                marks.append(resident() / MEGABYTE)
     return marks[0], marks[-1]
 
 
 def resident() -> int:
-    """Bytes of this process in memory."""
+    """Returns the resident memory of this process [bytes]."""
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
@@ -140,12 +140,12 @@ def resident() -> int:
 def main() -> int:
     """Measures and prints; returns the exit code."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--walks", type=int, default=100, help="of each kind")
+    parser.add_argument("--walks", type=int, default=100, help="walks of each kind")
     parser.add_argument(
         "--memory-runs",
         type=int,
         default=1000,
-        help="short ones, one after the other in one process",
+        help="short runs in one process, for the growth of memory",
     )
     given = parser.parse_args()
     rows = []
@@ -160,9 +160,8 @@ def main() -> int:
         writer.writerows(rows)
     if given.memory_runs:
         begin, end = growth(given.memory_runs)
-        print(
-            f"memory after {given.memory_runs // 10} runs {begin:.1f} MB, after {given.memory_runs} {end:.1f} MB"
-        )
+        few, all_runs = given.memory_runs // 10, given.memory_runs
+        print(f"memory after {few} runs {begin:.1f} MB, after {all_runs} {end:.1f} MB")
     return 0
 
 

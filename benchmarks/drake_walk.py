@@ -1,21 +1,23 @@
-"""A walk in Drake: `drake_walk.py WALK METHOD STEP REPEATS PATH_OUT`, as the native drivers are
-called and answering as they do.
+"""Runs a walk in Drake: `drake_walk.py WALK METHOD STEP REPEATS PATH_OUT`.
 
-The robot is the plant's: same tree, inertias, reflected rotor inertias and PD gains. The contact is
-Drake's own, since Drake's wheel brings no C++ headers and a law called back in Python would time
-Python: point contact between foot and half space, linear in depth with Hunt-Crossley dissipation,
-regularised Coulomb friction. Its stiffness gives the standing robot the same depth, its dissipation
-the restitution asked for at IMPACT_SPEED, its stiction tolerance friction's slope at rest. The
-motors are Drake's PD actuators with their effort limit; Drake has no torque-speed line, and the
-gears' dry friction is left out. So the paths are another robot's, and each of Drake's three models
-has a limit of its own to be judged by: the continuous plant's (runge_kutta3 at 1e-5), CENIC's
-(cenic at 1e-6) and the time-stepping plant's (discrete at 5e-5 s). Their friction differs.
+Command line and output are those of the native drivers (native/driver.h).
+
+The robot is that of the plant: same tree, inertias, reflected rotor inertias and PD gains. The
+contact is Drake's own, since Drake's wheel contains no C++ headers and a law in a Python callback
+would measure Python: point contact between foot and half space, linear in depth with Hunt-Crossley
+dissipation, regularised Coulomb friction. Its stiffness is chosen for the same depth under the
+standing robot, its dissipation for the requested restitution at IMPACT_SPEED, its stiction
+tolerance for the same slope of friction at rest. The motors are Drake's PD actuators with their
+effort limit; Drake has no torque-speed line, and the gears' dry friction is left out. The paths
+therefore differ from the plant's, and each of Drake's three models is judged by its own converged
+solution: the continuous plant's (runge_kutta3 at 1e-5), CENIC's (cenic at 1e-6) and the
+time-stepping plant's (discrete at 5e-5 s). Their friction differs.
 
 METHOD: one of Drake's integration schemes, STEP its accuracy; or `discrete`, the time-stepping
-plant (lagged), STEP its period in s. Evaluations: of the right-hand side; steps where Drake counts
-none. Microseconds per evaluation: CalcTimeDerivatives at a new state, less the time of setting it;
-unknown where the plant is discrete, and not what CENIC calls, which solves one convex problem a
-step.
+plant (lagged), STEP its period in s. Evaluations are those of the right-hand side, or steps where
+Drake does not count them. Microseconds per evaluation are those of CalcTimeDerivatives at a new
+state, less the time to set it; they are unknown for the discrete plant. CENIC does not call this
+function: it solves one convex problem per step.
 """
 
 from __future__ import annotations
@@ -66,7 +68,7 @@ EVALUATIONS = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class Walk:
-    """A walk file: the robot, and the commands (n) held over h [s] each."""
+    """Content of a walk file: the robot, and n commands, each constant over h [s]."""
 
     robot: Any
     h: float
@@ -74,7 +76,7 @@ class Walk:
 
 
 def read_walk(path: str) -> Walk:
-    """A walk file's content."""
+    """Reads a walk file."""
     data = Path(path).read_bytes()
     robot = HxDefinition.from_buffer_copy(data)
     start = ct.sizeof(HxDefinition)
@@ -89,7 +91,7 @@ def read_walk(path: str) -> Walk:
 
 @dataclass(frozen=True, kw_only=True)
 class Model:
-    """The diagram and what is looked at in it."""
+    """The diagram, its plant and its torso."""
 
     diagram: Diagram
     plant: MultibodyPlant
@@ -97,7 +99,7 @@ class Model:
 
 
 def build(robot: Any, *, time_step: float) -> Model:
-    """The robot on its ground; time_step 0 is the continuous plant."""
+    """Builds the robot on its ground; time_step 0 [s] gives the continuous plant."""
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(
         time_step=time_step,
@@ -116,7 +118,7 @@ def build(robot: Any, *, time_step: float) -> Model:
 
 
 def add_link(plant: MultibodyPlant, name: str, link: Any) -> RigidBody:
-    """A body with mass, com [m] and inertia [kg m2] about it."""
+    """Adds a body with mass [kg], centre of mass [m] and inertia about it [kg m2]."""
     return plant.AddRigidBody(
         name,
         SpatialInertia.MakeFromCentralInertia(
@@ -126,7 +128,7 @@ def add_link(plant: MultibodyPlant, name: str, link: Any) -> RigidBody:
 
 
 def add_leg(plant: MultibodyPlant, robot: Any, leg: int, torso: RigidBody) -> None:
-    """Three links with their joints and motors, and a foot."""
+    """Adds three links with their joints and motors, and a foot."""
     hip = RigidTransform(
         RotationMatrix.MakeZRotation(robot.leg[leg].hip_yaw), np.array(robot.leg[leg].hip_position)
     )
@@ -147,8 +149,10 @@ def add_leg(plant: MultibodyPlant, robot: Any, leg: int, torso: RigidBody) -> No
 
 
 def foot_material(robot: Any) -> ProximityProperties:
-    """Stiffness as deep under the standing robot's sixth as the plant's, dissipation for its
-    restitution at IMPACT_SPEED.
+    """Returns the material of a foot.
+
+    Under a sixth of the weight its depth is that of the plant's foot; at IMPACT_SPEED its
+    restitution is the requested one.
     """
     masses = robot.torso.mass + sum(link.mass for leg in robot.leg for link in leg.link)
     load = masses * float(np.linalg.norm(robot.gravity)) / LEGS
@@ -161,7 +165,7 @@ def foot_material(robot: Any) -> ProximityProperties:
 
 
 def material(stiffness: float, dissipation: float, mu: float) -> ProximityProperties:
-    """Stiffness [N/m], Hunt-Crossley dissipation [s/m], friction."""
+    """Returns a material with stiffness [N/m], Hunt-Crossley dissipation [s/m] and friction."""
     properties = ProximityProperties()
     AddContactMaterial(
         dissipation=dissipation,
@@ -173,8 +177,9 @@ def material(stiffness: float, dissipation: float, mu: float) -> ProximityProper
 
 
 def exact_restitution_chi(e: float) -> float:
-    """The root of chi (1 + e) = ln[(1 + chi)/(1 - chi e)] other than 0; it does not depend on
-    the elastic force's exponent.
+    """Returns the root of chi (1 + e) = ln[(1 + chi)/(1 - chi e)] other than 0.
+
+    It does not depend on the exponent of the elastic force.
     """
     low, high = 0.0, 1.0 / e
     for _ in range(100 if e < 1.0 else 0):
@@ -186,7 +191,7 @@ def exact_restitution_chi(e: float) -> float:
 
 
 def add_ground(plant: MultibodyPlant, robot: Any) -> None:
-    """A rigid half space through (0, 0, height), rising along the heading."""
+    """Adds a rigid half space through (0, 0, height) that rises along the heading."""
     terrain = robot.terrain
     incline = terrain.incline if terrain.kind == 2 else 0.0
     normal = np.array(
@@ -203,7 +208,7 @@ def add_ground(plant: MultibodyPlant, robot: Any) -> None:
 
 
 def put_at_start(model: Model, robot: Any, context: Context) -> None:
-    """The initial state of the definition."""
+    """Sets the initial state of the definition."""
     plant, at = model.plant, robot.initial
     own = plant.GetMyMutableContextFromRoot(context)
     rotation = RotationMatrix(Quaternion(np.array(at.quaternion) / np.linalg.norm(at.quaternion)))
@@ -216,8 +221,8 @@ def put_at_start(model: Model, robot: Any, context: Context) -> None:
             joint.set_angular_rate(own, at.speed[leg][k])
 
 
-def tell(model: Model, context: Context, command: Any) -> None:
-    """A command to the motors."""
+def set_command(model: Model, context: Context, command: Any) -> None:
+    """Sets the command of the motors."""
     plant = model.plant
     instance = plant.GetModelInstanceByName("DefaultModelInstance")
     own = plant.GetMyMutableContextFromRoot(context)
@@ -228,13 +233,13 @@ def tell(model: Model, context: Context, command: Any) -> None:
 
 
 def torso_position(model: Model, robot: Any, context: Context) -> Array:
-    """m (3,)    the torso's centre of mass."""
+    """Returns the position of the torso's centre of mass in world axes (3,) [m]."""
     pose = model.plant.EvalBodyPoseInWorld(model.plant.GetMyContextFromRoot(context), model.torso)
     return np.asarray(pose.multiply(np.array(robot.torso.com)))
 
 
 def simulator_of(model: Model, method: str, step: float, h: float) -> Simulator:
-    """A simulator by METHOD and STEP, its step at most h [s]."""
+    """Returns a simulator for METHOD and STEP, with steps of at most h [s]."""
     simulator = Simulator(model.diagram)
     if method != "discrete":
         integrator = ResetIntegratorFromFlags(simulator, method, h)
@@ -243,16 +248,16 @@ def simulator_of(model: Model, method: str, step: float, h: float) -> Simulator:
 
 
 def walk_once(model: Model, walk: Walk, method: str, step: float) -> tuple[float, int, Array]:
-    """Seconds of the loop, evaluations (steps where Drake counts none), and the path (n + 1, 3)."""
+    """Returns the loop's time [s], evaluations (or steps), and the path (n + 1, 3) [m]."""
     simulator = simulator_of(model, method, step, walk.h)
     context = simulator.get_mutable_context()
     put_at_start(model, walk.robot, context)
-    tell(model, context, walk.inputs[0])
+    set_command(model, context, walk.inputs[0])
     simulator.Initialize()
     path = [torso_position(model, walk.robot, context)]
     begin = time.perf_counter()
     for k, command in enumerate(walk.inputs):
-        tell(model, context, command)
+        set_command(model, context, command)
         simulator.AdvanceTo((k + 1) * walk.h)
         path.append(torso_position(model, walk.robot, context))
     seconds = time.perf_counter() - begin
@@ -263,10 +268,10 @@ def walk_once(model: Model, walk: Walk, method: str, step: float) -> tuple[float
 
 
 def microseconds_per_evaluation(model: Model, walk: Walk) -> float:
-    """us    CalcTimeDerivatives, every time at another state."""
+    """Returns the time of CalcTimeDerivatives [us], evaluated at a new state each time."""
     context = model.diagram.CreateDefaultContext()
     put_at_start(model, walk.robot, context)
-    tell(model, context, walk.inputs[0])
+    set_command(model, context, walk.inputs[0])
     state = context.get_continuous_state_vector().CopyToVector()
     result = model.diagram.AllocateTimeDerivatives()
 
@@ -282,7 +287,7 @@ def microseconds_per_evaluation(model: Model, walk: Walk) -> float:
 
 
 def mean_seconds(action: Callable[[], None]) -> float:
-    """s    of one call."""
+    """Returns the mean time of one call [s]."""
     begin = time.perf_counter()
     for _ in range(EVALUATIONS):
         action()
@@ -291,9 +296,8 @@ def mean_seconds(action: Callable[[], None]) -> float:
 
 def main(walk_path: str, method: str, step: str, repeats: str, path_out: str) -> None:
     """Runs, writes the path and prints the JSON line."""
-    logging.getLogger("drake").setLevel(
-        logging.ERROR
-    )  # half spaces and deformable bodies, of which there are none
+    # Drake warns about half spaces and deformable bodies, but the model has no deformable bodies
+    logging.getLogger("drake").setLevel(logging.ERROR)
     walk, size = read_walk(walk_path), float(step)
     discrete = method == "discrete"
     model = build(walk.robot, time_step=size if discrete else 0.0)

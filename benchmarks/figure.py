@@ -1,7 +1,8 @@
-"""The work-precision figure: error against time, medians over the family, bands from the best walk
-to the worst.
+"""Draws the work-precision figure: error against computing time over the family of walks.
 
-`python -m benchmarks.figure FOLDER` draws it again from the folder's walks.csv.
+Lines are medians, bands reach from the best walk to the worst.
+
+`python -m benchmarks.figure FOLDER` draws it from the walks.csv of a folder.
 """
 
 from __future__ import annotations
@@ -34,19 +35,21 @@ NAMES = {
 }
 COLOURS = (*PALETTE, "0.55")
 MARKERS = "osD^v"
-CELLS: dict[Any, Any] = {"str": str, "float": float}  # by the type of a field
+CELLS: dict[Any, Any] = {"str": str, "float": float}  # conversions by a field's type
 BEST = ("rosw3", "ros2")  # of ours, beside the peers
 
 
 def draw(runs: Sequence[Run], series: Sequence[Series], folder: Path) -> None:
-    """Writes work_precision.svg and .png: our integrators on the left, the peers' beside the
-    best of ours on the right.
+    """Writes work_precision.svg and .png.
+
+    The left panel shows our integrators, the right one the peers beside the best of ours.
     """
     with rc_context(SETTINGS):
         figure = Figure(figsize=(WIDTH, 5.6))
         left, right = figure.subplots(1, 2, sharex=True, sharey=True)
         figure.suptitle(
-            f"Walking for {DURATION:g} s, {len({run.walk for run in runs})} walks: error against computing time"
+            f"Walking for {DURATION:g} s, {len({run.walk for run in runs})} walks:"
+            " error against computing time"
         )
         _panel(
             left, runs, [one for one in series if one.engine == OURS], "this plant's integrators"
@@ -63,7 +66,7 @@ def draw(runs: Sequence[Run], series: Sequence[Series], folder: Path) -> None:
 
 
 def read_runs(path: Path) -> list[Run]:
-    """The runs of a walks.csv."""
+    """Reads the runs of a walks.csv."""
     with path.open(encoding="utf-8", newline="") as file:
         return [
             Run(**{item.name: CELLS[item.type](row[item.name]) for item in fields(Run)})
@@ -72,7 +75,7 @@ def read_runs(path: Path) -> list[Run]:
 
 
 def _panel(axes: Any, runs: Sequence[Run], series: Sequence[Series], title: str) -> None:
-    """Colours tell engines apart, where there are several, and markers their methods."""
+    """Draws one panel. With several engines colours mean engines and markers mean methods."""
     engines = list(dict.fromkeys(one.engine for one in series))
     for k, one in enumerate(series):
         among = (

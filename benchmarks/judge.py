@@ -1,6 +1,4 @@
-"""From runs to the figures that are compared: which setting of a method meets an error over the
-whole family, and what it costs.
-"""
+"""Finds the setting of a method that meets an error over the whole family, and its cost."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from benchmarks.series import Series
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """One setting over the family."""
+    """Errors and real-time factors of one setting over the family."""
 
     setting: float
     error: float  # m    median
@@ -26,19 +24,19 @@ class Spread:
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """A method at the setting that meets an error."""
+    """A method and the setting with which it meets an error."""
 
     series: Series
     spread: Spread
 
 
 def of_series(runs: Iterable[Run], series: Series) -> list[Run]:
-    """The runs of one method."""
+    """Returns the runs of one method."""
     return [run for run in runs if (run.engine, run.method) == (series.engine, series.method)]
 
 
 def spreads(runs: Sequence[Run], series: Series) -> list[Spread]:
-    """Coarse to fine; settings that were not measured are left out."""
+    """Returns the spreads of the measured settings, from coarse to fine."""
     mine = of_series(runs, series)
     groups = [[run for run in mine if run.setting == setting] for setting in series.settings]
     return [_spread(group) for group in groups if group]
@@ -55,11 +53,10 @@ def _spread(group: Sequence[Run]) -> Spread:
 def choose(
     runs: Sequence[Run], series: Series, target: float, *, every_walk: bool
 ) -> Choice | None:
-    """The coarsest setting that meets an error [m] in every walk, or in the median walk, as all
-    finer ones do too.
+    """Returns the coarsest setting that meets an error [m], as all finer settings do too.
 
-    One setting for all walks, and no setting that looks good between worse ones: neither may be
-    picked by luck.
+    The error is met in every walk, or in the median walk. One setting serves all walks, and a good
+    setting between worse ones is not chosen, because both could be good by chance.
     """
     chosen = None
     for spread in reversed(spreads(runs, series)):
@@ -72,7 +69,7 @@ def choose(
 def best(
     runs: Sequence[Run], candidates: Iterable[Series], target: float, *, every_walk: bool = True
 ) -> Choice | None:
-    """The fastest of several methods at an error."""
+    """Returns the fastest of several methods that meet an error [m]."""
     found = [
         choice
         for series in candidates
@@ -82,8 +79,9 @@ def best(
 
 
 def agreement(runs: Sequence[Run], engine: str) -> float:
-    """m    how close an engine came to our converged paths: over its settings, the least median
-    error. NaN: it never ran.
+    """Returns the least median error of an engine to our converged paths [m].
+
+    NaN if the engine has no runs.
     """
     groups: dict[tuple[str, float], list[float]] = {}
     for run in runs:
@@ -93,9 +91,9 @@ def agreement(runs: Sequence[Run], engine: str) -> float:
 
 
 def per_evaluation(runs: Iterable[Run], engine: str, law: str) -> float:
-    """us    median time of one evaluation of the right-hand side; NaN when no driver told."""
-    told = [
+    """Returns the median time of one evaluation of the right-hand side [us], NaN if unknown."""
+    times = [
         run.microseconds_per_evaluation for run in runs if (run.engine, run.law) == (engine, law)
     ]
-    told = [value for value in told if math.isfinite(value)]
-    return median(told) if told else math.nan
+    times = [value for value in times if math.isfinite(value)]
+    return median(times) if times else math.nan

@@ -1,6 +1,4 @@
-"""The co-simulation's own cost: the whole loop against real time, and the master on an FMU that
-computes nothing.
-"""
+"""Measures the co-simulation: the whole loop, and the master on an FMU that computes nothing."""
 
 from __future__ import annotations
 
@@ -33,12 +31,12 @@ class Still:
         self._command = JointCommand()
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """The same command always."""
+        """Returns the same command in every step."""
         return self._command
 
 
 def realtime_factor(tools: Tools, control: str) -> float:
-    """Of the whole loop, plant and Python controller, at a macro-step of 5 ms."""
+    """Returns the real-time factor of plant and Python controller at a macro-step of 5 ms."""
     scenario = load_scenario(SCENARIO, overrides=[f"control={control}"])
     gains = (
         None
@@ -52,7 +50,7 @@ def realtime_factor(tools: Tools, control: str) -> float:
 
 
 def master_overhead(tools: Tools) -> float:
-    """us per macro-step of fmpy's calls and the recording alone."""
+    """Returns the time per macro-step of fmpy's calls and the recording alone [us]."""
     scenario = load_scenario(SCENARIO)
     schedule = make_schedule(scenario)
     with TemporaryDirectory(prefix="hexapod-bench-") as folder:
@@ -70,7 +68,7 @@ def master_overhead(tools: Tools) -> float:
 
 
 def _idle_fmu(folder: Path, tools: Tools) -> Path:
-    """The FMU with a binary that does nothing."""
+    """Writes the FMU with a binary that does nothing and returns its path."""
     idle = folder / "idle.fmu"
     library = next(tools.native.glob("libbench_idle_fmu.*"))
     with zipfile.ZipFile(tools.fmu) as source, zipfile.ZipFile(idle, "w") as target:

@@ -1,6 +1,4 @@
-"""Runs of drivers: time, evaluations, and the error against the converged solution of the same
-law.
-"""
+"""Runs drivers and measures time, evaluations and the error against the converged solution."""
 
 from __future__ import annotations
 
@@ -25,18 +23,18 @@ from benchmarks.walks import DURATION
 
 Array = NDArray[np.float64]
 
-TIMEOUT = 300.0  # s    of one call of a driver
-SHORT = 0.05  # s    a walk that is over sooner is repeated
-REPEATS, REPEATED_TIME = 9, 0.15  # at most, and until about so many seconds
+TIMEOUT = 300.0  # s    for one call of a driver
+SHORT = 0.05  # s    shorter walks are repeated
+REPEATS, REPEATED_TIME = 9, 0.15  # at most so many repeats, and about so many seconds in total
 
 
 class DriverError(Exception):
-    """A driver that gave up, in its own words."""
+    """A driver failed; the message is the driver's."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One walk by one method at one setting; error and seconds are inf where the engine gave up."""
+    """One walk by one method at one setting; error and seconds are inf if the engine failed."""
 
     engine: str
     method: str
@@ -55,14 +53,14 @@ class Run:
 
 @dataclass
 class Bench:
-    """Runs drivers on walk files and knows the converged paths."""
+    """Runs drivers on walk files and compares with the converged paths."""
 
     tools: Tools
     walks: Mapping[str, Path]  # files by name
     _references: dict[str, Array] = field(default_factory=dict)
 
     def run(self, series: Series, setting: float, walk: str) -> Run:
-        """Measures one walk; short ones several times."""
+        """Measures one walk; repeats short ones."""
         facts: dict[str, Any] = {
             "engine": series.engine,
             "method": series.method,
@@ -71,10 +69,12 @@ class Bench:
             "walk": walk,
         }
         try:
-            told, path = self.call(series.engine, series.method, setting, walk)
-            if told["seconds"][0] < SHORT:
-                repeats = max(3, min(REPEATS, int(REPEATED_TIME / told["seconds"][0])))
-                told, path = self.call(series.engine, series.method, setting, walk, repeats=repeats)
+            printed, path = self.call(series.engine, series.method, setting, walk)
+            if printed["seconds"][0] < SHORT:
+                repeats = max(3, min(REPEATS, int(REPEATED_TIME / printed["seconds"][0])))
+                printed, path = self.call(
+                    series.engine, series.method, setting, walk, repeats=repeats
+                )
             error = distance(path, self.reference(series, walk))
         except DriverError:
             return Run(
@@ -84,11 +84,11 @@ class Bench:
                 microseconds_per_evaluation=math.nan,
                 **facts,
             )
-        each = told["microseconds_per_evaluation"]
+        each = printed["microseconds_per_evaluation"]
         return Run(
             error=error,
-            seconds=median(told["seconds"]),
-            evaluations=told["evaluations"],
+            seconds=median(printed["seconds"]),
+            evaluations=printed["evaluations"],
             microseconds_per_evaluation=math.nan if each is None else each,
             **facts,
         )
@@ -96,7 +96,9 @@ class Bench:
     def call(
         self, engine: str, method: str, setting: float, walk: str, *, repeats: int = 1
     ) -> tuple[dict[str, Any], Array]:
-        """What a driver prints, and its path (n + 1, 3). Raises DriverError."""
+        """Returns the printed values of a driver and its path (n + 1, 3) [m]. Raises
+        DriverError.
+        """
         out = BUILD / f"path-{os.getpid()}.bin"
         words = [
             *command(engine, self.tools),
@@ -106,14 +108,15 @@ class Bench:
             str(repeats),
             str(out),
         ]
-        told = json.loads(call(words))
+        printed = json.loads(call(words))
         path = np.fromfile(out).reshape(-1, 3)
         out.unlink()
-        return told, path
+        return printed, path
 
     def reference(self, series: Series, walk: str) -> Array:
-        """The converged path (n + 1, 3), kept in build/bench for as long as neither walk nor
-        driver changes. Raises DriverError.
+        """Returns the converged path (n + 1, 3) [m]. Raises DriverError.
+
+        The path is kept in build/bench until the walk or the driver changes.
         """
         engine, method, setting = series.reference
         key = f"{engine}-{method}-{setting:g}-{walk}"
@@ -131,7 +134,7 @@ class Bench:
 
 
 def call(words: list[str]) -> str:
-    """The last line that a command prints. Raises DriverError."""
+    """Runs a command and returns the last line of its output. Raises DriverError."""
     try:
         done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=TIMEOUT)
     except subprocess.TimeoutExpired as error:
@@ -143,6 +146,6 @@ def call(words: list[str]) -> str:
 
 
 def distance(path: Array, reference: Array) -> float:
-    """m    the largest distance between two paths; inf for one that left the numbers."""
+    """Returns the largest distance between two paths [m], inf if one is not finite."""
     gap = np.linalg.norm(path - reference, axis=1).max()
     return float(gap) if np.isfinite(gap) else math.inf

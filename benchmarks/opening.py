@@ -1,9 +1,9 @@
-"""What an importer waits for before the first step: the model description read, the instance made.
+"""Measures what an importer does before the first step: reading and instantiating.
 
 usage: python -m benchmarks.opening
 
-Prints the median and best processor time of some repetitions, next to what is asked of them.
-Nothing here is asserted: machines are noisy.
+Prints the median and best processor time of some repetitions beside their limit. Nothing is
+asserted, because machines are noisy.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ REPETITIONS = 30
 
 
 def milliseconds(action: Callable[[], object]) -> tuple[float, float]:
-    """Median and best processor time of an action."""
+    """Returns the median and the least processor time of an action [ms]."""
     times = []
     for _ in range(REPETITIONS):
         begin = time.process_time()
@@ -51,9 +51,9 @@ def main() -> int:
             ),
             ("instance made from its resources", 50.0, _instantiate(root)),
         ]
-        for name, asked, action in rows:
+        for name, limit, action in rows:
             median, best = milliseconds(action)
-            print(f"{name:36} {median:8.2f} ms   best {best:8.2f} ms   asked: below {asked:g} ms")
+            print(f"{name:36} {median:8.2f} ms   best {best:8.2f} ms   limit: {limit:g} ms")
     return 0
 
 
@@ -63,7 +63,7 @@ def _description(fmu: Path) -> bytes:
 
 
 def _instantiate(root: str) -> Callable[[], None]:
-    """An instance made and freed, the library being loaded."""
+    """Returns an action that creates and frees an instance of the loaded library."""
     description = fmpy.read_model_description(root)
     slave = FMU2Slave(
         guid=description.guid,

@@ -1,6 +1,4 @@
-"""What is measured of the plant alone: right-hand side, instructions, many instances, steep
-laws.
-"""
+"""Measures the plant alone: right-hand side, instructions, many instances, steep laws."""
 
 from __future__ import annotations
 
@@ -26,20 +24,24 @@ Figures = dict[str, float]
 
 
 def derivatives(tools: Tools, walks: Sequence[Path]) -> dict[str, Figures]:
-    """us of one evaluation by kernel, "plain" and with "multipliers": medians over the walks."""
-    told = [
+    """Returns the time of one evaluation by kernel, "plain" and with "multipliers" [us].
+
+    The times are medians over the walks.
+    """
+    results = [
         json.loads(call([str(tools.driver("derivative")), str(walk), str(REPEATS)]))
         for walk in walks
     ]
     return {
-        kernel: {kind: median(one[kernel][kind] for one in told) for kind in told[0][kernel]}
-        for kernel in told[0]
+        kernel: {kind: median(one[kernel][kind] for one in results) for kind in results[0][kernel]}
+        for kernel in results[0]
     }
 
 
 def instructions(tools: Tools, walk: Path, kernels: Sequence[str]) -> Figures:
-    """Instructions counted by callgrind: of one evaluation by kernel, without and with
-    multipliers. Empty without valgrind.
+    """Returns the instructions of one evaluation by kernel, without and with multipliers.
+
+    Callgrind counts them; the result is empty without valgrind.
     """
     if shutil.which("valgrind") is None:
         return {}
@@ -49,13 +51,13 @@ def instructions(tools: Tools, walk: Path, kernels: Sequence[str]) -> Figures:
             count = _counted(
                 [str(tools.driver("derivative")), str(walk), "1", kernel, flag], "measure*"
             )
-            if count:  # a kernel that valgrind's processor does not have counts nothing
+            if count:  # 0: valgrind's processor does not have the kernel
                 found[f"{kernel} {kind}"] = count / (ROUNDS * VISITS)
     return found
 
 
 def instructions_per_step(bench: Bench, series: Series, setting: float, walk: str) -> float:
-    """Instructions of one macro-step, mean over a walk. NaN without valgrind."""
+    """Returns the instructions of one macro-step, mean over a walk. NaN without valgrind."""
     if shutil.which("valgrind") is None:
         return float("nan")
     path = bench.walks[walk]
@@ -80,19 +82,21 @@ def _counted(words: Sequence[str], function: str) -> float:
 
 
 def instances(tools: Tools, walk: Path) -> list[dict[str, Any]]:
-    """By number of plants stepped in turn: us of one macro-step, bytes of an instance,
-    allocations.
+    """Returns, by number of plants stepped in turn: time of a macro-step [us], bytes of an
+    instance, allocations.
     """
-    told = []
+    results = []
     for count in COUNTS:
         line = call([str(tools.driver("instances")), str(walk), repr(TOLERANCE), str(count)])
-        told.append({"instances": count, **json.loads(line)})
-    return told
+        results.append({"instances": count, **json.loads(line)})
+    return results
 
 
-def resident_bytes(told: Sequence[dict[str, Any]]) -> float:
-    """By how much the process grows with one more instance. NaN where the system does not tell."""
-    first, last = told[0], told[-1]
+def resident_bytes(results: Sequence[dict[str, Any]]) -> float:
+    """Returns the growth of the process per instance [bytes], NaN if the system does not report
+    it.
+    """
+    first, last = results[0], results[-1]
     if None in (first["resident_per_instance"], last["resident_per_instance"]):
         return float("nan")
     grown = (
@@ -105,8 +109,9 @@ def resident_bytes(told: Sequence[dict[str, Any]]) -> float:
 def cost_of(
     bench: Bench, series: Series, setting: float, pairs: Sequence[tuple[str, str]]
 ) -> float:
-    """Time of changed walks over that of the unchanged ones, at one setting: median over pairs
-    (changed, unchanged). inf: it gave up.
+    """Returns the time of changed walks over that of the unchanged ones at one setting.
+
+    The median is over pairs (changed, unchanged); inf if the engine failed.
     """
     return median(
         bench.run(series, setting, changed).seconds / bench.run(series, setting, plain).seconds

@@ -1,5 +1,7 @@
-"""`python -m benchmarks.run [--quick]`: builds, measures, prints the table, writes CSV and
-figure into benchmarks/results/<machine>/.
+"""Runs all benchmarks of speed and accuracy: `python -m benchmarks.run [--quick]`.
+
+Builds the drivers, measures, prints the table, and writes CSV files and the figure into
+benchmarks/results/<machine>/.
 """
 
 from __future__ import annotations
@@ -39,8 +41,8 @@ from benchmarks.toolchain import REQUIREMENTS, Tools, prepare
 from benchmarks.walks import STIFF_RUBBER, STIFF_SLOPE, Walk, family, stiff, write
 
 RESULTS = ROOT / "benchmarks" / "results"
-QUICK_WALKS = 5  # every n-th of the family; odd, so that both robots are among them
-QUICK_SETTINGS = 2  # every n-th
+QUICK_WALKS = 5  # every n-th walk; odd, so that both robots are included
+QUICK_SETTINGS = 2  # every n-th setting
 STEEP = {
     f"friction slope {STIFF_SLOPE:g} s/m": {"slope": STIFF_SLOPE},
     f"rubber of {STIFF_RUBBER:g} N/m^1.5": {"stiffness": STIFF_RUBBER},
@@ -51,8 +53,9 @@ console = Console(width=180)
 
 
 def main() -> None:
-    """Everything, in about a quarter of an hour; --quick in a minute or two, into build/bench
-    instead of the results.
+    """Runs everything in about a quarter of an hour.
+
+    With --quick it takes a minute or two and writes into build/bench instead of the results.
     """
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument(
@@ -76,7 +79,7 @@ def main() -> None:
     table = rows(runs, series, parts)
     _write_csv(folder / "table.csv", [asdict(row) | {"met": row.met} for row in table])
     _write_csv(folder / "instances.csv", scaling)
-    _tell(runs, series, table, tools, folder)
+    _print_results(runs, series, table, tools, folder)
     if quick:
         console.print(
             'quick: few walks, settings and peers; "the best of them" is the best of these only'
@@ -95,8 +98,9 @@ def _steep_files(walks: Iterable[Walk]) -> dict[str, Path]:
 
 
 def measured(bench: Bench, series: Sequence[Series], walks: Sequence[str]) -> list[Run]:
-    """Every method at every setting on every walk; engines alternate, so that the machine's
-    noise hits all of them.
+    """Runs every method at every setting on every walk.
+
+    Engines alternate, so that the noise of the machine affects all of them.
     """
     turns = max(len(one.settings) for one in series)
     return [
@@ -111,7 +115,7 @@ def measured(bench: Bench, series: Sequence[Series], walks: Sequence[str]) -> li
 def measured_parts(
     bench: Bench, series: Sequence[Series], runs: Sequence[Run], walks: Sequence[Walk]
 ) -> tuple[Parts, list[dict[str, Any]]]:
-    """What is measured beside the walks, and the cost against the number of instances."""
+    """Measures the parts other than walks, and the cost by number of instances."""
     files = [bench.walks[walk.name] for walk in walks]
     kernels = derivatives(bench.tools, files[:DERIVATIVE_WALKS])
     scaling = instances(bench.tools, files[0])
@@ -140,7 +144,7 @@ def measured_parts(
 
 
 def machine() -> str:
-    """A folder's name for this machine: its processor's."""
+    """Returns the name of this machine's folder, made from its processor's name."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
         name = re.search(r"model name\s*:\s*(.+)", text)
@@ -186,7 +190,7 @@ def _write_csv(path: Path, records: Sequence[dict[str, Any]]) -> None:
 
 
 def described(tools: Tools) -> dict[str, Any]:
-    """What the figures depend on."""
+    """Returns what the figures depend on: processor, compiler, versions of the peers."""
     compiler = subprocess.run(
         ["cc", "--version"], capture_output=True, text=True, check=False
     ).stdout.partition("\n")[0]
@@ -204,7 +208,7 @@ def described(tools: Tools) -> dict[str, Any]:
     }
 
 
-def _tell(
+def _print_results(
     runs: Sequence[Run], series: Sequence[Series], table: Sequence[Row], tools: Tools, folder: Path
 ) -> None:
     console.print(shown(table, title=f"{len({run.walk for run in runs})} walks on {machine()}"))
@@ -212,7 +216,8 @@ def _tell(
         one.engine for one in series if one.engine != OURS and one.law == PLANT_LAW
     ):
         console.print(
-            f"{engine} comes as close to our converged paths as {agreement(runs, engine):.1e} m (median over the walks)"
+            f"{engine} comes as close to our converged paths as {agreement(runs, engine):.1e} m"
+            " (median over the walks)"
         )
     for peer, reason in tools.missing.items():
         console.print(f"{peer} is missing: {reason}", markup=False)

@@ -1,6 +1,4 @@
-"""What is measured: every integrator of ours and of the peers, each with its settings from
-coarse to fine.
-"""
+"""Lists the measured integrators, ours and the peers', with settings from coarse to fine."""
 
 from __future__ import annotations
 
@@ -10,7 +8,7 @@ from pathlib import Path
 from benchmarks.toolchain import Tools
 
 OURS = "hexapod"
-PLANT_LAW, MUJOCO_LAW, DRAKE_LAW = "plant", "mujoco", "drake"  # whose contact
+PLANT_LAW, MUJOCO_LAW, DRAKE_LAW = "plant", "mujoco", "drake"  # contact laws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,11 +19,10 @@ class Series:
     method: str  # as its driver calls it
     settings: tuple[float, ...]  # step sizes in s or tolerances, coarse to fine
     adaptive: bool
-    law: str = PLANT_LAW  # an engine's own contact is judged by its own converged solution
-    every: int = 1  # n-th walk only, for slow engines; odd, so that both robots are among them
-    converged: tuple[str, float] | None = (
-        None  # method and setting of this engine that it is judged by; None: its law's
-    )
+    law: str = PLANT_LAW  # results with an engine's own contact law are judged by its own solution
+    every: int = 1  # runs every n-th walk, for slow engines; odd, so that both robots are included
+    # method and setting of this engine's converged solution; None: that of its law
+    converged: tuple[str, float] | None = None
     quick: bool = False  # measured in a quick run too, in every second setting
 
     @property
@@ -34,7 +31,7 @@ class Series:
 
     @property
     def reference(self) -> tuple[str, str, float]:
-        """Engine, method and setting of what counts as converged."""
+        """Engine, method and setting of the converged solution."""
         return (self.engine, *self.converged) if self.converged else REFERENCES[self.law]
 
 
@@ -66,7 +63,7 @@ OWN_STEPS = (2e-3, 1e-3, 5e-4)
 
 
 def ours() -> list[Series]:
-    """Our integrators."""
+    """Returns our integrators."""
     implicit = [
         Series(engine=OURS, method=name, settings=TOLERANCES, adaptive=True, quick=True)
         for name in ("rosw3", "ros2")
@@ -88,13 +85,14 @@ def ours() -> list[Series]:
 
 
 def peers() -> list[Series]:
-    """The peers' integrators: MuJoCo, Pinocchio and Simbody under the plant's law, MuJoCo and
-    Drake under their own.
+    """Returns the peers' integrators.
+
+    MuJoCo, Pinocchio and Simbody use the plant's law, MuJoCo and Drake also their own.
     """
-    return [*_under_our_law(), *_under_their_own()]
+    return [*_with_plant_law(), *_with_own_law()]
 
 
-def _under_our_law() -> list[Series]:
+def _with_plant_law() -> list[Series]:
     return [
         Series(engine="mujoco", method="law-RK4", settings=PEER_STEPS, adaptive=False, quick=True),
         Series(
@@ -130,7 +128,7 @@ def _under_our_law() -> list[Series]:
     ]
 
 
-def _under_their_own() -> list[Series]:
+def _with_own_law() -> list[Series]:
     drake = {
         "discrete": (5e-3, 2e-3, 1e-3, 5e-4),
         "cenic": (1e-1, 1e-2, 1e-3),
@@ -167,18 +165,18 @@ def _under_their_own() -> list[Series]:
     ]
 
 
-# what counts as converged, by whose law: (engine, method, setting)
+# converged solutions by contact law: (engine, method, setting)
 REFERENCES = {
     PLANT_LAW: (OURS, "dp54", 1e-9),
     MUJOCO_LAW: ("mujoco", "own-RK4", 6.25e-5),
     DRAKE_LAW: ("drake", "runge_kutta3", 1e-5),
 }
-# Drake's three plants differ in their friction, and so in their limits
+# Drake's three plants differ in their friction, so each has its own converged solution
 DRAKE_LIMITS = {"cenic": ("cenic", 1e-6), "discrete": ("discrete", 1e-4)}
 
 
 def command(engine: str, tools: Tools) -> list[str]:
-    """How the driver of an engine is called; [] when it is not there."""
+    """Returns the command of an engine's driver, [] if the driver does not exist."""
     if engine == "drake":
         script = Path(__file__).parent / "drake_walk.py"
         return (

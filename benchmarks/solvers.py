@@ -1,8 +1,9 @@
-"""`python -m benchmarks.solvers [--page]`: what a coarser solver costs in accuracy, metric by
-metric, and saves in steps.
+"""Measures what coarser solver settings cost in accuracy and save in steps.
 
-Walks are `walk_flat`, 10 s, under both controls, with variations; errors are against a solver a
-thousand times as exact as the default one. Nothing here depends on the machine. Writes
+usage: python -m benchmarks.solvers [--page]
+
+Walks are `walk_flat`, 10 s, under both controls, with variations. Errors are against a solver that
+is a thousand times as exact as the default one. The results do not depend on the machine. Writes
 benchmarks/results/solvers.csv; with --page the table in docs/studies.md too.
 """
 
@@ -52,7 +53,7 @@ Array = NDArray[np.float64]
 def walked(
     walker: Walker, control: str, gains: Gains | None, settings: Sequence[str]
 ) -> tuple[Array, float]:
-    """(seeds, SHOWN) figures of walks, and their mean number of steps."""
+    """Returns metrics of walks (seeds, SHOWN) and their mean number of steps."""
     scenario = load_scenario("walk_flat", overrides=[f"control={control}", *settings])
     results = [
         walker.simulate(replace(scenario, seed=seed, variation=STANDARD), gains=gains)
@@ -65,8 +66,9 @@ def walked(
 
 
 def errors(control: str) -> list[dict[str, Any]]:
-    """For each setting: steps, and the largest error over the seeds of each metric, in its own
-    unit and relative to its mean.
+    """Returns for each setting the steps and the largest errors of the metrics over the seeds.
+
+    Errors are in the metric's unit and relative to its mean.
     """
     gains = chosen_gains(load_scenario("walk_flat", overrides=[f"control={control}"]))
     rows = []
@@ -88,8 +90,10 @@ def errors(control: str) -> list[dict[str, Any]]:
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Markdown: errors relative to the figure, and in brackets those too small for `hexapod
-    compare` to call a change.
+    """Returns the table in Markdown.
+
+    Errors are relative to the metric. Those in brackets are too small for `hexapod compare` to
+    report a change.
     """
     lines = [
         "| control | solver, tolerance | steps | "
@@ -112,7 +116,7 @@ def _cell(error: float, share: float, floor: float) -> str:
 
 
 def main() -> None:
-    """Computes, prints, writes."""
+    """Computes the errors, prints and writes them."""
     assert set(SHOWN) <= set(METRICS)
     rows = [row for control in BOTH for row in errors(control)]
     path = RESULTS / "solvers.csv"

@@ -1,5 +1,6 @@
-"""`python -m benchmarks.study [--page]`: what a study's run costs beside its walk, how two workers
-scale, bytes and memory per run.
+"""Measures a study: overhead per run, scaling to two workers, bytes and memory per run.
+
+usage: python -m benchmarks.study [--page]
 
 Writes benchmarks/results/<machine>/study.csv; with --page the table in docs/studies.md too.
 """
@@ -60,7 +61,7 @@ RUNS, LARGE, BY_DASK, TASKS, FEW, WALKS, PYTHON_WALKS, REPEATS = (
     60,
     3,
 )
-CORES, MILLION = 100, 1e6  # of the plan
+CORES, MILLION = 100, 1e6  # of the extrapolated study
 DEFAULT: dict[str, Any] = {}
 # settings of the solver by name: docs/studies.md says what they cost in accuracy
 SOLVERS: dict[str, dict[str, Any]] = {
@@ -103,7 +104,8 @@ MEANINGS = {
     ),
     "overhead_dask": (
         "ms",
-        "of a processor, for a run that takes no time, through a Dask scheduler with two workers, in chunks",
+        "of a processor, for a run that takes no time,"
+        " through a Dask scheduler with two workers, in chunks",
     ),
     "task_dask": ("ms", "of a processor, for a task of one such run: client, scheduler and worker"),
     "finish": (
@@ -121,21 +123,20 @@ AIMS = {
     "overhead": "< 5 ms",
     "overhead_dask": "< 5 ms",
 }
-SPEEDS = [
-    name for name in MEANINGS if name.startswith(("rate", "walk", "scaling"))
-]  # the rest is the study's own
+# all other figures are the overhead of the study
+SPEEDS = [name for name in MEANINGS if name.startswith(("rate", "walk", "scaling"))]
 OWN = [name for name in MEANINGS if name not in SPEEDS]
 Figures = dict[str, tuple[float, str, str]]  # by name: value, unit, what it is
 
 
 class Instant:
-    """An engine whose walks take no time: what is left is the study's own."""
+    """An engine whose walks take no time, so that only the overhead of the study remains."""
 
     def __init__(self, fmu: Path, controller: Path) -> None:
         self._metrics = {name: 0.123456789 * place for place, name in enumerate(METRICS)}
 
     def summary(self, scenario: Scenario, *, gains: Gains | None, progress: Progress) -> Summary:
-        """As Engine says."""
+        """Returns invented metrics at once; see Engine.summary."""
         metrics = {name: value * (1.0 + scenario.seed) for name, value in self._metrics.items()}
         return Summary(
             control=scenario.control,
@@ -146,11 +147,11 @@ class Instant:
         )
 
     def close(self) -> None:
-        """Nothing to free."""
+        """Does nothing."""
 
 
 class Timed:
-    """A study, run into a folder that is gone afterwards."""
+    """Runs a study in a temporary folder and measures it."""
 
     def __init__(
         self,
@@ -176,9 +177,8 @@ class Timed:
                 options=Options(**options),
                 start=self._begun,
             )
-            self.processor = (
-                processor_time() - begin
-            )  # s    of this process and the workers it waited for
+            # s    of this process and the workers it waited for
+            self.processor = processor_time() - begin
             self.bytes = (Path(folder) / RESULTS_FILE).stat().st_size / runs
             if report:
                 write_study_report(read_results(Path(folder)), Path(folder))
@@ -190,8 +190,8 @@ class Timed:
 
     @property
     def rate(self) -> float:
-        """Runs per second, from when a tenth of them was there, for workers take a while to
-        begin, until the last tenth.
+        """Runs per second between the first and the last tenth, because workers need time to
+        start.
         """
         times, counts = np.array(self._stamps).T
         done = np.cumsum(counts)
@@ -200,7 +200,7 @@ class Timed:
 
 
 def processor_time() -> float:
-    """s    of this process and of those it has waited for"""
+    """Returns the processor time of this process and of its finished child processes [s]."""
     return float(
         sum(
             sum(resource.getrusage(who)[:2])
@@ -210,16 +210,16 @@ def processor_time() -> float:
 
 
 def measured(fmu: Path, gains: Gains) -> Figures:
-    """All figures. Processor time, of which others on the machine take nothing, and medians of
-    rates that were measured side by side.
-    """
+    """Returns all figures: processor times, which other programs hardly change, and rates."""
     common: dict[str, Any] = {"fmu": fmu, "gains": gains}
     found = _own_costs(common) | _walk_costs(common) | _rates(common)
     return {name: (found[name], *MEANINGS[name]) for name in MEANINGS}
 
 
 def _own_costs(common: dict[str, Any]) -> dict[str, float]:
-    """Of runs that take no time. A study's own costs are what more runs take more."""
+    """Returns the overhead of a study, from the difference between many and few runs of no
+    duration.
+    """
     many, small, large, most = *_measured_memory(RUNS, common), *_measured_memory(LARGE, common)
     by_dask = [through_cluster(runs, common) for runs in (FEW, BY_DASK)]
     with patch.object(dispatch, "CHUNK_TIME", 0.0):  # chunks of one run
@@ -249,8 +249,9 @@ def _walk_costs(common: dict[str, Any]) -> dict[str, float]:
 
 
 def _rates(common: dict[str, Any]) -> dict[str, float]:
-    """Per minute the best of all, for noise only ever takes away, and their medians; ratios of
-    what ran one after the other, medians.
+    """Returns rates per minute and ratios of rates.
+
+    Rates are the best of all repeats, because noise only lowers them; ratios are medians.
     """
     rates: dict[str, list[float]] = {
         name: []
@@ -284,7 +285,7 @@ def _rates(common: dict[str, Any]) -> dict[str, float]:
 
 
 def free_rate(count: int, common: dict[str, Any]) -> float:
-    """Walks per second of so many processes that know nothing of each other or of a study."""
+    """Returns walks per second of `count` independent processes without a study."""
     context = get_context("spawn")
     together = context.Barrier(count)
     with ProcessPoolExecutor(
@@ -296,16 +297,16 @@ def free_rate(count: int, common: dict[str, Any]) -> float:
         return sum(future.result() for future in futures)
 
 
-_together: Any = None  # of a process of `free_rate`: where it waits for the others
+_together: Any = None  # the barrier at which a process of `free_rate` waits for the others
 
 
 def _meet_at(barrier: Any) -> None:
-    global _together  # noqa: PLW0603  the one thing such a process is told beside its task
+    global _together  # noqa: PLW0603  an initializer cannot pass it otherwise
     _together = barrier
 
 
 def walk_alone(fmu: Path, gains: Gains) -> float:
-    """Walks per second of this process."""
+    """Returns walks per second of this process."""
     settings = [f"{name}={value}" for name, value in SOLVERS[""].items()]
     plans = [
         load_scenario("walk_flat", overrides=[f"control={control}", *settings]) for control in BOTH
@@ -322,13 +323,14 @@ def walk_alone(fmu: Path, gains: Gains) -> float:
 
 
 def _measured_memory(runs: int, common: dict[str, Any]) -> tuple[Timed, float]:
-    """Runs that take no time, and the peak memory after them and their report [B]."""
+    """Measures runs of no duration; returns them and the peak memory after their report [B]."""
     return Timed(runs, engine=INSTANT, workers=2, report=True, **common), peak_memory()
 
 
 def through_cluster(runs: int, common: dict[str, Any]) -> float:
-    """s    of processor for runs that take no time: program, scheduler and workers, from their
-    start to their end
+    """Returns the processor time of runs of no duration [s].
+
+    It includes program, scheduler and workers, from their start to their end.
     """
     begin = processor_time()
     with cluster() as address:
@@ -337,13 +339,13 @@ def through_cluster(runs: int, common: dict[str, Any]) -> float:
 
 
 def peak_memory() -> float:
-    """B    of this process so far"""
+    """Returns the peak memory of this process [B]."""
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 @contextmanager
 def cluster() -> Iterator[str]:
-    """A Dask scheduler with two worker processes on loopback; its address."""
+    """Starts a Dask scheduler with two workers on loopback; yields its address."""
     with TemporaryDirectory(prefix="hexapod-dask-") as folder:
         file = Path(folder) / "scheduler.json"
         common = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
@@ -371,7 +373,9 @@ def cluster() -> Iterator[str]:
 
 
 def write(figures: Figures, *, page: bool) -> Path:
-    """The CSV, and the page's table if wanted."""
+    """Writes the CSV file and, with `page`, the tables of docs/studies.md; returns the CSV's
+    path.
+    """
     path = RESULTS / machine() / "study.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_text(path) as file:
@@ -389,7 +393,7 @@ def write(figures: Figures, *, page: bool) -> Path:
 
 
 def put_in_page(contents: Mapping[str, str]) -> None:
-    """Parts of docs/studies.md anew, each between its own marks."""
+    """Replaces parts of docs/studies.md, each between its own marks."""
     text = PAGE.read_text(encoding="utf-8")
     for name, content in contents.items():
         begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
@@ -399,7 +403,7 @@ def put_in_page(contents: Mapping[str, str]) -> None:
 
 
 def table(figures: Mapping[str, tuple[float, str, str]], names: Sequence[str]) -> str:
-    """Markdown."""
+    """Returns a table of figures in Markdown."""
     lines = ["| what | measured | aim |", "|---|---|---|"]
     for name in names:
         value, unit, meaning = figures[name]
@@ -411,8 +415,9 @@ def table(figures: Mapping[str, tuple[float, str, str]], names: Sequence[str]) -
 
 
 def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
-    """What a million walks of 10 s, half of them under either control, come to on a hundred such
-    cores.
+    """Extrapolates to a million walks of 10 s on a hundred such cores; returns Markdown.
+
+    Half of the walks are under each control.
     """
     values = {name: value for name, (value, _, _) in figures.items()}
     walk, exact = (
@@ -429,7 +434,8 @@ def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
         ),
         (
             f"on {CORES} cores",
-            f"{60.0 * hours / CORES:.0f} min at {per_second:.0f} walks per second; {60.0 * MILLION * exact / 3600.0 / CORES:.0f} min",
+            f"{60.0 * hours / CORES:.0f} min at {per_second:.0f} walks per second;"
+            f" {60.0 * MILLION * exact / 3600.0 / CORES:.0f} min",
         ),
         (
             "of what one program hands out and stores",
@@ -443,7 +449,8 @@ def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
         ("memory of the program for its runs", f"{values['memory'] * MILLION / 1e6:.0f} MB"),
         (
             "tasks on a Dask cluster",
-            f"{tasks:.0f} per second, {100.0 * tasks * 1e-3 * values['task_dask']:.0f} % of one core for all that handle them",
+            f"{tasks:.0f} per second, {100.0 * tasks * 1e-3 * values['task_dask']:.0f} % of one"
+            " core for all that handle them",
         ),
     ]
     return "\n".join(
@@ -456,7 +463,7 @@ def plan(figures: Mapping[str, tuple[float, str, str]]) -> str:
 
 
 def main() -> None:
-    """Measures, prints, writes."""
+    """Measures, prints and writes all figures."""
     with TemporaryDirectory(prefix="hexapod-bench-") as folder:
         fmu = export_fmu(load_robot("athena"), Path(folder) / "athena.fmu")
         gains = chosen_gains(load_scenario("walk_flat", overrides=["control=compliant"]))

@@ -1,4 +1,4 @@
-"""The table: our figure, each peer's, the ratio, the goal."""
+"""Builds the table of results: our figure, each peer's, their ratio, the goal."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OWN_CONTACT = ("own-implicitfast", 1e-3)  # what MuJoCo's users run
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One line of the table; NaN: not there. `better` tells which side of the goal is good."""
+    """One line of the table; NaN means missing. `better` is the good side of the goal."""
 
     figure: str
     unit: str
@@ -50,7 +50,7 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Parts:
-    """What was measured beside the walks."""
+    """Measurements other than those of the walks."""
 
     derivatives: dict[str, dict[str, float]]
     steep: dict[str, float]  # cost over the default's, by what is steep
@@ -64,7 +64,7 @@ class Parts:
 
 
 def rows(runs: Sequence[Run], series: Sequence[Series], parts: Parts) -> list[Row]:
-    """The whole table."""
+    """Returns all rows of the table."""
     return [
         *_evaluation(runs, parts),
         *_walking(runs, series),
@@ -75,8 +75,8 @@ def rows(runs: Sequence[Run], series: Sequence[Series], parts: Parts) -> list[Ro
 
 def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
     for kernel, goal in KERNEL_GOALS.items():
-        told = parts.derivatives.get(kernel, {})
-        plain, full = told.get("plain", math.nan), told.get("multipliers", math.nan)
+        times = parts.derivatives.get(kernel, {})
+        plain, full = times.get("plain", math.nan), times.get("multipliers", math.nan)
         yield Row(figure=f"right-hand side, {kernel}", unit="us", ours=plain, goal=goal)
         yield Row(
             figure=f"the same with all multipliers, {kernel}: extra",
@@ -84,7 +84,7 @@ def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
             ours=full / plain - 1.0,
             goal=MULTIPLIERS_GOAL,
         )
-    fastest = min((told["plain"] for told in parts.derivatives.values()), default=math.nan)
+    fastest = min((times["plain"] for times in parts.derivatives.values()), default=math.nan)
     peers = [
         ("pinocchio", PLANT_LAW),
         ("mujoco", PLANT_LAW),
@@ -110,8 +110,8 @@ def _evaluation(runs: Sequence[Run], parts: Parts) -> Iterable[Row]:
 
 
 def _walking(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]:
-    """At each error: ours and every peer with all walks within it, then with the median walk
-    within it.
+    """Yields, for each error, ours and every peer: first all walks within it, then the median
+    walk.
     """
     mine = [one for one in series if one.engine == OURS]
     theirs = [one for one in series if one.engine != OURS and one.law != MUJOCO_LAW]
@@ -152,7 +152,7 @@ def _against(
     *,
     every_walk: bool,
 ) -> Iterable[Row]:
-    """A row for each peer at its best, and one for the best of them."""
+    """Yields a row for each peer at its best setting, and one for the best peer."""
     engines = list(dict.fromkeys(one.engine for one in peers if spreads(runs, one)))
     found = {
         engine: best(
@@ -183,7 +183,7 @@ def _against(
 
 
 def _own_contact(runs: Sequence[Run], series: Sequence[Series]) -> Iterable[Row]:
-    """MuJoCo as its users run it, each engine judged by its own converged solution."""
+    """Yields MuJoCo with its own contact; each engine is judged by its own converged solution."""
     chosen = best(runs, [one for one in series if one.engine == OURS], FINE)
     method, setting = OWN_CONTACT
     for one in series:
@@ -249,13 +249,13 @@ def _how(choice: Choice | None) -> str:
 
 
 def chosen_setting(runs: Sequence[Run], series: Sequence[Series]) -> Choice | None:
-    """What of ours stands in the table at the coarser error."""
+    """Returns our method and setting in the table at the coarser error."""
     mine = [one for one in series if one.engine == OURS]
     return best(runs, mine, FINE) or best(runs, mine, FINE, every_walk=False)
 
 
 def shown(found: Sequence[Row], *, title: str) -> Table:
-    """The table for a terminal."""
+    """Formats the table for a terminal."""
     table = Table(title=title)
     columns: tuple[tuple[str, Callable[[Row], str], Any], ...] = (
         ("figure", lambda row: f"{row.figure} [{row.unit}]".replace("[", "\\["), "left"),
@@ -279,7 +279,9 @@ MET = {True: "[green]yes[/green]", False: "[red]no[/red]", None: ""}
 def _goal(row: Row) -> str:
     if math.isnan(row.goal):
         return ""
-    return f"{row.judged if row.judged == 'ratio' else ''} {'<=' if row.better == 'less' else '>='} {_number(row.goal)}".strip()
+    judged = "ratio" if row.judged == "ratio" else ""
+    relation = "<=" if row.better == "less" else ">="
+    return f"{judged} {relation} {_number(row.goal)}".strip()
 
 
 def _number(value: float) -> str:

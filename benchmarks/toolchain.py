@@ -1,8 +1,6 @@
-"""What the benchmarks need beside the package: an environment of the peers' wheels and the drivers
-built against them.
+"""Installs the peers' wheels and builds the drivers, all in build/bench.
 
-All of it lies in build/bench. A peer that cannot be had here is reported with the reason and
-otherwise left out.
+A peer that cannot be installed or built is reported with the reason and left out.
 """
 
 from __future__ import annotations
@@ -19,13 +17,15 @@ from benchmarks import BUILD, ROOT
 REQUIREMENTS = Path(__file__).parent / "requirements.txt"
 OUR_TARGETS = ("bench_plant", "bench_derivative", "bench_instances", "bench_idle_fmu", "fmu")
 PEER_TARGETS = ("mujoco", "pinocchio", "simbody")
-QUICK_TARGETS = ("mujoco",)  # compiles in seconds, Pinocchio's templates in minutes
-LAST_LINES = 3  # of a failed command's words
+QUICK_TARGETS = ("mujoco",)  # compiles in seconds; Pinocchio takes minutes
+LAST_LINES = 3  # of a failed command's output
 
 
 @dataclass(frozen=True)
 class Tools:
-    """Where drivers and the peers' Python are; missing: why a peer is not there."""
+    """Folders of the drivers and of the peers' Python; `missing` maps absent peers to the
+    reason.
+    """
 
     native: Path
     python: Path
@@ -33,17 +33,18 @@ class Tools:
 
     @property
     def fmu(self) -> Path:
-        """The default robot's FMU, of the sources as they are."""
+        """The default robot's FMU, built from the current sources."""
         return self.native / "athena.fmu"
 
     def driver(self, name: str) -> Path:
-        """A native driver."""
+        """Returns the path of a native driver."""
         return self.native / f"bench_{name}"
 
 
 def prepare(*, quick: bool) -> Tools:
-    """Installs the peers' wheels and builds all drivers; what is up to date stays. Raises
-    RuntimeError when our own do not build.
+    """Installs the peers' wheels and builds all drivers that are not up to date.
+
+    Raises RuntimeError when our own drivers do not build.
     """
     python = _environment()
     missing = _install(python, ("mujoco",) if quick else None)
@@ -52,11 +53,11 @@ def prepare(*, quick: bool) -> Tools:
     if configured:
         raise RuntimeError(f"the drivers cannot be configured: {configured}")
     for target in OUR_TARGETS:
-        if trouble := _build(native, target):
-            raise RuntimeError(f"{target} does not build: {trouble}")
+        if error := _build(native, target):
+            raise RuntimeError(f"{target} does not build: {error}")
     for target in QUICK_TARGETS if quick else PEER_TARGETS:
-        if trouble := _build(native, f"bench_{target}"):
-            missing[target] = missing.get(target) or trouble
+        if error := _build(native, f"bench_{target}"):
+            missing[target] = missing.get(target) or error
     return Tools(native, python, missing)
 
 
@@ -69,7 +70,7 @@ def _environment() -> Path:
 
 
 def _install(python: Path, chosen: tuple[str, ...] | None) -> dict[str, str]:
-    """Installs the pinned wheels one by one; returns what went wrong by peer."""
+    """Installs the pinned wheels one by one; returns the errors by peer."""
     missing = {}
     for line in REQUIREMENTS.read_text(encoding="utf-8").splitlines():
         name = line.partition("==")[0]
@@ -77,7 +78,7 @@ def _install(python: Path, chosen: tuple[str, ...] | None) -> dict[str, str]:
             continue
         stamp = python.parents[1] / f".{line}"
         if not stamp.exists():
-            trouble = _run(
+            error = _run(
                 [
                     str(python),
                     "-m",
@@ -88,8 +89,8 @@ def _install(python: Path, chosen: tuple[str, ...] | None) -> dict[str, str]:
                     line,
                 ]
             )
-            if trouble:
-                missing[PACKAGES[name]] = trouble
+            if error:
+                missing[PACKAGES[name]] = error
             else:
                 stamp.touch()
     return missing
@@ -112,7 +113,7 @@ def _build(native: Path, target: str) -> str:
 
 
 def _run(command: list[str]) -> str:
-    """Runs a command; returns "", or the last it said when it failed."""
+    """Runs a command; returns "", or the last lines of its output if it failed."""
     environment = os.environ | {
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     }

@@ -1,10 +1,9 @@
-"""The family of walks: who walks how over what, and what the servos are told. `python -m
-benchmarks.walks` writes the files.
+"""The family of walks on which all engines are measured; `python -m benchmarks.walks` writes it.
 
-A step size that looks good on one trajectory may be luck, so every figure is judged on all of
-these: both robots, all gaits, two of each, the rest drawn once from a seeded generator. The joint
-commands are the kinematic controller's, which looks at no measurement, so every engine gets the
-same ones whatever its own error is.
+A step size may look good on one trajectory by chance, so every figure is judged on all walks: both
+robots, all gaits, two walks of each; the rest is drawn once from a seeded generator. The joint
+commands come from the kinematic controller. It uses no measurement, so every engine gets the same
+commands, whatever its own error is.
 
 A walk file is raw bytes, so that a driver in any language reads it without a parser:
     hxDefinition | int64 n | double h | n x hxInput (held over [k h, (k + 1) h))
@@ -35,9 +34,9 @@ SEED = 20240229
 DURATION, STEP = 2.0, 0.005  # s
 
 SPEED = (0.04, 0.16)  # m/s
-TURN = 0.3  # rad/s, at most, either way; of every other walk
+TURN = 0.3  # rad/s, largest yaw rate, of every other walk
 MU = (0.4, 0.9)
-STIFFNESS = (0.3, 3.0)  # of the robot's own, drawn in the logarithm
+STIFFNESS = (0.3, 3.0)  # times the robot's own, log-uniform
 RESTITUTION = (0.2, 0.9)
 
 STIFF_SLOPE, STIFF_RUBBER = 1000.0, 1e7  # s/m, N/m^1.5
@@ -59,15 +58,16 @@ class Walk:
 
 
 def family() -> list[Walk]:
-    """The walks everything is measured on, always the same ones."""
+    """Returns the walks of the family, which are always the same."""
     generator = np.random.default_rng(SEED)
     places = [(robot, gait, k) for k in range(VARIANTS) for gait in PATTERNS for robot in ROBOTS]
     return [_drawn(generator, *place) for place in places]
 
 
 def stiff(walk: Walk, *, slope: float | None = None, stiffness: float | None = None) -> Walk:
-    """The same walk with a steeper friction law [s/m] or a harder foot [N/m^1.5], named after
-    the change.
+    """Returns the walk with a steeper friction law [s/m] or a stiffer foot [N/m^1.5].
+
+    Its name contains the change.
     """
     robot, name = walk.robot, walk.name
     if slope is not None:
@@ -84,7 +84,7 @@ def stiff(walk: Walk, *, slope: float | None = None, stiffness: float | None = N
 
 
 def _drawn(generator: np.random.Generator, robot_name: str, gait_name: str, k: int) -> Walk:
-    """One walk; what the legs cannot reach is drawn again."""
+    """Draws one walk; draws again if the legs cannot reach it."""
     robot = load_robot(robot_name)
     gait = make_gait(robot, gait_name)
     while True:
@@ -115,23 +115,23 @@ def _reachable(command: BodyCommand, robot: Robot, gait: Gait) -> bool:
 
 
 def commands(walk: Walk) -> Iterator[Command]:
-    """What the servos are told at k h, without feedback."""
+    """Yields the commands of the servos at k h, without feedback."""
     controller, nothing = Controller(walk.robot, period=STEP, gait=walk.gait), Measurement()
     for k in range(walk.steps):
-        told = controller.step(k * STEP, walk.command, nothing)
+        joints = controller.step(k * STEP, walk.command, nothing)
         yield Command(
-            angle_ref=told.angle_ref, speed_ref=told.speed_ref, torque_ref=told.torque_ref
+            angle_ref=joints.angle_ref, speed_ref=joints.speed_ref, torque_ref=joints.torque_ref
         )
 
 
 def start(walk: Walk) -> Any:
-    """The hxDefinition: the robot at rest on the ground, in its stance."""
+    """Returns the hxDefinition of the robot at rest on the ground, in its stance."""
     position, quaternion, angle = settled(walk.robot)
     return definition(walk.robot, position=position, quaternion=quaternion, angle=angle)
 
 
 def file_bytes(walk: Walk) -> bytes:
-    """The walk as the drivers read it."""
+    """Returns the content of the walk's file."""
     parts = [
         bytes(start(walk)),
         struct.pack("=qd", walk.steps, STEP),
@@ -149,11 +149,12 @@ def write(walk: Walk, folder: Path = BUILD / "walks") -> Path:
 
 
 def describe(walk: Walk) -> str:
-    """One line about a walk."""
+    """Returns one line about a walk."""
     robot, command = walk.robot, walk.command
     return (
-        f"{walk.name:24s} vx {command.vx:.3f} m/s, yaw rate {command.yaw_rate:+.3f} rad/s, mu {robot.friction.mu:.2f}, "
-        f"K {robot.contact.stiffness:.3g} N/m^1.5, restitution {robot.contact.restitution:.2f}, period {walk.gait.period:.2f} s"
+        f"{walk.name:24s} vx {command.vx:.3f} m/s, yaw rate {command.yaw_rate:+.3f} rad/s,"
+        f" mu {robot.friction.mu:.2f}, K {robot.contact.stiffness:.3g} N/m^1.5,"
+        f" restitution {robot.contact.restitution:.2f}, period {walk.gait.period:.2f} s"
     )
 
 

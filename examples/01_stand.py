@@ -1,4 +1,4 @@
-"""The robot's FMU by itself: it stands on the ground and stays there.
+"""Simulates the plant FMU without inputs: the robot stands still.
 
 usage: python examples/01_stand.py
 """
@@ -13,7 +13,7 @@ from hexapod_cosim.models import load_robot
 
 
 def main() -> None:
-    """Exports the FMU, lets fmpy simulate it, and prints what carries the weight."""
+    """Exports the FMU, simulates it with fmpy, and prints the force on each foot."""
     robot = load_robot("athena")
     feet = [f"{leg.name}.foot.normal_force" for leg in robot.legs]
     with TemporaryDirectory() as folder:
@@ -23,9 +23,8 @@ def main() -> None:
     print(f"height changes by {1e6 * sag:.3f} um in 1 s")
     for foot in feet:
         print(f"{foot}: {result[foot][-1]:.3f} N")
-    print(
-        f"sum {sum(result[foot][-1] for foot in feet):.3f} N, weight {robot.total_mass * 9.81:.3f} N"
-    )
+    carried = sum(result[foot][-1] for foot in feet)
+    print(f"sum {carried:.3f} N, weight {robot.total_mass * 9.81:.3f} N")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A walk from Python: a scenario changed in a line, run, and judged.
+"""Changes a scenario, runs it and prints its metrics.
 
 usage: python examples/02_walk.py
 """
@@ -15,9 +15,8 @@ def main() -> None:
     )
     result = simulate(scenario)
     position = result.outcome.recording.vector("torso.position")
-    print(
-        f"{result.outcome.status}: {position[-1, 0] - position[0, 0]:.3f} m in {result.outcome.simulated:g} s"
-    )
+    distance = position[-1, 0] - position[0, 0]
+    print(f"{result.outcome.status}: {distance:.3f} m in {result.outcome.simulated:g} s")
     for name, value in result.metrics.items():
         print(f"{name:20} {value:10.4g} {METRICS[name][0]}")
 

@@ -1,4 +1,4 @@
-"""A controller of your own: anything with a `step` method can drive the plant. This one sways.
+"""Drives the plant with a controller of your own: any object with a `step` method.
 
 usage: python examples/03_own_controller.py
 """
@@ -24,7 +24,7 @@ class Sway:
         self.stance = stance
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """Joint commands for the next macro-step."""
+        """Returns the joint commands for the next macro-step."""
         del command, measurement
         angle, speed = self.stance.copy(), np.zeros((6, 3))
         phase = 2.0 * np.pi * FREQUENCY * t
@@ -34,7 +34,7 @@ class Sway:
 
 
 def sway() -> Outcome:
-    """Runs it for two seconds on the standing robot."""
+    """Runs the controller for two seconds on the standing robot."""
     scenario = load_scenario("stand", overrides=["duration=2"])
     schedule = make_schedule(scenario)
     with open_plant(scenario) as plant:
@@ -56,7 +56,8 @@ def main() -> None:
     outcome = sway()
     yaw = outcome.recording.column("torso.yaw")
     print(
-        f"{outcome.status}: the torso turns by {np.degrees(np.ptp(yaw)):.2f} deg at {outcome.realtime_factor:.0f} x real time"
+        f"{outcome.status}: the torso turns by {np.degrees(np.ptp(yaw)):.2f} deg"
+        f" at {outcome.realtime_factor:.0f} x real time"
     )
 
 

@@ -1,5 +1,6 @@
-"""Plant and controller, both as FMUs, walk: a co-simulation master of thirty lines on bare fmpy,
-connected by equal names.
+"""Runs plant and controller FMUs with a co-simulation master of thirty lines on fmpy.
+
+Variables of the same name are connected.
 
 usage: python examples/04_two_fmus.py
 """
@@ -19,7 +20,7 @@ STEP, STEPS, SPEED = 0.005, 1000, 0.08  # s, 1, m/s
 
 
 class Instance:
-    """An FMU that runs, with its variables by name."""
+    """An FMU instance with access to its variables by name."""
 
     def __init__(self, path: Path) -> None:
         description, folder = read_model_description(path), extract(path, path.with_suffix(""))
@@ -45,33 +46,30 @@ class Instance:
         }
 
     def start(self) -> None:
-        """To step mode."""
+        """Initialises the FMU up to step mode."""
         self.fmu.instantiate()
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
 
     def get(self, names: list[str]) -> list[float]:
-        """Values now."""
+        """Returns the present values of variables."""
         return list(self.fmu.getReal([self.reference[name] for name in names]))
 
     def set(self, names: list[str], values: list[float]) -> None:
-        """New values of inputs."""
+        """Sets the values of inputs."""
         self.fmu.setReal([self.reference[name] for name in names], values)
 
 
 def walk(plant: Instance, controller: Instance) -> float:
-    """Five seconds straight on; returns the way of the torso [m]."""
-    sensed, commanded = (
-        sorted(plant.outputs & controller.inputs),
-        sorted(controller.outputs & plant.inputs),
-    )
+    """Walks straight for five seconds; returns the distance of the torso [m]."""
+    sensed = sorted(plant.outputs & controller.inputs)
+    commanded = sorted(controller.outputs & plant.inputs)
     controller.set(["command.vx"], [SPEED])
     for k in range(STEPS):
         controller.set(sensed, plant.get(sensed))
-        plant.set(
-            commanded, controller.get(commanded)
-        )  # the controller's outputs are functions of its inputs at once
+        # the controller's outputs already depend on the inputs just set
+        plant.set(commanded, controller.get(commanded))
         for instance in (plant, controller):
             instance.fmu.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
     return plant.get(["torso.position[1]"])[0]
@@ -89,9 +87,9 @@ def main() -> None:
         )
         for instance in (plant, controller):
             instance.start()
-        print(
-            f"{len(plant.outputs & controller.inputs)} measurements, {len(controller.outputs & plant.inputs)} commands"
-        )
+        measurements = plant.outputs & controller.inputs
+        commands = controller.outputs & plant.inputs
+        print(f"{len(measurements)} measurements, {len(commands)} commands")
         print(f"the torso walks {walk(plant, controller):.4f} m in {STEPS * STEP:g} s")
         for instance in (plant, controller):
             instance.fmu.freeInstance()

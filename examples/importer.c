@@ -1,8 +1,8 @@
-// An FMI 2.0 importer: the robot of an unpacked FMU stands for a second, or walks by recorded joint
-// commands (a row every 5 ms, held).
-//   unzip -q athena.fmu -d athena; cc -std=gnu11 importer.c -I FMI -ldl -o importer    FMI: the
-//   standard's headers; fmpy/c-code has them
-//   ./importer athena [commands.csv] > outputs.csv    commands: "time","LF.coxa.angle_ref",...
+// An FMI 2.0 importer. The robot of an unpacked FMU stands for a second, or walks by recorded joint
+// commands (one row for each 5 ms, constant between rows). FMI: folder of the standard's headers,
+// for instance fmpy/c-code. commands.csv: "time","LF.coxa.angle_ref",...
+//   unzip -q athena.fmu -d athena; cc -std=gnu11 importer.c -I FMI -ldl -o importer
+//   ./importer athena [commands.csv] > outputs.csv
 #include "fmi2FunctionTypes.h"
 #include <dlfcn.h> // Windows: LoadLibrary, GetProcAddress and binaries/win64/*.dll instead
 #include <stdarg.h>

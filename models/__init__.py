@@ -1,4 +1,6 @@
-"""What the robot is: its data, and the paper's equations as a readable, dense oracle."""
+"""Defines the robot: its data, its files, and a dense reference implementation of the equations of
+motion.
+"""
 
 from hexapod_cosim.models.errors import (
     FmuError,

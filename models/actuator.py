@@ -1,5 +1,5 @@
-"""The servo of a joint: PD with feed-forward inside the torque-speed line, and dry friction in
-the gear.
+"""Computes the torques of a joint's servo (eq. 12): PD control with feed-forward, torque-speed
+line, gear friction.
 """
 
 from __future__ import annotations
@@ -8,16 +8,16 @@ import numpy as np
 
 from hexapod_cosim.models.records import Array, Servo
 
-GEAR_SPEED = 0.05  # rad/s, where the gear's dry friction saturates
+GEAR_SPEED = 0.05  # rad/s  speed at which the gear's dry friction saturates
 
 
 def servo_torque(
     servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array
 ) -> Array:
-    """Motor torque on the child [N m], shapes as the inputs'.
+    """Returns the motor's torque on the child [N m], in the shape of the inputs.
 
-    clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line; in torque mode kp =
-    kd = 0.
+    The torque is kp (q_ref - q) + kd (qd_ref - qd) + tau_ff, clipped to the torque-speed line; in
+    torque mode kp = kd = 0.
     """
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
@@ -27,16 +27,17 @@ def servo_torque(
 
 
 def gear_friction(servo: Servo, speed: Array) -> Array:
-    """Gear torque on the child [N m], -tau_c tanh(qd / 0.05 rad/s), in every mode."""
+    """Returns the gear's torque on the child [N m], -tau_c tanh(qd / 0.05 rad/s), in every mode."""
     return -servo.coulomb_friction * np.tanh(speed / GEAR_SPEED)
 
 
 def servo_slopes(
     servo: Servo, angle: Array, speed: Array, angle_ref: Array, speed_ref: Array, torque_ref: Array
 ) -> tuple[Array, Array]:
-    """Minus the slopes of `servo_torque` by angle [N m/rad] and speed [N m s/rad], 0 where clipped.
+    """Returns minus the derivatives of `servo_torque` by angle [N m/rad] and by speed [N m s/rad].
 
-    Shapes are the inputs'. On the torque-speed line the slope by speed is the line's own.
+    Shapes are those of the inputs. The derivatives are 0 where the torque is clipped, except that
+    the derivative by speed is the slope of the torque-speed line on that line.
     """
     kp, kd = (0.0, 0.0) if servo.mode == "torque" else (servo.kp, servo.kd)
     wanted = kp * (angle_ref - angle) + kd * (speed_ref - speed) + torque_ref
@@ -51,5 +52,7 @@ def servo_slopes(
 
 
 def gear_drag(servo: Servo, speed: Array) -> Array:
-    """Minus the slope of `gear_friction` by speed [N m s/rad], shape as the input's."""
+    """Returns minus the derivative of `gear_friction` by speed [N m s/rad], in the shape of the
+    input.
+    """
     return servo.coulomb_friction / GEAR_SPEED * (1.0 - np.tanh(speed / GEAR_SPEED) ** 2)

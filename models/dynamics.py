@@ -1,11 +1,10 @@
-"""The paper's equations, dense and plain: the oracle for the C plant, which solves the same system
-in O(n).
+"""Solves the equations of motion (eq. 1) with dense matrices, as the reference of the C plant.
 
-    [ M  D^T ] [ dv     ]   [ g                                    ]
-    [ D  0   ] [ lambda ] = [ gamma - 2 alpha dPhi - beta^2 Phi    ]     (eq. 1)
+[ M  D^T ] [ dv     ]   [ g                                    ]
+[ D  0   ] [ lambda ] = [ gamma - 2 alpha dPhi - beta^2 Phi    ]     (eq. 1)
 
-Velocities are stacked body by body, v then w, world axes: 19 x 6 = 114. Each joint has 5
-multipliers: 18 x 5 = 90.
+The C plant solves the same system in O(n). Velocities are stacked body by body, v then w, world
+axes: 19 x 6 = 114. Each joint has 5 multipliers: 18 x 5 = 90.
 """
 
 from __future__ import annotations
@@ -37,8 +36,10 @@ MULTIPLIERS = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What the outside does to the robot. Arrays (6, 3) leg-major, (3,) world axes at the
-    torso's centre of mass.
+    """Inputs of the robot.
+
+    Arrays of joints are (6, 3), leg by leg; vectors (3,) are in world axes at the torso's centre of
+    mass.
     """
 
     angle_ref: Array  # rad
@@ -46,15 +47,14 @@ class Command:
     torque_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))  # N m
     push_force: Array = field(default_factory=lambda: np.zeros(3))  # N
     push_torque: Array = field(default_factory=lambda: np.zeros(3))  # N m
-    acceleration_ref: Array = field(
-        default_factory=lambda: np.zeros((LEGS, JOINTS))
-    )  # rad/s2  kinematic
-    age: float = 0.0  # s  since it was given: a kinematic drive goes on from there (eq. 13)
+    # rad/s2, of kinematic drives only
+    acceleration_ref: Array = field(default_factory=lambda: np.zeros((LEGS, JOINTS)))
+    age: float = 0.0  # s  time since the command; kinematic drives extrapolate (eq. 13)
 
 
 @dataclass(frozen=True)
 class JointKinematics:
-    """One joint's constraint: rows 1-3 hold the point, rows 4-5 the axis."""
+    """Constraint of a joint: rows 1-3 fix the point, rows 4-5 the axis."""
 
     phi: Array  # (5,)  Phi
     dphi: Array  # (5,)  its rate
@@ -65,8 +65,9 @@ class JointKinematics:
 
 
 def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKinematics:
-    """Eq. 2-4 for the joint between two bodies (13,), drift allowed. The lost dots of gamma's
-    first row are restored.
+    """Returns eq. 2-4 of the joint between two bodies (13,), which may have drifted.
+
+    The first row of gamma contains the time derivatives that the paper's print lacks.
     """
     (r_i, p_i, v_i, w_i), (r_j, p_j, v_j, w_j) = split(parent), split(child)
     R_i, R_j = rotation_matrix(p_i), rotation_matrix(p_j)
@@ -94,8 +95,8 @@ def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKin
     )
     dphi = D_i @ np.concatenate([v_i, w_i]) + D_j @ np.concatenate([v_j, w_j])
 
-    # gamma = (-skew(ds_i^P) w_i + skew(ds_j^P) w_j,  -s^T skew(w_j) da - a^T skew(w_i) ds - 2
-    # da.ds,  the same with b)
+    # gamma = (-skew(ds_i^P) w_i + skew(ds_j^P) w_j,
+    #          -s^T skew(w_j) da - a^T skew(w_i) ds - 2 da.ds,  the same with b)
     dsP_i, dsP_j, ds = cross(w_i, sP_i), cross(w_j, sP_j), cross(w_i, s)
     rows = [
         -s @ skew(w_j) @ dn - n @ skew(w_i) @ ds - 2.0 * dn @ ds
@@ -107,7 +108,7 @@ def joint_kinematics(joint: JointModel, parent: Array, child: Array) -> JointKin
 
 @dataclass(frozen=True)
 class Constraints:
-    """All joints, stacked."""
+    """Constraints of all joints, stacked."""
 
     phi: Array  # (90,)
     dphi: Array  # (90,)
@@ -117,16 +118,13 @@ class Constraints:
 
 
 def constraints(robot: Robot, body: Array) -> Constraints:
-    """The constraint equations of the joints between bodies (19, 13)."""
+    """Returns the constraint equations of the joints between bodies (19, 13)."""
     models = joint_models(robot)
     joints = [joint_kinematics(model, body[model.parent], body[model.child]) for model in models]
     D, G = np.zeros((MULTIPLIERS * len(models), 6 * BODIES)), np.zeros((len(models), 6 * BODIES))
     for k, (model, joint) in enumerate(zip(models, joints, strict=True)):
-        rows, i, j = (
-            slice(MULTIPLIERS * k, MULTIPLIERS * (k + 1)),
-            6 * model.parent,
-            6 * model.child,
-        )
+        rows = slice(MULTIPLIERS * k, MULTIPLIERS * (k + 1))
+        i, j = 6 * model.parent, 6 * model.child
         D[rows, i : i + 6], D[rows, j : j + 6] = joint.D_i, joint.D_j
         G[k, i + 3 : i + 6], G[k, j + 3 : j + 6] = -joint.s, joint.s
     stack = [
@@ -137,12 +135,12 @@ def constraints(robot: Robot, body: Array) -> Constraints:
 
 
 def masses(robot: Robot) -> Array:
-    """(19,) kg"""
+    """Returns the masses (19,) of the bodies [kg]."""
     return np.array([robot.torso.mass, *(link.mass for leg in robot.legs for link in leg.links)])
 
 
 def world_inertias(robot: Robot, body: Array) -> Array:
-    """(19, 3, 3) J = R J_B R^T, world axes [kg m2]."""
+    """Returns the inertias J = R J_B R^T (19, 3, 3), world axes [kg m2]."""
     local = [robot.torso.inertia, *(link.inertia for leg in robot.legs for link in leg.links)]
     turns = [rotation_matrix(state[3:7]) for state in body]
     return np.array(
@@ -151,8 +149,9 @@ def world_inertias(robot: Robot, body: Array) -> Array:
 
 
 def mass_matrix(robot: Robot, body: Array) -> Array:
-    """(114, 114) M = diag(m 1, J) + J_r G^T G: the geared rotors' inertia acts on the joint
-    speeds.
+    """Returns M = diag(m 1, J) + J_r G^T G (114, 114).
+
+    The inertia J_r of the geared rotors acts on the joint speeds.
     """
     M = np.zeros((6 * BODIES, 6 * BODIES))
     for k, (mass, J) in enumerate(zip(masses(robot), world_inertias(robot, body), strict=True)):
@@ -165,11 +164,10 @@ def mass_matrix(robot: Robot, body: Array) -> Array:
 def applied_forces(
     robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
 ) -> Array:
-    """(19, 6) force and torque on each body at its centre of mass: gravity, gyroscopic, contact,
-    push; no servo.
+    """Returns the forces g (19, 6) of eq. 1 without the joints' torques [N, N m].
 
-    damping: (6,) of the contacts [s/m], nan for a foot that is not in contact; bristle: (6, 3)
-    their deflection [m], slack unless given.
+    damping: (6,) of the contacts [s/m], nan for open feet. bristle: deflections (6, 3) [m], 0 by
+    default.
     """
     g = np.zeros((BODIES, 6))
     g[:, 0:3] = masses(robot)[:, None] * np.array(robot.gravity)
@@ -184,8 +182,9 @@ def applied_forces(
 
 
 def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
-    """(6, 3) motor torque (0 in kinematic mode, where it is a multiplier) and (6, 3) gear torque
-    on the child [N m].
+    """Returns motor torque (6, 3) and gear torque (6, 3) on the child [N m].
+
+    The motor torque is 0 in kinematic mode, where it is a multiplier.
     """
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
     gear = gear_friction(robot.servo, speed)
@@ -197,9 +196,9 @@ def joint_torques(robot: Robot, body: Array, command: Command) -> tuple[Array, A
 
 
 def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
-    """(6, 3) s.(dw_j - dw_i) [rad/s2] that keeps a kinematically driven joint on its command.
+    """Returns the acceleration s.(dw_j - dw_i) (6, 3) of kinematic drives [rad/s2] (eq. 13).
 
-    The command is q_ref + qd_ref s + qdd_ref s^2/2, s its age; with Baumgarte's terms (eq. 13).
+    The drives follow q_ref + qd_ref s + qdd_ref s^2/2, s the command's age, with Baumgarte terms.
     """
     alpha, beta, age = robot.baumgarte.alpha, robot.baumgarte.beta, command.age
     speed_ref = command.speed_ref + command.acceleration_ref * age
@@ -227,11 +226,10 @@ class Accelerations:
 def accelerations(
     robot: Robot, body: Array, command: Command, damping: Array, bristle: Array | None = None
 ) -> Accelerations:
-    """Solves eq. 1 for bodies (19, 13), drifted joints allowed; damping (6,) and bristle (6, 3) as
-    in `applied_forces`.
+    """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
-    In kinematic mode each joint adds the row G dv = drive_acceleration, whose multiplier is minus
-    the motor's torque.
+    damping (6,) and bristle (6, 3) are those of `applied_forces`. In kinematic mode each joint adds
+    the row G dv = drive_acceleration, whose multiplier is minus the motor's torque.
     """
     joints = constraints(robot, body)
     motor, gear = joint_torques(robot, body, command)
@@ -246,10 +244,8 @@ def accelerations(
     )
     D = joints.D
     if robot.servo.mode == "kinematic":
-        D, c = (
-            np.vstack([D, joints.G]),
-            np.concatenate([c, drive_acceleration(robot, body, command).ravel()]),
-        )
+        drive_rows = drive_acceleration(robot, body, command).ravel()
+        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive_rows])
     none = np.zeros((len(c), len(c)))
     solution = np.linalg.solve(
         np.block([[mass_matrix(robot, body), D.T], [D, none]]), np.concatenate([g, c])
@@ -260,8 +256,9 @@ def accelerations(
 
 
 def joint_reactions(robot: Robot, body: Array, multipliers: Array) -> tuple[Array, Array]:
-    """(18, 3) force and (18, 3) torque of each joint on its child, the torque about the joint's
-    point: -D_j^T lambda moved there.
+    """Returns force (18, 3) [N] and torque (18, 3) [N m] of each joint on its child.
+
+    They are -D_j^T lambda; the torque is about the joint's point.
     """
     force, torque = np.zeros((LEGS * JOINTS, 3)), np.zeros((LEGS * JOINTS, 3))
     for k, model in enumerate(joint_models(robot)):

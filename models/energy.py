@@ -1,4 +1,4 @@
-"""What the books hold: energies of the bodies, momentum, and how far the joints have drifted."""
+"""Computes energies, momentum and constraint errors of all bodies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hexapod_cosim.models.records import Array, Robot
 
 
 def kinetic_energy(robot: Robot, body: Array) -> float:
-    """J, of the bodies (19, 13) and the geared rotors."""
+    """Returns the kinetic energy [J] of the bodies (19, 13) and the geared rotors."""
     v, w = body[:, 7:10], body[:, 10:13]
     linear = masses(robot) @ np.sum(v * v, axis=1)
     angular = np.einsum("ki,kij,kj->", w, world_inertias(robot, body), w)
@@ -20,8 +20,8 @@ def kinetic_energy(robot: Robot, body: Array) -> float:
 
 
 def potential_energy(robot: Robot, body: Array) -> float:
-    """J, of gravity (0 at the world's origin) and the elastic part of the contacts, 2/5 K
-    delta^2.5.
+    """Returns the potential energy [J] of gravity, 0 at the world's origin, and of the contacts,
+    2/5 K delta^2.5 each.
     """
     gravity = -float(masses(robot) @ (body[:, 0:3] @ np.array(robot.gravity)))
     depth = np.array([max(foot.penetration, 0.0) for foot in foot_contacts(robot, body)])
@@ -29,13 +29,15 @@ def potential_energy(robot: Robot, body: Array) -> float:
 
 
 def centre_of_mass(robot: Robot, body: Array) -> Array:
-    """(3,) of the whole robot, world [m]."""
+    """Returns the centre of mass (3,) of the robot, world axes [m]."""
     return masses(robot) @ body[:, 0:3] / robot.total_mass
 
 
 def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
-    """(3,) linear [kg m/s] and (3,) angular momentum about the world's origin [kg m2/s], rotors'
-    spin left out (geared, internal).
+    """Returns linear momentum (3,) [kg m/s] and angular momentum (3,) about the world's origin [kg
+    m2/s].
+
+    The spin of the rotors is not included, because it is internal to the geared joints.
     """
     linear = masses(robot)[:, None] * body[:, 7:10]
     spin = np.einsum("kij,kj->ki", world_inertias(robot, body), body[:, 10:13])
@@ -43,6 +45,6 @@ def momentum(robot: Robot, body: Array) -> tuple[Array, Array]:
 
 
 def constraint_errors(robot: Robot, body: Array) -> tuple[float, float]:
-    """Norms of Phi [m or 1] and of its rate [m/s or 1/s]."""
+    """Returns the norms of Phi [m or 1] and of its rate [m/s or 1/s]."""
     joints = constraints(robot, body)
     return float(np.linalg.norm(joints.phi)), float(np.linalg.norm(joints.dphi))

@@ -1,4 +1,4 @@
-"""What goes wrong, told in one paragraph: where, what, got, expected, and what to do about it."""
+"""Defines the exceptions of this package and their messages: where, what, got, expected, fix."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import Any
 
 
 class HexapodError(Exception):
-    """Base of every error this package raises on purpose. The data stay readable as attributes.
+    """Base class of all exceptions that this package raises on purpose.
+
+    The data remain available as attributes.
 
     Args:
-        what: the fault, as a clause ("mass is not positive").
-        got: the offending value; None when there is none to show.
-        expected: what would have been accepted, in words.
-        fix: what the reader can do, as an imperative.
-        where: file and key, or the like.
+        what: the error, as a clause ("mass is not positive").
+        got: the invalid value; None omits it.
+        expected: the valid values, in words.
+        fix: what the user can do, as an imperative.
+        where: the location, for example file and key.
     """
 
     def __init__(
@@ -42,34 +44,35 @@ class HexapodError(Exception):
         return f"{text}; {self.fix}" if self.fix else text
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Keeps the keyword arguments when an error crosses a process border."""
+        """Keeps the keyword arguments when the exception is pickled."""
         return _rebuild, (type(self), self.what, self.got, self.expected, self.fix, self.where)
 
 
 def _rebuild(
     kind: type[HexapodError], what: str, got: Any, expected: Any, fix: str | None, where: str | None
 ) -> HexapodError:
+    """Creates an unpickled exception."""
     return kind(what, got=got, expected=expected, fix=fix, where=where)
 
 
 class RobotError(HexapodError):
-    """A robot file, or a robot, that cannot be."""
+    """A robot or a robot file is invalid."""
 
 
 class ReachError(HexapodError):
-    """A point that no pose of a leg reaches."""
+    """No pose of a leg reaches a point."""
 
 
 class ScenarioError(HexapodError):
-    """A scenario that cannot be run."""
+    """A scenario is invalid."""
 
 
 class FmuError(HexapodError):
-    """An FMU that is missing, foreign, damaged, or that refused a call."""
+    """An FMU is missing, invalid or damaged, or a call of it failed."""
 
 
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:
-    """The valid name most like `name`, or None when nothing is near."""
+    """Returns the valid name most similar to `name`, or None when none is similar."""
     match = get_close_matches(name, list(valid), n=1, cutoff=0.5)
     return match[0] if match else None
 
@@ -82,8 +85,9 @@ def unknown_name(
     where: str | None = None,
     error: type[HexapodError] = HexapodError,
 ) -> HexapodError:
-    """The error for a name that is not on a closed list: lists the valid ones and proposes the
-    nearest.
+    """Returns the exception for a name outside a closed list.
+
+    The message lists the valid names and proposes the most similar one.
     """
     names = list(valid)
     near = nearest_name(name, names)

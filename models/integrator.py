@@ -1,8 +1,8 @@
-"""From one time to another, with error control and a stop at every touch-down.
+"""Integrates the motion with error control and ends a step at every touch-down.
 
-The readable form of plant_fmu/src/lanes/integrator.h, under the same names. It leaves out what
-the C plant measures along the way (models/measure.py has that), commands that change within a
-step, and calls that an event breaks off.
+This is the readable form of plant_fmu/src/lanes/integrator.h, with the same names. It omits the
+measurements of a step (models/measure.py), commands that change within a step, and calls that an
+event interrupts.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from hexapod_cosim.models.method import METHOD, Method, method_step
 from hexapod_cosim.models.records import Array, Robot
 from hexapod_cosim.models.stage import Slopes, keep_slopes, solve_stage
 
-STEP_FLOOR = 1e-11  # s  below this the error control gives up
-TOUCH_DEPTH = (1e-10, 1e-6)  # m, m over the tolerance  a touch-down is found when in by less
-CAUTIOUS_STEP = 1e-4  # s  tried first
+STEP_FLOOR = 1e-11  # s  the error control fails below this step
+TOUCH_DEPTH = (1e-10, 1e-6)  # m, m per tolerance  depth to which a touch-down is located
+FIRST_STEP_SIZE = 1e-4  # s  first step
 ERROR_SCALE = np.array([0.1] * 3 + [1.0] * 4 + [1.0] * 3 + [10.0] * 3)  # of r p v w
 BRISTLE_SCALE = 10.0  # preslidings
 TURN, BODY = 3 * BODIES, BODY_STATE * BODIES  # sizes of a stage's first two parts
@@ -39,15 +39,15 @@ TURN, BODY = 3 * BODIES, BODY_STATE * BODIES  # sizes of a stage's first two par
 
 @dataclass(frozen=True)
 class State:
-    """Where the integration is."""
+    """State of the integration."""
 
     body: Array  # (19, 13) r p v w
     bristle: Array  # (6, 3) m
     damping: Array  # (6,) s/m  of the contacts, nan for open feet
     impact_speed: Array  # (6,) m/s  at the last touch-down
     time: float = 0.0  # s
-    next_step: float = CAUTIOUS_STEP  # s  what the error control would take next
-    first_step: float = CAUTIOUS_STEP  # s  the same for the first step of a call
+    next_step: float = FIRST_STEP_SIZE  # s  step that the error control proposes next
+    first_step: float = FIRST_STEP_SIZE  # s  the same for the first step of a call
     steps: int = 0
     rejected: int = 0
     touchdowns: int = 0
@@ -56,7 +56,7 @@ class State:
 
 @dataclass(frozen=True)
 class Feet:
-    """All feet: penetration [m] and approach speed [m/s], each (6,)."""
+    """Penetration [m] and approach speed [m/s] of all feet, each (6,)."""
 
     delta: Array
     ddelta: Array
@@ -64,16 +64,16 @@ class Feet:
 
 @dataclass(frozen=True)
 class Trial:
-    """Where one step leads, kept or not."""
+    """Result of one step, accepted or not."""
 
     body: Array  # (19, 13)
     bristle: Array  # (6, 3)
-    error: float  # 1  over the tolerance; 0 without an estimate
+    error: float  # 1  error over the tolerance; 0 without an estimate
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where a step starts. The command's age is that at state.time."""
+    """Start of a step; the command's age is that at state.time."""
 
     robot: Robot
     command: Command
@@ -86,20 +86,20 @@ class Start:
 
     @property
     def touch(self) -> float:
-        """How deep a foot may be that has just touched down [m]."""
+        """Largest depth of a foot that has just touched down [m]."""
         return max(TOUCH_DEPTH[0], TOUCH_DEPTH[1] * self.robot.solver.tolerance)
 
 
 def start_state(robot: Robot, body: Array, time: float = 0.0) -> State:
-    """The state at bodies (19, 13): feet in the ground are closed, as if put down slowly."""
-    first = min(CAUTIOUS_STEP, robot.solver.step_max)
+    """Returns the state at bodies (19, 13); feet in the ground are closed, with impact speed 0."""
+    first = min(FIRST_STEP_SIZE, robot.solver.step_max)
     closed = standing_damping(robot, body)
     still = np.zeros((LEGS, 3))
     return State(body, still, closed, np.zeros(LEGS), time, first, first)
 
 
 def feet_of(robot: Robot, body: Array) -> Feet:
-    """The feet of bodies (19, 13)."""
+    """Returns penetration and approach speed of the feet of bodies (19, 13)."""
     feet = foot_contacts(robot, body)
     delta = np.array([foot.penetration for foot in feet])
     return Feet(delta, np.array([foot.approach_speed for foot in feet]))
@@ -109,10 +109,11 @@ def feet_of(robot: Robot, body: Array) -> Feet:
 
 
 def try_step(start: Start, h: float) -> Trial:
-    """One step of h [s] by the solver's method (eq. 19, 20), with its error (eq. 22).
+    """Computes one step of h [s] by the solver's method (eq. 19, 20), with its error (eq. 22).
 
-    The vector that eq. 19 advances is what bodies turned by (57,), bodies (247,) and bristles
-    (18,): the first part tells later stages the angular velocities behind quaternion rates.
+    The vector that eq. 19 advances contains the rotations of bodies (57,), the bodies (247,) and
+    the bristles (18,). Later stages need the first part, because quaternion rates alone do not give
+    the angular velocities.
     """
     robot, method, solver = start.robot, start.method, start.robot.solver
     z, kept = h * method.gamma, list[Slopes]()
@@ -141,16 +142,17 @@ def try_step(start: Start, h: float) -> Trial:
 
 
 def _shifts(change: Array) -> tuple[Array, Array, Array]:
-    """s_x (114,), s_v (114,) and s_b (6, 3) of the sums over earlier stages."""
+    """Returns s_x (114,), s_v (114,) and s_b (6, 3) of the sums over earlier stages."""
     body = change[TURN : TURN + BODY].reshape(BODIES, BODY_STATE)
     s_x = np.hstack([body[:, 0:3], change[:TURN].reshape(BODIES, 3)])
     return s_x.ravel(), body[:, 7:13].ravel(), change[TURN + BODY :].reshape(LEGS, 3)
 
 
 def error_norm(robot: Robot, estimate: Array) -> float:
-    """The largest entry of an error estimate (265,) over its scale and the tolerance (eq. 22).
+    """Returns the largest entry of an error estimate (265,) over its scale and the tolerance (eq.
+    22).
 
-    Quaternions of links are those of their joints' axes a, b, s, as the C plant has them.
+    Quaternions of links are those of their joints' axes a, b, s, as in the C plant.
     """
     body = estimate[:BODY].reshape(BODIES, BODY_STATE).copy()
     for joint in joint_models(robot):
@@ -164,9 +166,9 @@ def error_norm(robot: Robot, estimate: Array) -> float:
 
 
 def frame_quaternion(x: Array, y: Array, z: Array) -> Array:
-    """(4,) quaternion of a right-handed frame given by its axes (3,), up to its sign."""
+    """Returns the quaternion (4,), of either sign, of a right-handed frame with axes (3,)."""
     R = np.column_stack([x, y, z])
-    # K = 4 p p^T, so each of its rows is parallel to p; the largest is the best known
+    # K = 4 p p^T: each row is parallel to p, the largest has the smallest rounding error
     K = np.zeros((4, 4))
     turn = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     K[0, 0], K[0, 1:], K[1:, 0] = 1.0 + np.trace(R), turn, turn
@@ -176,10 +178,10 @@ def frame_quaternion(x: Array, y: Array, z: Array) -> Array:
 
 
 def project(robot: Robot, body: Array) -> Array:
-    """Bodies (19, 13) put back on their joints, hip to foot.
+    """Returns the bodies (19, 13), projected onto their joints from hip to foot.
 
-    Each link is turned by the least turn that aligns the axis, moved to the joint's point, and
-    keeps of its relative motion the turning about the axis alone.
+    The smallest rotation aligns the axis, a translation restores the joint's point, and velocities
+    keep only the rotation about the axis.
     """
     body = body.copy()
     for joint in joint_models(robot):
@@ -198,8 +200,8 @@ def project(robot: Robot, body: Array) -> Array:
 # touch-down
 
 
-def open_depth(damping: Array, feet: Feet) -> float:
-    """How deep the deepest open foot is in the ground [m]."""
+def deepest_open_foot(damping: Array, feet: Feet) -> float:
+    """Returns the penetration of the deepest open foot [m]."""
     return float(np.max(np.where(np.isnan(damping), feet.delta, -math.inf)))
 
 
@@ -210,7 +212,7 @@ def cubic_crossing(
     slope_end: float,
     level: float,
 ) -> float:
-    """Where on [0, 1] the cubic with these ends and slopes reaches a level (eq. 24)."""
+    """Returns where on [0, 1] the cubic with these ends and slopes reaches a level (eq. 24)."""
     bend = slope_start + slope_end - 2.0 * (end - start)
     curve = end - start - slope_start - bend
     low, high = 0.0, 1.0
@@ -222,7 +224,7 @@ def cubic_crossing(
 
 
 def expected_touch(start: Start, t_low: float, low: Feet, t_high: float, high: Feet) -> float:
-    """When the first open foot will be half a touch depth in, between two times [s] (eq. 24)."""
+    """Returns the time [s] at which the first open foot reaches half the touch depth (eq. 24)."""
     h, level, first = t_high - t_low, 0.5 * start.touch, 1.0
     for leg in range(LEGS):
         if np.isnan(start.state.damping[leg]) and high.delta[leg] > level:
@@ -234,22 +236,23 @@ def expected_touch(start: Start, t_low: float, low: Feet, t_high: float, high: F
 def find_touchdown(start: Start, h: float, trial: Trial) -> tuple[float, Trial, int]:
     """Shortens a step of h [s] that ends below the ground to one that ends on it.
 
-    Each guess is a step of its own; every third halves what is left, should the cubics crawl.
+    Each guess takes a step of its own. Every third guess halves the interval, in case the cubics
+    converge slowly.
 
     Returns:
-        The step [s], where it leads, and how many steps were tried.
+        The step [s], its result, and the number of trials.
     """
     damping, tried = start.state.damping, 0
     low, high = 0.0, h
     feet_low, feet = feet_of(start.robot, start.state.body), feet_of(start.robot, trial.body)
-    while open_depth(damping, feet) > start.touch and high - low > STEP_FLOOR:
+    while deepest_open_foot(damping, feet) > start.touch and high - low > STEP_FLOOR:
         tried += 1
         middle = expected_touch(start, low, feet_low, high, feet) if tried % 3 else low
         if not low < middle < high:
             middle = 0.5 * (low + high)
         nearer = try_step(start, middle)
         found = feet_of(start.robot, nearer.body)
-        if open_depth(damping, found) > 0.0:
+        if deepest_open_foot(damping, found) > 0.0:
             high, feet, trial = middle, found, nearer
         else:
             low, feet_low = middle, found
@@ -259,7 +262,7 @@ def find_touchdown(start: Start, h: float, trial: Trial) -> tuple[float, Trial, 
 def switch_contacts(robot: Robot, state: State) -> State:
     """Closes feet that are in the ground and opens those that are not.
 
-    The damping is fixed by the approach speed at touch-down; the bristles of open feet are slack.
+    The approach speed at touch-down fixes the damping; the bristles of open feet are 0.
     """
     feet, damping = feet_of(robot, state.body), state.damping.copy()
     impact_speed, touchdowns = state.impact_speed.copy(), state.touchdowns
@@ -285,14 +288,15 @@ def switch_contacts(robot: Robot, state: State) -> State:
 
 
 def step_factor(method: Method, error: float) -> float:
-    """Factor by which the step may change after an attempt with this error (eq. 23)."""
+    """Returns the factor by which the step may change after a trial with this error (eq. 23)."""
     if error <= 0.0 or math.isnan(error):
         return 0.2 if math.isnan(error) else 5.0
     return float(np.clip(0.9 * error ** (-1.0 / (method.error_order + 1)), 0.2, 5.0))
 
 
 def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float, float]:
-    """One accepted step of at most h_max [s], shortened by the error control and by touch-downs.
+    """Computes one accepted step of at most h_max [s], shortened by the error control and by
+    touch-downs.
 
     Returns:
         The state at its end (its time is the caller's to set), its length [s], and the next
@@ -313,7 +317,7 @@ def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float,
         state = replace(state, next_step=kept)
         next_step = kept
     taken, more = h, 0
-    if open_depth(state.damping, feet_of(robot, trial.body)) > 0.0:
+    if deepest_open_foot(state.damping, feet_of(robot, trial.body)) > 0.0:
         taken, trial, more = find_touchdown(start, h, trial)
     state = replace(
         state,
@@ -327,12 +331,15 @@ def advance(start: Start, h_max: float, next_step: float) -> tuple[State, float,
 
 
 def run_to(robot: Robot, command: Command, state: State, t_call: float, t_end: float) -> State:
-    """From state.time to t_end [s]; the last step lands on it exactly. The call began at t_call."""
+    """Advances from state.time to t_end [s]; the last step ends on t_end exactly.
+
+    t_call: start of the call [s].
+    """
     first = t_call == state.time
     while state.time < t_end:
         left, aged = t_end - state.time, command.age + state.time - t_call
         start = Start(robot, replace(command, age=aged), state)
-        # new inputs make a larger error than the last step's
+        # new inputs cause a larger error than the last step's
         size = min(state.first_step, state.next_step) if first else state.next_step
         after, taken, size = advance(start, left, size)
         if first:
@@ -343,10 +350,11 @@ def run_to(robot: Robot, command: Command, state: State, t_call: float, t_end: f
 
 
 def integrate(robot: Robot, command: Command, state: State, t_end: float) -> State:
-    """Advances the state to t_end [s] exactly under a held command whose age is that at its start.
+    """Advances the state to t_end [s] exactly under a constant command whose age is that at the
+    start.
 
-    With solver.step = 0 the error control chooses the steps; else a call is cut into equal steps
-    of at most solver.step. Raises HexapodError when the error control finds no step.
+    With solver.step = 0 the error control chooses the steps. Otherwise a call consists of equal
+    steps of at most solver.step. Raises HexapodError when the error control finds no step.
     """
     t_start, solver = state.time, robot.solver
     if solver.step == 0.0:

@@ -1,7 +1,7 @@
-"""Where the bodies are: rotations, joint angles to bodies and back. Frames: docs/architecture.md.
+"""Computes rotations, body states from joint angles, and joint angles from body states.
 
-Letters: R_WB turns B's components into the world's. World W, torso T, hip H, parent link P, link L,
-centre of mass c.
+Letters of frames (docs/architecture.md): R_WB converts components in B to components in W. World W,
+torso T, hip H, parent link P, link L, centre of mass c.
 """
 
 from __future__ import annotations
@@ -20,21 +20,19 @@ BODY_STATE = 13  # r[3] p[4] v[3] w[3]
 
 
 def skew(a: Array) -> Array:
-    """(3, 3) matrix with skew(a) b = a x b."""
+    """Returns the (3, 3) matrix with skew(a) b = a x b."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def cross(a: Array, b: Array) -> Array:
-    """(3,) a x b, for single vectors several times as fast as numpy's."""
-    (ax, ay, az), (bx, by, bz) = (
-        a.tolist(),
-        b.tolist(),
-    )  # Python's own floats are the fastest at single numbers
+    """Returns a x b (3,). It is several times as fast as numpy's for single vectors."""
+    # Python's floats are the fastest for single numbers
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def rotation_matrix(p: Array) -> Array:
-    """(3, 3) body to world, from a quaternion [w x y z] that is normalised on use."""
+    """Returns the rotation (3, 3), body to world, of a quaternion [w x y z] of any length."""
     w, x, y, z = (p / math.sqrt(p @ p)).tolist()
     return np.array(
         [
@@ -46,12 +44,12 @@ def rotation_matrix(p: Array) -> Array:
 
 
 def quaternion_rate(p: Array, w: Array) -> Array:
-    """(4,) dp/dt of a body that turns with w [rad/s], world axes."""
+    """Returns dp/dt (4,) of a body with angular velocity w [rad/s], world axes (eq. 6)."""
     return 0.5 * np.concatenate([[-w @ p[1:]], p[0] * w + cross(w, p[1:])])
 
 
 def quaternion_product(p: Array, q: Array) -> Array:
-    """(4,) the rotation q followed by p."""
+    """Returns the rotation (4,) q followed by p."""
     (pw, px, py, pz), (qw, qx, qy, qz) = p.tolist(), q.tolist()
     return np.array(
         [
@@ -64,32 +62,30 @@ def quaternion_product(p: Array, q: Array) -> Array:
 
 
 def axis_quaternion(axis: Array, angle: float) -> Array:
-    """(4,) rotation by angle [rad] about a unit axis."""
+    """Returns the rotation (4,) by angle [rad] about a unit axis."""
     return np.array([math.cos(angle / 2.0), *(math.sin(angle / 2.0) * axis)])
 
 
 def axis_rotation(axis: Array, angle: float) -> Array:
-    """(3, 3) rotation by angle [rad] about a unit axis."""
+    """Returns the rotation (3, 3) by angle [rad] about a unit axis."""
     return rotation_matrix(axis_quaternion(axis, angle))
 
 
 def inertia_matrix(inertia: tuple[float, ...]) -> Array:
-    """(3, 3) from the entries xx yy zz xy xz yz."""
+    """Returns the matrix (3, 3) of the entries xx yy zz xy xz yz."""
     xx, yy, zz, xy, xz, yz = inertia
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def unit_axis(axis: tuple[float, ...]) -> Array:
-    """(3,) the joint axis at unit length."""
+    """Returns the joint axis (3,) at unit length."""
     vector: Array = np.array(axis)
     return vector / float(np.linalg.norm(vector))
 
 
 @dataclass(frozen=True)
 class JointModel:
-    """Constants of the joint between parent i and child j: vectors fixed in a body, in that
-    body's axes.
-    """
+    """Constants of the joint between parent i and child j; vectors are in body axes."""
 
     parent: int  # body number
     child: int
@@ -99,12 +95,14 @@ class JointModel:
     b_j: Array
     point_i: Array  # centre of mass of i to the joint's point [m]
     point_j: Array  # centre of mass of j to the joint's point [m]
-    zero: Array  # (4,) turn from the parent's to the child's axes at angle 0
+    zero: Array  # (4,) rotation from the parent's to the child's axes at angle 0
 
 
 def axis_normals(axis: Array) -> tuple[Array, Array]:
-    """Two unit normals to a unit axis: a = axis x (the coordinate direction it is least along,
-    the first on ties), b = axis x a.
+    """Returns two unit normals a, b of a unit axis.
+
+    a = axis x e with the coordinate direction e of the axis's smallest component, the first of
+    equal ones; b = axis x a.
     """
     least = np.eye(3)[int(np.argmin(np.abs(axis)))]
     a = cross(axis, least)
@@ -114,7 +112,7 @@ def axis_normals(axis: Array) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def joint_models(robot: Robot) -> tuple[JointModel, ...]:
-    """The 18 joints, leg by leg; joint k moves body k + 1."""
+    """Returns the 18 joints, leg by leg; joint k moves body k + 1."""
     return tuple(_joint_model(robot, leg, joint) for leg in range(LEGS) for joint in range(JOINTS))
 
 
@@ -143,7 +141,9 @@ def _joint_model(robot: Robot, leg: int, joint: int) -> JointModel:
 
 
 def foot_position(leg: Leg, angle: Array) -> Array:
-    """(3,) the foot sphere's centre in the torso frame [m] at three joint angles [rad]."""
+    """Returns the centre (3,) of the foot's sphere in the torso frame [m] at three joint angles
+    [rad].
+    """
     p_T = np.array(leg.hip_position)
     R_TL = axis_rotation(np.array([0.0, 0.0, 1.0]), leg.hip_yaw)
     for link, q in zip(leg.links, angle, strict=True):
@@ -153,7 +153,7 @@ def foot_position(leg: Leg, angle: Array) -> Array:
 
 
 def foot_positions(robot: Robot, angle: Array) -> Array:
-    """(6, 3) the feet's centres in the torso frame [m] at joint angles (6, 3) [rad]."""
+    """Returns the feet's centres (6, 3) in the torso frame [m] at joint angles (6, 3) [rad]."""
     return np.array([foot_position(leg, q) for leg, q in zip(robot.legs, angle, strict=True)])
 
 
@@ -166,11 +166,11 @@ def body_states(
     angle: Array,
     speed: Array,
 ) -> Array:
-    """All bodies on their joints exactly, from the torso's motion and the joints'.
+    """Returns the states of all bodies, which satisfy the joints exactly.
 
     Args:
         position, velocity: (3,) of the torso's centre of mass, world axes [m, m/s].
-        quaternion: (4,) torso to world, normalised here.
+        quaternion: (4,) torso to world, of any length.
         angular_velocity: (3,) of the torso, world axes [rad/s].
         angle, speed: (6, 3) of the joints [rad, rad/s].
 
@@ -187,6 +187,7 @@ def body_states(
 
 
 def _child_state(joint: JointModel, parent: Array, q: float, qd: float) -> Array:
+    """Returns the child's state (13,) at a joint angle [rad] and speed [rad/s]."""
     r_i, p_i, v_i, w_i = split(parent)
     p_j = quaternion_product(quaternion_product(p_i, joint.zero), axis_quaternion(joint.s_j, q))
     sP_i, sP_j = rotation_matrix(p_i) @ joint.point_i, rotation_matrix(p_j) @ joint.point_j
@@ -196,13 +197,15 @@ def _child_state(joint: JointModel, parent: Array, q: float, qd: float) -> Array
 
 
 def split(state: Array) -> tuple[Array, Array, Array, Array]:
-    """r, p, v, w of one body's state (13,)."""
+    """Returns r, p, v, w of a body's state (13,)."""
     return state[0:3], state[3:7], state[7:10], state[10:13]
 
 
 def joint_angle(joint: JointModel, parent: Array, child: Array) -> float:
-    """Angle [rad] in (-pi, pi] of the twist about the axis, so that small violations of the
-    joint do not enter to first order.
+    """Returns the joint's angle [rad] in (-pi, pi].
+
+    It is the twist about the axis, so that small violations of the joint do not enter to first
+    order.
     """
     p_i = quaternion_product(parent[3:7], joint.zero)
     p = quaternion_product(p_i * np.array([1.0, -1.0, -1.0, -1.0]), child[3:7])
@@ -211,13 +214,13 @@ def joint_angle(joint: JointModel, parent: Array, child: Array) -> float:
 
 
 def joint_speed(joint: JointModel, parent: Array, child: Array) -> float:
-    """s . (w_j - w_i) [rad/s]"""
+    """Returns the joint's speed s . (w_j - w_i) [rad/s]."""
     s = rotation_matrix(parent[3:7]) @ joint.s_i
     return float(s @ (child[10:13] - parent[10:13]))
 
 
 def joint_angles(robot: Robot, body: Array) -> Array:
-    """(6, 3) angles [rad] of bodies (19, 13), drifted joints allowed."""
+    """Returns the angles (6, 3) [rad] of bodies (19, 13), whose joints may have drifted."""
     angles = [
         joint_angle(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)
     ]
@@ -225,7 +228,7 @@ def joint_angles(robot: Robot, body: Array) -> Array:
 
 
 def joint_speeds(robot: Robot, body: Array) -> Array:
-    """(6, 3) speeds [rad/s] of bodies (19, 13), drifted joints allowed."""
+    """Returns the speeds (6, 3) [rad/s] of bodies (19, 13), whose joints may have drifted."""
     speeds = [
         joint_speed(joint, body[joint.parent], body[joint.child]) for joint in joint_models(robot)
     ]
@@ -233,7 +236,7 @@ def joint_speeds(robot: Robot, body: Array) -> Array:
 
 
 def foot_centres(robot: Robot, body: Array) -> Array:
-    """(6, 3) the feet's centres in the world [m] of bodies (19, 13)."""
+    """Returns the feet's centres (6, 3), world axes [m], of bodies (19, 13)."""
     tibias = body[JOINTS::JOINTS]
     points = [np.array(leg.links[-1].tip) - np.array(leg.links[-1].com) for leg in robot.legs]
     return np.array(

@@ -1,9 +1,9 @@
-"""What a step of the integrator did: works and losses (eq. 27), and what is integrated along the
-step's path (eq. 28).
+"""Measures a step of the integrator: works and losses (eq. 27), and integrals along its path (eq.
+28).
 
-A step of h [s] leads from one set of body states (19, 13) to another. The integrator adds up the
-impulses of its own stage forces; everything else here follows from both ends. The fast form is
-plant_fmu/src/lanes/measure.h.
+A step of h [s] leads from one set of body states (19, 13) to another. The integrator supplies the
+impulses of its stage forces; all other quantities follow from both ends.
+plant_fmu/src/lanes/measure.h is the fast form.
 """
 
 from __future__ import annotations
@@ -26,24 +26,21 @@ from hexapod_cosim.models.kinematics import (
 )
 from hexapod_cosim.models.records import Array, Robot
 
-NODES = np.linspace(
-    0.0, 1.0, 5
-)  # of a step, at which the laws of feet are evaluated; those of motors at every second one
+# nodes of a step for the forces of feet; motors use every second one
+NODES = np.linspace(0.0, 1.0, 5)
 FOOT_WEIGHTS = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0  # Simpson's rule
 MOTOR_WEIGHTS = np.array([1.0, 4.0, 1.0]) / 6.0
-LOAD_SHARE = 0.01  # of the robot's weight: a foot that bears more slips under load
-LANDING_SAMPLE = 1e-4  # s    between two forces of a landing
-LANDING_SAMPLES = 200  # of a landing, which is over 20 ms after touch-down
-CONE_BINS, NEARLY_SLIDING = (
-    31,
-    0.9,
-)  # of the shares of the friction cone that feet use; where the last one begins
-RISE_SAMPLES = 10  # across the window of 1 ms over which a landing's force rises
+LOAD_SHARE = 0.01  # 1  of the weight; a foot with a larger load counts its slip
+LANDING_SAMPLE = 1e-4  # s  between two forces of a landing
+LANDING_SAMPLES = 200  # samples of a landing, which lasts 20 ms
+CONE_BINS = 31  # bins of the share of the friction cone
+NEARLY_SLIDING = 0.9  # 1  start of the last bin
+RISE_SAMPLES = 10  # samples in the rise window of 1 ms
 
 
 @dataclass(frozen=True)
 class Impulses:
-    """Impulses of a step's forces: h times the stage forces, weighted as the stages are."""
+    """Impulses of a step's forces: h times the stage forces with the stages' weights."""
 
     motor: Array  # (6, 3) N m s  motors on their joints
     gear: Array  # (6, 3) N m s  gear friction on the joints
@@ -52,7 +49,7 @@ class Impulses:
 
 @dataclass(frozen=True)
 class Works:
-    """Works of the motors on the joints, and what contacts, friction and gears took, all [J]."""
+    """Works of the motors on the joints, and losses in contacts, friction and gears [J]."""
 
     motor: Array  # (6, 3)
     contact: float
@@ -62,7 +59,7 @@ class Works:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a step adds to the plant's outputs of the same names, and its peaks."""
+    """Contributions of a step to the plant's outputs of the same names, and its peaks."""
 
     positive_work: Array  # (6, 3) J
     negative_work: Array  # (6, 3) J, >= 0
@@ -74,13 +71,14 @@ class Measured:
 
 
 def _wrapped(angle: Array) -> Array:
-    """Angles [rad] of any shape within half a turn."""
+    """Returns angles [rad] of any shape, wrapped to [-pi, pi)."""
     return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
-    """(6, 3) mean velocity [m/s] of the contact points' material along the ground: the way of
-    the feet's centres, and their rolling.
+    """Returns the mean velocity (6, 3) [m/s] of the contact points' material along the ground.
+
+    It consists of the displacement of the feet's centres and their rolling.
     """
     slips = []
     ends = [
@@ -100,11 +98,10 @@ def mean_slip(robot: Robot, before: Array, after: Array, h: float) -> Array:
 def step_works(
     robot: Robot, before: Array, after: Array, h: float, impulses: Impulses, closed: Array
 ) -> Works:
-    """Works of a step (eq. 27): impulses times the mean of the speeds at its ends. closed (6,):
-    feet in contact during the step.
+    """Returns the works of a step (eq. 27): impulses times the mean of the speeds at its ends.
 
-    Contact takes the work of the normal force less the growth of its stored energy 2/5 K
-    delta^(5/2).
+    The loss in contact is the work of the normal force minus the growth of the stored energy 2/5 K
+    delta^(5/2). closed (6,): feet in contact during the step.
     """
     speed = 0.5 * (joint_speeds(robot, before) + joint_speeds(robot, after))
     contact = friction = 0.0
@@ -123,10 +120,11 @@ def step_works(
 
 
 def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Impulses) -> Array:
-    """(31,) time [s] that feet bore load in a step, summed over them, by the share |f_t|/(mu f_n)
-    of the friction cone (eq. 30).
+    """Returns the time (31,) [s] of feet under load in a step, by the share of the friction cone
+    (eq. 30).
 
-    The share is that of the step's impulses. Bins begin at 0.9 (i/30)^2.
+    The share is |f_t|/(mu f_n) of the step's impulses. Bin i begins at 0.9 (i/30)^2; times are
+    summed over the feet.
     """
     time = np.zeros(CONE_BINS)
     least = h * LOAD_SHARE * robot.total_mass * float(np.linalg.norm(robot.gravity))
@@ -147,8 +145,9 @@ def cone_time(robot: Robot, before: Array, after: Array, h: float, impulses: Imp
 def cubic(
     start: Array, slope_start: Array, rise: Array, slope_end: Array, x: Array
 ) -> tuple[Array, Array, Array]:
-    """Value, rate and second rate at x (nodes,) in [0, 1] of the cubics through values and rates
-    per step at both ends (eq. 28).
+    """Returns value, first and second derivative at x (nodes,) in [0, 1] of cubics (eq. 28).
+
+    The cubics are given by values and rates per step at both ends.
     """
     bend = slope_start + slope_end - 2.0 * rise
     curve = rise - slope_start - bend
@@ -166,7 +165,7 @@ def measured_step(
     work: Array,
     damping: Array,
 ) -> Measured:
-    """What a step did along its path, in position or torque mode.
+    """Returns the measurements of a step along its path, in position or torque mode.
 
     work: (6, 3) the motors' works of `step_works` [J]; damping: (6,) d of eq. 14 [s/m], nan for
     feet that are open during the step.
@@ -178,28 +177,25 @@ def measured_step(
 def _joints(
     robot: Robot, before: Array, after: Array, h: float, command: Command, work: Array
 ) -> tuple[Array, Array, Array]:
-    """Positive and negative work and the squared torque's integral, each (6, 3)."""
-    angle, speeds = (
-        joint_angles(robot, before),
-        [h * joint_speeds(robot, body) for body in (before, after)],
-    )
+    """Returns positive and negative work and the integral of the squared torque, each (6, 3)."""
+    angle = joint_angles(robot, before)
+    speeds = [h * joint_speeds(robot, body) for body in (before, after)]
     rise = _wrapped(joint_angles(robot, after) - angle)
     value, rate, _ = cubic(angle, speeds[0], rise, speeds[1], NODES[::2])
-    told = (command.angle_ref, command.speed_ref, command.torque_ref)
+    references = (command.angle_ref, command.speed_ref, command.torque_ref)
     torque = servo_torque(
         robot.servo,
         _wrapped(value),
         rate / h,
-        *(np.broadcast_to(part, value.shape) for part in told),
+        *(np.broadcast_to(part, value.shape) for part in references),
     )
     power = torque * rate / h
     positive, negative, squared = (
         h * np.tensordot(MOTOR_WEIGHTS, part, 1)
         for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0), torque**2)
     )
-    rest = work - (
-        positive - negative
-    )  # what the path misses of the step's work goes to the larger part
+    # the difference from the step's work goes to the larger part
+    rest = work - (positive - negative)
     drives = positive > negative
     positive, negative = (
         positive + np.where(drives, rest, 0.0),
@@ -212,7 +208,7 @@ def _joints(
 def _feet(
     robot: Robot, before: Array, after: Array, h: float, damping: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Slip under load, impulse, largest normal force and its steepest rise, each (6,)."""
+    """Returns slip under load, impulse, largest normal force and its steepest rise, each (6,)."""
     ends = foot_contacts(robot, before), foot_contacts(robot, after)
     delta = [np.array([foot.penetration for foot in feet]) for feet in ends]
     slope = [h * np.array([foot.approach_speed for foot in feet]) for feet in ends]
@@ -242,12 +238,15 @@ def _feet(
 
 
 def landing_rate(robot: Robot, time: Array, delta: Array, ddelta: Array, damping: Array) -> float:
-    """Largest rise [N/s] of one foot's normal force over 1 ms, in windows that end every 0.1 ms of
-    the 20 ms after touch-down (eq. 29).
+    """Returns the largest rise [N/s] of a foot's normal force over 1 ms of a landing (eq. 29).
 
-    time (n,) [s]: ends of the steps since touch-down, which is the first; delta, ddelta (n,) [m,
-    m/s]: penetration and approach speed there; damping (n - 1,): d of eq. 14 [s/m] during the
-    steps, nan where the foot is open. Before touch-down there is no force.
+    The windows end every 0.1 ms of the 20 ms after touch-down; forces before touch-down are 0.
+
+    Args:
+        robot: the robot.
+        time: (n,) ends of the steps since touch-down, which is the first [s].
+        delta, ddelta: (n,) penetration and approach speed there [m, m/s].
+        damping: (n - 1,) d of eq. 14 during the steps [s/m], nan where the foot is open.
     """
     samples = np.arange(1, LANDING_SAMPLES + 1) * LANDING_SAMPLE + time[0]
     force = [
@@ -261,7 +260,7 @@ def landing_rate(robot: Robot, time: Array, delta: Array, ddelta: Array, damping
 def _force_at(
     robot: Robot, t: float, time: Array, delta: Array, ddelta: Array, damping: Array
 ) -> float:
-    """Normal force [N] of a foot at a time within its steps."""
+    """Returns the normal force [N] of a foot at a time within its steps."""
     k = max(int(np.searchsorted(time, t)) - 1, 0)
     h = time[k + 1] - time[k]
     depth, rate, _ = cubic(
@@ -275,8 +274,9 @@ def _force_at(
 
 
 def _under_load(robot: Robot, h: float, force: Array, speed: Array) -> Array:
-    """(6,) integral of the slip speed over where the force, linear between nodes, exceeds
-    LOAD_SHARE of the weight.
+    """Returns the integral (6,) of the slip speed over times at which the foot bears load.
+
+    The force is linear between nodes; load is a force above LOAD_SHARE of the weight.
     """
     mass = robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links)
     above = force - LOAD_SHARE * mass * float(np.linalg.norm(robot.gravity))

@@ -1,6 +1,7 @@
-"""Integration methods: explicit Runge-Kutta and linearly implicit Rosenbrock-W, as coefficients.
+"""Defines the integration methods by their coefficients: explicit Runge-Kutta and linearly implicit
+Rosenbrock-W.
 
-The same rows stand in plant_fmu/src/method.c.
+plant_fmu/src/method.c contains the same coefficients.
 """
 
 from __future__ import annotations
@@ -18,32 +19,32 @@ Stage = Callable[[float, Array, Array], Array]
 
 @dataclass(frozen=True)
 class Method:
-    """Coefficients of a method with s stages, as eq. 19 and its error estimate use them."""
+    """Coefficients of a method with s stages (eq. 19) and of its error estimate."""
 
     order: int
-    error_order: int  # of the embedded method; 0: there is none, so steps are fixed
+    error_order: int  # of the embedded method; 0: none, fixed steps only
     gamma: float  # 0: explicit
     a: Array  # (s, s)
     g: Array  # (s, s)
     c: Array  # (s,)
     b: Array  # (s,)
-    e: Array  # (s,)  b less the weights of the embedded method
+    e: Array  # (s,)  b minus the weights of the embedded method
 
     @property
     def stages(self) -> int:
-        """s"""
+        """Number of stages s."""
         return len(self.b)
 
 
 def method_step(method: Method, stage: Stage, y_0: Array, h: float) -> tuple[Array, Array]:
-    """One step of eq. 19 from y_0 (n,) over h [s].
+    """Computes one step of eq. 19 from y_0 (n,) over h [s].
 
     Args:
         method: the coefficients.
         stage: gives k_i/h (n,) from c_i h, y_i (n,) and sum g_ij k_j (n,). An explicit method's
-            stage returns f(t_0 + c_i h, y_i) and looks at nothing else.
-        y_0: where the step starts.
-        h: its length.
+            stage returns f(t_0 + c_i h, y_i).
+        y_0: start of the step.
+        h: length of the step [s].
 
     Returns:
         y_1 (n,) and the estimate of its error (n,), which is 0 without an embedded method.
@@ -55,7 +56,7 @@ def method_step(method: Method, stage: Stage, y_0: Array, h: float) -> tuple[Arr
 
 
 def _lower(rows: Sequence[Sequence[float]]) -> Array:
-    """(s, s) matrix whose row i holds the i numbers of rows[i] left of the diagonal."""
+    """Returns the (s, s) matrix with the i numbers of rows[i] left of the diagonal of row i."""
     matrix = np.zeros((len(rows), len(rows)))
     for i, row in enumerate(rows):
         matrix[i, : len(row)] = row
@@ -70,7 +71,7 @@ def _row(
     gamma: float = 0.0,
     g: Sequence[Sequence[float]] = ((),),
 ) -> Method:
-    """A method with c as the row sums of a; its embedded method is of one order less."""
+    """Returns a method with c as the row sums of a, and an embedded method of one order less."""
     s, matrix = len(b), _lower(a)
     return Method(
         order=order,
@@ -87,7 +88,7 @@ def _row(
 ROS2_GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
 METHOD: dict[str, Method] = {
-    # near ROS34PW2 (Rang and Angermann 2005), made by tools/rosw3.py: L-stable, stiffly accurate
+    # close to ROS34PW2 (Rang and Angermann 2005), by tools/rosw3.py: L-stable, stiffly accurate
     "rosw3": _row(
         order=3,
         gamma=0.435866521508459,
@@ -137,7 +138,7 @@ METHOD: dict[str, Method] = {
         b=[2 / 9, 1 / 3, 4 / 9, 0.0],
         e=[2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8],
     ),
-    # the classic method of Kutta
+    # classic method of Kutta
     "rk4": _row(
         order=4,
         a=[[], [1 / 2], [0.0, 1 / 2], [0.0, 0.0, 1.0]],

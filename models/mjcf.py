@@ -1,10 +1,10 @@
-"""A robot as a MuJoCo model: the same bodies, joints and servos; ground contact as near as MuJoCo's
-comes.
+"""Writes a robot as a MuJoCo model with the same bodies, joints and servos and a similar ground
+contact.
 
-MuJoCo's contact is a spring and a damper of accelerations, not Hertz's: its stiffness is chosen so
-that a standing tripod's feet sink in as deep as Hertz's law says, its damping so that a free bounce
-returns the restitution. Friction is Coulomb's, an elliptic cone. What is left out: the servos'
-torque-speed line, the tanh law's creep.
+MuJoCo's contact is a spring and a damper of accelerations. Its stiffness is chosen so that the feet
+of a standing tripod sink in as deep as with Hertz's law, its damping so that a free bounce has the
+restitution. Friction is Coulomb's, with an elliptic cone. The servos' torque-speed line and the
+tanh law's creep are omitted.
 """
 
 from __future__ import annotations
@@ -30,14 +30,10 @@ from hexapod_cosim.models.records import JOINT_NAMES, Array, Leg, Link, Robot, V
 from hexapod_cosim.models.urdf.writer import COLOURS, THICKNESS, numbers
 
 TIME_STEP = 0.001  # s
-# 1    of MuJoCo's constraints, its default: the share of a constraint's acceleration it may take
+# 1  MuJoCo's default: the share of a constraint's acceleration that it corrects
 IMPEDANCE = 0.9
-DRAWN = {
-    "contype": "0",
-    "conaffinity": "0",
-    "group": "1",
-    "mass": "0",
-}  # geometry that neither touches nor weighs
+# geometry for pictures, without contact and mass
+DRAWN = {"contype": "0", "conaffinity": "0", "group": "1", "mass": "0"}
 UNKNOWNS = 6 + LEGS * JOINTS
 Z = np.array([0.0, 0.0, 1.0])
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
@@ -46,7 +42,7 @@ GROUND = "5 5 0.1"  # m    half sizes of the drawn plane and its grid
 
 
 def robot_to_mjcf(robot: Robot) -> str:
-    """The text of an MJCF file, with a keyframe "stance" on the ground."""
+    """Returns the text of an MJCF file, with a keyframe "stance" on the ground."""
     root = ET.Element("mujoco", model=robot.name)
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
     option = ET.SubElement(root, "option", timestep=repr(TIME_STEP), gravity=numbers(robot.gravity))
@@ -100,7 +96,9 @@ def _ground(world: ET.Element, robot: Robot) -> None:
 
 
 def _friction(robot: Robot) -> str:
-    """Sliding as the robot's; no torsion and no rolling: the feet touch in a point."""
+    """Returns the robot's sliding friction, without torsion and rolling: the feet are point
+    contacts.
+    """
     return numbers((0.0 if robot.friction.law == "none" else robot.friction.mu, 0.0, 0.0))
 
 
@@ -109,10 +107,10 @@ def _solimp() -> str:
 
 
 def _solref(robot: Robot) -> str:
-    """Time constant t [s] and damping ratio z.
+    """Returns time constant t [s] and damping ratio z.
 
-    MuJoCo's force at a depth r is r / ((1 - d) w t^2 z^2), d the impedance, w the mobility; Hertz's
-    depth under f is (f / K)^(2/3).
+    MuJoCo's force at a depth r is r / ((1 - d) w t^2 z^2), with the impedance d and the mobility w;
+    Hertz's depth under f is (f / K)^(2/3).
     """
     load = max(robot.weight / 3.0, 1e-6)
     depth = (load / robot.contact.stiffness) ** (2.0 / 3.0)
@@ -123,8 +121,10 @@ def _solref(robot: Robot) -> str:
 
 
 def tibia_mobility(robot: Robot) -> float:
-    """Acceleration of the tibias' centres of mass per force there [1/kg], mean of legs and
-    directions, at angle 0: MuJoCo's invweight.
+    """Returns the acceleration of the tibias' centres of mass per force there [1/kg], MuJoCo's
+    invweight.
+
+    It is the mean over legs and directions, at angle 0.
     """
     J = np.stack(
         [_motion(robot, speed).ravel() for speed in np.eye(UNKNOWNS)], axis=-1
@@ -136,8 +136,9 @@ def tibia_mobility(robot: Robot) -> float:
 
 
 def _motion(robot: Robot, speed: Array) -> Array:
-    """(19, 6) velocities and angular velocities of the bodies at angle 0 for the torso's (6,)
-    and the joints' (18,) speeds.
+    """Returns velocities and angular velocities (19, 6) of the bodies at angle 0.
+
+    speed (24,): the torso's (6,) and the joints' (18,).
     """
     return body_states(
         robot, np.zeros(3), UPRIGHT, speed[:3], speed[3:6], ZERO, speed[6:].reshape(LEGS, JOINTS)
@@ -188,7 +189,7 @@ def _leg(torso: ET.Element, leg: Leg, robot: Robot) -> None:
             material="limb",
         )
         place, quaternion = link.tip, UPRIGHT
-    # feet touch the ground alone
+    # feet touch the ground only
     foot = ET.SubElement(
         body,
         "geom",
@@ -236,9 +237,7 @@ def _servos(root: ET.Element, robot: Robot) -> None:
 
 
 def _stance(root: ET.Element, robot: Robot) -> None:
-    """The standing pose with the lowest feet just on the ground, the torso as steep as it; in a
-    moment the robot settles.
-    """
+    """Adds the standing pose: the lowest feet touch the ground, and the torso is parallel to it."""
     tilt = _ground_quaternion(robot)
     heading = robot.terrain.heading if robot.terrain.kind == "slope" else 0.0
     quaternion = quaternion_product(tilt, axis_quaternion(Z, -heading))
@@ -251,9 +250,7 @@ def _stance(root: ET.Element, robot: Robot) -> None:
 
 
 def _ground_quaternion(robot: Robot) -> Array:
-    """(4,) turns z to the ground's normal: a slope rises along its heading, so the normal leans
-    back.
-    """
+    """Returns the rotation (4,) of z to the ground's normal."""
     terrain = robot.terrain
     slope = terrain.kind == "slope"
     turn = axis_quaternion(Z, terrain.heading if slope else 0.0)

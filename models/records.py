@@ -1,8 +1,8 @@
-"""What the robot is: frozen records with units and ranges.
+"""Defines the records of a robot as frozen dataclasses with units and ranges.
 
-Frames and conventions: docs/architecture.md. Records hold tuples of floats, so a robot is hashable,
-picklable and comparable; `dataclasses.replace` makes a changed one, `check_robot` judges it by the
-rules that files are judged by.
+Frames and conventions: docs/architecture.md. Records contain tuples of floats, so that robots are
+hashable, picklable and comparable. Use `dataclasses.replace` to change one and `check_robot` to
+check it by the rules for files.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ CONTACT_LAWS = (
     "hertz",
 )
 FRICTION_LAWS = ("tanh", "none", "bristle")
-STATIC_LAWS = ("bristle",)  # friction laws that tell static from kinetic friction
+STATIC_LAWS = ("bristle",)  # friction laws with a static friction coefficient
 SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
@@ -45,21 +45,19 @@ GAITS = ("tripod", "ripple", "wave", "amble")
 
 @dataclass(frozen=True, kw_only=True)
 class Torso:
-    """The main body; its frame's origin is the one hip positions are measured from."""
+    """The main body. Hip positions are relative to the origin of its frame."""
 
     mass: Annotated[float, Number("kg", above=0.0)]
-    size: Annotated[
-        Vector3, Vector("m", 3, above=0.0)
-    ]  # box, for drawing and for the default inertia
+    # box, for pictures and for the default inertia
+    size: Annotated[Vector3, Vector("m", 3, above=0.0)]
     com: Annotated[Vector3, Vector("m", 3, default=(0.0, 0.0, 0.0))]
-    inertia: Annotated[
-        Vector6, Vector("kg m2", 6)
-    ]  # about the com: xx yy zz xy xz yz; absent in a file: of the box
+    # about the com: xx yy zz xy xz yz; default of a file: homogeneous box
+    inertia: Annotated[Vector6, Vector("kg m2", 6)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """One moving segment; its frame sits at its own joint and equals the parent's at angle 0."""
+    """A moving segment. Its frame lies at its joint and equals the parent's at angle 0."""
 
     mass: Annotated[float, Number("kg", above=0.0)]
     length: Annotated[float, Number("m")]  # next joint (tibia: foot centre) along x
@@ -73,13 +71,13 @@ class Link:
 
     @property
     def tip(self) -> Vector3:
-        """Next joint or foot centre in the link frame [m]."""
+        """Position of the next joint or the foot's centre in the link frame [m]."""
         return (self.length, self.offset_y, self.offset_z)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Leg:
-    """Three links on a hip."""
+    """A hip with three links."""
 
     name: str
     hip_position: Annotated[Vector3, Vector("m", 3)]  # in the torso frame
@@ -90,6 +88,8 @@ class Leg:
 
 @dataclass(frozen=True, kw_only=True)
 class Foot:
+    """Radius and material of all feet."""
+
     radius: Annotated[float, Number("m", above=0.0)]
     youngs_modulus: Annotated[float, Number("Pa", above=0.0)]
     poisson: Annotated[float, Number("1", above=-1.0, at_most=0.5)]
@@ -97,10 +97,11 @@ class Foot:
 
 @dataclass(frozen=True, kw_only=True)
 class Contact:
+    """Normal contact law (eq. 14)."""
+
     law: Annotated[str, Choice(CONTACT_LAWS)]
-    stiffness: Annotated[
-        float, Number("N/m^1.5", above=0.0)
-    ]  # absent in a file: Hertz, sphere on rigid ground
+    # default of a file: Hertz, sphere on rigid ground
+    stiffness: Annotated[float, Number("N/m^1.5", above=0.0)]
     restitution: Annotated[float, Number("1", at_least=0.0, at_most=1.0)]
     damping_factor: Annotated[float, Number("s/m", at_least=0.0)]  # c of the constant law
     impact_speed_floor: Annotated[float, Number("m/s", above=0.0)]
@@ -108,17 +109,17 @@ class Contact:
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
+    """Friction law (eq. 15-18)."""
+
     law: Annotated[str, Choice(FRICTION_LAWS)]
     mu: Annotated[float, Number("1", at_least=0.0)]
-    # of a foot that sticks, bristle law; 0 or absent: mu
+    # static friction, bristle law; 0: mu
     mu_static: Annotated[float, Number("1", at_least=0.0, default=0.0)] = 0.0
     slope: Annotated[float, Number("s/m", above=0.0)]  # k_t of eq. 15, tanh law
-    presliding: Annotated[
-        float, Number("m", at_least=1e-7, at_most=1.0)
-    ]  # b_max of eq. 16, bristle law; absent in a file: Mindlin
-    bristle_damping: Annotated[
-        float, Number("s", at_least=0.0, at_most=10.0, default=0.005)
-    ]  # tau of eq. 17, bristle law
+    # b_max of eq. 16, bristle law; default of a file: Mindlin
+    presliding: Annotated[float, Number("m", at_least=1e-7, at_most=1.0)]
+    # tau of eq. 17, bristle law
+    bristle_damping: Annotated[float, Number("s", at_least=0.0, at_most=10.0, default=0.005)]
     # v_s of eq. 18, bristle law
     stribeck_speed: Annotated[float, Number("m/s", at_least=1e-6, at_most=100.0, default=0.005)] = (
         0.005
@@ -127,6 +128,8 @@ class Friction:
 
 @dataclass(frozen=True, kw_only=True)
 class Servo:
+    """Servo of every joint (eq. 12)."""
+
     mode: Annotated[str, Choice(SERVO_MODES)]
     kp: Annotated[float, Number("N m/rad", at_least=0.0)]
     kd: Annotated[float, Number("N m s/rad", at_least=0.0)]
@@ -134,19 +137,23 @@ class Servo:
     speed_max: Annotated[float, Number("rad/s", above=0.0)]  # no-load
     rotor_inertia: Annotated[float, Number("kg m2", at_least=0.0)]  # seen at the joint
     coulomb_friction: Annotated[float, Number("N m", at_least=0.0)]
-    torque_continuous: Annotated[float, Number("N m", above=0.0)]  # above it, a warning
-    # at the joint: torque over the root of the copper loss; absent in a file: of an ideal motor
+    torque_continuous: Annotated[float, Number("N m", above=0.0)]  # a larger one gives a warning
+    # torque over the root of the copper loss, at the joint; default of a file: ideal motor
     motor_constant: Annotated[float, Number("N m/sqrt(W)", above=0.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baumgarte:
+    """Baumgarte stabilisation of the constraints (eq. 1)."""
+
     alpha: Annotated[float, Number("1/s", at_least=0.0)]
     beta: Annotated[float, Number("1/s", at_least=0.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Solver:
+    """Settings of the integrator."""
+
     method: Annotated[str, Choice(METHODS)]
     step: Annotated[float, Number("s", at_least=0.0)]  # 0: error control
     tolerance: Annotated[float, Number("1", above=0.0, below=1.0)]
@@ -156,6 +163,8 @@ class Solver:
 
 @dataclass(frozen=True, kw_only=True)
 class Terrain:
+    """Ground plane; a slope rises by `incline` along `heading`."""
+
     kind: Annotated[str, Choice(TERRAINS)]
     height: Annotated[float, Number("m", default=0.0)]
     incline: Annotated[float, Number("rad", above=-math.pi / 2, below=math.pi / 2, default=0.0)]
@@ -164,15 +173,19 @@ class Terrain:
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
+    """Parameters of the gait."""
+
     name: Annotated[str, Choice(GAITS)]
     period: Annotated[float, Number("s", above=0.0)]
     duty: Annotated[float, Number("1", above=0.0, below=1.0)]
-    stride: Annotated[float, Number("m", at_least=0.0)]  # the body's way in one period
+    stride: Annotated[
+        float, Number("m", at_least=0.0)
+    ]  # distance that the body moves in one period
     step_height: Annotated[float, Number("m", above=0.0)]
 
 
 def _plain(content: Any) -> Any:
-    """Nested content in which equal numbers are written alike: 0 and -0.0 as 0.0."""
+    """Converts nested content to lists and floats, in which 0 and -0.0 are both 0.0."""
     if isinstance(content, dict):
         return {key: _plain(value) for key, value in content.items()}
     if isinstance(content, tuple | list):
@@ -184,7 +197,7 @@ def _plain(content: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Robot:
-    """A six-legged robot with its laws and settings; `source` says where its numbers come from."""
+    """A six-legged robot with its laws and settings; `source` gives the numbers' provenance."""
 
     name: str
     gravity: Annotated[Vector3, Vector("m/s2", 3)]
@@ -202,32 +215,32 @@ class Robot:
 
     @property
     def total_mass(self) -> float:
-        """kg"""
+        """Mass of all bodies [kg]."""
         return self.torso.mass + sum(link.mass for leg in self.legs for link in leg.links)
 
     @property
     def weight(self) -> float:
-        """N"""
+        """Weight of all bodies [N]."""
         return self.total_mass * float(np.linalg.norm(self.gravity))
 
     @property
     def stance(self) -> Array:
-        """(6, 3) joint angles of the standing pose [rad]."""
+        """Joint angles (6, 3) of the standing pose [rad]."""
         return np.array([leg.stance for leg in self.legs])
 
     @property
     def angle_min(self) -> Array:
-        """(6, 3) lower joint limits [rad]."""
+        """Lower joint limits (6, 3) [rad]."""
         return np.array([[link.angle_min for link in leg.links] for leg in self.legs])
 
     @property
     def angle_max(self) -> Array:
-        """(6, 3) upper joint limits [rad]."""
+        """Upper joint limits (6, 3) [rad]."""
         return np.array([[link.angle_max for link in leg.links] for leg in self.legs])
 
     @cached_property
     def hash(self) -> str:
-        """sha256 of everything but the provenance texts, in hex: equal robots, equal hash."""
+        """SHA-256 in hexadecimal of all fields but `source`; equal robots have equal hashes."""
         content = _plain(asdict(self))
         del content["source"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

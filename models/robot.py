@@ -1,12 +1,15 @@
-"""Robots from files: `load_robot("athena")` gives a checked `Robot`. The records themselves stand
-in records.py.
+"""Reads robot files: `load_robot("athena")` returns a checked `Robot`.
 
-A robot file shares link data between the legs in [links.coxa], [links.femur], [links.tibia]; any
-leg may override any of those keys in [legs.LF.femur] and so on, so legs need not be equal. Three
-figures may be left out and are then computed: torso.inertia (the homogeneous box of torso.size),
+A robot file contains the link data that all legs share in [links.coxa], [links.femur] and
+[links.tibia]. A leg can override any of their keys in [legs.LF.femur] and so on, so legs can
+differ.
+
+Three values are computed if a file omits them: torso.inertia (homogeneous box of torso.size),
 contact.stiffness (Hertz, from the foot's radius and material) and friction.presliding (Mindlin,
-from the same and the weight). A URDF is a robot file too, and a robot file may name one, [urdf]
-file = "my.urdf", with what is put over it (urdf/).
+from the same and the weight).
+
+A URDF is a robot file too. A robot file can also refer to one by [urdf] file = "my.urdf" and
+override its data (urdf/). records.py defines the records.
 """
 
 from __future__ import annotations
@@ -88,17 +91,17 @@ __all__ = [
     "robot_from_table",
 ]
 
-LEAST_PRESLIDING = 1e-6  # m  where there is no load or no friction to take it from
+LEAST_PRESLIDING = 1e-6  # m  default without load or friction
 STANCE = Number("rad", at_least=-math.pi, at_most=math.pi)
 
 
 def list_robots() -> list[str]:
-    """Names of the robots that come with the package."""
+    """Returns the names of the robots in this package."""
     return sorted(path.stem for path in Path(__file__).parent.glob("*.toml"))
 
 
 def load_robot(path_or_name: str | Path) -> Robot:
-    """Reads and checks a robot file, or one of `list_robots()` by name. Raises RobotError."""
+    """Reads and checks a robot file, or a robot of `list_robots()` by name. Raises RobotError."""
     path = _robot_path(path_or_name)
     if path.suffix.lower() == ".urdf":
         return _robot_from_urdf(urdf_table(path), str(path))
@@ -125,14 +128,16 @@ def load_robot(path_or_name: str | Path) -> Robot:
 
 @lru_cache(maxsize=64)
 def _robot_from_text(text: str, where: str) -> Robot | None:
-    """The robot of a file's text, read once; None if it names a URDF, which may change without
-    it.
+    """Returns the robot of a file's text, or None if it refers to a URDF.
+
+    Results are cached by the text; a URDF can change without it.
     """
     table = tomllib.loads(text)
     return None if "urdf" in table else robot_from_table(table, where=where)
 
 
 def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
+    """Returns the robot of a URDF's tables. Error messages name the URDF's elements."""
     try:
         return robot_from_table(table, where=where)
     except RobotError as error:
@@ -140,6 +145,7 @@ def _robot_from_urdf(table: Mapping[str, Any], where: str) -> Robot:
 
 
 def _robot_path(path_or_name: str | Path) -> Path:
+    """Returns the path of a robot file, given by path or by name."""
     path = Path(path_or_name)
     if path.suffix or len(path.parts) != 1 or path.is_file():
         return path
@@ -150,8 +156,9 @@ def _robot_path(path_or_name: str | Path) -> Path:
 
 
 def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
-    """A checked robot from the nested tables of a robot file; `where` names the file in
-    messages. Raises RobotError.
+    """Returns a checked robot from the nested tables of a robot file. Raises RobotError.
+
+    where: name of the file for messages.
     """
     refuse_unknown_keys(table, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
     sections = {
@@ -161,7 +168,7 @@ def robot_from_table(table: Mapping[str, Any], *, where: str) -> Robot:
     }
     gravity, legs = _read_gravity(table, f"{where}: gravity"), _read_legs(table, where)
     mass = sections["torso"].mass + sum(link.mass for leg in legs for link in leg.links)
-    standing = mass * math.hypot(*gravity) / 3.0  # N  a foot of a tripod
+    standing = mass * math.hypot(*gravity) / 3.0  # N  load of a foot of a tripod
     robot = Robot(
         name=_read_text(table.get("name"), f"{where}: name"),
         gravity=gravity,
@@ -274,7 +281,7 @@ def _read_leg(
 
 
 def box_inertia(mass: float, size: Vector3) -> Vector6:
-    """Inertia of a homogeneous box about its centre [kg m2]: xx yy zz xy xz yz."""
+    """Returns the inertia of a homogeneous box about its centre [kg m2]: xx yy zz xy xz yz."""
     x2, y2, z2 = (edge * edge for edge in size)
     return (
         mass / 12.0 * (y2 + z2),
@@ -287,22 +294,24 @@ def box_inertia(mass: float, size: Vector3) -> Vector6:
 
 
 def ideal_motor_constant(torque_max: float, speed_max: float) -> float:
-    """Stall torque [N m] over the root of the stall power [W] of a direct-current motor without
-    losses but copper, k_m = T_s/sqrt(T_s w_0), from its stall torque and no-load speed [rad/s].
+    """Returns the motor constant of an ideal motor, k_m = T_s/sqrt(T_s w_0) [N m/sqrt(W)].
+
+    It is the stall torque over the root of the stall power of a direct-current motor that has
+    copper losses only, from its stall torque [N m] and no-load speed [rad/s].
     """
     return math.sqrt(torque_max / speed_max)
 
 
 def hertz_stiffness(foot: Foot) -> float:
-    """K of F = K delta^1.5 for the foot's sphere on a rigid half-space [N/m^1.5]."""
+    """Returns K of F = K delta^1.5 for the foot's sphere on a rigid half-space [N/m^1.5]."""
     return 4.0 / 3.0 * math.sqrt(foot.radius) * foot.youngs_modulus / (1.0 - foot.poisson**2)
 
 
 def mindlin_presliding(foot: Foot, stiffness: float, mu: float, load: float) -> float:
-    """Tangential displacement at which the foot's sphere pressed on by a load f_n [N] slides
-    (Mindlin 1949) [m].
+    """Returns the tangential displacement [m] at which the loaded foot slides (Mindlin 1949).
 
-    3 mu f_n (2 - nu)/(16 G a), a = sqrt(R delta) the radius of the contact, delta = (f_n/K)^(2/3).
+    3 mu f_n (2 - nu)/(16 G a) with the load f_n [N], the radius of the contact a = sqrt(R delta),
+    and delta = (f_n/K)^(2/3).
     """
     shear_modulus = foot.youngs_modulus / (2.0 * (1.0 + foot.poisson))
     per_root_depth = 16.0 / 3.0 * shear_modulus * math.sqrt(foot.radius) / (2.0 - foot.poisson)

@@ -1,7 +1,6 @@
-"""Typed records read from TOML tables: what a field may hold stands in its annotation, and is
-checked in one place.
+"""Reads typed records from TOML tables and checks them by the annotations of their fields.
 
-mass: Annotated[float, Number("kg", above=0.0)]
+Example of a field: `mass: Annotated[float, Number("kg", above=0.0)]`.
 """
 
 from __future__ import annotations
@@ -27,13 +26,14 @@ class Number:
     default: float | None = None
 
     def range_text(self) -> str:
-        """The range in words, "a finite number" when there is none."""
+        """Returns the range in words, "a finite number" without one."""
         bounds = [(self.above, ">"), (self.at_least, ">="), (self.below, "<"), (self.at_most, "<=")]
         parts = [f"{sign} {bound:g}" for bound, sign in bounds if math.isfinite(bound)]
         text = "a finite number" + (" " + " and ".join(parts) if parts else "")
         return f"{text} [{self.unit}]"
 
     def holds(self, value: float) -> bool:
+        """Returns whether the value is finite and within the range."""
         return (
             math.isfinite(value)
             and self.above < value < self.below
@@ -41,6 +41,7 @@ class Number:
         )
 
     def read(self, value: Any, where: str) -> float:
+        """Returns the value as a float. Raises RobotError; `where` names the key."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RobotError(
                 "wrong type",
@@ -62,7 +63,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Vector:
-    """A fixed count of finite numbers with one unit."""
+    """A fixed count of finite numbers with a common unit."""
 
     unit: str
     size: int
@@ -70,6 +71,7 @@ class Vector:
     default: tuple[float, ...] | None = None
 
     def read(self, value: Any, where: str) -> tuple[float, ...]:
+        """Returns the values as a tuple. Raises RobotError; `where` names the key."""
         expected = f"{self.size} numbers [{self.unit}]"
         if not isinstance(value, list | tuple):
             raise RobotError(
@@ -93,12 +95,13 @@ class Vector:
 
 @dataclass(frozen=True)
 class Choice:
-    """One name of a closed list."""
+    """A name from a closed list."""
 
     names: tuple[str, ...]
     default: str | None = None
 
     def read(self, value: Any, where: str) -> str:
+        """Returns the name. Raises RobotError; `where` names the key."""
         if not isinstance(value, str):
             raise RobotError(
                 "wrong type",
@@ -116,12 +119,13 @@ Spec = Number | Vector | Choice
 
 
 def specs(record: type[Any]) -> dict[str, Spec]:
-    """The annotated fields of a record class, by name."""
+    """Returns the annotated fields of a record class, by name."""
     return _specs(cast(Hashable, record))
 
 
 @cache
 def _specs(record: Any) -> dict[str, Spec]:
+    """Reads the annotations of a record class once."""
     hints = get_type_hints(record, include_extras=True)
     return {
         name: spec
@@ -132,7 +136,7 @@ def _specs(record: Any) -> dict[str, Spec]:
 
 
 def expect_table(value: Any, where: str) -> Mapping[str, Any]:
-    """The value, if it is a TOML table."""
+    """Returns the value if it is a TOML table. Raises RobotError otherwise."""
     if not isinstance(value, Mapping):
         raise RobotError(
             "wrong type",
@@ -145,7 +149,7 @@ def expect_table(value: Any, where: str) -> Mapping[str, Any]:
 
 
 def refuse_unknown_keys(table: Mapping[str, Any], valid: list[str], where: str) -> None:
-    """Raises on the first key that is not valid, proposing the nearest."""
+    """Raises RobotError for the first invalid key, with the most similar valid one."""
     for key in table:
         if key not in valid:
             raise unknown_name("key", key, valid, where=where, error=RobotError)
@@ -154,8 +158,9 @@ def refuse_unknown_keys(table: Mapping[str, Any], valid: list[str], where: str) 
 def read_given(
     record: type[Any], table: Mapping[str, Any], where: str, *, extra: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """The record's fields that the table gives, each checked; `extra` names keys that belong to
-    someone else.
+    """Returns the checked fields of the record that the table contains. Raises RobotError.
+
+    extra: valid keys that are not fields of the record.
     """
     fields = specs(record)
     refuse_unknown_keys(table, [*fields, *extra], where)
@@ -167,7 +172,10 @@ def read_given(
 
 
 def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """All fields of the record: given ones and defaults. Raises on a missing one."""
+    """Returns all fields of the record, given ones and defaults.
+
+    Raises RobotError for a missing one.
+    """
     values = {key: spec.default for key, spec in specs(record).items() if spec.default is not None}
     values |= given
     for key, spec in specs(record).items():
@@ -184,6 +192,6 @@ def require(record: type[Any], given: Mapping[str, Any], where: str) -> dict[str
 
 
 def check_record(record: Any, where: str) -> None:
-    """Checks a record that was built in Python by the same rules that hold for files."""
+    """Checks a record that was built in Python by the rules for files. Raises RobotError."""
     for key, spec in specs(type(record)).items():
         spec.read(getattr(record, key), f"{where}.{key}")

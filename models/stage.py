@@ -1,7 +1,8 @@
-"""A stage of the integrator (eq. 20), dense: the fast form is plant_fmu/src/lanes/stage.h.
+"""Computes a stage of the integrator (eq. 20) with dense matrices; plant_fmu/src/lanes/stage.h is
+the fast form.
 
-A linearly implicit stage solves eq. 1 with the stiff part of the forces taken where the step leads.
-Without it (z = 0) it is eq. 1 itself, as explicit methods need it.
+A linearly implicit stage solves eq. 1 with the stiff part of the forces evaluated at the end of the
+stage. With z = 0 it is eq. 1 itself, the stage of an explicit method.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from hexapod_cosim.models.records import Array, Robot
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes that W keeps of the forces: those of the step's first stage."""
+    """Derivatives of the forces that W uses; those of the step's first stage."""
 
     motor_stiffness: Array  # (6, 3) N m/rad
     motor_damping: Array  # (6, 3) N m s/rad
@@ -51,12 +52,12 @@ class Slopes:
     viscosity: Array  # (6,) N s/m  of the normal force by ddelta
     drag: Array  # (6,) N s/m  of friction by slip velocity; bristles: by their rate
     bristle: Array  # (6,) N/m    of friction by the bristles' deflection, -G_b
-    beta: Array  # (6,) 1/s    at which sliding bristles let go
+    beta: Array  # (6,) 1/s    release rate of sliding bristles
 
 
 @dataclass(frozen=True)
 class StageRate:
-    """k/h of a stage: what positions, velocities and bristles advance with."""
+    """k/h of a stage: rates of positions, velocities and bristles."""
 
     nu: Array  # (114,)  m/s and rad/s, body by body
     alpha: Array  # (114,)  m/s2 and rad/s2
@@ -64,12 +65,12 @@ class StageRate:
 
 
 def slip_velocity(foot: FootContact) -> Array:
-    """(3,) velocity of the contact point's material along the ground [m/s]."""
+    """Returns the velocity (3,) of the contact point's material along the ground [m/s]."""
     return foot.velocity + foot.approach_speed * foot.normal
 
 
 def _foot_bristle_slopes(robot: Robot, foot: FootContact, bristle: Array) -> BristleSlopes:
-    """Friction over load as a spring and a damper; laws without bristles are a damper alone."""
+    """Returns friction over load as a spring and a damper; laws without bristles have no spring."""
     slip = slip_velocity(foot)
     if robot.friction.law == "bristle":
         return bristle_slopes(robot.friction, slip, bristle)
@@ -84,15 +85,15 @@ def keep_slopes(
     damping: Array,
     ahead: float,
 ) -> Slopes:
-    """The slopes at bodies (19, 13) and bristles (6, 3), contacts a time `ahead` [s] further.
+    """Returns the derivatives of the forces at bodies (19, 13) and bristles (6, 3).
 
-    A foot that has just touched down has no depth and no slopes yet. Its slopes are taken at
-    delta + ahead max(ddelta, 0), or W would miss the contact that it is there for.
-    damping: (6,) of the contacts [s/m], nan for open feet.
+    The contact's are taken at delta + ahead max(ddelta, 0), because a foot that has just touched
+    down has neither depth nor derivatives yet, and W would miss its contact. damping: (6,) of the
+    contacts [s/m], nan for open feet.
     """
     angle, speed = joint_angles(robot, body), joint_speeds(robot, body)
-    told = (command.angle_ref, command.speed_ref, command.torque_ref)
-    motor_stiffness, motor_damping = servo_slopes(robot.servo, angle, speed, *told)
+    references = (command.angle_ref, command.speed_ref, command.torque_ref)
+    motor_stiffness, motor_damping = servo_slopes(robot.servo, angle, speed, *references)
     feet = []
     for leg, foot in enumerate(foot_contacts(robot, body)):
         deeper = foot.penetration + ahead * max(foot.approach_speed, 0.0)
@@ -105,7 +106,7 @@ def keep_slopes(
 
 
 def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
-    """(3, 114) J: the velocity of the contact point's material is J v."""
+    """Returns J (3, 114): the velocity of the contact point's material is J v."""
     tibia = JOINTS * (leg + 1)
     J = np.zeros((3, 6 * BODIES))
     J[:, 6 * tibia : 6 * tibia + 3] = np.eye(3)
@@ -114,10 +115,10 @@ def contact_jacobian(body: Array, leg: int, foot: FootContact) -> Array:
 
 
 def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of eq. 20 where the bodies (19, 13) are.
+    """Returns G_x and G_v of eq. 20, each (114, 114), at bodies (19, 13).
 
-    They are servos and gears on the joints' axes, and each contact along its normal n and, by
-    its drag alone, across it.
+    They consist of servos and gears on the joints' axes, and of each contact along its normal n
+    and, by its drag alone, across it.
     """
     G = constraints(robot, body).G
     G_x = -G.T @ (slopes.motor_stiffness.reshape(-1, 1) * G)
@@ -131,7 +132,7 @@ def slope_matrices(robot: Robot, body: Array, slopes: Slopes) -> tuple[Array, Ar
 
 
 def law_bristle_rates(robot: Robot, body: Array, bristle: Array, damping: Array) -> Array:
-    """(6, 3) db/dt as the law has it [m/s], 0 for open feet and with laws without bristles."""
+    """Returns db/dt (6, 3) of the bristle law [m/s]; 0 for open feet and with other laws."""
     rate = np.zeros((LEGS, 3))
     for leg, foot in enumerate(foot_contacts(robot, body)):
         if robot.friction.law == "bristle" and not np.isnan(damping[leg]):
@@ -149,7 +150,7 @@ def solve_stage(
     z: float,
     change: tuple[Array, Array, Array],
 ) -> StageRate:
-    """Eq. 20 at bodies (19, 13) and bristles (6, 3), dense.
+    """Solves eq. 20 at bodies (19, 13) and bristles (6, 3) with dense matrices.
 
     Args:
         robot, command: as in `accelerations`.

@@ -1,13 +1,13 @@
-"""How the robot stands: the pose in which nothing accelerates.
+"""Computes the pose in which the robot stands at rest.
 
-Tanh friction holds nothing at rest, so on level ground the feet spread until no tangential force is
-left. On a slope no such pose exists; the robot stands while it creeps, and friction at the creep's
-velocity carries what pulls it downhill. Under the bristle law it stands still there: what it has
-given way downhill, as one body, carries it instead.
+Tanh friction has no force at rest, so on level ground the feet spread until no tangential force
+remains. On a slope no pose of rest exists: the robot creeps, and friction at the creep velocity
+balances gravity. With the bristle law the robot rests on a slope, and deflected bristles balance
+gravity.
 
-Where gravity pulls along the ground more than friction can hold, the robot slides. Then the pose is
-the one in which all bodies accelerate alike: the pose of rest under gravity less that acceleration.
-Without friction on level ground that acceleration is 0, and the pose is that of any other friction.
+If gravity along the ground exceeds friction, the robot slides. The pose is then that of rest under
+gravity minus the common acceleration of all bodies. Without friction on level ground this
+acceleration is 0, and the pose is that of any other friction.
 """
 
 from __future__ import annotations
@@ -34,18 +34,19 @@ from hexapod_cosim.models.kinematics import (
 from hexapod_cosim.models.records import STATIC_LAWS, Array, Baumgarte, Gait, Robot, Solver
 from hexapod_cosim.models.terrain import ground_normal
 
-RESIDUAL = 1e-9  # N and N m: some 1e4 times the rounding of forces of this size
+RESIDUAL = 1e-9  # N, N m  about 1e4 times the rounding of such forces
 ITERATIONS = 60
-DIFFERENCE = 1e-7  # of the Jacobian's columns; Newton forgives its error
-LEVEL = 1e-12  # of gravity: less of it along the ground is rounding
-TORSO = 6  # of the unknowns, and of the residual
+DIFFERENCE = 1e-7  # 1  step of the Jacobian's differences
+LEVEL = 1e-12  # 1  of gravity; a smaller part along the ground is rounding
+TORSO = 6  # the torso's unknowns and residuals
 UNKNOWNS = TORSO + LEGS * JOINTS
 
 
 @dataclass(frozen=True)
 class Standing:
-    """A pose of rest, or of sliding as one body; torso above the world's origin, heading along
-    x.
+    """A pose of rest, or of sliding as one body.
+
+    The torso is above the world's origin and heads along x.
     """
 
     position: Array  # (3,) m  torso's centre of mass
@@ -53,15 +54,15 @@ class Standing:
     angle: Array  # (6, 3) rad
     velocity: Array  # (3,) m/s  creep along the ground, 0 on level ground and under the bristle law
     foot_force: Array  # (6, 3) N  ground on foot
-    bristle: Array  # (6, 3) m  what the feet have given way, 0 but on a slope under the bristle law
+    bristle: Array  # (6, 3) m  deflections; 0 on level ground or without the bristle law
     # (3,) m/s2  acceleration of the whole robot along the ground, 0 where friction holds it
     slide: Array
 
 
 def sliding(gravity: Array, normal: Array, mu: float, mu_static: float = 0.0) -> Array:
-    """(3,) acceleration [m/s2] with which a robot slides, 0 where friction holds it.
+    """Returns the acceleration (3,) [m/s2] of a sliding robot, 0 where friction holds it.
 
-    Gravity that does not press the robot onto the ground lets it fall, not slide.
+    It is also 0 if gravity does not press the robot onto the ground.
 
     Args:
         gravity: (3,) [m/s2].
@@ -77,17 +78,18 @@ def sliding(gravity: Array, normal: Array, mu: float, mu_static: float = 0.0) ->
     return np.asarray(pull * (1.0 - mu * press / size))
 
 
-def _slide(robot: Robot) -> Array:
-    """(3,) the same of a robot on its own ground."""
+def _slide_acceleration(robot: Robot) -> Array:
+    """Returns the acceleration (3,) [m/s2] with which the robot slides on its ground."""
     mu = 0.0 if robot.friction.law == "none" else robot.friction.mu
     mu_static = robot.friction.mu_static if robot.friction.law in STATIC_LAWS else 0.0
     return sliding(np.array(robot.gravity), ground_normal(robot.terrain), mu, mu_static)
 
 
-def _standing_part(robot: Robot) -> Robot:
-    """The robot with one and the same of all that does not matter to how it stands: how motion is
-    integrated, how it walks, and on level ground how strong its friction is, since it has nothing
-    to hold.
+def _standing_key(robot: Robot) -> Robot:
+    """Returns the robot with fixed values of all data that do not affect how it stands.
+
+    These are the integrator, the gait and, on level ground, friction. The result is the key of the
+    cache.
     """
     friction, calm = (
         robot.friction,
@@ -104,10 +106,11 @@ def _standing_part(robot: Robot) -> Robot:
     )
 
 
-def _held(robot: Robot, slide: Array) -> Robot:
-    """A sliding robot seen from a frame that slides with it.
+def _in_sliding_frame(robot: Robot, slide: Array) -> Robot:
+    """Returns a sliding robot in a frame that slides with it.
 
-    There gravity is less, and any friction above its own holds it.
+    Gravity is reduced by the frame's acceleration, and friction is raised so that it holds the
+    robot.
     """
     mu = (
         1.0 if robot.friction.law == "none" or robot.friction.mu == 0.0 else 2.0 * robot.friction.mu
@@ -119,29 +122,31 @@ def _held(robot: Robot, slide: Array) -> Robot:
 
 
 def settled(robot: Robot) -> tuple[Array, Array, Array]:
-    """Torso position (3,), quaternion (4,) and joint angles (6, 3) at rest on the ground, servos
-    holding the stance. Raises RobotError.
+    """Returns torso position (3,) [m], quaternion (4,) and joint angles (6, 3) [rad] at rest on the
+    ground.
+
+    Servos hold the stance. Raises RobotError.
     """
     pose = standing(robot)
     return pose.position, pose.quaternion, pose.angle
 
 
 def standing(robot: Robot) -> Standing:
-    """Equilibrium by Newton on torso height, roll, pitch, creep velocities (bristles: what it has
-    given way) and joint angles.
+    """Returns the equilibrium pose; results are cached, and their arrays are read-only.
 
-    Servos in position or torque mode hold the stance by their PD law (a torque servo alone would
-    not stand); kinematic ones exactly. Looked up when it was asked for before: the interface and
-    every picture of a robot need it, and it is most of an export's time. Its arrays are read-only.
-    Raises RobotError when there is no such pose: servos too weak or soft.
+    Newton's method solves for torso height, roll, pitch, creep velocities (bristle law:
+    deflections) and joint angles. Servos in position or torque mode hold the stance by their PD
+    law, because torque servos alone would not stand; kinematic drives hold it exactly. Raises
+    RobotError when there is no such pose because servos are too weak or too soft.
     """
-    return _found(_standing_part(robot))
+    return _cached_standing(_standing_key(robot))
 
 
 @lru_cache(maxsize=64)
-def _found(given: Robot) -> Standing:
-    slide = _slide(given)
-    robot = _held(given, slide) if slide.any() else given
+def _cached_standing(given: Robot) -> Standing:
+    """Solves for the equilibrium of a robot of `_standing_key`."""
+    slide = _slide_acceleration(given)
+    robot = _in_sliding_frame(given, slide) if slide.any() else given
     x = _start(robot)
     loads = _loads(robot, x)
     for _ in range(ITERATIONS):
@@ -159,6 +164,7 @@ def _found(given: Robot) -> Standing:
 
 
 def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
+    """Returns the exception for a residual that does not vanish."""
     got = f"forces out of balance by {np.max(np.abs(residual)):.3g}"
     fix = "raise servo.kp or servo.torque_max, or change the stance"
     return RobotError(
@@ -171,8 +177,9 @@ def _no_equilibrium(robot: Robot, residual: Array) -> RobotError:
 
 
 def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:
-    """One damped step: halved until the residual falls, since feet lose the ground (and all
-    slope) when a step is too long.
+    """Computes a damped Newton step, which is halved until the residual decreases.
+
+    Feet that lose the ground after too long a step have no derivatives.
     """
     residual = _residual(robot, loads)
     try:
@@ -187,8 +194,9 @@ def _newton_step(robot: Robot, x: Array, loads: Array) -> tuple[Array, Array]:
 
 
 def _jacobian(robot: Robot, x: Array, loads: Array) -> Array:
-    """(24, 24) of the residual by differences. A leg's loads do not depend on other legs'
-    angles: all legs' are moved at once.
+    """Returns the Jacobian (24, 24) of the residual by differences.
+
+    The loads of a leg do not depend on other legs' angles, so that all legs move at once.
     """
 
     def change(direction: Array) -> Array:
@@ -212,8 +220,9 @@ def _jacobian(robot: Robot, x: Array, loads: Array) -> Array:
 
 
 def _start(robot: Robot) -> Array:
-    """Unknowns z, roll, pitch, creep (vx, vy, yaw rate), angles: the stance, along the ground,
-    its feet as deep as they carry.
+    """Returns the first unknowns: z, roll, pitch, creep (vx, vy, yaw rate), joint angles.
+
+    The robot is in its stance, parallel to the ground, with the feet at the depth that carries it.
     """
     x = np.zeros(UNKNOWNS)
     normal = ground_normal(robot.terrain)
@@ -227,21 +236,20 @@ def _start(robot: Robot) -> Array:
 
 
 def _attitude(x: Array) -> Array:
-    roll, pitch = (
-        axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1]),
-        axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2]),
-    )
+    """Returns the torso's quaternion (4,) of the unknowns."""
+    roll = axis_quaternion(np.array([1.0, 0.0, 0.0]), x[1])
+    pitch = axis_quaternion(np.array([0.0, 1.0, 0.0]), x[2])
     return quaternion_product(pitch, roll)
 
 
 def _velocity(robot: Robot, x: Array) -> Array:
-    """(3,) creep along the ground."""
+    """Returns the creep velocity (3,) along the ground [m/s]."""
     normal = ground_normal(robot.terrain)
     return np.array([x[3], x[4], -(normal[0] * x[3] + normal[1] * x[4]) / normal[2]])
 
 
 def _bodies(robot: Robot, x: Array) -> Array:
-    """(19, 13) bodies of the unknowns, all moving with the creep."""
+    """Returns the bodies (19, 13) of the unknowns, all moving with the creep."""
     angle = x[6:].reshape(LEGS, JOINTS)
     turning = x[5] * ground_normal(robot.terrain)
     position = np.array([0.0, 0.0, x[0]])
@@ -251,8 +259,9 @@ def _bodies(robot: Robot, x: Array) -> Array:
 
 
 def _bristles(robot: Robot, body: Array) -> Array:
-    """(6, 3) m. What the feet have given way: the creep of these bodies, read as so many
-    preslidings for each m/s; 0 with other laws.
+    """Returns the bristles' deflections (6, 3) [m], 0 with other laws.
+
+    The unknown creep stands for the deflection: one presliding for each m/s.
     """
     if robot.friction.law != "bristle":
         return np.zeros((LEGS, 3))
@@ -265,7 +274,7 @@ def _bristles(robot: Robot, body: Array) -> Array:
 
 
 def _foot_forces(robot: Robot, body: Array) -> Array:
-    """(6, 3) ground on feet [N]. Feet that bristles hold do not move."""
+    """Returns the forces (6, 3) of the ground on the feet [N]; feet with bristles are at rest."""
     feet, bristle = foot_contacts(robot, body), _bristles(robot, body)
     if robot.friction.law == "bristle":
         feet = tuple(replace(foot, velocity=np.zeros(3), approach_speed=0.0) for foot in feet)
@@ -273,16 +282,19 @@ def _foot_forces(robot: Robot, body: Array) -> Array:
 
 
 def _residual(robot: Robot, loads: Array) -> Array:
-    """(24,) force and moment on the robot at the torso, and the torque left over at each joint
-    (kinematic: rad off the stance).
+    """Returns the residual (24,): force and moment on the torso, and the unbalanced torque of each
+    joint.
+
+    For kinematic drives the last are the deviations from the stance [rad].
     """
     weight = robot.torso.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0])
     return np.concatenate([weight + loads[:, :TORSO].sum(axis=0), loads[:, TORSO:].ravel()])
 
 
 def _loads(robot: Robot, x: Array) -> Array:
-    """(6, 9) each leg's force and moment on the torso at its centre of mass, world axes, and
-    what is left over at its joints.
+    """Returns (6, 9): each leg's force and moment on the torso, and its joints' residuals.
+
+    Force and moment act at the torso's centre of mass, world axes.
     """
     body = _bodies(robot, x)
     force = masses(robot)[:, None] * np.array(robot.gravity)
@@ -304,8 +316,10 @@ def _loads(robot: Robot, x: Array) -> Array:
 
 
 def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> tuple[Array, Array]:
-    """Adds each link's force and moment to that above it, leaf to root, in place; returns (6, 6)
-    what the legs do to the torso, and (18,) torques about the joint axes.
+    """Adds each link's force and moment to its parent's, leaf to root, in place.
+
+    Returns the legs' forces and moments on the torso (6, 6), and the torques about the joint axes
+    (18,).
     """
     on_torso, torque = np.zeros((LEGS, TORSO)), np.zeros(LEGS * JOINTS)
     for k, joint in reversed(list(enumerate(joint_models(robot)))):
@@ -324,6 +338,7 @@ def _carry_to_torso(robot: Robot, body: Array, force: Array, moment: Array) -> t
 
 
 def _standing(robot: Robot, x: Array) -> Standing:
+    """Returns the pose of rest of the unknowns."""
     position, angle = np.array([0.0, 0.0, x[0]]), x[6:].reshape(LEGS, JOINTS)
     body = _bodies(robot, x)
     creep = np.zeros(3) if robot.friction.law == "bristle" else _velocity(robot, x)
@@ -339,9 +354,7 @@ def _standing(robot: Robot, x: Array) -> Standing:
 
 
 def _sliding(robot: Robot, pose: Standing, slide: Array) -> Standing:
-    """The pose of a robot that slides: without creep, its bristles stretched to the full
-    downhill.
-    """
+    """Returns the pose of a sliding robot: without creep, with fully deflected bristles."""
     way = (
         robot.friction.presliding * slide / np.linalg.norm(slide)
         if robot.friction.law == "bristle"

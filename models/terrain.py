@@ -1,4 +1,4 @@
-"""The ground: signed distance of a point and the normal there (docs/equations.md, contact)."""
+"""Computes the distance of a point from the ground, and the ground's normal."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from hexapod_cosim.models.records import Array, Terrain
 
 
 def ground_normal(terrain: Terrain) -> Array:
-    """(3,) unit normal of the plane, away from the ground; a slope rises by `incline` along
-    `heading`.
-    """
+    """Returns the unit normal (3,) of the ground plane, out of the ground."""
     incline = terrain.incline if terrain.kind == "slope" else 0.0
     uphill = np.array([np.cos(terrain.heading), np.sin(terrain.heading), 0.0])
     normal: Array = np.cos(incline) * np.array([0.0, 0.0, 1.0]) - np.sin(incline) * uphill
@@ -18,8 +16,8 @@ def ground_normal(terrain: Terrain) -> Array:
 
 
 def ground(terrain: Terrain, point: Array) -> tuple[float, Array]:
-    """Signed distance [m] of a world point (3,), positive above ground, and the unit normal (3,)
-    there.
+    """Returns the signed distance [m] of a world point (3,), positive above the ground, and the
+    unit normal (3,).
     """
     normal = ground_normal(terrain)
     return float(normal @ (point - np.array([0.0, 0.0, terrain.height]))), normal

@@ -1,8 +1,7 @@
-"""Is this robot physically possible? Rules that need more than one number; single values are judged
-by their annotations.
+"""Checks whether a robot is physically possible, by rules that need more than one number.
 
-A robot whose inertias no solid body can have simulates wrongly or not at all, so it is refused on
-load.
+The annotations of the records check single values. A robot with impossible inertias would simulate
+wrongly, so it is rejected on load.
 """
 
 from __future__ import annotations
@@ -25,32 +24,24 @@ from hexapod_cosim.models.records import (
 )
 from hexapod_cosim.models.schema import Vector, check_record
 
-# an inertia printed with four figures may miss the triangle inequality by rounding: a thin rod
-# meets it with equality
+# a thin rod satisfies the triangle inequality with equality; rounding to four digits may violate it
 INERTIA_ROUNDING = 1e-3
-# matter lies within a link's extent, but a short bracket may carry a servo longer than itself; real
-# links stay below 0.8
+# a short bracket may carry a servo longer than itself; real links stay below 0.8
 GYRATION_PER_EXTENT = 2.0
-# the box holds all matter: twice its half diagonal is already generous
+# matter lies within the box; real torsos stay below half of this limit
 GYRATION_PER_DIAGONAL = 1.0
-# largest distance of a stance foot from the plane through all six: a leg's sag under load is of
-# this size
+# m  distance of a stance foot from the plane of all six; legs sag under load by about as much
 STANCE_PLANE_TOLERANCE = 0.01
 AXIS_TOLERANCE = 1e-6
-SETTINGS = (
-    "contact",
-    "friction",
-    "servo",
-    "baumgarte",
-    "solver",
-    "terrain",
-)  # what changes without another body
+# sections that do not concern the bodies
+SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain")
 DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
 
 
 def check_robot(robot: Robot, *, where: str | None = None) -> None:
-    """Raises RobotError on the first rule that the robot breaks; `where` names its file in the
-    message.
+    """Checks a robot. Raises RobotError for the first violated rule.
+
+    where: name of the robot's file for messages.
     """
     at = f"{where or robot.name}: "
     Vector("m/s2", 3).read(robot.gravity, at + "gravity")
@@ -79,7 +70,10 @@ def check_robot(robot: Robot, *, where: str | None = None) -> None:
 
 
 def check_settings(robot: Robot, *, where: str | None = None) -> None:
-    """The same of its laws and settings alone, for a robot of checked bodies."""
+    """Checks the robot's laws and settings only, for a robot with checked bodies.
+
+    Raises RobotError.
+    """
     at = f"{where or robot.name}: "
     for name in SETTINGS:
         check_record(getattr(robot, name), at + name)
@@ -87,8 +81,10 @@ def check_settings(robot: Robot, *, where: str | None = None) -> None:
 
 
 def check_inertia(mass: float, inertia: tuple[float, ...], extent: float, where: str) -> None:
-    """Positive definite, triangle inequality of the principal moments, radius of gyration at
-    most `extent` [m].
+    """Checks the inertia of a body. Raises RobotError.
+
+    It must be positive definite, its principal moments must satisfy the triangle inequality, and
+    its radius of gyration must be at most `extent` [m].
     """
     moments = np.linalg.eigvalsh(inertia_matrix(inertia))
     shown = [float(f"{moment:.4g}") for moment in moments]
@@ -212,7 +208,7 @@ def _check_laws(robot: Robot, at: str) -> None:
 
 
 def _check_static_friction(friction: Friction, where: str) -> None:
-    """That it is not below the kinetic one, and that the law uses it."""
+    """Checks that static friction is not below kinetic friction and that the law uses it."""
     static, mu = friction.mu_static, friction.mu
     if static in (0.0, mu):
         return
@@ -271,7 +267,7 @@ def _check_stance(robot: Robot, at: str) -> None:
 
 
 def _plane_fit(points: Array) -> tuple[Array, float]:
-    """Heights above the least-squares plane z = c + ax + by, and that plane's slope."""
+    """Returns heights above the least-squares plane z = c + ax + by, and that plane's slope."""
     columns = np.column_stack([np.ones(len(points)), points[:, :2]])
     plane = np.linalg.lstsq(columns, points[:, 2], rcond=None)[0]
     return points[:, 2] - columns @ plane, float(np.hypot(plane[1], plane[2]))

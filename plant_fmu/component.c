@@ -1,4 +1,4 @@
-/* component.c - the plant as an FMU's component */
+/* component.c - connects the plant to the FMI layer */
 #include "fmi/component.h"
 
 #include <string.h>
@@ -52,8 +52,7 @@ hxStatus hx_component_set_state(hxComponent *component, const void *bytes) {
   return hx_plant_set_state(plant_of(component), bytes, hx_plant_state_size());
 }
 
-/* ----------------------------------------------------------------------------------------------
- * model exchange */
+/* ---- model exchange ---- */
 
 static void get_state(const hxComponent *component, struct hxVariables *variables) {
   hx_plant_get_coordinates(const_plant(component), &variables->state);
@@ -81,7 +80,7 @@ static void indicate(const hxComponent *component, double indicator[]) {
   hx_plant_indicators(const_plant(component), indicator);
 }
 
-/* an event sets the bristles of feet without contact to zero: the only states that events change */
+/* Updates the contacts; bristles are the only states that an event sets. */
 static int update(hxComponent *component, struct hxVariables *variables) {
   hxCoordinates now;
   if (!hx_plant_update_contacts(plant_of(component))) return 0;

@@ -1,3 +1,1 @@
-"""What the compliant control is worth against the kinematic one, part by part and case by case;
-`python -m benchmarks.control`.
-"""
+"""Compares compliant with kinematic control, part by part: `python -m benchmarks.control`."""

@@ -1,5 +1,6 @@
-"""`python -m benchmarks.control [--quick] [--only SECTION] [--tuning]`: walks the cases, prints
-the tables, writes them to docs and CSV.
+"""Runs the cases of the comparison, prints the tables and writes them to docs and CSV files.
+
+usage: python -m benchmarks.control [--quick] [--only SECTION] [--tuning]
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ from benchmarks.control.tables import changes_table, put_into, refused, robustne
 from hexapod_cosim.models import HexapodError
 
 PAGE, RESULTS = ROOT / "docs" / "control.md", ROOT / "benchmarks" / "results" / "control"
-QUICK_SEEDS, QUICK_CYCLES = 2, 3.0  # the least with figures
-QUICK_CASES = 8  # every n-th case of a section, from the last on: all parts, for one
+QUICK_SEEDS, QUICK_CYCLES = 2, 3.0  # the smallest numbers that give metrics
+QUICK_CASES = 8  # every n-th case of a section, counted from the last
 
 
 def sections() -> list[Section]:
-    """Every table of the page."""
+    """Returns the sections of the page, one for each table."""
     judged = seeds("judged")
     grids = [
         Section(name=f"grid {robot}", cases=grid(robot), seeds=judged)
@@ -48,7 +49,7 @@ def sections() -> list[Section]:
 
 
 def tuning_sections() -> list[Section]:
-    """What gains may be tuned on."""
+    """Returns the sections that may be used for tuning."""
     return [
         Section(name=f"tuning {robot}", cases=tuning(robot), seeds=seeds("tuning"))
         for robot in DATA["tuning"]["robots"]
@@ -56,7 +57,7 @@ def tuning_sections() -> list[Section]:
 
 
 def quick(chosen: Sequence[Section]) -> list[Section]:
-    """A few cases and seeds of each."""
+    """Returns the sections with a few cases and seeds."""
     return [
         Section(
             name=one.name,
@@ -68,7 +69,7 @@ def quick(chosen: Sequence[Section]) -> list[Section]:
 
 
 def tables(measured: Measured) -> dict[str, str]:
-    """Markdown by section."""
+    """Returns the tables in Markdown by section."""
     return {
         name: (robustness_table if name == "robustness" else changes_table)(cases)
         for name, cases in measured.items()
@@ -76,8 +77,9 @@ def tables(measured: Measured) -> dict[str, str]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """All tables, in some five minutes on two processors; --quick in a minute, into build/bench
-    instead of docs and results.
+    """Makes all tables in some five minutes on two processors.
+
+    With --quick it takes a minute and writes into build/bench instead of docs and results.
     """
     parser = argparse.ArgumentParser(prog="python -m benchmarks.control", description=main.__doc__)
     parser.add_argument(
@@ -115,14 +117,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def expect_walks(measured: Measured) -> None:
-    """Raises HexapodError when a whole table would be empty: that is no result."""
+    """Raises HexapodError when a whole table would be empty."""
     for name, cases in measured.items():
         if all(map(refused, cases.values())):
             reason = next(run.reason for case in cases.values() for run in case.first)
             raise HexapodError(
                 "no case of this table could be walked",
                 got=reason,
-                fix="mend that first; nothing was written",
+                fix="fix that first; nothing was written",
                 where=name,
             )
 
@@ -134,12 +136,14 @@ def walked(chosen: Sequence[Section], cycles: float | None) -> Measured:
         return measure(
             chosen,
             cycles=cycles,
-            tell=lambda done, total: bar.update(task, completed=done, total=total),
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
 
 
 def write(measured: Measured, *, page: Path | None) -> Path:
-    """CSV of each section; the tables into the page, if given. Returns the CSV files' folder."""
+    """Writes CSV files, and the tables into the page if given; returns the folder of the CSV
+    files.
+    """
     folder = BUILD / "control" if page is None else RESULTS
     folder.mkdir(parents=True, exist_ok=True)
     for name, cases in measured.items():

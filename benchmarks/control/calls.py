@@ -1,6 +1,4 @@
-"""What a call of the controller takes, within a co-simulation: `python -m
-benchmarks.control.calls`.
-"""
+"""Measures controller calls in a co-simulation: `python -m benchmarks.control.calls`."""
 
 from __future__ import annotations
 
@@ -34,22 +32,23 @@ SHARES = {"median": 50.0, "90 %": 90.0, "99 %": 99.0, "longest": 100.0}
 
 
 class Timed:
-    """A controller that notes how long its calls take [s]."""
+    """A controller that records the duration of its calls [s]."""
 
     def __init__(self, controller: Controller) -> None:
         self._controller, self.times = controller, list[float]()
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """The controller's own."""
+        """Calls the controller and measures the time."""
         begin = perf_counter()
-        told = self._controller.step(t, command, measurement)
+        joints = self._controller.step(t, command, measurement)
         self.times.append(perf_counter() - begin)
-        return told
+        return joints
 
 
 def call_times(fmu: Path, gains: Gains | None) -> NDArray[np.float64]:
-    """us    (steps,) of every call in a walk, the least of some walks: what else the machine
-    does only adds to it
+    """Returns the time of every call in a walk (steps,) [us].
+
+    Each is the least of some walks, because other programs only lengthen it.
     """
     scenario = load_scenario(SCENARIO)
     robot, schedule = load_robot(scenario.robot), make_schedule(scenario)

@@ -1,5 +1,6 @@
-"""The cases of scenarios.toml as settings over a scenario: one factor at a time around the
-judged walk, and the plane of gait and speed.
+"""Turns the cases of scenarios.toml into settings of a scenario.
+
+The cases vary one factor at a time around the judged walk, and gait and speed together.
 """
 
 from __future__ import annotations
@@ -20,23 +21,19 @@ DATA: dict[str, Any] = tomllib.loads(
     (Path(__file__).parent / "scenarios.toml").read_text(encoding="utf-8")
 )
 PARTS = tuple(item.name for item in fields(Parts))
-SWITCH = "compliance."  # what begins so says nothing to kinematic control
+SWITCH = "compliance."  # settings that begin with it do not apply to kinematic control
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A walk to be walked under both controls: what is set over the scenario (as with --set),
-    and under which name it is shown.
-    """
+    """A walk to be run under both controls: its name and its settings (as with --set)."""
 
     name: str
     scenario: str
     settings: tuple[str, ...]
 
     def plan(self, control: str, seed: int) -> Scenario:
-        """The scenario of a seed. Raises ScenarioError for a setting that this version does not
-        know.
-        """
+        """Returns the scenario of a seed. Raises ScenarioError for an unknown setting."""
         kept = [
             text for text in self.settings if control == "compliant" or not text.startswith(SWITCH)
         ]
@@ -48,19 +45,19 @@ class Case:
 
 
 def seeds(name: str) -> range:
-    """Of a set of cases, or of the robustness table, which has the judged walk's first ones."""
+    """Returns the seeds of a set of cases; by default they start at the first judged seed."""
     table = DATA[name]
     first = table.get("first_seed", DATA["judged"]["first_seed"])
     return range(first, first + table["seeds"])
 
 
 def judged_walk(name: str = "judged", *settings: str) -> Case:
-    """The walk that everything is judged on first."""
+    """Returns the judged walk with settings."""
     return Case(name=name, scenario=DATA["judged"]["scenario"], settings=settings)
 
 
 def ablation() -> list[Case]:
-    """No part, each part alone, all but each part, all parts."""
+    """Returns cases with no part, each part alone, all but each part, and all parts."""
     off = {part: f"{SWITCH}{part}=false" for part in PARTS}
     alone = [
         judged_walk(f"{part} alone", *(text for other, text in off.items() if other != part))
@@ -71,8 +68,9 @@ def ablation() -> list[Case]:
 
 
 def sticking() -> list[Case]:
-    """The judged walk on ground that holds a foot still, with all parts and with the tangential
-    PID alone.
+    """Returns the judged walk on ground that holds a foot still.
+
+    One case has all parts, the other the slip PID alone.
     """
     law = DATA["judged"]["sticking"]
     alone = next(case for case in ablation() if case.name == "slip_pid alone")
@@ -80,8 +78,9 @@ def sticking() -> list[Case]:
 
 
 def model_errors() -> list[Case]:
-    """The judged walk on plants that are not the controller's model: with all parts, and without
-    the slip PID.
+    """Returns the judged walk on plants that differ from the controller's model.
+
+    Each has a case with all parts and one without the slip PID.
     """
     entries = [entry for entry in DATA["robustness"]["cases"] if entry.get("model_error")]
     off = f"{SWITCH}slip_pid=false"
@@ -93,14 +92,12 @@ def model_errors() -> list[Case]:
 
 
 def robustness() -> list[Case]:
-    """The judged walk with something wrong."""
+    """Returns the judged walk with disturbances, faults and model errors."""
     return [judged_walk(entry["name"], *entry["settings"]) for entry in DATA["robustness"]["cases"]]
 
 
 def grid(robot: str) -> list[Case]:
-    """Of the judged set: every gait at every speed, then friction and payload around the judged
-    walk.
-    """
+    """Returns every gait at every speed, then friction and payload around the judged walk."""
     table, own = DATA["judged"], load_robot(robot)
     frictions = [
         _walk(table, f"mu {mu:g}", robot, [f"friction.mu={mu}"])
@@ -116,8 +113,9 @@ def grid(robot: str) -> list[Case]:
 
 
 def tuning(robot: str) -> list[Case]:
-    """Of the tuning set: the same, where every case differs from every judged one in speed,
-    friction, payload and timing at once.
+    """Returns the same cases for tuning.
+
+    Every case differs from every judged one in speed, friction, payload and timing.
     """
     table = DATA["tuning"]
     (mu, *frictions), (load, *payloads) = table["mu"], table["payload"]

@@ -1,6 +1,4 @@
-"""Cases walked under both controls, over seeds, in one batch: what several cases have in common
-is walked once.
-"""
+"""Runs cases under both controls over seeds in one batch; equal runs of several cases run once."""
 
 from __future__ import annotations
 
@@ -17,12 +15,12 @@ from hexapod_cosim.cosim.run.batch import run_batch
 from hexapod_cosim.cosim.scenario.records import CONTROLS, Scenario
 from hexapod_cosim.models import ScenarioError, load_robot
 
-Tell = Callable[[int, int], None]  # runs done, of how many
+Progress = Callable[[int, int], None]  # runs done, of how many
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A table's cases."""
+    """The cases and seeds of one table."""
 
     name: str
     cases: Sequence[Case]
@@ -37,9 +35,15 @@ def measure(
     *,
     cycles: float | None = None,
     workers: int | None = None,
-    tell: Tell | None = None,
+    progress: Progress | None = None,
 ) -> Measured:
-    """Walks all cases of all sections. `cycles` of the gait replace the scenarios' own duration."""
+    """Runs all cases of all sections.
+
+    Args:
+        cycles: duration of every run in gait cycles; None: that of the scenario.
+        workers: number of worker processes; None: one for each processor.
+        progress: is called with the number of finished runs and of all runs.
+    """
     places = [
         (section, case, control)
         for section in sections
@@ -51,7 +55,7 @@ def measure(
         [_place(plans, case, control, seed, cycles) for seed in section.seeds]
         for section, case, control in places
     ]
-    runs = dict(zip(plans, _walk(list(plans.values()), workers, tell), strict=True))
+    runs = dict(zip(plans, _walk(list(plans.values()), workers, progress), strict=True))
     found: dict[str, dict[str, Comparison]] = {section.name: {} for section in sections}
     walked = [[run if isinstance(run, Summary) else runs[run] for run in row] for row in wanted]
     for (section, case, _), first, second in zip(
@@ -64,8 +68,8 @@ def measure(
 def _place(
     plans: dict[str, Scenario], case: Case, control: str, seed: int, cycles: float | None
 ) -> str | Summary:
-    """Where the run of a case will stand among the plans; a case that this version does not know
-    is refused at once.
+    """Adds the run of a case to the plans and returns its key, or the refusal of an unknown
+    case.
     """
     try:
         plan = case.plan(control, seed)
@@ -89,11 +93,13 @@ def _period(plan: Scenario) -> float:
     return make_gait(load_robot(plan.robot), **dict(plan.settings.get("gait", {}))).period
 
 
-def _walk(plans: Sequence[Scenario], workers: int | None, tell: Tell | None) -> list[Summary]:
+def _walk(
+    plans: Sequence[Scenario], workers: int | None, progress: Progress | None
+) -> list[Summary]:
     done: list[Summary] = []
     with closing(run_batch(plans, workers=workers, compiled=True)) as runs:
         for run in runs:
             done.append(run)
-            if tell is not None:
-                tell(len(done), len(plans))
+            if progress is not None:
+                progress(len(done), len(plans))
     return done

@@ -1,4 +1,4 @@
-"""The measured as Markdown for docs/control.md, between its markers, and as CSV."""
+"""Writes the measurements as Markdown between the markers of docs/control.md, and as CSV."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ COLUMNS = {
     "electrical_cost": "electrical cost",
     "servo_load_max": "hottest servo",
 }
-# metric -> heading, and what the figure is multiplied by for people
+# metric -> heading, and factor to its unit
 PLAIN = {
     "slip_per_metre": ("slip [mm/m]", 1e3),
     "height_rms": ("height [mm]", 1e3),
@@ -39,14 +39,17 @@ PLAIN = {
     "peak_force": ("peak force [BW]", 1.0),
 }
 BEGIN, END = "<!-- control:{} -->", "<!-- /control:{} -->"
-LEGEND = "Changes from kinematic to compliant, means over {} seeds; ± half a 95 % interval where it shows; ≈ not sure, or too small to measure."
+LEGEND = (
+    "Changes from kinematic to compliant, means over {} seeds;"
+    " ± half a 95 % interval where it shows; ≈ not sure, or too small to measure."
+)
 
 Cases = Mapping[str, Comparison]  # by name
 
 
 def changes_table(cases: Cases) -> str:
-    """A row per case: how many runs walked to the end under either control, and the change of
-    every metric.
+    """Returns a row for each case: completed runs under each control, and changes of all
+    metrics.
     """
     rows = [
         [name, _walked(item), *(cell(key, item.changes[key]) for key in COLUMNS)]
@@ -66,8 +69,8 @@ def changes_table(cases: Cases) -> str:
 
 
 def robustness_table(cases: Cases) -> str:
-    """A row per case: how many runs walked to the end, a few figures under either control, and
-    how long compliance was given up.
+    """Returns a row for each case: completed runs, some metrics under each control, and
+    fallback.
     """
     headings = ["case", "walked", *(text for text, _ in PLAIN.values()), "fallback"]
     rows = [
@@ -75,21 +78,24 @@ def robustness_table(cases: Cases) -> str:
         for name, item in cases.items()
         if not refused(item)
     ]
-    note = "Kinematic → compliant, means over {} seeds. Fallback: share of the time in which a leg walked without feedback."
+    note = (
+        "Kinematic → compliant, means over {} seeds."
+        " Fallback: share of the time in which a leg walked without feedback."
+    )
     return "\n\n".join(
         filter(None, [_markdown(headings, rows), _legend(cases, note), _left_out(cases)])
     )
 
 
 def refused(comparison: Comparison) -> bool:
-    """Whether a control could not begin at all."""
+    """Returns whether all runs of a control were refused."""
     return any(
         all(run.status == REFUSED for run in runs) for runs in (comparison.first, comparison.second)
     )
 
 
 def cell(name: str, change: Change) -> str:
-    """A change for people: relative where that has a meaning, else the value it came to."""
+    """Formats a change: relative where that is defined, else the value under compliant control."""
     if not change.pairs:
         return "-"
     if not math.isfinite(change.relative):
@@ -129,7 +135,7 @@ def _legend(cases: Cases, text: str = LEGEND) -> str:
 
 
 def _left_out(cases: Cases) -> str:
-    """What could not be walked, and why."""
+    """Lists the refused cases with the reason."""
     lost = {
         name: next(run.reason for run in (*item.first, *item.second) if run.reason)
         for name, item in cases.items()

@@ -1,11 +1,12 @@
-/* derivative.c - microseconds of one evaluation of the right-hand side, by kernel: `derivative WALK
- * REPEATS [KERNEL MULTIPLIERS]`
+/* derivative.c - measures one evaluation of the right-hand side, for each kernel
  *
- * Evaluated are the states of a walk, one after the other, so that neither the branch predictor nor
- * the cache knows the answer. Prints a JSON line, for each kernel that runs here {"plain": us,
- * "multipliers": us}: the least of the repeats' means, since noise only ever adds. With a kernel
- * and 0 or 1 named, that is evaluated ROUNDS times at every state and nothing is printed: for
- * counting instructions.
+ *     derivative WALK REPEATS [KERNEL MULTIPLIERS]
+ *
+ * It evaluates the states of a walk one after the other, so that neither the branch predictor nor
+ * the cache can repeat results. It prints a JSON line with {"plain": us, "multipliers": us} for
+ * each kernel that this processor supports: the least of the repeats' means, because noise only
+ * adds. With KERNEL and MULTIPLIERS (0 or 1) it evaluates that one ROUNDS times at every state and
+ * prints nothing; callgrind counts its instructions.
  */
 #include <string.h>
 
@@ -36,7 +37,7 @@ static int visit(const Walk *walk, Visited *visited) {
   return 0;
 }
 
-/* us of one evaluation; the results are summed so that none can be left out */
+/* Returns the time of one evaluation [us]. It sums the results, so that none is optimised away. */
 __attribute__((noinline)) static double measure(const hxKernel *kernel, const Visited *visited,
                                                 int multipliers, double *sum) {
   hxPlantMotion rate;

@@ -1,10 +1,9 @@
-/* driver.h - what all drivers share: the walk file, the clock, the command line and the JSON line
- * they print
+/* driver.h - shared code of all drivers: walk file, clock, command line and output as a JSON line
  *
  *     driver WALK METHOD STEP REPEATS PATH_OUT
  *
- * Timed is the loop over the macro-steps alone: hand over the commands, integrate, read the torso's
- * position.
+ * The time is that of the loop over the macro-steps alone: pass the commands, integrate, read the
+ * torso's position.
  */
 #ifndef BENCH_DRIVER_H
 #define BENCH_DRIVER_H
@@ -23,16 +22,15 @@ typedef struct {
   hxInput *input;  /* n of them */
 } Walk;
 
-/* One engine. Functions return 0 when they succeed; self is whatever the driver keeps. */
+/* One engine. Functions return 0 on success; self points to the data of the driver. */
 typedef struct {
   int (*prepare)(void *self, const Walk *walk, const char *method, double step);
   int (*start)(void *self); /* the initial state at t = 0 */
   int (*advance)(void *self, const hxInput *input, double t_end);
   void (*torso)(void *self, double position[3]); /* m  centre of mass */
   double (*evaluations)(void *self); /* of the right-hand side since start */
-  void (*evaluate)(
-      void *self, const hxInput *input,
-      int count); /* the right-hand side here, count times; NULL: not to be had alone */
+  /* evaluates the right-hand side count times; NULL if the engine cannot */
+  void (*evaluate)(void *self, const hxInput *input, int count);
 } Driver;
 
 enum { STATES = 100, EVALUATIONS_A_STATE = 10 };
@@ -58,7 +56,7 @@ static inline int walk_read(const char *path, Walk *walk) {
   return good ? 0 : 1;
 }
 
-/* Walks once; path: (n + 1) x 3. Returns 0, or 1 when the engine gave up. */
+/* Runs the walk once; path: (n + 1) x 3. Returns 0, or 1 if the engine failed. */
 static inline int walk_once(const Driver *driver, void *self, const Walk *walk, double *path,
                             double *seconds) {
   if (driver->start(self)) return 1;
@@ -72,8 +70,7 @@ static inline int walk_once(const Driver *driver, void *self, const Walk *walk, 
   return 0;
 }
 
-/* Mean time of an evaluation over a walk's first states, in microseconds; negative when there is
- * none to be had. */
+/* Returns the mean time of an evaluation over a walk's first states [us], negative if unknown. */
 static inline double evaluation_time(const Driver *driver, void *self, const Walk *walk) {
   double seconds = 0.0;
   if (!driver->evaluate || driver->start(self)) return -1.0;

@@ -1,5 +1,4 @@
-// idle_fmu.cpp - an FMU's binary that computes nothing: what a run of it takes is the master's own
-// time
+// idle_fmu.cpp - the binary of an FMU that computes nothing; a run of it measures the master alone
 #include <cstddef>
 
 extern "C" {

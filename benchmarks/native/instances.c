@@ -1,17 +1,18 @@
-/* instances.c - many plants in one process, stepped in turn: `instances WALK TOLERANCE COUNT`
- * prints a JSON line
+/* instances.c - measures many plants in one process, stepped in turn
  *
- * {"microseconds_per_step": of one plant's macro-step, "bytes_per_instance": its structure,
- * "resident_per_instance": by which the process grew, null where the system does not tell,
- * "allocations": in all steps together}. All plants walk the same walk: what grows is the memory
- * they touch.
+ *     instances WALK TOLERANCE COUNT
+ *
+ * It prints a JSON line: "microseconds_per_step" of one plant, "bytes_per_instance" of its
+ * structure, "resident_per_instance", the growth of the process (null if the system does not report
+ * it), and "allocations" in all steps. All plants run the same walk; only the used memory grows
+ * with COUNT.
  */
 #include <unistd.h>
 
 #include "driver.h"
 #include "state.h"
 
-/* the linker puts these in the place of the allocator, for the code of this program */
+/* The linker replaces the allocator by these functions, for the code of this program. */
 static long allocations;
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
@@ -26,7 +27,7 @@ void *__wrap_realloc(void *block, size_t size) {
   return ++allocations, __real_realloc(block, size);
 }
 
-/* bytes of the process in memory; 0 where there is no /proc */
+/* Returns the resident memory of the process [bytes], 0 without /proc. */
 static double resident(void) {
   double pages = 0.0, ignored;
   FILE *file = fopen("/proc/self/statm", "r");

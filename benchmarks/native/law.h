@@ -1,5 +1,6 @@
-/* law.h - the plant's laws for the peers, written from docs/equations.md and not from its sources:
- * servo, contact, friction
+/* law.h - the plant's laws of servo, contact and friction for the peers
+ *
+ * They are written from docs/equations.md and not from the plant's sources.
  *
  * Exact restitution, tanh friction, flat ground, servo in position mode; law_compile refuses
  * anything else.
@@ -59,7 +60,7 @@ static inline double law_within(double x, double low, double high) {
   return x < low ? low : x > high ? high : x;
 }
 
-/* N m  motor within its torque-speed line, and the gear's dry friction */
+/* Returns the torque of motor (torque-speed line) and gear (dry friction) [N m]. */
 static inline double law_servo(const Law *law, double angle, double speed, double angle_ref,
                                double speed_ref, double torque_ref) {
   const double wanted = law->kp * (angle_ref - angle) + law->kd * (speed_ref - speed) + torque_ref;
@@ -74,8 +75,8 @@ static inline double law_damping(const Law *law, double impact_speed) {
 }
 
 /* Ground on foot [N], world axes: centre of the sphere and velocity of its lowest point. A foot
- * that goes through the ground for the first time within a step feels it at once, at its present
- * speed: the peers do not stop at touch-downs. */
+ * that enters the ground within a step gets the contact force at once, at its present speed,
+ * because the peers do not stop at touch-downs. */
 static inline double law_foot(const Law *law, const LawFoot *foot, const double centre[3],
                               const double velocity[3], double force[3]) {
   const double depth = law->radius - (centre[2] - law->ground), approach = -velocity[2];
@@ -90,7 +91,7 @@ static inline double law_foot(const Law *law, const LawFoot *foot, const double 
   return depth;
 }
 
-/* Touch-down and lift-off, after a step. */
+/* Updates touch-down and lift-off after a step. */
 static inline void law_switch(const Law *law, LawFoot *foot, double depth, double approach) {
   if (depth > 0.0 && !foot->closed) foot->damping = law_damping(law, approach);
   foot->closed = depth > 0.0;

@@ -1,4 +1,4 @@
-/* mujoco.c - MuJoCo under the drivers' command line
+/* mujoco.c - runs a walk in MuJoCo, with the drivers' command line (driver.h)
  *
  * METHOD: "own-" or "law-", then an integrator of MuJoCo: implicitfast, RK4, Euler, implicit. STEP:
  * its time step. own: MuJoCo's contact, friction and servos as its users have them: a sphere on a
@@ -28,9 +28,7 @@ typedef struct {
 
 static MuJoCo *present; /* the callback has no argument of its own */
 
-/* ---- model
- * -----------------------------------------------------------------------------------------------------------
- */
+/* ---- model ---- */
 
 typedef struct {
   char text[XML_SIZE];
@@ -111,8 +109,7 @@ static mjModel *load(const Xml *xml) {
   return model;
 }
 
-/* ---- the plant's law as a passive force
- * ------------------------------------------------------------------------------ */
+/* ---- the plant's law as a passive force ---- */
 
 static void cross(const mjtNum *a, const mjtNum *b, mjtNum *c) { mju_cross(c, a, b); }
 
@@ -172,9 +169,7 @@ static void apply_law(const mjModel *m, mjData *d) {
   self->fresh = 0;
 }
 
-/* ---- driver
- * ----------------------------------------------------------------------------------------------------------
- */
+/* ---- driver ---- */
 
 static int prepare(void *self, const Walk *walk, const char *method, double step) {
   static Xml xml;

@@ -1,5 +1,6 @@
-// pinocchio.cpp - Pinocchio's articulated-body algorithm with the plant's laws (law.h) under the
-// drivers' command line
+// pinocchio.cpp - runs a walk in Pinocchio with the plant's laws (law.h)
+//
+// The command line is that of the drivers (driver.h).
 //
 // METHOD: rk4, semi-implicit. STEP: step size. An evaluation is kinematics, servos, six contacts
 // and ABA with external forces.
@@ -53,7 +54,8 @@ pinocchio::Inertia inertia(double mass, const double *com, const double *J) {
   return pinocchio::Inertia(mass, vector(com), about_com);
 }
 
-// The cheap joint of an axis of the frame, turned round where it points back; else the general one.
+// Returns the fast joint type for an axis of the frame (reversed for a negative axis), or the
+// general one.
 pinocchio::JointIndex add_joint(Engine &engine, pinocchio::JointIndex parent,
                                 const pinocchio::SE3 &placement, const Vector3d &axis, double *sign,
                                 const std::string &name) {

@@ -1,4 +1,4 @@
-/* plant.c - this plant under the drivers' command line
+/* plant.c - runs a walk in this plant, with the drivers' command line (driver.h)
  *
  * METHOD: a method's name, error control with the tolerance STEP; with "-fixed" appended, steps of
  * STEP seconds.

@@ -1,4 +1,6 @@
-// simbody.cpp - a walk in Simbody with the plant's laws (law.h), under the drivers' command line
+// simbody.cpp - runs a walk in Simbody with the plant's laws (law.h)
+//
+// The command line is that of the drivers (driver.h).
 //
 // METHOD: CPodesBDF, RungeKuttaMerson, RungeKutta3, SemiExplicitEuler2, STEP: accuracy;
 // SemiExplicitEuler, STEP: step size. An evaluation is realize(Acceleration): kinematics, servos,
@@ -101,8 +103,7 @@ private:
 // ----------------------------------------------------------------------------------------------
 // law
 
-// All a run needs; its discrete state, the command's number and the feet, is changed by the event
-// handlers.
+// Data of a run. Event handlers change its discrete state: the command's number and the feet.
 struct Setup {
   const Robot &robot;
   const Walk &walk;
@@ -139,7 +140,7 @@ struct Setup {
 
   void close(int leg, double impact_speed) { foot[leg] = {1, law_damping(&law, impact_speed)}; }
 
-  // in the air it makes no difference when
+  // the time of a lift-off within the step has no effect
   void open_lifted(const State &state) {
     robot.system.realize(state, Stage::Position);
     for (int leg = 0; leg < HX_LEGS; ++leg)
@@ -426,7 +427,7 @@ Run walk_once(const Method &method, double step, Setup &setup, const State &firs
   return run;
 }
 
-// Every evaluation at another state, so that nothing cached serves.
+// Evaluates at another state each time, so that no cached result is used.
 double microseconds_per_evaluation(Setup &setup, State state) {
   setup.start(state);
   const double begin = seconds_now();

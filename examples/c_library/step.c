@@ -1,4 +1,4 @@
-/* step.c - the plant as a C library: the robot stands, lifts a leg, goes back and is pushed.
+/* step.c - uses the plant as a C library: the robot stands, lifts a leg, is restored and pushed.
  *
  * cc -std=c11 step.c $(pkg-config --cflags --libs hexapod-plant) -o step
  */
@@ -21,7 +21,7 @@ static void advance(hxPlant *plant, const hxInput *input, double duration) {
     }
 }
 
-static void tell(hxPlant *plant, const hxInput *input, const char *what) {
+static void print_state(hxPlant *plant, const hxInput *input, const char *what) {
   hxOutput seen;
   double sum = 0.0;
   int feet = 0;
@@ -47,18 +47,18 @@ int main(void) {
   }
   hx_input_default(&input); /* the standing pose */
   advance(plant, &input, 1.0);
-  tell(plant, &input, "stands");
+  print_state(plant, &input, "stands");
   hx_plant_get_state(plant, saved);
 
   input.angle_ref[RM][FEMUR] += 0.4; /* rad */
   advance(plant, &input, 1.0);
-  tell(plant, &input, "lifts");
+  print_state(plant, &input, "lifts");
 
   if (hx_plant_set_state(plant, saved, hx_plant_state_size()) != HX_OK) return EXIT_FAILURE;
   hx_input_default(&input);
   input.push_force[0] = 10.0; /* N */
   advance(plant, &input, 0.2);
-  tell(plant, &input, "pushed");
+  print_state(plant, &input, "pushed");
 
   hx_plant_destroy(plant);
   free(saved);

@@ -1,3 +1,1 @@
-"""URDF in both directions: table.py reads one as the tables of a robot file, writer.py writes a
-robot as one.
-"""
+"""Converts URDFs: table.py reads one as a robot file's tables, writer.py writes one."""

@@ -1,6 +1,4 @@
-"""What a URDF cannot say and nobody gave: scaled from the ATHENA-like robot, as assumed.toml is
-copied from it.
-"""
+"""Computes defaults for data that a URDF lacks, scaled from the ATHENA-like robot."""
 
 from __future__ import annotations
 
@@ -28,7 +26,9 @@ GAIT_PERIOD, HIP_HEIGHT = 1.0, 0.12
 
 
 def assume_servo(servo: Table) -> list[str]:
-    """Fills in what follows from the stall torque; returns the names of what was assumed."""
+    """Fills in the servo data that follow from the stall torque; returns the names of assumed
+    values.
+    """
     if not isinstance(servo.get("torque_max"), float):
         return []
     kp = servo.get("kp", servo["torque_max"] / TORQUE_ANGLE)
@@ -44,7 +44,7 @@ def assume_servo(servo: Table) -> list[str]:
 
 
 def assume_gait(gait: Table, height: float) -> list[str]:
-    """Fills in strides and their period for hips at a height [m] above the feet."""
+    """Fills in stride and period for hips at a height [m] above the feet."""
     taller = height / HIP_HEIGHT if height > 0.0 else 1.0  # what has no height is refused later
     scaled = {"stride": STRIDE * height, "step_height": STEP_HEIGHT * height}
     return _fill(gait, {"period": GAIT_PERIOD * math.sqrt(taller), **scaled})
@@ -57,7 +57,7 @@ def _fill(table: Table, values: Mapping[str, float]) -> list[str]:
 
 
 def equivalent_box(mass: float, inertia: list[float]) -> list[float]:
-    """Edges [m] of the homogeneous box of these moments about its centre."""
+    """Returns the edges [m] of the homogeneous box with these moments about its centre."""
     xx, yy, zz = inertia[:3]
     return [
         math.sqrt(max(6.0 * square / mass, 1e-8))
@@ -66,8 +66,9 @@ def equivalent_box(mass: float, inertia: list[float]) -> list[float]:
 
 
 def assume_stances(legs: Mapping[str, Table]) -> list[str]:
-    """Joint angles for legs that have none: femur a little up, tibia steeply down, all feet at
-    one height. Returns those legs' names.
+    """Fills in the joint angles of legs without a stance; returns those legs' names.
+
+    The femur points slightly up and the tibia steeply down; all feet have one height.
     """
     missing = [
         name
@@ -88,9 +89,7 @@ def assume_stances(legs: Mapping[str, Table]) -> list[str]:
 
 
 class _Plane:
-    """A leg of the controller's pattern in its own plane (controller/walk/kinematics.py has the
-    equations).
-    """
+    """A leg of the controller's pattern in its own plane (see controller/walk/kinematics.py)."""
 
     def __init__(self, leg: Table) -> None:
         tips = [
@@ -101,13 +100,13 @@ class _Plane:
         self.tilt = [math.atan2(tip.imag, tip.real) for tip in tips[1:]]
 
     def foot_height(self, rise: float) -> float:
-        """z of the foot [m] in the torso's frame with the femur at `rise`."""
+        """Returns z of the foot [m] in the torso's frame with the femur at `rise`."""
         return float(
             self.base + self.size[0] * math.sin(rise) + self.size[1] * math.sin(TIBIA_RISE)
         )
 
     def stance(self, height: float) -> Array:
-        """(3,) angles [rad] that put the foot at a height [m]."""
+        """Returns the angles (3,) [rad] that put the foot at a height [m]."""
         wanted = (height - self.foot_height(0.0)) / max(self.size[0], 1e-9)
         rise = math.asin(min(max(wanted, -1.0), 1.0))
         femur = rise - self.tilt[0]

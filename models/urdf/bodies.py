@@ -1,4 +1,4 @@
-"""A URDF's tree with its fixed joints merged: a body and the joints that leave it."""
+"""Merges a URDF's links at fixed joints into bodies and the joints between them."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from hexapod_cosim.models.urdf.elements import Inertial, Sphere, Urdf, UrdfJoint
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A link that is part of a body."""
+    """A link of a body."""
 
     link: UrdfLink
     rotation: Array  # (3, 3) link to body
     position: Array  # (3,) m    of the link's frame in the body's
 
     def point(self, place: Array) -> Array:
-        """(3,) a point of the link in the body's frame [m]."""
+        """Returns a point (3,) of the link in the body's frame [m]."""
         return self.position + self.rotation @ place
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A moving joint and the body behind it."""
+    """A moving joint and the body that it moves."""
 
     joint: UrdfJoint
     rotation: Array  # (3, 3) child body to this one at angle 0
@@ -37,7 +37,7 @@ class Branch:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Links that move as one; its frame is its first link's."""
+    """Links that move together; the frame is that of the first link."""
 
     name: str
     members: list[Member] = field(default_factory=list)
@@ -45,7 +45,7 @@ class Body:
 
     @property
     def spheres(self) -> list[Sphere]:
-        """Collision spheres in the body's frame."""
+        """Returns the collision spheres in the body's frame."""
         return [
             Sphere(member.point(sphere.centre), sphere.radius)
             for member in self.members
@@ -53,8 +53,9 @@ class Body:
         ]
 
     def inertial(self, where: str) -> Inertial:
-        """Mass, centre of mass and inertia of all members together, in the body's frame. Raises
-        RobotError when there is no mass.
+        """Returns mass, centre of mass and inertia of all members together, in the body's frame.
+
+        Raises RobotError without mass.
         """
         parts = [_moved(member) for member in self.members if member.link.inertial is not None]
         if not parts:
@@ -69,7 +70,7 @@ class Body:
 
     @property
     def problem(self) -> RobotError | None:
-        """Why its inertia is none of a possible body."""
+        """The reason why the inertia is impossible, or None."""
         found = (
             member.link.inertial.problem
             for member in self.members
@@ -97,8 +98,9 @@ def _together(parts: list[Inertial]) -> Inertial:
 
 
 def root_body(urdf: Urdf) -> Body:
-    """The torso with everything behind it. Raises RobotError for what is no tree, or stands
-    bolted to the world.
+    """Returns the torso with all bodies that follow.
+
+    Raises RobotError for a graph that is not a tree, or a torso fixed to the world.
     """
     leaving = _leaving(urdf)
     root = _unworldly(_root(urdf), leaving, urdf)
@@ -121,7 +123,7 @@ def root_body(urdf: Urdf) -> Body:
 
 
 def _leaving(urdf: Urdf) -> dict[str, list[UrdfJoint]]:
-    """The joints that leave each link."""
+    """Returns the joints that leave each link."""
     leaving: dict[str, list[UrdfJoint]] = {name: [] for name in urdf.links}
     parents: dict[str, str] = {}
     for joint in urdf.joints:
@@ -158,7 +160,7 @@ def _root(urdf: Urdf) -> str:
 
 
 def _unworldly(root: str, leaving: dict[str, list[UrdfJoint]], urdf: Urdf) -> str:
-    """The root, or what floats in it when it is the world."""
+    """Returns the root, or the floating child of a root that is the world."""
     joints = leaving[root]
     if len(joints) == 1 and joints[0].kind == "floating" and urdf.links[root].inertial is None:
         return joints[0].child
@@ -175,7 +177,7 @@ def _unworldly(root: str, leaving: dict[str, list[UrdfJoint]], urdf: Urdf) -> st
 
 
 def _collect(body: Body, urdf: Urdf, leaving: dict[str, list[UrdfJoint]]) -> None:
-    """Fills in the members that fixed joints hold together, and the branches."""
+    """Adds the links that fixed joints connect, and the branches."""
     waiting = [Member(urdf.links[body.name], np.eye(3), np.zeros(3))]
     while waiting:
         member = waiting.pop(0)

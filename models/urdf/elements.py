@@ -1,8 +1,9 @@
-"""What a URDF says, link by link and joint by joint, checked where a single element can be. Raises
-RobotError, naming the element.
+"""Reads a URDF's links and joints and checks each element.
 
-The format: wiki.ros.org/urdf/XML. Rotations are matrices that turn the element's components into
-its parent's.
+Raises RobotError, which names the element.
+
+Format: wiki.ros.org/urdf/XML. Rotations are matrices that convert components in the element to
+components in its parent.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from hexapod_cosim.models.records import Array
 from hexapod_cosim.models.urdf.values import name_of, number, numbers, origin, read_root
 from hexapod_cosim.models.validation import check_inertia
 
-EXTENSION = "hexapod"  # an element of ours: what URDF has no words for
+EXTENSION = "hexapod"  # element of this project for data that URDF lacks
 MOVING = ("revolute", "continuous")
 KINDS = (*MOVING, "fixed", "floating", "prismatic", "planar")
 SILENT = ("link", "joint", EXTENSION, "material", "mujoco")  # all others are told to have no effect
-AXIS_TOLERANCE = 1e-6  # an axis this near to unit length is taken as printed
-DAMPING = "damping"  # what a side file may have ignored
+AXIS_TOLERANCE = 1e-6  # an axis this close to unit length is not normalised
+DAMPING = "damping"  # a side file may ignore it
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ class Urdf:
 
 
 def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -> Urdf:
-    """Reads a URDF; `ignore` may hold "damping"."""
+    """Reads a URDF; `ignore` may contain "damping". Raises RobotError."""
     root = read_root(text, where)
     ignored: Counter[str] = Counter()
     links = [
@@ -100,8 +101,8 @@ def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -
         for element in root.findall("joint")
     ]
     ignored.update(element.tag for element in root if element.tag not in SILENT)
-    _refuse_twins([link.name for link in links], "link", where)
-    _refuse_twins([joint.name for joint in joints], "joint", where)
+    _check_unique_names([link.name for link in links], "link", where)
+    _check_unique_names([joint.name for joint in joints], "joint", where)
     return Urdf(
         root.get("name") or "robot",
         where,
@@ -112,7 +113,7 @@ def parse_urdf(text: str | bytes, *, where: str, ignore: tuple[str, ...] = ()) -
     )
 
 
-def _refuse_twins(names: list[str], kind: str, where: str) -> None:
+def _check_unique_names(names: list[str], kind: str, where: str) -> None:
     twins = [name for name, count in Counter(names).items() if count > 1]
     if twins:
         raise RobotError(
@@ -249,7 +250,7 @@ def _axis(element: ET.Element, where: str) -> Array:
 
 
 def _optional(limit: ET.Element | None, key: str, where: str) -> float | None:
-    """A limit that is given; 0 is what exporters write who know none."""
+    """Returns a limit if it is given; exporters write 0 for an unknown one."""
     value = number(limit, key, 0.0, where)
     return abs(value) or None
 
@@ -259,7 +260,8 @@ def _limits(
 ) -> tuple[ET.Element | None, float, float]:
     limit = element.find("limit")
     if kind == "revolute" and limit is None:
-        fix = 'add <limit lower="..." upper="..." effort="..." velocity="..."/>, or make it continuous'
+        example = '<limit lower="..." upper="..." effort="..." velocity="..."/>'
+        fix = f"add {example}, or make it continuous"
         raise RobotError(
             "a revolute joint without limits", expected="<limit>", fix=fix, where=where
         )
@@ -285,7 +287,10 @@ def _friction(
     dynamics = element.find("dynamics")
     damping = number(dynamics, "damping", 0.0, where)
     if damping != 0.0 and DAMPING not in ignore:
-        fix = 'put it into servo.kd and write `ignore = ["damping"]` under [urdf] of a robot file with file = "..."'
+        fix = (
+            'put it into servo.kd and write `ignore = ["damping"]` under [urdf] '
+            'of a robot file with file = "..."'
+        )
         raise RobotError(
             "viscous damping in a joint",
             got=damping,
@@ -298,5 +303,5 @@ def _friction(
 
 
 def describe(ignored: Counter[str]) -> str:
-    """What had no effect, in words; empty when there was nothing."""
+    """Returns a text about elements without effect, empty if there are none."""
     return ", ".join(f"{count} {name}" for name, count in sorted(ignored.items()) if count)

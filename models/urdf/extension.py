@@ -1,6 +1,4 @@
-"""Our own element of a URDF, <hexapod>: what URDF has no words for, one child a section of robot
-files.
-"""
+"""Reads the element <hexapod>, which contains the sections of robot files that URDF lacks."""
 
 from __future__ import annotations
 
@@ -13,8 +11,8 @@ from hexapod_cosim.models.urdf.values import number, numbers
 
 
 def extension_tables(urdf: Urdf, fields: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """The tables of our own element: one child a section, its attributes as the fields' types
-    say.
+    """Returns the tables of <hexapod>: each child is a section, its attributes have the fields'
+    types.
     """
     tables: dict[str, Any] = {}
     for child in urdf.extension if urdf.extension is not None else ():

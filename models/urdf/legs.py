@@ -1,10 +1,9 @@
-"""Which of a URDF's chains is which leg, and its links in this project's frames
+"""Finds the legs of a URDF and converts their links to this project's frames
 (docs/architecture.md).
 
-Legs are known by where their hips are, not by names. Every link's frame becomes parallel to the
-hip's at angle 0. The hip's yaw is chosen so that the joints turn about +z, -y and +y where their
-axes allow that, as the controller wants it; joints whose axis points the other way are then counted
-the other way round.
+Legs are identified by the positions of their hips, not by names. At angle 0 every link's frame is
+parallel to the hip's. The hip's yaw is chosen so that the joints rotate about +z, -y and +y, as the
+controller requires, where their axes allow it. Joints with the opposite axis are reversed.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ SHORT = 1e-6  # m    no direction can be taken from a way as short
 
 @dataclass(frozen=True, eq=False)
 class FoundLeg:
-    """A leg's table as a robot file has it, and where it comes from."""
+    """A leg's table for a robot file, and its origin in the URDF."""
 
     name: str
     table: dict[str, Any]
@@ -47,8 +46,9 @@ class FoundLeg:
 def find_legs(
     torso: Body, origin: Array, axes: Array, *, keep_frames: bool, where: str
 ) -> list[FoundLeg]:
-    """The six legs in our order; `origin` (3,) and `axes` (3, 3) are the torso's frame in the
-    root link's. Raises RobotError.
+    """Returns the six legs in the order LF LM LR RF RM RR. Raises RobotError.
+
+    origin (3,) and axes (3, 3): the torso's frame in the root link's.
     """
     if len(torso.branches) != len(LEG_NAMES):
         raise _not_six(torso, where)
@@ -63,12 +63,14 @@ def find_legs(
 
 
 def _not_six(torso: Body, where: str) -> RobotError:
-    """The error for a torso without exactly six moving joints: other joints besides six legs can
-    be fixed, missing legs cannot.
+    """Returns the exception for a torso without exactly six moving joints.
+
+    Additional joints can be made fixed; missing legs cannot be added.
     """
     legs = [branch.joint.name for branch in torso.branches if _is_leg(branch)]
     others = [branch.joint.name for branch in torso.branches if not _is_leg(branch)]
-    got = f"{len(torso.branches)} moving joints on {torso.name!r}: {', '.join(branch.joint.name for branch in torso.branches)}"
+    names = ", ".join(branch.joint.name for branch in torso.branches)
+    got = f"{len(torso.branches)} moving joints on {torso.name!r}: {names}"
     if len(legs) == len(LEG_NAMES):
         fix = f"make joints that are no legs' fixed: {', '.join(others)}"
         return RobotError(
@@ -79,7 +81,10 @@ def _not_six(torso: Body, where: str) -> RobotError:
             where=where,
         )
     if len(torso.branches) == 1:
-        fix = f"make {torso.branches[0].joint.name!r} fixed if what it moves is the torso; robots with six legs alone can be simulated"
+        fix = (
+            f"make {torso.branches[0].joint.name!r} fixed if what it moves is the torso; "
+            "robots with six legs alone can be simulated"
+        )
         return RobotError(
             "not six legs on the root link",
             got=got,
@@ -88,7 +93,10 @@ def _not_six(torso: Body, where: str) -> RobotError:
             where=where,
         )
     got = f"{len(legs)} legs of three joints each, of {got}"
-    fix = "take a robot with six legs: plant, gaits and controller are a hexapod's, and fixing or adding joints makes no other robot one"
+    fix = (
+        "take a robot with six legs: plant, gaits and controller are a hexapod's, "
+        "and fixing or adding joints makes no other robot one"
+    )
     return RobotError(
         "six legs only: robots with another number of legs cannot be simulated",
         got=got,
@@ -99,7 +107,7 @@ def _not_six(torso: Body, where: str) -> RobotError:
 
 
 def _is_leg(branch: Branch) -> bool:
-    """Whether three moving joints follow each other from here on, and no more."""
+    """Returns whether exactly three moving joints follow each other."""
     count, branches = 1, branch.body.branches
     while len(branches) == 1:
         count, branches = count + 1, branches[0].body.branches
@@ -111,7 +119,8 @@ def _chain(branch: Branch, where: str) -> tuple[Branch, Branch, Branch]:
     while chain[-1].body.branches:
         body = chain[-1].body
         if len(body.branches) > 1 or len(chain) == len(JOINT_NAMES):
-            got = f"{', '.join(item.joint.name for item in body.branches)} on link {body.name!r}, joint {len(chain) + 1} of the leg"
+            found = ", ".join(item.joint.name for item in body.branches)
+            got = f"{found} on link {body.name!r}, joint {len(chain) + 1} of the leg"
             fix = "make the others fixed"
             raise RobotError(
                 "a leg that is no chain of three joints",
@@ -143,7 +152,10 @@ def _order(hips: Array, names: list[str], where: str) -> list[int]:
         got = ", ".join(
             f"{name} at ({x:.3g}, {y:.3g})" for name, (x, y, _) in zip(names, hips, strict=True)
         )
-        fix = 'say which way is forward: `forward = "y"` under [urdf] of a robot file with file = "..."'
+        fix = (
+            'say which way is forward: `forward = "y"` under [urdf] '
+            'of a robot file with file = "..."'
+        )
         raise RobotError(
             "not three hips left and three right",
             got=got,
@@ -199,8 +211,8 @@ def _leg(
 def _pattern_yaw(
     turns: list[Array], chain: tuple[Branch, Branch, Branch], outwards: Array
 ) -> float | None:
-    """The hip's yaw [rad] in which the axes are up to sign the controller's; None where there is
-    none.
+    """Returns the hip's yaw [rad] at which the axes equal the controller's up to their signs, or
+    None.
     """
     coxa, femur, tibia = (R @ branch.joint.axis for R, branch in zip(turns, chain, strict=True))
     if np.hypot(*coxa[:2]) > PATTERN_TOLERANCE or abs(femur[2]) > PATTERN_TOLERANCE:
@@ -215,8 +227,9 @@ def _pattern_yaw(
 
 
 def _yaw(coxa: Branch, R_TC: Array, wanted: float | None, *, plain: bool) -> tuple[float, Array]:
-    """The hip's yaw [rad] and the coxa's axes in the hip's frame; exact where the URDF gives the
-    yaw itself.
+    """Returns the hip's yaw [rad] and the coxa's axes in the hip's frame.
+
+    The yaw is exact where the URDF gives it.
     """
     printed = coxa.joint.yaw if coxa.direct and plain else None
     if printed is not None and abs(printed) <= math.pi:
@@ -234,8 +247,9 @@ def _axis(axis: Array, pattern: Array | None) -> tuple[Array, float]:
 
 
 def _foot(tibia: Body) -> tuple[Array | None, float | None]:
-    """Centre of the foot [m] in the tibia's frame, and its radius: the outermost collision
-    sphere, else the outermost fixed link.
+    """Returns the foot's centre [m] in the tibia's frame, and its radius.
+
+    It is the outermost collision sphere, else the outermost fixed link.
     """
     spheres = tibia.spheres
     if spheres:
@@ -249,7 +263,10 @@ def _foot(tibia: Body) -> tuple[Array | None, float | None]:
 
 
 def _footless(tibia: Body, where: str) -> RobotError:
-    fix = "give it a collision sphere where it touches the ground, or a fixed link there; or give length and offsets under [links.tibia]"
+    fix = (
+        "give it a collision sphere where it touches the ground, or a fixed link there; "
+        "or give length and offsets under [links.tibia]"
+    )
     return RobotError(
         "a leg without a foot", expected="a foot", fix=fix, where=f"{where}: link {tibia.name!r}"
     )
@@ -258,7 +275,7 @@ def _footless(tibia: Body, where: str) -> RobotError:
 def _link(
     branch: Branch, R: Array, tip: Array | None, axis: Array, sign: float, where: str
 ) -> dict[str, Any]:
-    """A link's table, in hip axes."""
+    """Returns a link's table, in hip axes."""
     inertial, joint = branch.body.inertial(where), branch.joint
     place = (
         {}
@@ -278,5 +295,5 @@ def _link(
 
 
 def inertia_entries(inertia: Array) -> list[float]:
-    """xx yy zz xy xz yz of a symmetric matrix."""
+    """Returns xx yy zz xy xz yz of a symmetric matrix."""
     return [float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]

@@ -1,5 +1,7 @@
-"""A URDF as the tables of a robot file, with what it does not say taken, in this order, from a side
-file, from the URDF's own <hexapod> element, or assumed.
+"""Converts a URDF to the tables of a robot file.
+
+Data that the URDF lacks come, in this order, from a side file, from the URDF's <hexapod> element,
+or from defaults.
 """
 
 from __future__ import annotations
@@ -125,7 +127,8 @@ class Options:
 
 
 def side_table(side: Mapping[str, Any], folder: Path, where: str) -> Table:
-    """The whole table of a robot file that names a URDF under [urdf], relative to its folder.
+    """Returns all tables of a robot file that names a URDF under [urdf], relative to its folder.
+
     Raises RobotError.
     """
     given = expect_table(side["urdf"], f"{where}: urdf")
@@ -151,8 +154,11 @@ def urdf_table(
     options: Options | None = None,
     where: str | None = None,
 ) -> Table:
-    """The tables of a robot file, from a URDF and what is put over it; `where` names the side
-    file. Raises RobotError.
+    """Returns the tables of a robot file from a URDF and the tables that override it.
+
+    Raises RobotError.
+
+    where: name of the side file for messages.
     """
     options, side = options or Options(), {} if side is None else side
     urdf = parse_urdf(_read(path), where=str(path), ignore=options.ignore)
@@ -192,8 +198,10 @@ def _assumed() -> Table:
 def _found(
     root: Body, urdf: Urdf, forward: str, *, keep_frames: bool
 ) -> tuple[Table, list[FoundLeg]]:
-    """The torso's table and the legs. The torso's frame is its heaviest link's place, in the
-    root link's axes turned forward.
+    """Returns the torso's table and the legs.
+
+    The torso's frame lies at its heaviest link, with the root link's axes rotated to the forward
+    direction.
     """
     inertial = root.inertial(urdf.where)
     heaviest = max(
@@ -213,9 +221,7 @@ def _found(
 
 
 def _refuse_impossible(torso: Body, legs: list[FoundLeg], above: Table) -> None:
-    """Raises RobotError for the first body whose inertia is impossible and is not given by
-    someone else.
-    """
+    """Raises RobotError for the first body whose impossible inertia is not replaced."""
     bodies = [("[torso]", torso, above.get("torso", {}))]
     for leg in legs:
         given = above.get("legs", {}).get(leg.name, {})
@@ -226,7 +232,10 @@ def _refuse_impossible(torso: Body, legs: list[FoundLeg], above: Table) -> None:
     for section, body, given in bodies:
         problem = None if "inertia" in given else body.problem
         if problem is not None:
-            fix = f"{problem.fix}; or give the right one, `inertia = [...]` under {section} of a robot file with [urdf] file"
+            fix = (
+                f"{problem.fix}; or give the right one, `inertia = [...]` under {section} "
+                "of a robot file with [urdf] file"
+            )
             raise RobotError(
                 problem.what,
                 got=problem.got,
@@ -245,7 +254,7 @@ def _refuse_footless(legs: list[FoundLeg], above: Table) -> None:
 
 
 def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
-    """Extents [m] of the torso's largest box, if it can hold its matter."""
+    """Returns the extents [m] of the torso's largest box, if it can contain its matter."""
     boxes = [
         np.abs(axes.T @ member.rotation) @ member.link.box
         for member in root.members
@@ -257,7 +266,7 @@ def _box(root: Body, axes: Array, torso: Table) -> list[float] | None:
 
 
 def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
-    """What the URDF says."""
+    """Returns the data of the URDF."""
     table: Table = {
         "name": urdf.name,
         "torso": torso,
@@ -273,7 +282,7 @@ def _measured(urdf: Urdf, torso: Table, legs: list[FoundLeg]) -> Table:
 
 
 def _shaped(own: Table) -> Table:
-    """The tables of the <hexapod> element as a robot file has them."""
+    """Returns the tables of the <hexapod> element in the form of a robot file."""
     table: Table = {
         key: value for key, value in own.items() if key not in ("world", *LEG_NAMES)
     } | own.get("world", {})
@@ -288,7 +297,9 @@ def _shaped(own: Table) -> Table:
 
 
 def _spread(side: Mapping[str, Any], where: str) -> Table:
-    """A side file's tables, with [links.*] put into every leg: they stand above the URDF's too."""
+    """Returns a side file's tables with [links.*] copied to every leg, so that they override the
+    URDF's.
+    """
     _check_side(side, where)
     table = deepcopy(dict(side))
     links, legs = table.pop("links", {}), table.get("legs", {})
@@ -297,7 +308,7 @@ def _spread(side: Mapping[str, Any], where: str) -> Table:
 
 
 def _check_side(side: Mapping[str, Any], where: str) -> None:
-    """Raises RobotError for keys and types that a robot file may not have."""
+    """Raises RobotError for keys and types that are invalid in a robot file."""
     refuse_unknown_keys(side, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
     for name, record in SECTIONS.items():
         read_given(record, expect_table(side.get(name, {}), f"{where}: {name}"), f"{where}: {name}")
@@ -328,7 +339,7 @@ def _check_links(links: Mapping[str, Any], where: str) -> None:
 
 
 def _merged(low: Mapping[str, Any], high: Mapping[str, Any]) -> Table:
-    """The tables of both; where both have a value, the higher one's."""
+    """Returns the tables of both; values of the second argument take precedence."""
     both = {
         key: _merged(low[key], high[key])
         for key in low
@@ -339,7 +350,7 @@ def _merged(low: Mapping[str, Any], high: Mapping[str, Any]) -> Table:
 
 
 def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
-    """Fills in what is missing, in place; returns the names of what was assumed."""
+    """Fills in missing values, in place; returns the names of assumed ones."""
     _unify(table, legs, urdf)
     assumed = ["foot.radius"] if any(leg.radius is None for leg in legs) else []
     assumed += [f"servo.{key}" for key in assume_servo(table["servo"])]
@@ -349,7 +360,7 @@ def _complete(table: Table, legs: list[FoundLeg], urdf: Urdf) -> list[str]:
 
 
 def _unify(table: Table, legs: list[FoundLeg], urdf: Urdf) -> None:
-    """Every joint has the same servo, every foot the same radius: one number for a list of them."""
+    """Replaces lists of one number per joint or foot by a single number, in place."""
     names = [name for leg in legs for name in leg.joints]
     for section, keys, owners in (
         ("servo", SIZES, names),
@@ -380,7 +391,7 @@ def _same(values: list[float | None], owners: list[str], key: str, name: str, wh
 
 
 def _height(table: Table) -> float:
-    """Of the hips above the feet [m], roughly: all joints of the pattern."""
+    """Returns the approximate height of the hips above the feet [m]."""
     legs = table["legs"].values()
     return float(np.mean([_drop(leg) for leg in legs]))
 
@@ -413,7 +424,7 @@ def _source(urdf: Urdf, legs: list[FoundLeg], assumed: list[str]) -> Table:
 
 
 def element_named(error: RobotError, table: Mapping[str, Any]) -> RobotError:
-    """The same error, with the URDF's names where it speaks of a leg or of one of its links."""
+    """Returns the same exception with the URDF's names of legs and links."""
     where = error.where or ""
     leg = next((name for name in LEG_NAMES if f"legs.{name}" in where), None)
     joints = table["source"].get(f"leg {leg}", "").removeprefix(JOINTS).split(", ")

@@ -1,6 +1,4 @@
-"""What stands in a URDF's attributes: numbers, turns, places; and the file as a whole. Raises
-RobotError, naming the element.
-"""
+"""Reads the attributes of a URDF's elements. Raises RobotError, which names the element."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ DECIMALS = re.compile(r"[+-]?\d*\.(\d{2,})")
 
 
 class _Builder(ET.TreeBuilder):
-    """Refuses document types, and with them entities, external or expanding."""
+    """Rejects document types, and with them external or expanding entities."""
 
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
         raise RobotError(
@@ -29,7 +27,7 @@ class _Builder(ET.TreeBuilder):
 
 
 def read_root(text: str | bytes, where: str) -> ET.Element:
-    """The <robot> element of a file."""
+    """Returns the <robot> element of a file."""
     try:
         root = ET.fromstring(text, parser=ET.XMLParser(target=_Builder()))
     except (ET.ParseError, ValueError, LookupError) as error:  # LookupError: an unknown encoding
@@ -59,7 +57,7 @@ def read_root(text: str | bytes, where: str) -> ET.Element:
 
 
 def name_of(element: ET.Element, where: str) -> str:
-    """The element's name, which it must have."""
+    """Returns the element's required name."""
     name = element.get("name")
     if not name:
         raise RobotError(
@@ -75,8 +73,9 @@ def numbers(
     where: str,
     count: int = 3,
 ) -> Array:
-    """(count,) finite numbers of an attribute; the default, if there is one, where the attribute
-    or the element is missing.
+    """Returns the finite numbers (count,) of an attribute.
+
+    Returns the default, if there is one, where the attribute or the element is missing.
     """
     text = None if element is None else element.get(key)
     if text is None and default is not None:
@@ -95,12 +94,12 @@ def numbers(
 
 
 def number(element: ET.Element | None, key: str, default: float | None, where: str) -> float:
-    """The same for a single one."""
+    """Returns the finite number of an attribute, or the default."""
     return float(numbers(element, key, None if default is None else (default,), where, 1)[0])
 
 
 def rpy_matrix(roll: float, pitch: float, yaw: float) -> Array:
-    """(3, 3) Rz(yaw) Ry(pitch) Rx(roll); exact for whole quarter turns."""
+    """Returns Rz(yaw) Ry(pitch) Rx(roll) (3, 3), exact for quarter turns."""
     (cr, sr), (cp, sp), (cy, sy) = _cos_sin(roll), _cos_sin(pitch), _cos_sin(yaw)
     matrix = np.array(
         [
@@ -120,8 +119,9 @@ def _cos_sin(angle: float) -> tuple[float, float]:
 
 
 def _angles(element: ET.Element | None, where: str) -> list[float]:
-    """Roll, pitch, yaw; a number that is a quarter turn to all its printed digits (1.57, 3.1416)
-    is one.
+    """Returns roll, pitch, yaw.
+
+    Numbers that equal a quarter turn to all their printed digits (1.57, 3.1416) become exact.
     """
     values = numbers(element, "rpy", (0.0, 0.0, 0.0), where)
     words = (element.get("rpy", "0 0 0") if element is not None else "0 0 0").split()
@@ -139,7 +139,7 @@ def _quarter_turn(value: float, word: str) -> float:
 
 
 def origin(element: ET.Element, where: str) -> tuple[Array, Array, list[float]]:
-    """Rotation (3, 3), place (3,) [m] and roll, pitch, yaw [rad] of the element's frame."""
+    """Returns rotation (3, 3), position (3,) [m] and roll, pitch, yaw [rad] of the element."""
     origin = element.find("origin")
     if origin is not None and origin.get("quat_xyzw"):
         raise RobotError(

@@ -1,8 +1,7 @@
-"""A robot as a URDF: what is read back from it is the same robot, to the last bit.
+"""Writes a robot as a URDF that load_robot() reads back to the last bit.
 
-Links and joints in this project's frames; every number in full. What URDF has no words for stands
-in one element of ours, <hexapod>, which other readers skip; <mujoco> keeps MuJoCo from welding the
-torso, and its mass, to the world.
+Links and joints have this project's frames. The element <hexapod> contains data that URDF lacks;
+other readers skip it. <mujoco> keeps MuJoCo from fixing the torso to the world.
 """
 
 from __future__ import annotations
@@ -17,12 +16,12 @@ from hexapod_cosim.models.schema import specs
 from hexapod_cosim.models.urdf.elements import EXTENSION
 
 RECORDS = ("foot", "contact", "friction", "servo", "baumgarte", "solver", "terrain", "gait")
-THICKNESS = 0.7  # 1    radius of a drawn link, of the foot's
+THICKNESS = 0.7  # 1  radius of a drawn link over the foot's
 COLOURS = {"body": "0.30 0.33 0.38 1", "limb": "0.72 0.74 0.78 1", "rubber": "0.85 0.45 0.15 1"}
 
 
 def robot_to_urdf(robot: Robot) -> str:
-    """The text of a URDF."""
+    """Returns the text of a URDF."""
     root = ET.Element("robot", name=robot.name)
     compiler = ET.SubElement(
         ET.SubElement(root, "mujoco"), "compiler", fusestatic="false", discardvisual="false"
@@ -39,7 +38,7 @@ def robot_to_urdf(robot: Robot) -> str:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Numbers in full, between blanks."""
+    """Returns the numbers in full precision, separated by blanks."""
     return " ".join(repr(float(value)) for value in values)
 
 
@@ -86,7 +85,7 @@ def _limb(root: ET.Element, name: str, link: Link, radius: float) -> None:
 
 
 def _foot(root: ET.Element, name: str, parent: str, place: Vector3, radius: float) -> None:
-    """A link of its own without mass, so that others find the foot's centre as a frame."""
+    """Adds a link without mass, so that other programs have the foot's centre as a frame."""
     link = ET.SubElement(root, "link", name=name)
     for tag in ("visual", "collision"):
         shape = _shape(link, tag, (0.0, 0.0, 0.0), "rubber" if tag == "visual" else None)
@@ -96,7 +95,7 @@ def _foot(root: ET.Element, name: str, parent: str, place: Vector3, radius: floa
 
 
 def direction_rpy(way: Vector3) -> Vector3:
-    """Roll, pitch and yaw that turn z along a way."""
+    """Returns roll, pitch and yaw of a rotation of z to a direction."""
     x, y, z = way
     return (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))
 

@@ -1,6 +1,6 @@
-# hexapod_package(TARGET COMPONENT HEADERS...) installs a library of this project for programs in C:
-#   find_package(hexapod COMPONENTS plant) gives hexapod::plant, pkg-config has hexapod-plant
-# Components are installed apart from each other, into one prefix, by one project or by several.
+# hexapod_package(TARGET COMPONENT HEADERS...) installs a library of this project for C programs:
+#   find_package(hexapod COMPONENTS plant) gives hexapod::plant, pkg-config provides hexapod-plant
+# Components are installed separately, into one prefix, by one or several projects.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -21,13 +21,13 @@ function(hexapod_package target component)
 
   configure_package_config_file(${HX_PACKAGE_DIR}/hexapodConfig.cmake.in hexapodConfig.cmake
     INSTALL_DESTINATION ${config} PATH_VARS CMAKE_INSTALL_DATADIR)
-  # before 1.0 a minor version may change what programs were compiled against
+  # before 1.0 a minor version may change the binary interface
   write_basic_package_version_file(hexapodConfigVersion.cmake
     VERSION ${hexapod_VERSION} COMPATIBILITY SameMinorVersion)
   set(here ${CMAKE_CURRENT_BINARY_DIR})
   install(FILES ${here}/hexapodConfig.cmake ${here}/hexapodConfigVersion.cmake DESTINATION ${config})
 
-  # relative to the file itself, so that the prefix can be moved
+  # relative paths, so that the prefix can be moved
   file(RELATIVE_PATH prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
   configure_file(${HX_PACKAGE_DIR}/hexapod.pc.in hexapod-${component}.pc @ONLY)
   install(FILES ${here}/hexapod-${component}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

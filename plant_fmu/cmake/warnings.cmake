@@ -1,5 +1,5 @@
-# HX_WARNINGS: what compilers warn about in every build. With HX_LINT warnings are errors, and clang
-# has all that it knows but for those listed here.
+# HX_WARNINGS: compiler warnings of every build. With HX_LINT warnings are errors, and clang enables
+# all warnings except those listed here.
 option(HX_LINT "Make warnings errors; with clang, have all but those in cmake/warnings.cmake" OFF)
 
 if(MSVC)
@@ -13,22 +13,22 @@ if(HX_LINT)
   list(APPEND HX_WARNINGS -Werror)
   if(CMAKE_C_COMPILER_ID MATCHES "Clang")
     list(APPEND HX_WARNINGS -Weverything
-      -Wno-unknown-warning-option      # the names of newer compilers, below
-      # about compilers and languages that are not meant: this is C11
+      -Wno-unknown-warning-option      # names below that older compilers lack
+      # about other languages and standards: this is C11
       -Wno-declaration-after-statement # C89
       -Wno-pre-c11-compat              # C99
       -Wno-implicit-void-ptr-cast      # C++: calloc's result, as everywhere in C
       -Wno-default-const-init-var      # C++: a static constant of zeros
       -Wno-unsafe-buffer-usage         # C++ has spans instead of pointers
       -Wno-nrvo                        # C++: copies of what is returned
-      # about ways of this project
+      # about conventions of this project
       -Wno-padded                      # structures are ordered for readers
       -Wno-comma                       # short assignments that belong together stand on one line
-      -Wno-float-equal                 # compared is what was set, not calculated: 0 is none
+      -Wno-float-equal                 # compared values were assigned, not calculated; 0: none
       -Wno-anon-enum-enum-conversion   # sizes are enumerators, products of sizes too
       -Wno-enum-float-conversion       # and a mean is a sum over a size
-      -Wno-keyword-macro               # src/tangent.c has complex numbers for double
-      # about what is right, and cannot be said in another way
+      -Wno-keyword-macro               # src/tangent.c defines double as complex
+      # about correct code that cannot be written otherwise
       -Wno-conditional-uninitialized   # vectors that loops over constant bounds fill
       -Wno-double-promotion            # the C library's NAN and INFINITY are floats
       -Wno-cast-qual                   # fmi/arrays.c: one loop reads or writes values

@@ -5,8 +5,9 @@
 #include "hexapod/checker.h"
 #include "method.h"
 
-/* A body can have inertia I when I and (tr I / 2) 1 - I, its second moments of mass, are positive
- * (semi-)definite: that is the triangle inequality of the principal moments, whatever the axes. */
+/* Returns whether a body can have the inertia I: I and (tr I / 2) 1 - I, its second moments of
+ * mass, are positive (semi-)definite, which is the triangle inequality of the principal moments in
+ * any axes. */
 static int is_inertia(const double I[6]) {
   const double half = 0.5 * (I[0] + I[1] + I[2]), slack = 1e-9 * half;
   const double p[6] = {
@@ -18,30 +19,33 @@ static int is_inertia(const double I[6]) {
          p[2] >= 0.0 && minor >= 0.0 && det >= 0.0;
 }
 
-static void body(hxChecker *c, const char *name, const double inertia[6]) {
+/* Fails for an impossible inertia. */
+static void check_inertia(hxChecker *c, const char *name, const double inertia[6]) {
   if (!is_inertia(inertia))
     hx_check_fail(c, name, inertia[0],
                   "an inertia that a body can have: positive, each principal moment at most the "
                   "sum of the others");
 }
 
-static void length_not_zero(hxChecker *c, const char *name, const double *x, int n,
-                            const char *expected) {
+/* Fails for a vector of n numbers without length. */
+static void check_not_zero(hxChecker *c, const char *name, const double *x, int n,
+                           const char *expected) {
   double square = 0.0;
   for (int i = 0; i < n; ++i) square += x[i] * x[i];
   if (!(square > 1e-12)) hx_check_fail(c, name, sqrt(square), expected);
 }
 
-static void legs(hxChecker *c, const hxDefinition *d) {
+/* Checks inertias, axes and lengths of all links. */
+static void check_legs(hxChecker *c, const hxDefinition *d) {
   char name[32];
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       const hxLink *link = &d->leg[leg].link[joint];
       const double tip[3] = {link->length, link->offset_y, link->offset_z};
       hx_joint_label(leg, joint, "inertia_xx", name);
-      body(c, name, link->inertia);
+      check_inertia(c, name, link->inertia);
       hx_joint_label(leg, joint, "axis", name);
-      length_not_zero(c, name, link->axis, 3, "a direction: not all zero");
+      check_not_zero(c, name, link->axis, 3, "a direction: not all zero");
       hx_joint_label(leg, joint, "length", name);
       if (tip[0] == 0.0 && tip[1] == 0.0 && tip[2] == 0.0)
         hx_check_fail(c, name, 0.0, "a tip away from the joint: length and offsets not all zero");
@@ -49,10 +53,10 @@ static void legs(hxChecker *c, const hxDefinition *d) {
   }
 }
 
-/* What numbers within their ranges must be together. */
-static void relations(hxChecker *c, const hxDefinition *d) {
-  body(c, "torso.inertia_xx", d->torso.inertia);
-  legs(c, d);
+/* Checks conditions between several numbers that are within their ranges. */
+static void check_relations(hxChecker *c, const hxDefinition *d) {
+  check_inertia(c, "torso.inertia_xx", d->torso.inertia);
+  check_legs(c, d);
   if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) &&
       d->contact.restitution < 1e-3)
     hx_check_fail(c, "contact.restitution", d->contact.restitution,
@@ -67,7 +71,7 @@ static void relations(hxChecker *c, const hxDefinition *d) {
   if (hx_method(d->solver.method)->error_order == 0 && d->solver.step == 0.0)
     hx_check_fail(c, "solver.step", d->solver.step,
                   "a fixed step > 0 with this solver.method, which has no error estimate");
-  length_not_zero(c, "initial.quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");
+  check_not_zero(c, "initial.quaternion", d->initial.quaternion, 4, "a quaternion: not all zero");
 }
 
 hxStatus hx_definition_check(const hxDefinition *d, char *message) {
@@ -75,7 +79,7 @@ hxStatus hx_definition_check(const hxDefinition *d, char *message) {
   const hxRange *range;
   const size_t n = hx_definition_ranges(&range);
   hx_check_ranges(&c, d, range, n);
-  if (c.status == HX_OK) relations(&c, d);
+  if (c.status == HX_OK) check_relations(&c, d);
   return c.status;
 }
 

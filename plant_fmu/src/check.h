@@ -1,5 +1,4 @@
-/* check.h - what an input must satisfy before it reaches the physics (hx_definition_check is
- * public) */
+/* check.h - checks of inputs; hx_definition_check is public */
 #ifndef HX_CHECK_H
 #define HX_CHECK_H
 
@@ -8,7 +7,8 @@
 
 HX_HIDDEN_BEGIN
 
-/* message: HX_MESSAGE_SIZE bytes, written on failure only; may be NULL */
+/* Checks the ranges of an input. message: HX_MESSAGE_SIZE bytes, written on failure only; may be
+ * NULL. */
 hxStatus hx_input_check(const hxInput *input, char *message);
 
 HX_HIDDEN_END

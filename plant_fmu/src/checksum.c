@@ -1,8 +1,8 @@
 #include "hexapod/status.h"
 
-/* FNV-1a over little-endian words, the last one filled up with zeros, and a shift that brings high
- * bits down: a product alone never does, and changes of sign bits would cancel. Every step is one
- * to one in the hash and in the word. */
+/* FNV-1a over little-endian words, the last one padded with zeros. A shift after each product
+ * mixes high bits into low ones, without which changes of sign bits would cancel. Every step is
+ * invertible in the hash and in the word. */
 uint64_t hx_checksum(uint64_t seed, const void *bytes, size_t n) {
   const unsigned char *byte = bytes;
   uint64_t hash = seed ^ 0xcbf29ce484222325u;

@@ -20,6 +20,7 @@ double hx_exact_restitution_chi(double e) {
   return 0.5 * (low + high);
 }
 
+/* The constants chi of the laws (eq. 14); hertz and constant: damping, s/m. */
 static double exact(const hxDefinition *d) {
   return hx_exact_restitution_chi(d->contact.restitution);
 }
@@ -36,12 +37,12 @@ static double hertz(const hxDefinition *d) {
   return 0.0;
 }
 
-/* d = chi / v0, with the floor that keeps a slow touch-down from dividing by zero */
+/* Returns d = chi / v0; the floor of v0 avoids a division by zero at slow touch-downs. */
 static double over_impact_speed(const hxModel *model, double impact_speed) {
   return model->damping_scale / fmax(impact_speed, model->impact_speed_floor);
 }
 
-static double whatever_the_speed(const hxModel *model, double impact_speed) {
+static double independent_of_speed(const hxModel *model, double impact_speed) {
   (void)impact_speed;
   return model->damping_scale;
 }
@@ -51,8 +52,8 @@ static const hxContactRow contact_rows[] = {
     [HX_CONTACT_FLORES] = {flores, over_impact_speed},
     [HX_CONTACT_LANKARANI_NIKRAVESH] = {lankarani_nikravesh, over_impact_speed},
     [HX_CONTACT_HUNT_CROSSLEY] = {hunt_crossley, over_impact_speed},
-    [HX_CONTACT_CONSTANT_DAMPING] = {constant, whatever_the_speed},
-    [HX_CONTACT_HERTZ] = {hertz, whatever_the_speed},
+    [HX_CONTACT_CONSTANT_DAMPING] = {constant, independent_of_speed},
+    [HX_CONTACT_HERTZ] = {hertz, independent_of_speed},
 };
 
 const hxContactRow *hx_contact(int law) {
@@ -60,6 +61,7 @@ const hxContactRow *hx_contact(int law) {
                                                                                : NULL;
 }
 
+/* Closes a foot and fixes its damping by the impact speed, m/s. */
 static void close_foot(const hxModel *model, hxContactState *contact, int leg,
                        double impact_speed) {
   contact->closed[leg] = 1.0;

@@ -1,5 +1,5 @@
-/* contact_law.h - what damps a contact (eq. 14): fixed at touch-down by the law and the speed of
- * impact, held until lift-off */
+/* contact_law.h - damping of contacts (eq. 14): touch-down fixes it by the law and the impact
+ * speed, and it holds until lift-off */
 #ifndef HX_CONTACT_LAW_H
 #define HX_CONTACT_LAW_H
 
@@ -7,27 +7,27 @@
 
 HX_HIDDEN_BEGIN
 
-/* One row per hxContactLaw; the only place a law is chosen. */
+/* Functions of a contact law; one row per hxContactLaw. */
 typedef struct {
-  double (*scale)(const hxDefinition *definition); /* the law's constant, compiled into the model */
-  double (*damping)(const hxModel *model, double impact_speed); /* d, s/m, at touch-down */
+  double (*scale)(const hxDefinition *definition); /* constant of the law, stored in the model */
+  double (*damping)(const hxModel *model, double impact_speed); /* d at touch-down, s/m */
 } hxContactRow;
 
-const hxContactRow *hx_contact(int law); /* NULL when there is no such law */
+const hxContactRow *hx_contact(int law); /* NULL for an unknown law */
 
-/* chi of the law that gives back exactly the restitution e: chi (1 + e) = ln[(1 + chi)/(1 - chi
- * e)]; e in (0, 1]. */
+/* Returns chi of the law with exact restitution e in (0, 1]: chi (1 + e) = ln[(1 + chi)/(1 - chi
+ * e)]. */
 double hx_exact_restitution_chi(double e);
 
-/* The contact states of a motion that starts here: feet in the ground are closed and count as put
- * down slowly. */
+/* Sets the contacts at the start of a motion: feet in the ground are closed, with impact speed 0.
+ */
 void hx_contact_start(const hxModel *model, const double delta[HX_SLOTS], hxContactState *contact);
 
-/* The bristles of open feet are slack (eq. 16). */
+/* Sets the bristles of open feet to 0 (eq. 16). */
 void hx_contact_slacken(const hxContactState *contact, hxPlantMotion *motion);
 
-/* Touch-down of open feet in the ground, lift-off of closed ones out of it; returns the number of
- * touch-downs. */
+/* Closes open feet that are in the ground and opens closed feet that are out of it; returns the
+ * number of touch-downs. */
 int hx_contact_switch(const hxModel *model, const double delta[HX_SLOTS],
                       const double ddelta[HX_SLOTS], hxContactState *contact);
 

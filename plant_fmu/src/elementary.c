@@ -12,7 +12,7 @@ static double alternating_series(double z, int first) {
 
 /* x = k pi/2 + r with |r| <= pi/4, then k quarter turns */
 void hx_sin_cos(double x, double *sine, double *cosine) {
-  if (!(fabs(x) < 1e9)) { /* no quarter turn can be told any more */
+  if (!(fabs(x) < 1e9)) { /* the quarter turn is not determined any more */
     *sine = *cosine = NAN;
     return;
   }

@@ -13,6 +13,6 @@ const hxKernel *const hx_kernels[] = {
 
 const hxKernel *hx_kernel(void) {
   const hxKernel *const *kernel = hx_kernels;
-  while (!(*kernel)->runs_here()) ++kernel;
+  while (!(*kernel)->is_supported()) ++kernel;
   return *kernel;
 }

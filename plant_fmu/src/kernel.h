@@ -1,8 +1,8 @@
-/* kernel.h - the physics of one instruction set behind a table of functions, and which of these
- * this build has
+/* kernel.h - table of functions of the physics for one instruction set, and the list of such
+ * kernels
  *
- * lanes/entry_points.h and what it includes are compiled once for each kernel_*.c, at its width.
- * All kernels give the same bits (lanes/lanes.h), so a state saved under one goes on under another.
+ * Each kernel_*.c compiles lanes/entry_points.h and what it includes at its own width. All kernels
+ * give the same bits (lanes/lanes.h), so a state saved by one can be continued by another.
  */
 #ifndef HX_KERNEL_H
 #define HX_KERNEL_H
@@ -11,53 +11,56 @@
 
 HX_HIDDEN_BEGIN
 
-/* Touch-downs and lift-offs: whether a call ends at the first, and whether there was one. */
+/* Event handling of a call: stop = end at the first touch-down or lift-off; found = there was one.
+ */
 typedef struct hxEvents {
   int stop, found;
 } hxEvents;
 
 typedef struct hxKernel {
   const char *name;
-  int (*runs_here)(void); /* whether this processor has its instructions */
+  int (*is_supported)(void); /* whether this processor has the instructions */
 
-  /* Sets contacts, energy, counters and time of a motion that starts here and now. */
+  /* Sets contacts, energy, counters and time at the start of a motion. */
   void (*start)(const hxModel *model, double t, hxState *state);
 
-  /* Advances the state to t_end exactly, or to an event; the command changes by the ramp per
-   * second, or is held (NULL). A command older than the state is that of a call which an event
-   * broke off. On failure the state is somewhere on the way and the message says why. */
+  /* Advances the state to t_end exactly, or to an event; the command changes by ramp per second,
+   * or is constant (NULL). A command older than the state belongs to a call that an event
+   * interrupted. After a failure the state lies between the two times and the message gives the
+   * reason. */
   hxStatus (*integrate)(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                         double t_end, hxEvents *events, hxState *state, char *message);
 
-  /* dy/dt, with or without the multipliers on the way. */
+  /* Computes dy/dt, and the multipliers on request. */
   void (*derivative)(const hxModel *model, const hxState *state, const hxCommand *command,
                      int multipliers, hxPlantMotion *rate);
 
-  /* A motion on its joints at coordinates; coordinates of a motion and their rates, either of which
-   * may be NULL. */
+  /* Computes the motion at coordinates. */
   void (*place)(const hxModel *model, const hxCoordinates *x, hxPlantMotion *motion);
+  /* Computes coordinates of a motion and their rates; either result may be NULL. */
   void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command,
                       hxCoordinates *x, hxCoordinates *rate);
 
-  /* All feet: penetration, approach speed; m, m/s. */
+  /* Computes penetration and approach speed of all feet; m, m/s. */
   void (*feet)(const hxModel *model, const hxPlantMotion *motion, double delta[HX_SLOTS],
                double ddelta[HX_SLOTS]);
 
-  /* Touch-downs and lift-offs that are due at the state's time by these penetrations. */
+  /* Switches the contacts that are due at the state's time by these penetrations. */
   void (*switch_contacts)(const hxModel *model, const double delta[HX_SLOTS],
                           const double ddelta[HX_SLOTS], hxState *state);
 
-  /* Measures the path since the last moment, for solvers of others whose step to here is completed.
-   */
+  /* Measures the path since the last moment, when an importer's solver has completed its step. */
   void (*measure)(const hxModel *model, const hxCommand *command, hxState *state);
 
+  /* Computes all outputs. */
   void (*output)(const hxModel *model, const hxState *state, const hxCommand *command,
                  hxOutput *output);
 
-  /* Rates of the outputs that are integrals since the start. */
+  /* Computes the rates of those outputs that are integrals since the start. */
   void (*integral_rates)(const hxModel *model, const hxState *state, const hxCommand *command,
                          hxOutput *rate);
 
+  /* Solves eq. 1 for accelerations, multipliers and motor torques. */
   void (*accelerations)(const hxModel *model, const hxState *state, const hxCommand *command,
                         double acceleration[HX_BODIES][6],
                         double multiplier[HX_BODIES - 1][HX_MULTIPLIERS],
@@ -66,9 +69,8 @@ typedef struct hxKernel {
 
 extern const hxKernel hx_kernel_baseline;
 
-/* Kernels of wider instruction sets, where the compiler can build them. Not by GCC for Windows,
- * which aligns the stack to 16 bytes and then stores wider vectors there as if aligned (its bug
- * 54412). */
+/* Kernels of wider instruction sets, where the compiler can build them. GCC for Windows cannot: it
+ * aligns the stack to 16 bytes but stores wider vectors as if aligned (GCC bug 54412). */
 #if defined(__GNUC__) && defined(__x86_64__) && !defined(HX_BASELINE_ONLY) &&                      \
     (defined(__clang__) || !defined(_WIN32))
 #define HX_HAS_X86_KERNELS 1
@@ -80,7 +82,7 @@ extern const hxKernel hx_kernel_avx2, hx_kernel_avx512;
 /* All kernels of this build, fastest first, ended by NULL. */
 extern const hxKernel *const hx_kernels[];
 
-/* The fastest kernel that this processor runs. */
+/* Returns the fastest kernel that this processor supports. */
 const hxKernel *hx_kernel(void);
 
 HX_HIDDEN_END

@@ -6,8 +6,8 @@
 
 static const hxMethodRow rows[] = {
     /* The coefficients nearest to ROS34PW2's (Rang and Angermann, BIT 45, 2005) that also meet the
-     * condition of method.h: order 3(2) with any A_i, A- and L-stable with the exact one, stiffly
-     * accurate. Made by tools/rosw3.py. */
+     * condition of method.h: order 3(2) with any A_i, A- and L-stable with the exact Jacobian,
+     * stiffly accurate. tools/rosw3.py computes them. */
     [HX_METHOD_ROSW3] =
         {.stages = 4,
          .order = 3,

@@ -1,5 +1,5 @@
 /* method.h - integration methods as coefficients: explicit Runge-Kutta and linearly implicit
- * Rosenbrock-W (eq. 19) */
+ * Rosenbrock-W methods (eq. 19) */
 #ifndef HX_METHOD_H
 #define HX_METHOD_H
 
@@ -19,13 +19,13 @@ enum { HX_STAGES = 7 };
 typedef struct hxMethodRow {
   int stages;
   int order;
-  int error_order; /* of the embedded method; 0: none, fixed step only */
+  int error_order; /* order of the embedded method; 0: none, fixed step only */
   double gamma;
   double a[HX_STAGES][HX_STAGES], g[HX_STAGES][HX_STAGES];
   double c[HX_STAGES], b[HX_STAGES], e[HX_STAGES];
 } hxMethodRow;
 
-const hxMethodRow *hx_method(int method); /* NULL when there is no such method */
+const hxMethodRow *hx_method(int method); /* NULL for an unknown method */
 
 HX_HIDDEN_END
 

@@ -11,7 +11,7 @@
 #include "robot.h"
 #include "tangent.h"
 
-/* A saved state: the plant's model and state behind what it takes to recognise them. */
+/* A saved state: a header that identifies it, then the plant's model and state. */
 typedef struct {
   uint64_t magic, version, size, checksum;
   hxModel model;
@@ -25,7 +25,8 @@ static uint64_t checksum(const hxSavedPlant *saved) {
   return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSavedPlant, model));
 }
 
-static hxStatus refuse(hxPlant *plant, hxStatus status, const char *text) {
+/* Sets the plant's message and returns the status. */
+static hxStatus fail(hxPlant *plant, hxStatus status, const char *text) {
   snprintf(plant->message, HX_MESSAGE_SIZE, "%s", text);
   return status;
 }
@@ -48,10 +49,10 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   char message[HX_MESSAGE_SIZE];
   double body[HX_BODIES][HX_BODY_STATE];
   if (!isfinite(t))
-    return refuse(plant, HX_INVALID_ARGUMENT,
-                  "start time: got a number that is not finite, expected seconds");
+    return fail(plant, HX_INVALID_ARGUMENT,
+                "start time: got a number that is not finite, expected seconds");
   const hxStatus status = hx_definition_check(definition, message);
-  if (status != HX_OK) return refuse(plant, status, message);
+  if (status != HX_OK) return fail(plant, status, message);
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
   hx_model_compile(&plant->model, definition);
@@ -62,7 +63,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   return HX_OK;
 }
 
-/* the largest size among numbers that begin at first; once not finite, always */
+/* Returns the largest magnitude of so_far and n numbers; NaN or infinity persists. */
 static double largest(double so_far, const void *first, size_t n) {
   const double *entry = first;
   for (size_t i = 0; first && i < n; ++i)
@@ -70,8 +71,8 @@ static double largest(double so_far, const void *first, size_t n) {
   return so_far;
 }
 
-/* a rate as a command, unless it is none; *finite says whether it is one of numbers */
-static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *finite) {
+/* Returns the command of a rate, NULL for a rate of zero; *finite: all its numbers are finite. */
+static const hxCommand *ramp_from_rate(const hxInput *rate, hxCommand *command, int *finite) {
   const double size = largest(0.0, rate, sizeof *rate / sizeof(double));
   *finite = isfinite(size);
   if (!rate || size == 0.0) return NULL;
@@ -79,22 +80,22 @@ static const hxCommand *ramp_of(const hxInput *rate, hxCommand *command, int *fi
   return command;
 }
 
-/* tells inputs apart: 52 bits of a checksum, never 0 */
-static double fingerprint_of(const hxInput *input) {
+/* Returns a fingerprint of an input: 52 bits of a checksum, never 0. */
+static double input_fingerprint(const hxInput *input) {
   return 1.0 + (double)(hx_checksum(1, input, sizeof *input) >> 12);
 }
 
-/* An event breaks a call off; what goes on under the same held input is the same call, so that the
- * motion does not depend on it. */
-static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
-                    hxEvents *events) {
+/* Advances the plant. If an event interrupted the last call and the input is the same, the step
+ * sequence of that call continues, so that the motion does not depend on the interruption. */
+static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rate, double t_end,
+                        hxEvents *events) {
   const hxState before = plant->state;
   hxCommand command, change;
   int finite;
-  const hxCommand *ramp = ramp_of(rate, &change, &finite);
+  const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
   if (!finite)
-    return refuse(plant, HX_INVALID_ARGUMENT,
-                  "rates of inputs: got a number that is not finite, expected units per second");
+    return fail(plant, HX_INVALID_ARGUMENT,
+                "rates of inputs: got a number that is not finite, expected units per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
     snprintf(plant->message, HX_MESSAGE_SIZE,
              "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
@@ -104,19 +105,19 @@ static hxStatus run(hxPlant *plant, const hxInput *input, const hxInput *rate, d
   hxStatus status = hx_input_check(input, plant->message);
   if (status != HX_OK) return status;
   const double fingerprint =
-      !ramp && (events->stop || before.call_input != 0.0) ? fingerprint_of(input) : 0.0;
-  const int goes_on = before.call_input != 0.0 && before.call_input == fingerprint &&
+      !ramp && (events->stop || before.call_input != 0.0) ? input_fingerprint(input) : 0.0;
+  const int resumes = before.call_input != 0.0 && before.call_input == fingerprint &&
                       before.call_start < before.time;
-  hx_command_from_input(&command, input, goes_on ? before.call_start : before.time);
+  hx_command_from_input(&command, input, resumes ? before.call_start : before.time);
   status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
                                   plant->message);
   if (status != HX_OK) {
     plant->state = before;
     return status;
   }
-  const int broken_off = plant->state.time < t_end;
-  plant->state.call_input = broken_off ? fingerprint : 0.0;
-  plant->state.call_start = broken_off ? command.time : 0.0;
+  const int interrupted = plant->state.time < t_end;
+  plant->state.call_input = interrupted ? fingerprint : 0.0;
+  plant->state.call_start = interrupted ? command.time : 0.0;
   return HX_OK;
 }
 
@@ -126,13 +127,13 @@ hxStatus hx_plant_step(hxPlant *plant, const hxInput *input, double t_end) {
 
 hxStatus hx_plant_step_ramp(hxPlant *plant, const hxInput *input, const hxInput *rate,
                             double t_end) {
-  return run(plant, input, rate, t_end, &(hxEvents){.stop = 0});
+  return advance(plant, input, rate, t_end, &(hxEvents){.stop = 0});
 }
 
 hxStatus hx_plant_step_to_event(hxPlant *plant, const hxInput *input, double t_end, int stop,
                                 int *event) {
   hxEvents events = {.stop = stop};
-  const hxStatus status = run(plant, input, NULL, t_end, &events);
+  const hxStatus status = advance(plant, input, NULL, t_end, &events);
   *event = events.found && status == HX_OK;
   return status;
 }
@@ -158,15 +159,15 @@ void hx_plant_get_state(const hxPlant *plant, void *bytes) {
 hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   hxSavedPlant saved;
   if (size != sizeof saved)
-    return refuse(plant, HX_BAD_STATE,
-                  "saved state: its size is not that of this version's states; save it again");
+    return fail(plant, HX_BAD_STATE,
+                "saved state: its size is not that of this version's states; save it again");
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse(plant, HX_BAD_STATE,
-                  "saved state: not one of this version; save it again with this version");
+    return fail(plant, HX_BAD_STATE,
+                "saved state: not one of this version; save it again with this version");
   if (saved.checksum != checksum(&saved))
-    return refuse(plant, HX_BAD_STATE,
-                  "saved state: damaged, its checksum does not match; save it again");
+    return fail(plant, HX_BAD_STATE,
+                "saved state: damaged, its checksum does not match; save it again");
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;
@@ -178,10 +179,12 @@ void hx_plant_get_coordinates(const hxPlant *plant, hxCoordinates *x) {
   hx_kernel()->coordinates(&plant->model, &plant->state, &no_command, x, NULL);
 }
 
-/* m, m/s, rad/s, J and, for angles, rad: what is beyond is a solver's stray step, not a state */
+/* Limits of coordinates (m, m/s, rad/s, J) and of angles (rad). Larger ones are errors of a
+ * solver's trial step. */
 static const double largest_coordinate = 1e9, largest_angle = 1e5;
 
-static int are_coordinates(const hxCoordinates *x) {
+/* Returns whether coordinates are a state of the robot. */
+static int are_valid_coordinates(const hxCoordinates *x) {
   const double *p = x->quaternion;
   return largest(0.0, x, HX_COORDINATES) <= largest_coordinate &&
          largest(0.0, x->angle, HX_LEGS * HX_JOINTS) <= largest_angle &&
@@ -189,11 +192,11 @@ static int are_coordinates(const hxCoordinates *x) {
 }
 
 hxStatus hx_plant_set_coordinates(hxPlant *plant, double t, const hxCoordinates *x) {
-  if (!isfinite(t) || !are_coordinates(x))
-    return refuse(plant, HX_NOT_FINITE,
-                  "coordinates: got numbers that are not finite, angles beyond 1e5 rad, others "
-                  "beyond 1e9 SI units or a "
-                  "quaternion near 0, expected a state of the robot");
+  if (!isfinite(t) || !are_valid_coordinates(x))
+    return fail(plant, HX_NOT_FINITE,
+                "coordinates: got numbers that are not finite, angles beyond 1e5 rad, others "
+                "beyond 1e9 SI units or a "
+                "quaternion near 0, expected a state of the robot");
   hx_kernel()->place(&plant->model, x, &plant->state.motion);
   plant->state.time = t;
   plant->state.call_input = 0.0;
@@ -213,24 +216,25 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
   hx_kernel()->coordinates(&plant->model, &plant->state, &command, NULL, rate);
 }
 
-/* m  Solvers that find one foot's sign change lose another's that comes within their rounding. So a
- * foot touches the ground from this deep, and leaves it from this high; in between it does so when
- * it is on its way there as another one switches (docs/equations.md). */
+/* m  Half-width of the band in which contacts switch. A foot touches the ground at this depth and
+ * leaves it at this height; within the band it switches together with another foot, if it moves in
+ * that direction. Otherwise solvers that locate one foot's sign change would miss another's within
+ * their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
-static void all_feet(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
+static void feet_of(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
   hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
 }
 
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  all_feet(plant, delta, ddelta);
+  feet_of(plant, delta, ddelta);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     indicator[leg] =
         delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
 }
 
-/* the penetration by which a foot switches, or stays as it is */
+/* Returns the penetration that makes a foot switch, or keep its state. */
 static double switching_depth(int closed, double delta, double ddelta) {
   if (closed) return delta <= -switch_band || (delta < 0.0 && ddelta < 0.0) ? -1.0 : 1.0;
   return delta >= switch_band || (delta > 0.0 && ddelta > 0.0) ? 1.0 : -1.0;
@@ -239,7 +243,7 @@ static double switching_depth(int closed, double delta, double ddelta) {
 int hx_plant_update_contacts(hxPlant *plant) {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
   const hxPlantMotion before = plant->state.motion;
-  all_feet(plant, delta, ddelta);
+  feet_of(plant, delta, ddelta);
   for (int slot = 0; slot < HX_SLOTS; ++slot)
     delta[slot] =
         switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
@@ -255,8 +259,8 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   const double scale =
       largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
   if (!isfinite(scale))
-    return refuse(plant, HX_INVALID_ARGUMENT,
-                  "derivatives: got a direction that is not finite, expected numbers");
+    return fail(plant, HX_INVALID_ARGUMENT,
+                "derivatives: got a direction that is not finite, expected numbers");
   hx_command_from_input(&point.command, input, plant->state.time);
   hx_command_from_input(&point.d_command, d_input ? d_input : &no_input, 0.0);
   hx_plant_get_coordinates(plant, &point.x);
@@ -268,8 +272,8 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   hx_tangent(&point, d_rate, d_output);
   return HX_OK;
 #else
-  return refuse(plant, HX_INVALID_ARGUMENT,
-                "derivatives: this binary's compiler has no complex numbers; use another");
+  return fail(plant, HX_INVALID_ARGUMENT,
+              "derivatives: this binary's compiler has no complex numbers; use another");
 #endif
 }
 
@@ -287,7 +291,7 @@ hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BOD
   for (int b = 0; b < HX_BODIES; ++b)
     for (int i = 0; i < HX_BODY_STATE; ++i)
       if (!isfinite(body[b][i]))
-        return refuse(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
+        return fail(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
   return HX_OK;

@@ -27,7 +27,7 @@ static void quat_mul(const double a[4], const double b[4], double out[4]) {
   out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0];
 }
 
-/* out = R(p) a, p of unit length: a + 2 w (u x a) + 2 u x (u x a) */
+/* Computes out = R(p) a, p of unit length: a + 2 w (u x a) + 2 u x (u x a). */
 static void rotate(const double p[4], const double a[3], double out[3]) {
   double t[3], s[3];
   cross(p + 1, a, t);
@@ -35,6 +35,7 @@ static void rotate(const double p[4], const double a[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = a[i] + 2.0 * (p[0] * t[i] + s[i]);
 }
 
+/* Copies the position of the next joint or the foot in link axes. */
 static void link_tip(const hxLink *link, double tip[3]) {
   tip[0] = link->length;
   tip[1] = link->offset_y;
@@ -52,7 +53,7 @@ void hx_axis_normals(const double axis[3], double a[3], double b[3]) {
   cross(axis, a, b);
 }
 
-/* The joint's point from the parent's centre of mass, in the parent link's axes. */
+/* Computes the joint's point from the parent's centre of mass, in the parent link's axes. */
 static void joint_on_parent(const hxDefinition *d, int leg, int joint, double point[3]) {
   if (joint == 0) {
     for (int i = 0; i < 3; ++i) point[i] = d->leg[leg].hip_position[i] - d->torso.com[i];
@@ -63,15 +64,15 @@ static void joint_on_parent(const hxDefinition *d, int leg, int joint, double po
   }
 }
 
-/* The turn from the parent's axes to the child's at angle 0: the hip's yaw for the coxa, none for
- * the others. */
+/* Computes the rotation from the parent's to the child's axes at angle 0: the hip's yaw for the
+ * coxa, identity for the others. */
 static void zero_turn(const hxDefinition *d, int leg, int joint, double p[4]) {
   const double half = joint == 0 ? 0.5 * d->leg[leg].hip_yaw : 0.0;
   hx_sin_cos(half, &p[3], &p[0]);
   p[1] = p[2] = 0.0;
 }
 
-/* The quaternion of a right-handed frame given by its axes, by the largest of its components
+/* Computes the quaternion of a right-handed frame from its axes, by the largest component
  * (Shepperd). */
 static void quat_from_axes(const double x[3], const double y[3], const double z[3], double p[4]) {
   const double squares[4] = {1.0 + x[0] + y[1] + z[2], 1.0 + x[0] - y[1] - z[2],
@@ -86,7 +87,8 @@ static void quat_from_axes(const double x[3], const double y[3], const double z[
   normalise(columns[largest], 4, p);
 }
 
-/* The turn from a link's axes to its joint's (x = a, y = b, z = axis); none for the torso. */
+/* Computes the rotation from a link's axes to its joint's (x = a, y = b, z = axis); identity for
+ * the torso. */
 static void joint_frame(const hxDefinition *d, int leg, int joint, double p[4]) {
   double s[3], a[3], b[3];
   p[0] = 1.0, p[1] = p[2] = p[3] = 0.0;
@@ -101,7 +103,7 @@ static void conjugate(const double p[4], double out[4]) {
   for (int i = 1; i < 4; ++i) out[i] = -p[i];
 }
 
-/* xx yy zz xy xz yz of R(p)^T S R(p) */
+/* Computes xx yy zz xy xz yz of R(p)^T S R(p). */
 static void inertia_in_frame(const double S[6], const double p[4], double out[6]) {
   static const int row[6] = {0, 1, 2, 0, 0, 1}, column[6] = {0, 1, 2, 1, 2, 2};
   double axis[3][3], moved[3][3];
@@ -119,6 +121,7 @@ static void inertia_in_frame(const double S[6], const double p[4], double out[6]
   }
 }
 
+/* Computes the constants of a leg's joint in slots: all vectors in joint axes. */
 static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int joint, int slot) {
   const hxLink *link = &d->leg[leg].link[joint];
   double frame_i[4], frame_j[4], to_i[4], to_j[4], turn[4], from[4], zero[4], s_j[3], axis[3],
@@ -131,7 +134,7 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   quat_mul(to_i, turn, from);
   quat_mul(from, frame_j, zero);
   normalise(link->axis, 3, s_j);
-  rotate(turn, s_j, axis); /* in the parent link's axes, as point */
+  rotate(turn, s_j, axis); /* axis and point: in the parent link's axes */
   rotate(to_i, axis, s_i);
   joint_on_parent(d, leg, joint, point);
   rotate(to_i, point, point_i);
@@ -145,6 +148,7 @@ static void compile_joint(hxJointModel *m, const hxDefinition *d, int leg, int j
   for (int i = 0; i < 4; ++i) m->zero[i][slot] = zero[i], m->frame[i][slot] = frame_j[i];
 }
 
+/* Computes a point and the normal of the ground. */
 static void compile_ground(hxModel *model, const hxDefinition *d) {
   const double incline = d->terrain.kind == HX_TERRAIN_SLOPE ? d->terrain.incline : 0.0;
   model->ground_point[0] = model->ground_point[1] = 0.0;
@@ -158,9 +162,9 @@ static void compile_ground(hxModel *model, const hxDefinition *d) {
 }
 
 static const double load_share =
-    0.01; /* of the robot's weight: a foot that bears more can slip under load */
+    0.01; /* 1  of the robot's weight; feet with a larger load count their slip */
 
-/* N  all bodies' */
+/* Returns the weight of all bodies, N. */
 static double weight_of(const hxDefinition *d) {
   double mass = d->torso.mass;
   for (int leg = 0; leg < HX_LEGS; ++leg)
@@ -169,6 +173,7 @@ static double weight_of(const hxDefinition *d) {
                      d->gravity[2] * d->gravity[2]);
 }
 
+/* Copies laws and settings, with derived constants. */
 static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->foot_radius = d->foot_radius;
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
@@ -214,8 +219,8 @@ void hx_model_compile(hxModel *model, const hxDefinition *d) {
   compile_settings(model, d);
 }
 
-/* Child from parent through a joint at an angle and speed: p_j = p_i zero turn(angle), velocities
- * by rigid-body motion. */
+/* Computes the child's state from the parent's: p_j = p_i zero turn(angle), velocities by
+ * rigid-body motion. */
 static void place_child(const hxDefinition *d, int leg, int joint,
                         const double parent[HX_BODY_STATE], double child[HX_BODY_STATE]) {
   const hxLink *link = &d->leg[leg].link[joint];
@@ -260,7 +265,7 @@ void hx_initial_bodies(const hxDefinition *d, double body[HX_BODIES][HX_BODY_STA
   }
 }
 
-/* The frame of the joint that a link hangs on. */
+/* Copies the rotation from a link's axes to its joint's. */
 static void frame_of(const hxModel *model, int leg, int joint, double p[4]) {
   for (int i = 0; i < 4; ++i) p[i] = model->joint[joint].frame[i][leg];
 }

@@ -1,4 +1,4 @@
-/* robot.h - from a definition to a checked, compiled model and its initial state */
+/* robot.h - compiles a definition into a model and its initial state */
 #ifndef HX_ROBOT_H
 #define HX_ROBOT_H
 
@@ -6,22 +6,24 @@
 
 HX_HIDDEN_BEGIN
 
-/* Two unit normals to a unit axis: a = axis x (the coordinate direction it is least along, the
- * first on ties), b = axis x a. */
+/* Computes two unit normals of a unit axis: a = axis x e with the coordinate direction e of the
+ * axis's smallest component (the first of equal ones), b = axis x a. */
 void hx_axis_normals(const double axis[3], double a[3], double b[3]);
 
+/* Computes the model of a checked definition. */
 void hx_model_compile(hxModel *model, const hxDefinition *definition);
 
-/* All bodies where the definition's initial torso and joint states put them: on the constraints
- * exactly. */
+/* Computes the initial states of all bodies from the definition's torso and joint states; the
+ * constraints are satisfied exactly. */
 void hx_initial_bodies(const hxDefinition *definition, double body[HX_BODIES][HX_BODY_STATE]);
 
-/* Between the bodies of hexapod.h, in link axes, and a motion, in joint axes. */
+/* Convert between body states of hexapod.h, in link axes, and a motion, in joint axes. */
 void hx_motion_from_bodies(const hxModel *model, const double body[HX_BODIES][HX_BODY_STATE],
                            hxPlantMotion *motion);
 void hx_bodies_from_motion(const hxModel *model, const hxPlantMotion *motion,
                            double body[HX_BODIES][HX_BODY_STATE]);
 
+/* Computes the command of an input given at a time, s. */
 void hx_command_from_input(hxCommand *command, const hxInput *input, double time);
 
 HX_HIDDEN_END

@@ -1,5 +1,5 @@
-/* tangent.c - the physics once more, on complex numbers: the imaginary part of all that it stores
- * is a derivative */
+/* tangent.c - the physics compiled for complex numbers; the imaginary part of each result is a
+ * derivative */
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -7,15 +7,15 @@
 
 #if defined(__GNUC__)
 
-/* no products of two derivatives to speak of, so none of the standard's care for infinite ones */
+/* products of complex numbers without the standard's treatment of infinities */
 #if defined(__clang__)
 #pragma STDC CX_LIMITED_RANGE ON
 #else
 #pragma GCC optimize("cx-limited-range")
 #endif
 
-/* In this file alone every number of the structures is complex: a point is made such from the real
- * one's bytes. */
+/* In this file every number of the structures is complex; to_complex() converts the bytes of real
+ * structures. */
 typedef double _Complex hxComplex;
 #define double hxComplex
 #include "tangent.h"
@@ -28,8 +28,8 @@ typedef double _Complex hxComplex;
 #include "lanes/dynamics.h"
 #include "lanes/output.h"
 
-/* Real or complex, a point is some numbers, the model's choices, and more numbers; an output is
- * numbers, contacts, and more numbers. */
+/* A point consists of numbers, the model's integer choices, and numbers; an output consists of
+ * numbers, contact flags, and numbers. */
 #define NUMBERS(bytes) ((bytes) / sizeof(hxComplex))
 enum {
   POINT_FIRST = NUMBERS(offsetof(hxTangentPoint, model.contact_law)),
@@ -43,33 +43,34 @@ enum {
 _Static_assert(POINT_CHOICES % sizeof(double) == 0 && OUTPUT_CONTACT % sizeof(double) == 0,
                "no padding, whatever numbers are");
 
-static const double *widen(const double *from, size_t n, hxComplex *to) {
+static const double *to_complex(const double *from, size_t n, hxComplex *to) {
   for (size_t i = 0; i < n; ++i) to[i] = hx_complex(from[i], 0.0);
   return from + n;
 }
 
-static void widen_point(const void *real, hxTangentPoint *point) {
-  const double *from = widen(real, POINT_FIRST, (hxComplex *)point);
+static void point_to_complex(const void *real, hxTangentPoint *point) {
+  const double *from = to_complex(real, POINT_FIRST, (hxComplex *)point);
   memcpy(&point->model.contact_law, from, POINT_CHOICES);
-  widen(from + POINT_CHOICES / sizeof(double), POINT_LAST, (hxComplex *)&point->model.stiffness);
+  to_complex(from + POINT_CHOICES / sizeof(double), POINT_LAST,
+             (hxComplex *)&point->model.stiffness);
 }
 
-/* numbers with a change of them in the imaginary part */
-static void turn(hxComplex *numbers, const hxComplex *change, size_t n, double scale) {
+/* Adds a change of the numbers as their imaginary part. */
+static void add_direction(hxComplex *numbers, const hxComplex *change, size_t n, double scale) {
   for (size_t i = 0; i < n; ++i)
     numbers[i] = hx_complex(hx_re(numbers[i]), hx_tangent_step * (hx_re(change[i]) / scale));
 }
 
-static double *narrow(const hxComplex *from, size_t n, double scale, double *to) {
+static double *to_derivatives(const hxComplex *from, size_t n, double scale, double *to) {
   for (size_t i = 0; i < n; ++i) to[i] = hx_im(from[i]) / hx_tangent_step * scale;
   return to + n;
 }
 
-static void narrow_output(const hxOutput *output, double scale, void *real) {
-  double *to = narrow((const hxComplex *)output, OUTPUT_FIRST, scale, real);
+static void output_to_derivatives(const hxOutput *output, double scale, void *real) {
+  double *to = to_derivatives((const hxComplex *)output, OUTPUT_FIRST, scale, real);
   memset(to, 0, OUTPUT_CONTACT);
-  narrow((const hxComplex *)&output->torso, OUTPUT_LAST, scale,
-         to + OUTPUT_CONTACT / sizeof(double));
+  to_derivatives((const hxComplex *)&output->torso, OUTPUT_LAST, scale,
+                 to + OUTPUT_CONTACT / sizeof(double));
 }
 
 void hx_tangent(const hxTangentPoint *real, hxCoordinates *d_rate, hxOutput *d_output) {
@@ -78,21 +79,23 @@ void hx_tangent(const hxTangentPoint *real, hxCoordinates *d_rate, hxOutput *d_o
   hxOutput output;
   hxWork work;
   hxRate all;
-  widen_point(real, &point);
+  point_to_complex(real, &point);
   const double scale = hx_re(point.scale);
-  turn((hxComplex *)&point.x, (const hxComplex *)&point.dx, NUMBERS(sizeof point.x), scale);
-  turn((hxComplex *)&point.command, (const hxComplex *)&point.d_command,
-       NUMBERS(sizeof point.command), scale);
+  add_direction((hxComplex *)&point.x, (const hxComplex *)&point.dx, NUMBERS(sizeof point.x),
+                scale);
+  add_direction((hxComplex *)&point.command, (const hxComplex *)&point.d_command,
+                NUMBERS(sizeof point.command), scale);
   hx_motion_from_coordinates(&point.model, &point.x, &point.state.motion);
   memset(&all, 0, sizeof all);
   hx_dynamics_evaluate(&point.model, &point.state.contact, &point.command, hx_re(point.state.time),
                        &point.state.motion, NULL, 1, &work, &all);
   hx_coordinates_rate(&all.motion, &work, &rate);
   hx_output_fill(&point.model, &point.state, &work, &output);
-  if (d_rate) narrow((const hxComplex *)&rate, NUMBERS(sizeof rate), scale, (double *)d_rate);
-  if (d_output) narrow_output(&output, scale, d_output);
+  if (d_rate)
+    to_derivatives((const hxComplex *)&rate, NUMBERS(sizeof rate), scale, (double *)d_rate);
+  if (d_output) output_to_derivatives(&output, scale, d_output);
 }
 
 #else
-typedef int hx_no_tangent; /* a file must not be empty */
+typedef int hx_no_tangent; /* ISO C forbids an empty file */
 #endif

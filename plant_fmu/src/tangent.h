@@ -1,5 +1,5 @@
-/* tangent.h - derivatives of rates and outputs along a direction, from the physics on complex
- * numbers (lanes/complex_step.h) */
+/* tangent.h - directional derivatives of rates and outputs, by the complex step
+ * (lanes/complex_step.h) */
 #ifndef HX_TANGENT_H
 #define HX_TANGENT_H
 
@@ -13,16 +13,17 @@ HX_HIDDEN_BEGIN
 #define HX_HAS_TANGENT 0 /* MSVC has no arithmetic on complex numbers */
 #endif
 
-/* Where, and which way. */
+/* A point and a direction. */
 typedef struct hxTangentPoint {
   hxCommand command, d_command;
   hxCoordinates x, dx;
   hxState state; /* contacts and time; the motion is that of x */
-  double scale;  /* > 0: sizes of d_command and dx */
+  double scale;  /* > 0  magnitude of d_command and dx */
   hxModel model;
 } hxTangentPoint;
 
-/* Either result may be NULL. In d_output, contact is 0. */
+/* Computes the derivatives of rates and outputs along the direction. Either result may be NULL;
+ * contact flags in d_output are 0. */
 void hx_tangent(const hxTangentPoint *point, hxCoordinates *d_rate, hxOutput *d_output);
 
 HX_HIDDEN_END

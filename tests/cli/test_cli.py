@@ -323,8 +323,8 @@ def test_an_unknown_engine_is_refused_with_the_valid_names(
     code, _, err = call(command, "walk_flat", "-o", tmp_path / "none", "--engine", "compile")
     assert code != 0
     assert (
-        "--engine: unknown engine: got 'compile', expected one of compiled, python; did you mean 'compiled'?"
-        in " ".join(err.split())
+        "--engine: unknown engine: got 'compile', expected one of compiled, python; "
+        "did you mean 'compiled'?" in " ".join(err.split())
     )
     assert not (tmp_path / "none").exists()
 

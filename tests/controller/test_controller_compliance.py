@@ -439,7 +439,7 @@ def steps_until_fallback(drag: float, total: float) -> int:
     ("drag", "total", "count"),
     [(0.54, 1.0, 0), (0.56, 1.0, 9), (0.56, 0.51, 9), (0.56, 0.49, 0), (1.0, 1.0, 9)],
 )
-def test_a_robot_slides_that_drags_by_55_percent_for_40_milliseconds_while_it_carries_half_its_weight(
+def test_a_robot_slides_when_loaded_feet_drag_by_55_percent_for_40_milliseconds(
     drag: float, total: float, count: int
 ) -> None:
     """At a period of 5 ms: eight times are 40 ms, nine are more."""

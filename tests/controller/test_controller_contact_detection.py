@@ -97,9 +97,7 @@ def test_a_foot_that_need_not_carry_or_is_not_high_contradicts_nothing() -> None
     assert not watch.busy()
 
 
-def test_a_sensor_is_believed_again_when_it_has_contradicted_nothing_for_one_and_a_half_cycles() -> (
-    None
-):
+def test_a_sensor_is_trusted_again_after_one_and_a_half_cycles_without_contradiction() -> None:
     watch = SensorWatch(WEIGHT, cycle=CYCLE, period=PERIOD)
     until_doubted(watch, 2, touching=but(2), total=0.5 * WEIGHT, standing=ALL, high=NONE)
     count = 0

@@ -56,9 +56,7 @@ def test_a_foot_is_expected_where_it_came_down_a_step_before() -> None:
     np.testing.assert_allclose(landings.expected(ALL, LOW, NONE), [0.012, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def test_a_foot_that_comes_down_late_meets_the_ground_at_the_end_of_its_path_and_one_that_never_left_tells_nothing() -> (
-    None
-):
+def test_a_late_foot_lands_at_the_end_of_its_path_and_one_that_never_left_reports_nothing() -> None:
     landings = Landings()
     landings.look(~FIRST, np.full(6, 0.03), FIRST)
     landings.look(~FIRST, LOW, NONE)

@@ -169,9 +169,7 @@ def test_two_feet_or_one_carry_what_they_can_without_their_moment(
     assert normal.min() >= 0.0
 
 
-def test_the_ridge_takes_a_billionth_of_the_weight_from_feet_on_a_line_and_hardly_active_feet_carry_it() -> (
-    None
-):
+def test_the_ridge_changes_loads_of_feet_on_a_line_by_a_billionth_of_the_weight() -> None:
     """S = sum a (1, y^2), ridge = 1e-9 (S_00 + S_yy) + 1e-12, the vertical force W S_00/(S_00 +
     ridge).
     """
@@ -183,9 +181,7 @@ def test_the_ridge_takes_a_billionth_of_the_weight_from_feet_on_a_line_and_hardl
         assert 1.0 - normal.sum() / WEIGHT == pytest.approx(lost, rel=1e-3)
 
 
-def test_feet_within_a_centimetre_take_no_moment_about_the_vertical_and_a_millionth_of_a_newton_is_no_load() -> (
-    None
-):
+def test_feet_within_a_centimetre_take_no_yaw_moment_and_a_micronewton_is_no_load() -> None:
     for reach, turns in ((0.0099, False), (0.0101, True)):
         feet = np.array([reach * 1j, -reach * 1j, 0j, 0j, 0j, 0j])
         shares = make().shares(feet, legs("110000"), demand(twist=0.4))

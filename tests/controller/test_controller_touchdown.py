@@ -63,9 +63,7 @@ def test_a_foot_is_held_no_higher_than_it_may() -> None:
     assert down.offset[2] == 0.03
 
 
-def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_with_the_speed_and_to_the_limit() -> (
-    None
-):
+def test_a_foot_that_finds_no_ground_reaches_down_after_the_grace_time_to_the_limit() -> None:
     down, missing = Touchdown(period=PERIOD), ~only(2)
     offsets = []
     for _ in range(100):

@@ -135,9 +135,7 @@ def test_speed_and_acceleration_lead_from_each_angle_to_the_next(gait: str) -> N
     assert 5.0 < max(accelerations) < 200.0  # rad/s2
 
 
-def test_a_joint_that_its_limits_hold_has_no_acceleration_and_none_has_more_than_turns_it_round() -> (
-    None
-):
+def test_a_joint_at_its_limit_has_no_acceleration_and_none_exceeds_a_reversal() -> None:
     legs = LegSolver(load_robot("athena"))
     angle, speed = np.zeros((6, 3)), np.zeros((6, 3))
     speed[0, 0], angle[1, 1], angle[2, 2] = (

@@ -140,7 +140,7 @@ WALKS = [
 
 def close(worst: np.ndarray) -> bool:
     print(
-        "largest differences of angle [rad], speed, torque and acceleration [of the servo's largest]:",
+        "largest differences of angle [rad], speed, torque and acceleration [servo's limit]:",
         worst,
     )
     return bool((worst <= [ANGLE, SPEED, TORQUE, ACCELERATION]).all())

@@ -185,8 +185,8 @@ def test_missing_headers_and_a_missing_licence_are_said_with_what_to_do(
     assert process.returncode != 0
     told = " ".join(process.stderr.split())
     assert (
-        f"No fmi2Functions.h in '{tmp_path}'. Give -DFMI_HEADERS=<folder of the headers of FMI 2.0 and 3.0"
-        in told
+        f"No fmi2Functions.h in '{tmp_path}'. Give -DFMI_HEADERS=<folder of the headers "
+        "of FMI 2.0 and 3.0" in told
     )
     assert "-DHX_FMU=OFF" in told
     alone = tmp_path / "alone" / "plant"
@@ -200,9 +200,11 @@ def test_the_library_alone_needs_no_fmi_headers_and_fits_into_another_project(
     vendored: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.25)\nproject(theirs VERSION 9.9 LANGUAGES C)\nset(HX_FMU OFF)\n"
+        "cmake_minimum_required(VERSION 3.25)\n"
+        "project(theirs VERSION 9.9 LANGUAGES C)\nset(HX_FMU OFF)\n"
         f"add_subdirectory({vendored.as_posix()} hexapod EXCLUDE_FROM_ALL)\n"
-        f"add_executable(step {EXAMPLE.as_posix()}/step.c)\ntarget_link_libraries(step PRIVATE hexapod::plant)\n",
+        f"add_executable(step {EXAMPLE.as_posix()}/step.c)\n"
+        "target_link_libraries(step PRIVATE hexapod::plant)\n",
         encoding="utf-8",
     )
     build = tmp_path / "build"

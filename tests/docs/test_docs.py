@@ -322,7 +322,8 @@ def compiled_scale(tree: Path, *, law: int, restitution: float) -> float:
     """The constant that a tree's contact_law.c computes for a law by number."""
     (tree / "ask.c").write_text(
         '#include "contact_law.h"\n'
-        "double ask(int law, double e) { hxDefinition d = {0}; d.contact.law = law; d.contact.restitution = e;"
+        "double ask(int law, double e) { hxDefinition d = {0}; d.contact.law = law; "
+        "d.contact.restitution = e;"
         " return hx_contact(law)->scale(&d); }\n",
         encoding="utf-8",
     )
@@ -343,8 +344,10 @@ def compiled_scale(tree: Path, *, law: int, restitution: float) -> float:
 def twin_chi(tree: Path, law: str, restitution: float) -> float:
     """chi of a law in a tree's models/, which is looked at in a process of its own."""
     code = (
-        "import sys, types; sys.meta_path[:] = [finder for finder in sys.meta_path if 'Redirect' not in type(finder).__name__]\n"
-        "package = types.ModuleType('hexapod_cosim'); package.__path__ = ['.']; sys.modules['hexapod_cosim'] = package\n"
+        "import sys, types; sys.meta_path[:] = "
+        "[finder for finder in sys.meta_path if 'Redirect' not in type(finder).__name__]\n"
+        "package = types.ModuleType('hexapod_cosim'); package.__path__ = ['.']; "
+        "sys.modules['hexapod_cosim'] = package\n"
         f"from hexapod_cosim.models.contact import CHI; print(repr(CHI[{law!r}]({restitution})))"
     )
     return float(run(tree, sys.executable, "-c", code))

@@ -1,5 +1,5 @@
-"""Random robots, and any robot as a URDF in other words: other frames, signs, parts, names and
-order.
+"""Provides random robots, and any robot as an equivalent URDF with other frames, signs, parts and
+names.
 """
 
 from __future__ import annotations
@@ -166,7 +166,8 @@ def stances(robot: Robot) -> str:
     """The part of our own element that says how it stands, and with which servo."""
     servo = robot.servo
     legs = "".join(f'<{leg.name} stance="{_text(leg.stance)}"/>' for leg in robot.legs)
-    return f'<hexapod>{legs}<servo kp="{servo.kp}" kd="{servo.kd}" rotor_inertia="{servo.rotor_inertia}"/></hexapod>'
+    gains = f'kp="{servo.kp}" kd="{servo.kd}" rotor_inertia="{servo.rotor_inertia}"'
+    return f"<hexapod>{legs}<servo {gains}/></hexapod>"
 
 
 def _halves(

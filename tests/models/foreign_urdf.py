@@ -1,4 +1,4 @@
-"""A URDF as others write them, by hand, and the robot it is in our own words."""
+"""Provides a URDF as other authors write them, and the same robot in this project's format."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ LEG = """
   <joint name="j_c{n}" type="revolute">
     <parent link="body"/> <child link="coxa_{n}"/>
     <origin xyz="{x} {y} 0.01" rpy="0 0 {yaw}"/> <axis xyz="0 0 {up}"/>
-    <limit lower="{c_low}" upper="{c_high}" effort="5.5" velocity="6.0"/> <dynamics damping="0" friction="0.04"/>
+    <limit lower="{c_low}" upper="{c_high}" effort="5.5" velocity="6.0"/>
+    <dynamics damping="0" friction="0.04"/>
   </joint>
   <link name="coxa_{n}">
     <inertial> <origin xyz="0.03 0 0" rpy="0 0 1.5708"/> <mass value="0.15"/>
@@ -38,7 +39,8 @@ LEG = """
   <joint name="j_f{n}" type="revolute">
     <parent link="coxa_{n}"/> <child link="femur_{n}"/>
     <origin xyz="0.05 0 0" rpy="{roll} 0 0"/> <axis xyz="0 0 1"/>
-    <limit lower="{f_low}" upper="{f_high}" effort="5.5" velocity="6.0"/> <dynamics friction="0.04"/>
+    <limit lower="{f_low}" upper="{f_high}" effort="5.5" velocity="6.0"/>
+    <dynamics friction="0.04"/>
   </joint>
   <link name="femur_{n}">
     <inertial> <origin xyz="0.05 0 0"/> <mass value="0.16"/>
@@ -47,14 +49,16 @@ LEG = """
   <joint name="j_t{n}" type="revolute">
     <parent link="femur_{n}"/> <child link="tibia_{n}"/>
     <origin xyz="0.09 0 0" rpy="3.14159 0 0"/> <axis xyz="0 0 2"/>
-    <limit lower="{t_low}" upper="{t_high}" effort="5.5" velocity="6.0"/> <dynamics friction="0.04"/>
+    <limit lower="{t_low}" upper="{t_high}" effort="5.5" velocity="6.0"/>
+    <dynamics friction="0.04"/>
   </joint>
   <link name="tibia_{n}">
     <inertial> <origin xyz="0.06 0 0"/> <mass value="0.09"/>
       <inertia ixx="8e-6" iyy="2e-4" izz="2e-4" ixy="0" ixz="0" iyz="0"/> </inertial>
   </link>
   <link name="toe_{n}">
-    <inertial> <mass value="0.01"/> <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/> </inertial>
+    <inertial> <mass value="0.01"/> <inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
     <collision> <geometry> <sphere radius="0.012"/> </geometry> </collision>
   </link>
   <joint name="toe_joint_{n}" type="fixed">
@@ -67,14 +71,17 @@ BODY = """<?xml version="1.0"?>
 <!-- a spider as somebody else draws it -->
 <robot name="spider">
   <link name="base_footprint"/>
-  <joint name="base_joint" type="fixed"> <parent link="base_footprint"/> <child link="body"/> <origin xyz="0 0 0.13"/> </joint>
+  <joint name="base_joint" type="fixed"> <parent link="base_footprint"/> <child link="body"/>
+  <origin xyz="0 0 0.13"/> </joint>
 {legs}
   <link name="body">
-    <inertial> <mass value="2.0"/> <inertia ixx="8e-3" iyy="0.025" izz="0.03" ixy="0" ixz="0" iyz="0"/> </inertial>
+    <inertial> <mass value="2.0"/>
+    <inertia ixx="8e-3" iyy="0.025" izz="0.03" ixy="0" ixz="0" iyz="0"/> </inertial>
     <collision> <geometry> <box size="0.34 0.2 0.07"/> </geometry> </collision>
   </link>
   <link name="battery">
-    <inertial> <mass value="0.4"/> <inertia ixx="2e-4" iyy="5e-4" izz="6e-4" ixy="0" ixz="0" iyz="0"/> </inertial>
+    <inertial> <mass value="0.4"/>
+    <inertia ixx="2e-4" iyy="5e-4" izz="6e-4" ixy="0" ixz="0" iyz="0"/> </inertial>
   </link>
   <joint name="battery_joint" type="fixed">
     <parent link="body"/> <child link="battery"/> <origin xyz="-0.06 0 0.03" rpy="0 0 1.57"/>
@@ -95,7 +102,7 @@ tibia.stance = 1.8
 
 
 def spider_urdf(names: Iterable[str] = NUMBERS) -> str:
-    """With these legs."""
+    """Returns the URDF with these legs."""
     return BODY.format(legs="".join(_spider_leg(name) for name in names))
 
 

@@ -1,4 +1,4 @@
-"""Robot files: what a good one gives, and what each kind of bad one is told."""
+"""Tests robot files: the robots of valid files and the messages for invalid ones."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""What other engines read in our URDFs and MJCFs is the robot: masses, centre of mass, mass
-matrix, feet.
-"""
+"""Tests that other engines read the same robot from the exported URDF and MJCF files."""
 
 from __future__ import annotations
 

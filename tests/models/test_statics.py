@@ -1,6 +1,4 @@
-"""How the robots stand: balance of forces, agreement with the equations of motion, and the poses
-that do not exist.
-"""
+"""Tests standing robots: balance of forces, agreement with eq. 1, and poses that do not exist."""
 
 from __future__ import annotations
 

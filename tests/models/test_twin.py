@@ -1,4 +1,4 @@
-"""The readable equations against their definitions and against the laws of motion."""
+"""Tests the reference equations against their definitions and the laws of motion."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def with_mode(robot: Robot, mode: str) -> Robot:
 
 
 def advanced(body: Array, dv: Array, h: float) -> Array:
-    """The bodies h seconds later, to second order in h."""
+    """Returns the bodies h seconds later, to second order in h."""
     later = body.copy()
     later[:, 0:3] += h * body[:, 7:10] + 0.5 * h * h * dv[:, 0:3]
     later[:, 7:13] += h * dv

@@ -1,6 +1,4 @@
-"""The laws of force by themselves: servo and gear, normal force with restitution, friction,
-ground.
-"""
+"""Tests the force laws of the twin: servo and gear, normal force, friction, ground."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a URDF cannot be: each refused with file, element, what was got and what to do."""
+"""Tests that invalid URDFs are rejected with file, element, got value and fix."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from hexapod_cosim.models import RobotError, load_robot
 
 # a word of the spider and what it becomes; the first place alone, which is leg RM's (number 1) for
 # what is in a leg
-ARM = """<link name="camera"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial></link>
+ARM = """<link name="camera"><inertial><mass value="0.1"/>
+<inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial></link>
 <joint name="pan" type="continuous"><parent link="body"/><child link="camera"/></joint>"""
 FEMUR = """<inertial> <origin xyz="0.05 0 0"/> <mass value="0.16"/>
       <inertia ixx="5e-5" iyy="1.8e-4" izz="1.7e-4" ixy="0" ixz="0" iyz="0"/> </inertial>"""
@@ -175,7 +176,8 @@ CASES: dict[str, tuple[str, str, list[str]]] = {
     "loose link": ("</robot>", '<link name="loose"/></robot>', ["not one root", "loose"]),
     "ring": (
         "</robot>",
-        '<link name="a"/><link name="b"/><joint name="ab" type="fixed"><parent link="a"/><child link="b"/></joint>'
+        '<link name="a"/><link name="b"/><joint name="ab" type="fixed"><parent link="a"/>'
+        '<child link="b"/></joint>'
         '<joint name="ba" type="fixed"><parent link="b"/><child link="a"/></joint></robot>',
         ["ring", "'a'"],
     ),
@@ -325,7 +327,8 @@ def test_a_missing_urdf_is_refused_with_its_path(tmp_path: Path) -> None:
 def test_a_thousand_fixed_links_in_a_row_are_no_problem(tmp_path: Path) -> None:
     names = ["body", *(f"n{k}" for k in range(3000))]
     chain = "".join(
-        f'<link name="{child}"/><joint name="to_{child}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>'
+        f'<link name="{child}"/><joint name="to_{child}" type="fixed"><parent link="{parent}"/>'
+        f'<child link="{child}"/></joint>'
         for parent, child in pairwise(names)
     )
     (tmp_path / "spider.urdf").write_text(

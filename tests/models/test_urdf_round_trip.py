@@ -1,4 +1,4 @@
-"""A robot written as a URDF and read again is the same robot; a URDF in other words too."""
+"""Tests that a robot written as a URDF and read again is the same robot."""
 
 from __future__ import annotations
 

@@ -187,7 +187,10 @@ def test_forward_may_be_another_axis_of_the_urdf(tmp_path: Path) -> None:
     text = disguised(robot, 3, stances(robot))
     (tmp_path / "x.urdf").write_text(text, encoding="utf-8")
     # a root without mass, turned by -90 degrees against the trunk: the trunk's x is the root's y
-    turned = '<link name="root"/><joint name="turn" type="fixed"><parent link="root"/><child link="trunk"/><origin rpy="0 0 1.5708"/></joint>'
+    turned = (
+        '<link name="root"/><joint name="turn" type="fixed"><parent link="root"/>'
+        '<child link="trunk"/><origin rpy="0 0 1.5708"/></joint>'
+    )
     (tmp_path / "y.urdf").write_text(
         text.replace("</robot>", f"{turned}</robot>"), encoding="utf-8"
     )
@@ -204,7 +207,10 @@ def test_a_side_file_stands_above_the_urdf(tmp_path: Path) -> None:
     (tmp_path / "spider.urdf").write_text(
         spider_urdf().replace('damping="0"', 'damping="0.1"'), encoding="utf-8"
     )
-    head = 'name = "mine"\n[urdf]\nfile = "spider.urdf"\nignore = ["damping"]\n[servo]\ntorque_max = 9.0\nkd = 0.5\n'
+    head = (
+        'name = "mine"\n[urdf]\nfile = "spider.urdf"\nignore = ["damping"]\n'
+        "[servo]\ntorque_max = 9.0\nkd = 0.5\n"
+    )
     masses = "[torso]\nmass = 3.0\n[legs.RM.tibia]\nmass = 0.2\n[links.tibia]\nmass = 0.12\n"
     (tmp_path / "mine.toml").write_text(head + masses, encoding="utf-8")
     robot = load_robot(tmp_path / "mine.toml")

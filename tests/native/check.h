@@ -1,4 +1,4 @@
-/* check.h - what the native tests are written with: CHECK a condition, NEAR a number. */
+/* check.h - assertions of the native tests: CHECK a condition, NEAR a number. */
 #ifndef HX_TESTS_CHECK_H
 #define HX_TESTS_CHECK_H
 

@@ -1,4 +1,4 @@
-/* description.h - what a test of the FMU's binary looks up in its modelDescription.xml. */
+/* description.h - data from modelDescription.xml for tests of the FMU's binary. */
 #ifndef HX_TESTS_DESCRIPTION_H
 #define HX_TESTS_DESCRIPTION_H
 

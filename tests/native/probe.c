@@ -19,9 +19,7 @@
     "-Wmissing-prototypes" /* called from Python only: there is no header */
 #endif
 
-/* ---- layout
- * -------------------------------------------------------------------------------------------------------------
- */
+/* ---- layout ---- */
 
 typedef struct {
   const char *name;
@@ -147,7 +145,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, cone_time),
 };
 
-/* the name of the i-th field, its place and size; NULL past the last */
+/* Returns the name of the i-th field, its offset and size; NULL past the last. */
 HX_API const char *hx_probe_field(size_t i, size_t *offset, size_t *size) {
   if (i >= sizeof fields / sizeof fields[0]) return NULL;
   *offset = fields[i].offset, *size = fields[i].size;
@@ -156,9 +154,7 @@ HX_API const char *hx_probe_field(size_t i, size_t *offset, size_t *size) {
 
 HX_API int hx_probe_lanes(void) { return HX_LANES; }
 
-/* ---- lanes, vectors
- * -------------------------------------------------------------------------------------------------------
- */
+/* ---- lanes, vectors ---- */
 
 static void put3(hxVec3 a, int lane, double *out) {
   out[0] = hx_lane(a.x, lane), out[1] = hx_lane(a.y, lane), out[2] = hx_lane(a.z, lane);
@@ -168,7 +164,7 @@ static hxQuat quat(const double p[4]) {
   return (hxQuat){hx_splat(p[0]), hx_splat(p[1]), hx_splat(p[2]), hx_splat(p[3])};
 }
 
-/* packs of legs at a time; n is a multiple of HX_SLOTS */
+/* Evaluates n numbers pack by pack; n is a multiple of HX_SLOTS. */
 HX_API void hx_probe_tanh(const double *x, double *out, int n) {
   for (int i = 0; i < n; i += HX_LANES) hx_store(out + i, hx_tanh(hx_load(x + i)));
 }
@@ -255,9 +251,7 @@ HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3
   }
 }
 
-/* ---- laws
- * --------------------------------------------------------------------------------------------------------------------
- */
+/* ---- laws ---- */
 
 HX_API double hx_probe_exact_restitution_chi(double e) { return hx_exact_restitution_chi(e); }
 
@@ -309,9 +303,7 @@ HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
   return touchdowns;
 }
 
-/* ---- the plant as it is now
- * ----------------------------------------------------------------------------------------------------
- */
+/* ---- present state of the plant ---- */
 
 static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplicit *implicit,
                      hxWork *work, hxRate *rate) {
@@ -380,7 +372,7 @@ static void fill_bristles(const double z[HX_LEGS][3], hxPlantMotion *motion) {
   }
 }
 
-/* puts the bristles; rate: their db/dt there */
+/* Sets the bristles; rate: their db/dt. */
 HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3],
                               double rate[HX_LEGS][3]) {
   hxWork work;
@@ -429,7 +421,7 @@ HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, doubl
   }
 }
 
-/* fills the stack that the next call will use */
+/* Overwrites the stack that the next call uses. */
 HX_API void hx_probe_stain_stack(int byte) {
   volatile char stain[300000];
   for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
@@ -442,7 +434,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   hxPlantMotion rate;
   for (int k = 0; k <= i; ++k)
     if (!hx_kernels[k]) return NULL;
-  if (!hx_kernels[i]->runs_here()) return NULL;
+  if (!hx_kernels[i]->is_supported()) return NULL;
   hx_command_from_input(&command, input, plant->state.time);
   hx_kernels[i]->derivative(&plant->model, &plant->state, &command, 1, &rate);
   hx_bodies_from_motion(&plant->model, &rate, body);

@@ -1,4 +1,4 @@
-/* test_controller.c - the controller through controller.h alone: at rest, saved, misused. */
+/* test_controller.c - tests the controller through controller.h: rest, saved states, misuse. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -6,7 +6,7 @@
 
 #include "check.h"
 
-/* ticks, the last of them under an input with a speed */
+/* Runs the controller for some ticks, the last ones with a speed command. */
 static void tick(hxController *controller, double vx, int ticks) {
   hxControllerInput input;
   hx_controller_input_default(&input);

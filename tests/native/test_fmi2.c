@@ -138,7 +138,7 @@ static void misuse_is_refused(void) {
   fmi2Real value;
   CHECK(fmi2GetReal(fmu, &nowhere, 1, &value) == fmi2Error);
   CHECK(set(fmu, "RR.tibia.angle_ref", nan("")) > fmi2Warning);
-  CHECK(set(fmu, "torso.mass", 1.0) > fmi2Warning); /* a parameter, once it runs */
+  CHECK(set(fmu, "torso.mass", 1.0) > fmi2Warning); /* parameters are fixed after initialisation */
   CHECK(fmi2DoStep(fmu, 0.0, -1.0, fmi2True) > fmi2Warning);
   CHECK(complaints == 5);
   CHECK(fmi2DoStep(fmu, 0.0, 0.01, fmi2True) == fmi2OK);

@@ -45,7 +45,7 @@ static hxDefinition falling_robot(void) {
   return robot;
 }
 
-/* ---- laws ----------------------------------------------------------------------------------- */
+/* ---- laws ---- */
 
 static void standing_feet_carry_the_weight(void) {
   hxPlant *plant = hx_plant_create();
@@ -109,7 +109,7 @@ static void rates_are_the_derivatives_of_coordinates(void) {
   hx_plant_destroy(plant);
 }
 
-/* a rate of what is linear in an input is the difference over it */
+/* the rate of a linear function of an input is its difference quotient */
 static void tangents_are_differences(void) {
   hxPlant *plant = hx_plant_create();
   hxInput input, change;
@@ -136,7 +136,7 @@ static void tangents_are_differences(void) {
   hx_plant_destroy(plant);
 }
 
-/* ---- the same bits -------------------------------------------------------------------------- */
+/* ---- the same bits ---- */
 
 static void a_saved_state_goes_on_as_it_would_have(void) {
   hxPlant *one = hx_plant_create(), *two = hx_plant_create();
@@ -168,7 +168,7 @@ static void stops_at_touch_downs_leave_no_trace(void) {
   hx_definition_default(&robot);
   hx_input_default(&input);
   robot.initial.position[2] += 0.02;
-  robot.initial.angle[RR][FEMUR] += 0.1; /* the feet land one after the other */
+  robot.initial.angle[RR][FEMUR] += 0.1; /* the feet land at different times */
   CHECK(hx_plant_reset(through, &robot, 0.0) == HX_OK &&
         hx_plant_reset(stopping, &robot, 0.0) == HX_OK);
   CHECK(hx_plant_step_to_event(through, &input, 0.3, 0, &found) == HX_OK && found);
@@ -183,7 +183,7 @@ static void stops_at_touch_downs_leave_no_trace(void) {
   hx_plant_destroy(through), hx_plant_destroy(stopping);
 }
 
-/* ---- refusals ------------------------------------------------------------------------------- */
+/* ---- refusals ---- */
 
 static void bad_input_changes_nothing(void) {
   hxPlant *plant = hx_plant_create();
@@ -222,7 +222,7 @@ static void bad_input_changes_nothing(void) {
   hx_plant_destroy(plant);
 }
 
-/* ---- every choice --------------------------------------------------------------------------- */
+/* ---- every choice ---- */
 
 static void moves(hxPlant *plant, const hxDefinition *robot) {
   double body[HX_BODIES][HX_BODY_STATE];

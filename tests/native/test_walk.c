@@ -16,7 +16,7 @@ static void sense(const hxOutput *seen, hxControllerInput *sensed) {
   memcpy(sensed->quaternion, seen->torso.quaternion, sizeof sensed->quaternion);
 }
 
-/* what is to be seen after the walk */
+/* results of the walk */
 static hxOutput walk(int control) {
   hxPlant *plant = hx_plant_create();
   hxController *controller = hx_controller_create();

@@ -35,7 +35,7 @@ static void *load(const char *path) {
 static Function *find(void *library, const char *name) {
   void *address = dlsym(library, name);
   Function *function;
-  memcpy(&function, &address, sizeof function); /* POSIX promises it, ISO C has no cast for it */
+  memcpy(&function, &address, sizeof function); /* POSIX allows it; ISO C has no such cast */
   return function;
 }
 #endif
@@ -74,7 +74,7 @@ static void print_reals(const double *value, size_t n) {
 
 enum { MOST = 2000 };
 
-/* how many there are, 0 when they are damaged */
+/* Returns their number, 0 for damaged ones. */
 static unsigned read_references(FILE *file, fmi2ValueReference reference[MOST]) {
   unsigned n;
   if (fscanf(file, "%u", &n) != 1 || n > MOST) return 0;
@@ -83,7 +83,7 @@ static unsigned read_references(FILE *file, fmi2ValueReference reference[MOST]) 
   return n;
 }
 
-/* one recorded step after the other; returns 0 when all went well */
+/* Replays the recorded steps; returns 0 on success. */
 static int walk(void *library, fmi2Component plant, FILE *inputs) {
   static fmi2ValueReference in[MOST], out[MOST];
   static double given[MOST], seen[MOST];

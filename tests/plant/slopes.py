@@ -1,5 +1,5 @@
-"""Slopes of contacts and servos by displacement and velocity, by differences of the twin: what W
-= M - z G_v - z^2 G_x is made of.
+"""Computes derivatives of contact and servo forces by differences of the twin, for W = M - z G_v -
+z^2 G_x.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ STEP = 1e-7  # m, rad, m/s: of central differences
 
 
 def resting(robot: Robot, seed: int) -> Array:
-    """Bodies on their joints and at rest, feet in the ground: there W's approximate slopes are
-    exact, save for geometric stiffness.
+    """Returns bodies at rest on their joints, feet in the ground.
+
+    W's approximate derivatives are exact there, except for geometric stiffness.
     """
     rng = np.random.default_rng(seed)
     still = np.zeros(3)
@@ -42,8 +43,9 @@ def body_height(robot: Robot, body: Array) -> Array:
 
 
 def foot_slopes(robot: Robot, body: Array, leg: int, damping: float) -> tuple[Array, Array]:
-    """(3, 6) twice: slopes of a foot's force by its tibia's displacement and velocity, linear
-    then angular, by differences.
+    """Returns derivatives (3, 6) of a foot's force by displacement and velocity of its tibia.
+
+    Columns are linear, then angular.
     """
     tibia, centre = body[3 * (leg + 1)], foot_centres(robot, body)[leg]
 
@@ -77,7 +79,7 @@ def foot_slopes(robot: Robot, body: Array, leg: int, damping: float) -> tuple[Ar
 
 
 def joint_slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
-    """(18,) twice: slopes of the joints' torques by their angle and speed, by differences."""
+    """Returns derivatives (18,) of the joints' torques by their angle and speed."""
 
     def torque(angle: float, speed: float) -> Array:
         turned = replace(command, angle_ref=command.angle_ref - angle)
@@ -94,8 +96,8 @@ def joint_slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Ar
 
 @dataclass(frozen=True)
 class LawSlopes:
-    """Slopes of the laws themselves: of the joints' torques (18,), and of the feet's forces by
-    displacement and velocity there (3, 3).
+    """Derivatives of the laws: joint torques (18,), and foot forces by displacement and velocity
+    (3, 3).
     """
 
     by_angle: Array
@@ -104,7 +106,7 @@ class LawSlopes:
 
 
 def law_slopes(robot: Robot, command: Command, body: Array) -> LawSlopes:
-    """The slopes at these bodies."""
+    """Returns the derivatives of the laws at these bodies."""
     damping = standing_damping(robot, body)
     touching = [
         leg for leg, foot in enumerate(foot_contacts(robot, body)) if foot.penetration > 0.0
@@ -117,8 +119,8 @@ def law_slopes(robot: Robot, command: Command, body: Array) -> LawSlopes:
 
 
 def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of these laws where the bodies are, geometric stiffness left
-    out as W leaves it out.
+    """Returns G_x and G_v (114, 114) of these laws at the bodies, without geometric stiffness, as
+    W.
     """
     G, feet = constraints(robot, body).G, foot_contacts(robot, body)
     G_x, G_v = G.T @ np.diag(law.by_angle) @ G, G.T @ np.diag(law.by_speed) @ G
@@ -131,5 +133,5 @@ def assembled(robot: Robot, body: Array, law: LawSlopes) -> tuple[Array, Array]:
 
 
 def slopes(robot: Robot, command: Command, body: Array) -> tuple[Array, Array]:
-    """(114, 114) twice: G_x and G_v of contacts and servos at these bodies."""
+    """Returns G_x and G_v (114, 114) of contacts and servos at these bodies."""
     return assembled(robot, body, law_slopes(robot, command, body))

@@ -1,6 +1,4 @@
-"""Feet that stick: what the bristle law promises of a block on an incline, of pushes, and of a
-walk.
-"""
+"""Tests the bristle law: a block on an incline, pushes, and a walk."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from states import changed
 from test_laws_standing import ACCURATE, block, laid, marching, stood, tilted
 
 from hexapod_cosim.models import load_robot
-from hexapod_cosim.models.contact import BREAK_AWAY, bristle_force, bristle_rate
+from hexapod_cosim.models.contact import SPRING_LIMIT, bristle_force, bristle_rate
 from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.records import Array
 
@@ -38,7 +36,7 @@ RETURNED = 1e-8
 
 def test_below_break_away_a_bristle_is_a_spring() -> None:
     rng = np.random.default_rng(0)
-    for share in (0.0, 0.3, BREAK_AWAY):
+    for share in (0.0, 0.3, SPRING_LIMIT):
         slip, z = rng.normal(size=3), share * FRICTION.presliding * np.array([0.6, 0.8, 0.0])
         assert bristle_rate(FRICTION, slip, z) == pytest.approx(slip, rel=EXACT)
         still = bristle_force(FRICTION, 10.0, np.zeros(3), z)
@@ -85,11 +83,11 @@ def test_turning_slip_and_bristle_turns_the_force() -> None:
 
 
 def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
-    """C1 in the deflection: slopes on either side of break-away and of the presliding agree to
-    first order in the distance.
+    """The rate is C1 in the deflection: slopes on either side of the spring limit and of the
+    presliding agree to first order in the distance.
     """
     x_axis = np.array([1.0, 0.0, 0.0])
-    for share in (BREAK_AWAY, 1.0):
+    for share in (SPRING_LIMIT, 1.0):
         slopes = [
             (
                 bristle_rate(
@@ -109,7 +107,7 @@ def test_a_bristle_lets_go_without_a_step_in_its_rate() -> None:
 
 
 def given(share: float) -> float:
-    """Of the presliding: where a share of the limit is held, u (3 - u^2)/2 = share."""
+    """Returns the deflection over the presliding for a share of the limit: u (3 - u^2)/2."""
     return 2.0 * math.sin(math.asin(share) / 3.0)
 
 
@@ -125,7 +123,7 @@ def test_below_the_friction_angle_a_block_holds_still_where_it_has_given_way(
     plant.step(62.0)
     held = plant.output()
     way = friction.presliding * given(math.tan(angle) / friction.mu)
-    assert way < BREAK_AWAY * friction.presliding
+    assert way < SPRING_LIMIT * friction.presliding
     u = held.foot.bristle @ downhill / friction.presliding
     share = held.foot.normal_force @ (u * (3.0 - u**2) / 2.0) / held.foot.normal_force.sum()
     assert share == pytest.approx(math.tan(angle) / friction.mu, rel=CLOSED)
@@ -138,7 +136,7 @@ def test_below_the_friction_angle_a_block_holds_still_where_it_has_given_way(
 
 def test_a_constant_force_between_break_away_and_the_limit_is_held_too(core: ct.CDLL) -> None:
     plant, downhill, _ = tilted(core, 0.58, 0.0, by="gravity", law="bristle")
-    assert given(math.tan(0.58) / plant.robot.friction.mu) > BREAK_AWAY
+    assert given(math.tan(0.58) / plant.robot.friction.mu) > SPRING_LIMIT
     plant.step(5.0)
     settled = plant.output()
     plant.step(25.0)
@@ -156,7 +154,7 @@ def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
     plant, downhill, _ = tilted(core, 0.15, 0.0, by="gravity", law="bristle")
     weight, mu = plant.robot.total_mass * 9.81, plant.robot.friction.mu
     size = 0.35 * mu * weight
-    assert given(math.tan(0.15) / mu + 0.35 / math.cos(0.15)) < 0.9 * BREAK_AWAY
+    assert given(math.tan(0.15) / mu + 0.35 / math.cos(0.15)) < 0.9 * SPRING_LIMIT
     way = np.array([math.cos(heading), math.sin(heading), 0.0])
     places, swing = [], 0.0
     for k in range(1200):  # 60 swings of 0.1 s, from the third on compared at their ends
@@ -173,7 +171,7 @@ def test_a_push_to_and_fro_below_break_away_does_not_walk_the_block_downhill(
 
 
 def test_what_bristles_hold_they_give_back(core: ct.CDLL) -> None:
-    """Pushed aside and let go below break-away, slowly: the books show the loan, and its return."""
+    """A slow push below the spring limit stores energy and returns it (energy audit)."""
     robot = block("athena", gravity=np.array([0.0, 0.0, -9.81]), law="bristle")
     plant = laid(core, robot, np.eye(4)[0])
     plant.step(1.0)
@@ -230,8 +228,8 @@ def test_a_walk_converges_in_proportion_to_the_tolerance(core: ct.CDLL) -> None:
 
 
 def test_a_stuck_leg_does_not_ring(core: ct.CDLL) -> None:
-    """Pushed and let go, the standing robot is quiet after a fifth of a second: its bristles
-    damp what its servos leave.
+    """After a push the standing robot is at rest within a fifth of a second, because bristles damp
+    the motion that the servos leave.
     """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver=ACCURATE)
     plant, speeds = stood(core, robot), []

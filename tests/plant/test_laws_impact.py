@@ -1,7 +1,7 @@
-"""Impact laws through the whole plant: restitution, penetration, touch-down, bouncing.
+"""Tests impact laws with the whole plant: restitution, penetration, touch-down, bouncing.
 
-A robot with its joints locked (kinematic drives on their references) that falls flat on six equal
-feet is a point mass on a contact of six times a foot's stiffness, so closed forms hold.
+A robot with locked joints (kinematic drives on their references) that falls flat on six equal feet
+is a point mass on a contact of six times a foot's stiffness, so closed forms hold.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ STILL = np.zeros(3)
 
 
 def rigid(law: str = "exact_restitution", *, gravity: float = 0.0, **contact: Any) -> Robot:
-    """Athena with locked joints; the high stiffness keeps impacts short."""
+    """Returns Athena with locked joints; the high stiffness keeps impacts short."""
     settings = {"law": law} | contact
     robot = changed(
         load_robot("athena"),
@@ -43,7 +43,7 @@ def changed_gravity(robot: Robot, gravity: float) -> Robot:
 
 
 def above(robot: Robot, clearance: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Where the torso of the level stance is with all feet this far [m] above the ground."""
+    """Returns the torso's position in the level stance at a height of the feet [m]."""
     feet = foot_contacts(
         robot, body_states(robot, STILL, np.eye(4)[0], STILL, STILL, robot.stance, np.zeros((6, 3)))
     )
@@ -55,8 +55,8 @@ def falling(core: ct.CDLL, robot: Robot, *, clearance: float = 1e-3, speed: floa
 
 
 def flown_off(plant: Plant, *, step: float = 1e-4, limit: float = 2.0) -> Any:
-    """The output just after all feet that touched have left again, with the deepest penetration
-    seen as `deepest`.
+    """Returns the output just after all feet have left the ground again; `deepest` is the deepest
+    penetration.
     """
     deepest, touched, end = 0.0, False, plant.time + limit
     while plant.time < end:
@@ -137,8 +137,8 @@ def test_the_energy_lost_in_an_impact_is_one_less_the_restitution_squared(core: 
 
 
 def test_every_apex_of_a_bouncing_robot_is_lower_by_the_restitution_squared(core: ct.CDLL) -> None:
-    """Gravity works in the contact too, on a way of delta_max: a stiff ground and a weak gravity
-    keep that below 1e-3.
+    """Gravity does work in the contact over delta_max; a stiff ground and a weak gravity keep it
+    below 1e-3.
     """
     e, height, gravity = 0.8, 0.1, 1.0
     robot = rigid(gravity=gravity, restitution=e, stiffness=1e10)
@@ -194,9 +194,7 @@ def test_fixed_steps_find_the_touchdown_too(core: ct.CDLL) -> None:
 def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(
     core: ct.CDLL, method: str, step: float
 ) -> None:
-    """The whole impact takes some 10 ms; the steps are stiff enough for where the approach
-    leads.
-    """
+    """The impact takes about 10 ms; the steps use the stiffness at the end of the approach."""
     plant, fastest = (
         falling(
             core,
@@ -212,9 +210,7 @@ def test_a_coarse_implicit_step_through_an_impact_gains_no_energy(
 
 
 def test_feet_of_unequal_height_touch_down_one_after_the_other(core: ct.CDLL) -> None:
-    """Each at its own time, in free fall until the first: the first one's speed is ballistic,
-    all are sampled.
-    """
+    """The first foot lands with the speed of free fall; all landings are sampled."""
     robot = rigid(gravity=9.81)
     angle = robot.stance.copy()
     angle[:, 1] -= 0.01 * np.arange(6)  # femurs lower: leg RR reaches furthest down
@@ -279,8 +275,8 @@ def test_a_touchdown_below_the_floor_counts_as_the_floor(core: ct.CDLL) -> None:
 
 
 def test_the_ground_never_pulls(core: ct.CDLL) -> None:
-    """A foot torn out faster than it came down: its damping force would be larger than its
-    elastic one.
+    """A foot leaves faster than it landed, so that its damping force would exceed its elastic
+    force.
     """
     robot = changed(rigid(restitution=0.2, gravity=9.81), servo={"mode": "position"})
     plant = falling(core, robot, clearance=0.02)

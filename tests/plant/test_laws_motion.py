@@ -1,4 +1,4 @@
-"""Laws of motion through the whole plant: momentum, energy, steady spin, the pendulum, symmetry."""
+"""Tests laws of motion with the whole plant: momentum, energy, steady spin, pendulum, symmetry."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def tumbling(core: ct.CDLL, robot: Robot, seed: int = 1) -> Plant:
 
 
 def free(**solver: Any) -> Robot:
-    """No gravity, no torque, no friction in the gears."""
+    """Returns a robot without gravity, torque and gear friction."""
     return replace(
         changed(load_robot("phantomx_mk4"), servo=LOSSLESS, solver=FLIGHT | solver),
         gravity=WEIGHTLESS,
@@ -58,7 +58,7 @@ def free(**solver: Any) -> Robot:
 def test_linear_momentum_changes_by_the_weight_alone_to_rounding(
     core: ct.CDLL, mode: str, method: str
 ) -> None:
-    """Whatever the servos do. Every method keeps a linear invariant exactly."""
+    """This holds with any servo torque; every method preserves linear invariants exactly."""
     robot = changed(load_robot("phantomx_mk4"), servo={"mode": mode}, solver={"method": method})
     plant = tumbling(core, robot)
     before = momentum(robot, plant.bodies)[0]
@@ -113,9 +113,7 @@ def test_a_falling_robot_trades_potential_for_kinetic_energy(core: ct.CDLL) -> N
 
 @pytest.mark.parametrize("axis", range(3))
 def test_a_spin_about_a_principal_axis_is_steady(core: ct.CDLL, axis: int) -> None:
-    """Joints locked, legs level: by symmetry the principal axes are the torso's; a turn of seven
-    seconds would show a torque.
-    """
+    """With locked joints and level legs the principal axes are the torso's by symmetry."""
     robot = replace(
         changed(load_robot("athena"), servo={"mode": "kinematic"}, solver=FLIGHT),
         gravity=WEIGHTLESS,
@@ -153,8 +151,9 @@ HEAVY = (1e6, 1e6, 1e6, 0.0, 0.0, 0.0)
 
 
 def pendulums() -> Robot:
-    """Six 1 kg bobs on 1 m tibias; coxas and femurs too heavy to turn, their joints all at the
-    hips; nothing else rotates.
+    """Returns six 1 kg bobs on 1 m tibias.
+
+    Coxas and femurs are too heavy to move, and their joints lie at the hips.
     """
     robot = changed(
         load_robot("athena"),
@@ -212,7 +211,7 @@ def mirrored_command(command: Command) -> Command:
 
 
 def landed(plant: Plant, mirror: Any) -> tuple[Any, Any]:
-    """Output and bodies after five commands, in which the robot lands."""
+    """Returns output and bodies after five commands, in which the robot lands."""
     for k in range(5):
         command = mirror(random_command(plant.robot, k, size=0.3))
         plant.step(0.03 * (k + 1), command)
@@ -266,8 +265,8 @@ def test_the_order_of_the_legs_does_not_matter(core: ct.CDLL) -> None:
 
 
 def test_turning_the_world_turns_the_motion(core: ct.CDLL) -> None:
-    """The same robot started turned about the vertical, on flat ground: nothing knows where x
-    points.
+    """The robot starts rotated about the vertical on flat ground; no law depends on the direction
+    of x.
     """
     robot, turn = changed(load_robot("athena"), solver=FIXED), 0.7
     z = np.array([math.cos(turn / 2.0), 0.0, 0.0, math.sin(turn / 2.0)])

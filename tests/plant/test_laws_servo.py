@@ -1,7 +1,7 @@
-"""Servos through the whole plant: limits, rotor inertia, gear friction, the kinematic drive.
+"""Tests servos with the whole plant: limits, rotor inertia, gear friction, kinematic drives.
 
-On legs whose coxas and femurs are too heavy to move, each tibia is a link on a wall: closed forms
-hold for its joint alone.
+Coxas and femurs are too heavy to move, so that each tibia is a link on a wall with closed forms for
+its joint.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ STRETCHED = np.zeros((6, 3))
 
 
 def walled(**servo: Any) -> Robot:
-    """No gravity; tibias on femurs that do not answer."""
+    """Returns a robot without gravity whose femurs do not move."""
     robot = changed(
         load_robot("athena"),
         servo={"coulomb_friction": 0.0} | servo,
@@ -47,13 +47,13 @@ def walled(**servo: Any) -> Robot:
 
 
 def tibia_inertia(robot: Robot) -> float:
-    """kg m2 about the knee, with the rotor's."""
+    """Returns the inertia about the knee, with the rotor's [kg m2]."""
     tibia = robot.legs[0].links[2]
     return tibia.inertia[1] + tibia.mass * tibia.com[0] ** 2 + robot.servo.rotor_inertia
 
 
 def tibias(value: float) -> Any:
-    """(6, 3) with this value at every knee."""
+    """Returns (6, 3) with this value at every knee."""
     return np.array([0.0, 0.0, value]) * np.ones((6, 1))
 
 
@@ -157,8 +157,8 @@ def driven(robot: Robot) -> Robot:
 def test_a_kinematic_drive_follows_its_reference_in_the_air_and_on_the_ground(
     core: ct.CDLL, name: str
 ) -> None:
-    """References that fit together, q + qd h from macro-step to macro-step: the joints are where
-    they are told to be.
+    """The references q + qd h are consistent from step to step, so that the joints follow them
+    exactly.
     """
     robot = driven(load_robot(name))
     start = landing(robot)
@@ -204,8 +204,8 @@ def test_a_drive_told_its_acceleration_stays_on_its_parabola(
 def test_a_drive_told_no_acceleration_lags_by_the_acceleration_over_beta_squared(
     core: ct.CDLL,
 ) -> None:
-    """What importers get that leave acceleration_ref at 0: 30 rad/s2 over (100/s)^2 are 3 mrad,
-    once the drive has settled.
+    """Importers may leave acceleration_ref at 0: 30 rad/s2 over (100/s)^2 are 3 mrad in the steady
+    state.
     """
     robot, h = in_flight(alpha=100.0, beta=100.0), 1e-4
     plant, lag = Plant(core, robot), {}
@@ -292,9 +292,7 @@ def test_drives_that_hold_a_standing_robot_give_the_torques_that_servos_give(cor
 
 
 def test_drive_work_is_what_the_robot_gains(core: ct.CDLL) -> None:
-    """Legs swung in free fall without gravity: the multiplier times the speed is all the power
-    there is.
-    """
+    """Legs swing in free fall without gravity, so that multiplier times speed is the only power."""
     robot = replace(
         changed(driven(load_robot("athena")), servo={"coulomb_friction": 0.0}, solver=FLIGHT),
         gravity=WEIGHTLESS,

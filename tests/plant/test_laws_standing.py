@@ -1,5 +1,5 @@
-"""Standing, creeping, sliding and walking in place through the whole plant: balances, the
-friction cone, the energy books.
+"""Tests standing, creeping, sliding and marching with the whole plant: balances, friction cone,
+energy audit.
 """
 
 from __future__ import annotations
@@ -93,7 +93,9 @@ def test_standing_joint_torques_are_the_statics_of_the_legs(core: ct.CDLL) -> No
     torque = stood(core, robot).output().torque
 
     def work(angle: Array) -> float:
-        """Potential of the legs' weight less the feet's forces, torso held."""
+        """Returns the potential of the legs' weight minus the work of foot forces, with the torso
+        fixed.
+        """
         body = body_states(
             robot, pose.position, pose.quaternion, np.zeros(3), np.zeros(3), angle, np.zeros((6, 3))
         )
@@ -126,7 +128,7 @@ def block(
 
 
 def laid(core: ct.CDLL, robot: Robot, quaternion: Array) -> Plant:
-    """The stance pressed into the ground as deep as its weight asks for."""
+    """Returns the stance pressed into the ground by the depth that carries its weight."""
     still, flat = np.zeros(3), np.zeros((6, 3))
     feet = foot_contacts(
         robot, body_states(robot, still, quaternion, still, still, robot.stance, flat)
@@ -139,8 +141,8 @@ def laid(core: ct.CDLL, robot: Robot, quaternion: Array) -> Plant:
 def tilted(
     core: ct.CDLL, angle: float, heading: float, *, by: str, law: str = "tanh"
 ) -> tuple[Plant, Array, Array]:
-    """A block on an incline, made by leaning gravity or by sloping the ground; the way downhill
-    and the ground's normal.
+    """Returns a block on an incline, by tilted gravity or sloping ground, with the downhill
+    direction and the normal.
     """
     uphill = np.array([math.cos(heading), math.sin(heading), 0.0])
     if by == "gravity":
@@ -212,7 +214,7 @@ def test_without_friction_a_block_slides_as_if_there_were_none(core: ct.CDLL) ->
 
 
 def marching(robot: Robot, t: float) -> Command:
-    """Two tripods lifted in turn, twice a second, and a sway."""
+    """Returns the command that lifts two tripods in turn, twice a second, and sways."""
     phase = 2.0 * math.pi * 2.0 * t + math.pi * (np.arange(6) % 2)
     swing = np.clip(np.sin(phase), 0.0, None)
     angle = robot.stance + np.column_stack([0.1 * np.cos(phase), 0.35 * swing, 0.2 * swing])

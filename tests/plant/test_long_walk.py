@@ -1,6 +1,4 @@
-"""What a long walk must keep: the energy books, the joints, and its indifference to stiff laws
-and to how the legs are numbered.
-"""
+"""Tests long walks: energy audit, joints, independence of stiff laws and leg numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ STIFF = 2.0  # of the evaluations
 
 
 def walking(robot: Robot, duration: float) -> Iterator[tuple[float, Command]]:
-    """End time and joint commands of every macro-step of a kinematic walk at 0.08 m/s."""
+    """Yields end time and joint commands of every step of a kinematic walk at 0.08 m/s."""
     controller = Controller(robot, period=H, gait=make_gait(robot, robot.gait.name))
     nothing, forward = Measurement(), BodyCommand(vx=0.08)
     for k in range(round(duration / H)):

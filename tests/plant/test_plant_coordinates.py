@@ -1,4 +1,4 @@
-"""The plant in coordinates, for solvers of others, and its exact derivatives."""
+"""Tests the plant in coordinates for importers' solvers, and its exact derivatives."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ VARIANTS: tuple[dict[str, dict[str, Any]], ...] = (
 
 
 def smooth(robot: Robot) -> Robot:
-    """Without kinks near by: servos that are never at their limits, feet whose force never ends
-    before the contact does.
+    """Returns a robot far from kinks.
+
+    Its servos stay below their limits, and its contacts are permanent.
     """
     gentle = changed(robot, servo={"torque_max": 1e4, "speed_max": 1e4})
     return (

@@ -1,6 +1,4 @@
-"""Steps that end where a foot touches down or lifts off: going on gives, bit for bit, what one
-call would have given.
-"""
+"""Tests steps that end at touch-down or lift-off: continuing gives the same bits as one call."""
 
 from __future__ import annotations
 
@@ -24,9 +22,7 @@ def dropped(core: ct.CDLL, robot: Robot) -> Plant:
 
 
 def command_of(robot: Robot) -> Command:
-    """One that moves the joints, so that a kinematic drive's reference depends on when it was
-    given.
-    """
+    """Returns a command that moves the joints, so that kinematic drives depend on its time."""
     return Command(angle_ref=robot.stance, speed_ref=np.full((6, 3), 0.2))
 
 

@@ -1,6 +1,4 @@
-"""The C plant equals the readable twin, function by function, on random states with drifted
-joints.
-"""
+"""Compares the C plant with the readable twin, function by function, on random states."""
 
 from __future__ import annotations
 
@@ -222,9 +220,7 @@ def test_foot_kinematics_and_forces_are_the_twins(
 
 
 def test_a_step_takes_a_foots_slopes_where_its_approach_leads_it(core: ct.CDLL) -> None:
-    """The implicit part of a step is to be stiff enough for its end: slopes at delta + h ddelta
-    while the foot approaches.
-    """
+    """The derivatives are those at delta + h ddelta while the foot approaches."""
     robot = changed(lopsided(7), contact={"impact_speed_floor": 2.0})
     plant, body = drifted(core, robot, 7)
     damping, approaching = contact_damping(robot.contact, 0.0), 0

@@ -1,8 +1,7 @@
-"""What the plant measures of its own steps: works, losses, slip, impulses and peaks, against closed
-forms and independent sums.
+"""Tests the measurements of the plant against closed forms and independent sums.
 
-Where a robot falls flat with its joints locked it is a point mass on a contact of six times a
-foot's stiffness (test_laws_impact.py).
+A robot with locked joints that falls flat is a point mass on a contact of six times a foot's
+stiffness (test_laws_impact.py).
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ CLOSED = 1e-3  # relative: paths between the ends of steps at a tolerance of 1e-
 
 
 def weight(robot: Robot) -> float:
-    """N"""
+    """Returns the robot's weight [N]."""
     return G * (robot.torso.mass + sum(link.mass for leg in robot.legs for link in leg.links))
 
 
@@ -56,8 +55,7 @@ def rises(forces: Array) -> Array:
     return np.asarray((late - early) / 1e-3)
 
 
-# ---- closed forms
-# -----------------------------------------------------------------------------------------------------------
+# ---- closed forms ----
 
 
 @pytest.mark.parametrize("e", [0.3, 0.7])
@@ -190,8 +188,7 @@ def test_gears_take_the_energy_of_joints_that_spin_down(core: ct.CDLL) -> None:
     assert energy.gear_loss > 0.5 * before
 
 
-# ---- sums over a walk
-# --------------------------------------------------------------------------------------------------------
+# ---- sums over a walk ----
 
 
 @pytest.fixture(scope="module", params=["tanh", "bristle"])
@@ -326,8 +323,7 @@ def test_measures_come_back_with_a_saved_state(core: ct.CDLL, robot: Robot) -> N
     assert ends[0] == ends[1]
 
 
-# ---- the books
-# ---------------------------------------------------------------------------------------------------------------
+# ---- the books ----
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("rosw3", 1e-4), ("ros2", 0.1)])

@@ -1,6 +1,4 @@
-"""Misuse of the plant: every bad call is told what it gave and what was expected, and leaves the
-plant as it was.
-"""
+"""Tests misuse of the plant: its messages, and that the plant does not change."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from hexapod_cosim.models.dynamics import Command
 
 
 def refused(plant: Plant, call: Callable[[], Any], status: int, pattern: str) -> None:
-    """The call fails with this status and message, and the plant is as it was."""
+    """Asserts that the call fails with this status and message and changes nothing."""
     before = plant.save()
     with pytest.raises(PlantError, match=pattern) as caught:
         call()
@@ -164,7 +162,8 @@ IMPOSSIBLE: list[tuple[str, Any, str]] = [
     (
         "friction.mu_static",
         0.8,
-        r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with this friction\.law; the bristle law alone",
+        r"friction\.mu_static: got 0\.8, expected 0 or friction\.mu with this friction\.law; "
+        r"the bristle law alone",
     ),
     ("friction.stribeck_speed", 0.0, r"friction\.stribeck_speed: got 0, expected 1e-06 to 100 m/s"),
     ("servo.mode", 4, r"servo\.mode: got 4, expected 1 to 3"),
@@ -249,14 +248,15 @@ def test_every_status_has_a_name(core: ct.CDLL) -> None:
 
 @pytest.mark.parametrize("settings", [{}, {"step": 1e-7}])
 def test_no_call_runs_on_for_ever(core: ct.CDLL, settings: dict[str, float]) -> None:
-    """An absurd push under error control, a step far too small without it: refused within a
-    bounded number of evaluations.
+    """An extreme push with error control, and a far too small step, fail within a bounded number of
+    evaluations.
     """
     plant = Plant(core, changed(load_robot("athena"), solver=settings))
     before = plant.save()
     with pytest.raises(
         PlantError,
-        match=r"gives up|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, expected at most",
+        match=r"gives up|solver\.step: got 1e-07 s, which makes 1000000 steps of this call, "
+        r"expected at most",
     ):
         plant.step(0.1, Command(angle_ref=plant.robot.stance, push_force=np.array([1e8, 0.0, 0.0])))
     assert plant.save() == before

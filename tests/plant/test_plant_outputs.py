@@ -1,5 +1,5 @@
-"""What the plant shows, against the twin: energies, reactions, attitude, errors; and the robot
-it carries compiled in.
+"""Compares the plant's outputs with the twin: energies, reactions, attitude, errors; tests the
+default robot.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def test_slip_speed_and_tangential_force_are_the_parts_along_the_ground(
 
 
 def numbers(value: Any) -> list[float]:
-    """All numbers in a structure, in order."""
+    """Returns all numbers of a structure, in order."""
     if isinstance(value, ct.Structure):
         return [number for field in value._fields_ for number in numbers(getattr(value, field[0]))]
     return (

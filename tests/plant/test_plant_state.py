@@ -1,4 +1,4 @@
-"""The plant's bytes are the plant: reruns, restores, resets and neighbours change no bit."""
+"""Tests that reruns, restores, resets and other plants change no bit of a plant."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The documentation's site, built from docs/ by `make docs`."""
+"""Builds the site of the documentation from docs/ (`make docs`)."""

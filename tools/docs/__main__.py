@@ -14,12 +14,12 @@ from tools.docs.stage import DOCS, ROOT, Stage, pages
 
 
 def build(out: Path, *, work: Path, computed: bool = True) -> int:
-    """Builds the site into `out`, by way of pages put together in `work`; returns Sphinx's exit
-    code, 0 without a warning.
+    """Builds the site and returns Sphinx's exit code, which is 0 without warnings.
 
     Args:
-        computed: with the validation's figures computed and the notebooks run; else without them,
-            for a look at a page.
+        out: folder of the site.
+        work: folder in which the pages are assembled.
+        computed: computes the validation and runs the notebooks.
     """
     shutil.rmtree(work, ignore_errors=True)
     stage = Stage(work)
@@ -37,7 +37,7 @@ def build(out: Path, *, work: Path, computed: bool = True) -> int:
 
 
 def generated() -> list[tuple[str, str]]:
-    """The pages of the reference."""
+    """Returns names and texts of the pages of the reference."""
     fmus = [
         (f"reference/{name}.md", variables.page(interface))
         for name, interface in variables.interfaces().items()
@@ -51,7 +51,7 @@ def generated() -> list[tuple[str, str]]:
 
 
 def main() -> int:
-    """The command."""
+    """Runs the command; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "-o", "--output", type=Path, default=ROOT / "build" / "docs", help="folder of the site"
@@ -63,7 +63,7 @@ def main() -> int:
         "--work",
         type=Path,
         default=ROOT / "build" / "docs-pages",
-        help="folder in which its pages are put together",
+        help="folder in which the pages are assembled",
     )
     arguments = parser.parse_args()
     began = time.monotonic()

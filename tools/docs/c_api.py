@@ -1,6 +1,4 @@
-"""The reference of the C API: the public headers, declaration by declaration, with their
-comments.
-"""
+"""Writes the reference of the C API: the declarations of the public headers with their comments."""
 
 from __future__ import annotations
 
@@ -23,12 +21,15 @@ TYPE = re.compile(r"^(?:typedef )?(struct|enum)\s*(\w*)")
 
 
 def page() -> str:
-    """The page on all headers."""
+    """Returns the page on all headers."""
     return "\n".join(_lines()) + "\n"
 
 
 def _lines() -> Iterator[str]:
-    yield "# C\n\nThe plant and the controller without FMI: a shared library each, C11, no dependencies. Made from the headers.\n"
+    yield (
+        "# C\n\nThe plant and the controller without FMI: a shared library each, C11, no "
+        "dependencies. Made from the headers.\n"
+    )
     for header in HEADERS:
         yield f"## {Path(header).name}\n"
         yield from _header((ROOT / header).read_text(encoding="utf-8"))
@@ -53,7 +54,7 @@ def _header(text: str) -> Iterator[str]:
 
 
 def _blocks(text: str) -> Iterator[str]:
-    """Declarations with the comments before them; blank lines inside braces do not part them."""
+    """Yields declarations with the comments before them; blank lines in braces do not end them."""
     lines: list[str] = []
     for line in text.splitlines():
         bare = COMMENT.sub("", line)
@@ -78,7 +79,7 @@ def _split(block: str) -> tuple[str, str]:
 
 
 def _functions(comment: str, code: str) -> Iterator[str]:
-    """Functions that share a comment; a comment behind one is its own."""
+    """Yields functions that share a comment; a comment after a function belongs to it alone."""
     if comment:
         yield comment + "\n"
     for prototype, own in re.findall(

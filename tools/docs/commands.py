@@ -1,6 +1,4 @@
-"""The reference of the `hexapod` command: what its --help says, written down by typer's own
-tool.
-"""
+"""Writes the reference of the `hexapod` command from its --help, with typer's own tool."""
 
 from __future__ import annotations
 
@@ -22,5 +20,5 @@ DOCUMENT = [
 
 
 def page() -> str:
-    """The page on all commands."""
+    """Returns the page on all commands."""
     return subprocess.run(DOCUMENT, capture_output=True, text=True, check=True).stdout

@@ -1,6 +1,8 @@
-"""Docstrings as Sphinx takes them. Ours are plain text with formulas in it (|v_t|, f_n, x*y): what
-reStructuredText would read as markup is escaped, `names` become code, indented formulas stay as
-they are typed, Args become fields. A comment at a field's right is what the field means.
+"""Converts docstrings to reStructuredText for Sphinx.
+
+Our docstrings are plain text with formulas (|v_t|, f_n, x*y). Characters that are markup in
+reStructuredText are escaped, `names` become code, indented formulas stay unchanged, and Args become
+fields. A comment to the right of a field is the description of the field.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ COMMENT = re.compile(r"^\s*#:? *(?!noqa|type:|fmt:)(.*)\r?\n?$")
 
 
 def converted(lines: list[str]) -> Iterator[str]:
-    """The lines of a docstring in reStructuredText."""
-    place = "text"  # or a section, or "formula": what indented lines belong to
+    """Yields the lines of a docstring in reStructuredText."""
+    place = "text"  # the meaning of indented lines: "text", "formula" or a section
     for line in lines:
         indented = line.startswith(" " * INDENT)
         if line.strip() and not indented:
@@ -38,7 +40,7 @@ def converted(lines: list[str]) -> Iterator[str]:
 
 
 def _field(line: str, section: str) -> Iterator[str]:
-    """A line of a section; arguments that share a text get it each."""
+    """Yields the fields of a line of a section, one for each argument."""
     found = ARGUMENT.match(line) if section == "Args:" else None
     if found:
         yield from (f":param {name}: {escaped(found[2])}" for name in found[1].split(", "))
@@ -49,7 +51,7 @@ def _field(line: str, section: str) -> Iterator[str]:
 
 
 def escaped(line: str) -> str:
-    """A line without markup but for code."""
+    """Escapes the markup of a line, except code."""
     parts = re.split(r"``?([^`]+)``?", line)
     return "".join(
         f"``{part}``" if place % 2 else re.sub(r"([\\*|_])", r"\\\1", part)
@@ -66,7 +68,7 @@ def process(
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Tells Sphinx."""
-    parser.comment_re = COMMENT  # Sphinx's own wants "#:"
+    """Registers the extension with Sphinx."""
+    parser.comment_re = COMMENT  # Sphinx's own pattern requires "#:"
     app.connect("autodoc-process-docstring", process)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,8 +1,7 @@
-"""Formulas as MathML, which browsers show by themselves: no script, nothing fetched at reading
-time.
+"""Converts formulas to MathML, which browsers show without scripts or downloads.
 
-The font that brackets and accents need comes with the site, inside a style sheet: pages opened from
-a disk may not load font files.
+The font for brackets and accents is embedded in a style sheet, because browsers do not load font
+files for pages that are opened from a disk.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from latex2mathml.converter import convert
 
 STYLE = "mathfont.css"
 # letters and signs, accents, Greek, punctuation and primes, arrows, operators, brackets and their
-# pieces, italic letters
+# parts, italic letters
 SHOWN = (
     (0x20, 0x7E),
     (0xA0, 0xFF),
@@ -36,24 +35,24 @@ SHOWN = (
     (0x1D434, 0x1D467),
     (0x1D6E2, 0x1D71B),
 )
-BAR = re.compile(r"<mo([^>]*)>(?=&#x0007C;)")  # of a norm: no operator
+BAR = re.compile(r"<mo([^>]*)>(?=&#x0007C;)")  # a bar of a norm, which is not an operator
 TAG = re.compile(r"\s*\\tag\{(\w+)\}\s*$")
 
 
 def mathml(latex: str, *, display: str) -> str:
-    """A formula as MathML, with what it was written as for readers who copy it."""
+    """Converts a formula to MathML; its LaTeX source is the alternative text."""
     text = BAR.sub(r'<mo\1 lspace="0" rspace="0">', str(convert(latex, display=display)))
     return text.replace("<math ", f'<math alttext="{escape(latex, quote=True)}" ', 1)
 
 
 def split_tag(latex: str) -> tuple[str, str]:
-    r"""A displayed formula and the number of its \tag, "" without one."""
+    r"""Splits a displayed formula into formula and number of its \tag, "" without one."""
     found = TAG.search(latex.strip())
     return (latex.strip()[: found.start()], found[1]) if found else (latex.strip(), "")
 
 
 def visit_math(translator: Any, node: nodes.math) -> None:
-    """A formula in a line of text."""
+    """Writes a formula in a line of text."""
     translator.body.append(
         f'<span class="formula">{mathml(node.astext(), display="inline")}</span>'
     )
@@ -61,19 +60,22 @@ def visit_math(translator: Any, node: nodes.math) -> None:
 
 
 def visit_math_block(translator: Any, node: nodes.math_block) -> None:
-    """A formula of its own, with its number as an anchor: equations.html#eq-4."""
+    """Writes a displayed formula with its number as an anchor: equations.html#eq-4."""
     latex, number = split_tag(node.astext())
     anchor = f' id="eq-{number}"' if number else ""
     label = f'<a class="formula-number" href="#eq-{number}">({number})</a>' if number else ""
+    formula = mathml(latex, display="block")
     translator.body.append(
-        f'<div class="formula-block"{anchor}><div>{mathml(latex, display="block")}</div>{label}</div>\n'
+        f'<div class="formula-block"{anchor}><div>{formula}</div>{label}</div>\n'
     )
     raise nodes.SkipNode
 
 
 def font_style() -> str:
-    """The style sheet with the font: STIX Two Math (SIL Open Font Licence), as ziamath brings
-    it, without what no page shows.
+    """Returns the style sheet with the font.
+
+    The font is STIX Two Math (SIL Open Font Licence) from ziamath, reduced to the characters of
+    SHOWN.
     """
     path = Path(ziamath.__file__).parent / "fonts" / "STIXTwoMath-Regular.ttf"
     font, bytes_out = TTFont(path), io.BytesIO()
@@ -84,16 +86,19 @@ def font_style() -> str:
     chosen.subset(font)
     font.save(bytes_out)
     data = base64.b64encode(bytes_out.getvalue()).decode()
-    return f'@font-face {{ font-family: "Site Math"; src: url("data:font/ttf;base64,{data}") format("truetype"); }}\n'
+    return (
+        '@font-face { font-family: "Site Math"; '
+        f'src: url("data:font/ttf;base64,{data}") format("truetype"); }}\n'
+    )
 
 
 def write_font(app: Any, _error: Any) -> None:
-    """Puts the style sheet beside the site's others."""
+    """Writes the style sheet into the site."""
     (Path(app.outdir) / "_static" / STYLE).write_text(font_style(), encoding="utf-8")
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Tells Sphinx."""
+    """Registers the extension with Sphinx."""
     app.add_css_file(STYLE)
     app.connect("build-finished", write_font)
     app.add_html_math_renderer(

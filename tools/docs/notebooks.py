@@ -1,4 +1,4 @@
-"""Runs the notebooks, side by side, and leaves them with what they put out."""
+"""Runs the notebooks in parallel and writes their outputs into them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from pathlib import Path
 import nbformat
 from nbclient import NotebookClient
 
-TIMEOUT = 300  # s, for one cell: beyond it something hangs
+TIMEOUT = 300  # s    limit for one cell
 
 
 def run(path: Path) -> float:
-    """Runs one and writes its results into it; the time it took [s]. Raises what a cell raised."""
+    """Runs a notebook and writes its outputs into it; returns the time [s].
+
+    Raises the exception of a cell that fails.
+    """
     began = time.monotonic()
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(
@@ -32,7 +35,7 @@ def run(path: Path) -> float:
 
 @contextmanager
 def running(folder: Path) -> Iterator[None]:
-    """Runs all of a folder while the block does something else, and prints how long each took."""
+    """Runs all notebooks of a folder during the block, then prints their times."""
     paths = sorted(folder.glob("*.ipynb"))
     with ThreadPoolExecutor(max_workers=min(len(paths), os.cpu_count() or 1)) as pool:
         times = [pool.submit(run, path) for path in paths]

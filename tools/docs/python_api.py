@@ -1,5 +1,6 @@
-"""The reference of the Python API: a page per module, which Sphinx fills from its docstrings,
-and one per package that lists them.
+"""Writes the reference of the Python API.
+
+Each module has a page, which Sphinx fills from its docstrings; each package has a list of modules.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {
     "models": "The robots as data, and every equation in plain numpy.",
     "controller": "How the robot walks: joint commands from a body velocity and from foot forces.",
-    "cosim": "FMUs, scenarios, runs and what is made of them.",
+    "cosim": "FMUs, scenarios, runs, results and reports.",
 }
-HIDDEN = ("cli", "__main__")  # the command has a reference of its own
+HIDDEN = ("cli", "__main__")  # the reference of commands covers them
 
 
 def pages() -> Iterator[tuple[str, str]]:
-    """Names and texts."""
+    """Yields names and texts of the pages."""
     names = {package: list(_modules(ROOT / package)) for package in PACKAGES}
     for package, modules in names.items():
         for path in modules:
@@ -40,7 +41,10 @@ def _dotted(path: Path) -> str:
 
 
 def _module_page(dotted: str) -> str:
-    return f"---\norphan: true\n---\n\n# {dotted}\n\n```{{eval-rst}}\n.. automodule:: hexapod_cosim.{dotted}\n   :members:\n```\n"
+    return (
+        f"---\norphan: true\n---\n\n# {dotted}\n\n```{{eval-rst}}\n"
+        f".. automodule:: hexapod_cosim.{dotted}\n   :members:\n```\n"
+    )
 
 
 def _package_page(package: str, modules: list[Path]) -> str:
@@ -56,9 +60,12 @@ def _index() -> str:
     rows = "\n".join(
         f"| [{package}]({package}.md) | {text} |" for package, text in PACKAGES.items()
     )
-    text = "Everything public, from its docstrings. "
-    text += "Where to begin: the [tutorial](../../tutorial.md) and the [notebooks](../../notebooks/index.md)."
-    return f"# Python\n\n{text}\n\n| package | what |\n|---|---|\n{rows}\n\n```{{toctree}}\n:hidden:\nmodels\ncontroller\ncosim\n```\n"
+    text = "All public modules, from their docstrings. "
+    text += "Start with the [tutorial](../../tutorial.md) and the "
+    text += "[notebooks](../../notebooks/index.md)."
+    table = f"| package | what |\n|---|---|\n{rows}"
+    contents = "```{toctree}\n:hidden:\nmodels\ncontroller\ncosim\n```"
+    return f"# Python\n\n{text}\n\n{table}\n\n{contents}\n"
 
 
 def _first_line(path: Path) -> str:

@@ -1,9 +1,8 @@
-"""Puts the site's pages together: those of docs/ and of the repository's root, and every file of
-the repository that they link to.
+"""Assembles the pages of the site: docs/, pages of the root, and the files that they link to.
 
-Links on the pages are relative, as a reader of the repository follows them. On the site a link to
-another page leads to that page, and one to a file or folder to a page that shows it, so the site is
-whole without the repository.
+Links on the pages are relative paths in the repository. On the site a link to another page leads to
+that page, and a link to a file or folder to a page that shows it, so the site does not need the
+repository.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from pathlib import Path, PurePosixPath
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-# pages from elsewhere, and files that a page of the reference tells better than they do
+# pages outside docs/, and files for which the site has a better page
 ELSEWHERE = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
@@ -50,17 +49,15 @@ HIDDEN = ("__pycache__", "generated")
 
 
 class BrokenLinkError(Exception):
-    """A link that leads nowhere."""
+    """A link whose target does not exist."""
 
 
 @dataclass
 class Stage:
-    """A folder that is filled with pages for Sphinx."""
+    """A folder into which the pages for Sphinx are written."""
 
     folder: Path
-    shown: set[str] = field(
-        default_factory=set
-    )  # files and folders of the repository that have a page of their own
+    shown: set[str] = field(default_factory=set)  # files and folders that have a page
 
     def write(self, name: str, text: str) -> None:
         """Adds a page."""
@@ -69,7 +66,7 @@ class Stage:
         path.write_text(text, encoding="utf-8")
 
     def add_page(self, source: Path) -> None:
-        """Adds a page of the repository, its links made those of the site."""
+        """Adds a page of the repository and converts its links to those of the site."""
         name, text = page_name(source), source.read_text(encoding="utf-8")
         if source.suffix == ".ipynb":
             notebook = json.loads(text)
@@ -86,20 +83,21 @@ class Stage:
         )
 
     def _target(self, link: str, source: Path, name: str) -> str:
-        """Where a link of a page leads on the site."""
+        """Returns the target on the site of a link of a page."""
         path, _, anchor = link.partition("#")
         if "://" in link or link.startswith("mailto:") or not path:
             return link
         found = (source.parent / path).resolve()
         if not found.exists() or not found.is_relative_to(ROOT):
             raise BrokenLinkError(
-                f"{source.relative_to(ROOT)}: link to {link}: no such file; expected a path relative to the page"
+                f"{source.relative_to(ROOT)}: link to {link}: no such file;"
+                " expected a path relative to the page"
             )
         relative = os.path.relpath(self._place(found), PurePosixPath(name).parent)
         return relative + (f"#{anchor}" if anchor and found.suffix == ".md" else "")
 
     def _place(self, found: Path) -> str:
-        """The name on the site of something in the repository; it is put there if it is not yet."""
+        """Returns the name on the site of a file or folder, which is added if it is missing."""
         inside = found.relative_to(ROOT).as_posix()
         if inside in INSTEAD:
             return INSTEAD[inside]
@@ -116,7 +114,7 @@ class Stage:
         return name
 
     def show(self, found: Path) -> str:
-        """The page that shows a file or lists a folder of the repository."""
+        """Returns the page that shows a file or lists a folder; writes it if it is missing."""
         inside = found.relative_to(ROOT).as_posix()
         name = f"source/{inside}/index.md" if found.is_dir() else f"source/{inside}.md"
         if inside not in self.shown:
@@ -137,15 +135,16 @@ class Stage:
 
 
 def _named(entry: Path, page: str) -> str:
-    """A file or folder in a list; a module of a package leads to its reference."""
+    """Formats a file or folder in a list; a module of a package links to its reference."""
     package = entry.parent.relative_to(ROOT).as_posix()
     if package not in PACKAGES or entry.suffix != ".py" or entry.stem.startswith("_"):
         return f"`{entry.name}{'/' if entry.is_dir() else ''}`"
-    return f"[`{entry.name}`]({os.path.relpath(f'reference/python/{package}.{entry.stem}.md', PurePosixPath(page).parent)})"
+    reference = f"reference/python/{package}.{entry.stem}.md"
+    return f"[`{entry.name}`]({os.path.relpath(reference, PurePosixPath(page).parent)})"
 
 
 def pages() -> Iterator[Path]:
-    """The repository's pages that are the site's too."""
+    """Yields the pages of the repository that are also pages of the site."""
     yield from sorted(
         path for path in DOCS.rglob("*.md") if path.name != "README.md" or path.parent != DOCS
     )
@@ -154,14 +153,14 @@ def pages() -> Iterator[Path]:
 
 
 def is_page(path: Path) -> bool:
-    """Whether a file is one of them."""
+    """Returns whether a file is such a page."""
     return path.relative_to(ROOT).as_posix() in ELSEWHERE or (
         path.suffix in {".md", ".ipynb"} and path.is_relative_to(DOCS)
     )
 
 
 def page_name(path: Path) -> str:
-    """What a page is called on the site."""
+    """Returns the name of a page on the site."""
     inside = path.relative_to(ROOT).as_posix()
     if inside in ELSEWHERE:
         return ELSEWHERE[inside]
@@ -170,12 +169,12 @@ def page_name(path: Path) -> str:
 
 
 def outside_code(text: str, change: Callable[[str], str]) -> str:
-    """A page with everything but its code, in blocks and in lines, changed."""
+    """Applies `change` to a page, except to its code blocks and inline code."""
     return "".join(part if part.startswith("`") else change(part) for part in CODE.split(text))
 
 
 def is_text(path: Path) -> bool:
-    """Whether a file is one to be read."""
+    """Returns whether a file is a text file."""
     return (
         path.suffix in {*LANGUAGES, ".txt", ".csv", ".jinja", ".cff", ""}
         and b"\0" not in path.read_bytes()[:1024]
@@ -183,7 +182,8 @@ def is_text(path: Path) -> bool:
 
 
 def listing_of(path: Path) -> str:
-    """A page that shows a file."""
+    """Returns a page that shows a file."""
     inside, text = path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
     fence, language = "`" * 8, LANGUAGES.get(path.suffix, "text")
-    return f"---\norphan: true\n---\n\n# {path.name}\n\n`{inside}`\n\n{fence}{language}\n{text.rstrip()}\n{fence}\n"
+    head = f"---\norphan: true\n---\n\n# {path.name}\n\n`{inside}`"
+    return f"{head}\n\n{fence}{language}\n{text.rstrip()}\n{fence}\n"

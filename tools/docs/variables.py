@@ -1,6 +1,4 @@
-"""The reference of an FMU's variables, from its interface.toml by way of the rows that stand in
-the FMU's own documentation.
-"""
+"""Writes the reference of an FMU's variables, from the rows of the FMU's own documentation."""
 
 from __future__ import annotations
 
@@ -14,15 +12,13 @@ from hexapod_cosim.models import load_robot
 
 HEADINGS = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters", "local": "Locals"}
 PERIOD = 0.005  # s, the default macro-step
-DESIGNED, DESIGNED_NAMES = (
-    "designed",
-    ("gains.slip.", "gains.suspension."),
-)  # by `hexapod design`, for each robot
+# `hexapod design` computes these start values for each robot
+DESIGNED, DESIGNED_NAMES = "designed", ("gains.slip.", "gains.suspension.")
 COLUMNS = ("variable", "unit", "number", "range", "start", "meaning")
 
 
 def interfaces() -> dict[str, Interface]:
-    """The default robot's two FMUs."""
+    """Returns the interfaces of the default robot's two FMUs."""
     robot = load_robot("athena")
     return {
         "plant": load_interface(robot),
@@ -33,7 +29,7 @@ def interfaces() -> dict[str, Interface]:
 
 
 def page(interface: Interface) -> str:
-    """The page on an FMU's variables."""
+    """Returns the page on an FMU's variables."""
     return "\n".join(_lines(interface)) + "\n"
 
 
@@ -46,8 +42,9 @@ def _lines(interface: Interface) -> Iterator[str]:
         "`{inertia}` for xx, yy, zz, xy, xz, yz, and `[i]` for 1, 2, 3 (quaternions: to 4).\n"
     )
     yield (
-        "In FMI 3.0 a row is one array without the braces' part of its name: `{leg}.foot.force[i]` is `foot.force[6][3]`, "
-        "its elements in the order above, the last index fastest.\n"
+        "In FMI 3.0 a row is one array without the braces' part of its name: "
+        "`{leg}.foot.force[i]` is `foot.force[6][3]`, its elements "
+        "in the order above, the last index fastest.\n"
     )
     for causality, heading in HEADINGS.items():
         rows = variable_rows(interface, causality, arrayed=False)
@@ -87,7 +84,7 @@ def _choices(interface: Interface) -> Iterator[str]:
 
 
 def escaped(text: str) -> str:
-    """Plain text as Markdown in a table."""
+    """Escapes plain text for a Markdown table."""
     for character in "\\|*_[]<>$`":
         text = text.replace(character, "\\" + character)
     return text

@@ -1,5 +1,5 @@
-/* checker.h - how definitions and inputs of plant and controller are judged. Not for users of their
- * headers. */
+/* checker.h - range checks of definitions and inputs, shared by the plant and the controller.
+ * Users of their headers do not need it. */
 #ifndef HEXAPOD_CHECKER_H
 #define HEXAPOD_CHECKER_H
 
@@ -9,18 +9,19 @@
 
 HX_HIDDEN_BEGIN
 
-/* Collects the first failure; every check after it is silent. */
+/* Collects the first failure; later failures are ignored. */
 typedef struct hxChecker {
   hxStatus status;
   char *message; /* HX_MESSAGE_SIZE bytes, or NULL */
 } hxChecker;
 
+/* Records a failure, with a message that says what was got and what was expected. */
 void hx_check_fail(hxChecker *checker, const char *name, double got, const char *expected);
 
-/* Every number within its range; NaN lies in none. */
+/* Fails for the first of n numbers that is outside its range. NaN is outside every range. */
 void hx_check_ranges(hxChecker *checker, const void *structure, const hxRange *range, size_t n);
 
-/* Writes "LF.coxa.QUANTITY" or the like. */
+/* Writes the variable's name, for example "LF.coxa.QUANTITY". */
 void hx_joint_label(int leg, int joint, const char *quantity, char name[32]);
 
 HX_HIDDEN_END

@@ -1,9 +1,9 @@
-/* inside.h - how the plant's own files are compiled, whatever an importer's compiler call says. Not
- * for users of hexapod.h. */
+/* inside.h - compiler settings and symbol visibility of the library's own files. Users of
+ * hexapod.h do not need it. */
 #ifndef HEXAPOD_INSIDE_H
 #define HEXAPOD_INSIDE_H
 
-/* a*b + c rounds twice on every machine, also on those with fused arithmetic */
+/* No fused multiply-add: a*b + c rounds twice on every machine, so that results are identical. */
 #if defined(__clang__)
 #pragma clang fp contract(off)
 #elif defined(__GNUC__)
@@ -12,8 +12,8 @@
 #pragma fp_contract(off)
 #endif
 
-/* What is declared between these two stays inside the library; where they are empty nothing is
- * exported unasked. */
+/* Declarations between these two macros are hidden from users of the library. They are empty where
+ * a compiler exports only what is marked. */
 #if defined(__GNUC__) && !defined(_WIN32)
 #define HX_HIDDEN_BEGIN _Pragma("GCC visibility push(hidden)")
 #define HX_HIDDEN_END _Pragma("GCC visibility pop")

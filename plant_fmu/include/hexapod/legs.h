@@ -1,5 +1,5 @@
-/* legs.h - what plant and controller agree on: legs in the order LF LM LR RF RM RR, joints coxa,
- * femur, tibia; and how ranges are told. */
+/* legs.h - order of legs (LF LM LR RF RM RR) and joints (coxa, femur, tibia), and the ranges of
+ * numbers, shared by the plant and the controller. */
 #ifndef HEXAPOD_LEGS_H
 #define HEXAPOD_LEGS_H
 
@@ -10,13 +10,13 @@ enum {
   HX_JOINTS = 3 /* per leg */
 };
 
-/* What one number of a definition or an input may be. */
+/* The allowed range of one number of a definition or an input. */
 typedef struct hxRange {
-  const char *name;  /* as in the FMU */
-  const char *unit;  /* "" when it has none */
-  double min, max;   /* inclusive */
-  size_t offset;     /* into the structure */
-  int is_int;        /* an int there, otherwise a double */
+  const char *name; /* name of the FMU variable */
+  const char *unit; /* "" for a dimensionless number */
+  double min, max;  /* inclusive */
+  size_t offset;    /* bytes from the start of the structure */
+  int is_int;       /* 1: the number is an int, 0: a double */
 } hxRange;
 
 #endif

@@ -1,4 +1,5 @@
-/* actuator.h - the servo of a joint: PD with feed-forward, torque-speed line, gear friction */
+/* actuator.h - the servo of a joint: PD control with feed-forward, torque-speed line, gear
+ * friction */
 #ifndef HX_ACTUATOR_H
 #define HX_ACTUATOR_H
 
@@ -12,16 +13,18 @@ typedef struct {
   hxReal drag;      /* N m s/rad  -d friction/d speed */
 } hxServo;
 
-static const double hx_gear_speed = 0.05; /* rad/s, where the gear's dry friction saturates */
+static const double hx_gear_speed =
+    0.05; /* rad/s  speed at which the gear's dry friction saturates */
 
-/* The motor: clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line (eq. 12). */
+/* The motor (eq. 12): clip(kp (q_ref - q) + kd (qd_ref - qd) + tau_ff) to the torque-speed line. */
 typedef struct {
-  hxReal torque; /* N m        motor on child */
-  hxReal wanted; /* N m        before the limits */
-  hxReal low, high; /* N m        the limits at this speed */
-  hxReal load; /* 1          speed over the no-load speed */
+  hxReal torque;    /* N m        motor on child */
+  hxReal wanted;    /* N m  before the limits */
+  hxReal low, high; /* N m  limits at this speed */
+  hxReal load;      /* 1    speed over the no-load speed */
 } hxMotor;
 
+/* Returns the motor's torque and its limits (eq. 12). */
 static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
@@ -33,13 +36,13 @@ static inline hxMotor hx_motor_torque(const hxModel *model, hxReal angle, hxReal
   return (hxMotor){hx_clip(wanted, low, high), wanted, low, high, load};
 }
 
-/* The motor with its slopes, and the gear: -tau_c tanh(qd / 0.05) (eq. 12). */
+/* Returns the motor's torque, the gear's -tau_c tanh(qd / 0.05) and their derivatives (eq. 12). */
 static inline hxServo hx_servo_torque(const hxModel *model, hxReal angle, hxReal speed,
                                       hxReal angle_ref, hxReal speed_ref, hxReal torque_ref) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxMotor motor = hx_motor_torque(model, angle, speed, angle_ref, speed_ref, torque_ref);
   const hxMask free = hx_less(motor.low, motor.wanted) & hx_less(motor.wanted, motor.high);
-  /* on the torque-speed line's slopes */
+  /* falling: the torque is limited by the sloping part of the torque-speed line */
   const hxMask falling =
       ~free & hx_less(zero, motor.torque * motor.load) & hx_less(hx_abs(motor.load), one);
   const hxReal t = hx_tanh(speed * (1.0 / hx_gear_speed));

@@ -1,10 +1,10 @@
-/* complex_step.h - one leg at a time, its derivative along: hxReal is the complex number x + i step
- * x', which takes the place of lanes.h's.
+/* complex_step.h - numbers with derivatives by the complex step, one leg at a time: hxReal is the
+ * complex number x + i step x', instead of the pack of lanes.h
  *
- * Arithmetic on complex numbers differentiates itself: (a + i h a')(b + i h b') = ab + i h (a b' +
- * a' b) but for h^2 a' b', which is nothing where h is 1e-170. Derivatives come out exact to
- * rounding; there is no difference of values in them. What chooses, by order or by sign, looks at
- * the real part; at a kink that is the side that the values are computed on.
+ * (a + i h a')(b + i h b') = ab + i h (a b' + a' b) - h^2 a' b', and the last term vanishes at h =
+ * 1e-170. Derivatives are therefore exact to rounding; no difference of values is taken.
+ * Comparisons use the real part; at a kink the derivative is that of the side on which the value
+ * is computed.
  */
 #ifndef HX_COMPLEX_STEP_H
 #define HX_COMPLEX_STEP_H
@@ -41,12 +41,12 @@ static inline hxReal hx_clip(hxReal x, hxReal low, hxReal high) {
 }
 static inline hxReal hx_abs(hxReal x) { return hx_re(x) < 0.0 ? -x : x; }
 
-/* f(x) from its value and its slope there */
+/* Returns f(x) with its derivative, from the value and the slope at x. */
 static inline hxReal hx_chain(hxReal x, double value, double slope) {
   return hx_complex(value, slope * hx_im(x));
 }
 
-/* the slope at 0 counts as 0: what is under a root here is a square */
+/* The slope at 0 is set to 0, because all arguments of roots are squares. */
 static inline hxReal hx_sqrt(hxReal x) {
   const double root = sqrt(fmax(hx_re(x), 0.0));
   return hx_chain(x, root, root > 0.0 ? 0.5 / root : 0.0);

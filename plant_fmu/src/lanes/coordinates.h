@@ -1,24 +1,25 @@
-/* coordinates.h - a motion that is on its joints exactly, from the torso's state and the joints'
- * angles and speeds, and their rates */
+/* coordinates.h - conversion between a motion of bodies and minimal coordinates: the torso's
+ * state, joint angles and speeds, and their rates */
 #ifndef HX_COORDINATES_H
 #define HX_COORDINATES_H
 
 #include "work.h"
 
-/* [leg][joint] of the outside, one joint, slot by slot */
+/* Copies one joint's column of a [leg][joint] table into slots. */
 static inline void gather_joint(const hxNumber (*table)[HX_JOINTS], int joint,
                                 hxNumber slots[HX_SLOTS]) {
   for (int leg = 0; leg < HX_LEGS; ++leg) slots[leg] = table[leg][joint];
   hx_fill_slots(slots);
 }
 
+/* Copies the lanes of one joint into its column of a [leg][joint] table. */
 static inline void scatter_joint(hxReal x, int joint, int slot, hxNumber (*table)[HX_JOINTS]) {
   for (int lane = 0; lane < HX_LANES && slot + lane < HX_LEGS; ++lane)
     table[slot + lane][joint] = hx_lane(x, lane);
 }
 
-/* p_j = p_i zero turn(q), about the child's z; w_j = w_i + qd s; r and v as the joint's point has
- * them on both sides */
+/* Places a link on its joint: p_j = p_i zero turn(q) about the child's z, w_j = w_i + qd s; r_j
+ * and v_j follow from the joint's point, which both bodies share. */
 static inline void place_link(const hxModel *model, int joint, int slot, hxReal angle, hxReal speed,
                               hxPlantMotion *motion) {
   const hxJointModel *m = &model->joint[joint];
@@ -40,6 +41,7 @@ static inline void place_link(const hxModel *model, int joint, int slot, hxReal 
                 hx_sub3(hx_add3(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
 }
 
+/* Computes the motion of all bodies at these coordinates; joints are satisfied exactly. */
 static inline void hx_motion_from_coordinates(const hxModel *model, const hxCoordinates *x,
                                               hxPlantMotion *motion) {
   memset(motion, 0, sizeof *motion);
@@ -63,7 +65,7 @@ static inline void hx_motion_from_coordinates(const hxModel *model, const hxCoor
   }
 }
 
-/* what the torso, the audit and the bristles have in common with a motion, or with its rate */
+/* Copies the torso's state, the works and the bristles of a motion, or of its rate. */
 static inline void copy_common(const hxPlantMotion *motion, hxCoordinates *x) {
   memcpy(x->position, &motion->torso[HX_R], sizeof x->position);
   memcpy(x->quaternion, &motion->torso[HX_P], sizeof x->quaternion);
@@ -75,7 +77,8 @@ static inline void copy_common(const hxPlantMotion *motion, hxCoordinates *x) {
     for (int i = 0; i < 3; ++i) x->bristle[leg][i] = motion->bristle[i][leg];
 }
 
-/* the motion an evaluation was made at; joints that have drifted count by their angle and speed */
+/* Reads the coordinates of the motion that work was evaluated at. Joints that have drifted are
+ * given by their angle and speed. */
 static inline void hx_coordinates_of(const hxPlantMotion *motion, const hxWork *work,
                                      hxCoordinates *x) {
   copy_common(motion, x);
@@ -87,6 +90,7 @@ static inline void hx_coordinates_of(const hxPlantMotion *motion, const hxWork *
     }
 }
 
+/* Computes the rates of the coordinates from dy/dt and the evaluation that gave it. */
 static inline void hx_coordinates_rate(const hxPlantMotion *rate, const hxWork *work,
                                        hxCoordinates *dx) {
   copy_common(rate, dx);

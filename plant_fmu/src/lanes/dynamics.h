@@ -1,7 +1,7 @@
-/* dynamics.h - eq. 1 solved exactly in O(n): Newton-Euler with multipliers and Baumgarte on the
- * tree of 19 bodies
+/* dynamics.h - exact O(n) solution of eq. 1: Newton-Euler equations with multipliers and Baumgarte
+ * terms on the tree of 19 bodies
  *
- * The forces come from forces.h; stage.h makes dy/dt the stage of a linearly implicit method.
+ * forces.h computes the forces; stage.h turns dy/dt into the stage of a linearly implicit method.
  * Conventions are those of forces.h.
  */
 #ifndef HX_DYNAMICS_H
@@ -9,22 +9,21 @@
 
 #include "stage.h"
 
-/* ---- the sweeps of eq. 10-11
- * -----------------------------------------------------------------------------------------------
- */
+/* ---- the sweeps of eq. 10-11 ---- */
 
-/* 1/d, d = S.U + what the joint itself resists with */
+/* Returns 1/d, d = S.U + the joint's own resistance; 0 for a kinematic drive. */
 static inline hxReal sweep_inverse(const hxModel *model, const hxSweep *sweep, hxReal resists) {
   return model->servo_mode == HX_SERVO_KINEMATIC ? hx_splat(0.0)
                                                  : 1.0 / (hx_power(sweep->U, sweep->S) + resists);
 }
 
+/* Returns the inertia of a link about the torso's centre of mass. */
 static inline hxRigid6 link_inertia(const hxModel *model, const hxJointWork *k, int joint,
                                     int slot) {
   return hx_rigid_inertia(hx_load(&model->joint[joint].mass[slot]), k->J, k->c);
 }
 
-/* U = I S of a link with all it carries; leaves I - U U^T/d, what the parent carries */
+/* Computes U = I S of a link with all it carries, and passes I - U U^T/d to the parent (eq. 10). */
 static inline void sweep_inertia(const hxModel *model, const hxImplicit *implicit, int joint,
                                  int pack, hxLegWork *leg, hxInertia6 *I) {
   hxJointWork *k = &leg->joint[joint];
@@ -48,7 +47,7 @@ static inline void sweep_inertia(const hxModel *model, const hxImplicit *implici
   hx_inertia_downdate(I, sweep->inverse_d, sweep->U);
 }
 
-/* u = torque - S.p; leaves p + U u/d, what the parent is handed */
+/* Computes u = torque - S.p, and passes p + U u/d to the parent (eq. 11). */
 static inline void sweep_force(hxJointWork *k, hxForce6 *p) {
   hxSweep *sweep = &k->sweep;
   *p = hx_force_add(*p, k->p);
@@ -56,7 +55,7 @@ static inline void sweep_force(hxJointWork *k, hxForce6 *p) {
   *p = hx_force_add_scaled(*p, sweep->inverse_d * sweep->u, sweep->U);
 }
 
-/* qdd = (u - U.a)/d; leaves a + S qdd, the child's acceleration but for its bias */
+/* Computes qdd = (u - U.a)/d, and passes a + S qdd to the child, without its bias. */
 static inline void sweep_motion(hxJointWork *k, hxMotion6 *a) {
   const hxSweep *sweep = &k->sweep;
   const hxReal qdd = sweep->inverse_d * (sweep->u - hx_power(sweep->U, *a));
@@ -66,15 +65,16 @@ static inline void sweep_motion(hxJointWork *k, hxMotion6 *a) {
   k->acceleration = (hxMotion6){felt.ang, motion_at(felt, k->c)};
 }
 
-/* Multipliers leaf to root: D_kk^T lambda_k = g_k - M_k dv_k - sum over children c of D_ck^T
- * lambda_c. About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5) and the axis's, u1 =
- * a x s, u2 = b x s. */
+/* Computes the multipliers from leaf to root: D_kk^T lambda_k = g_k - M_k dv_k - sum over children
+ * c of D_ck^T lambda_c. About the joint's point the torque is -(u1 lambda_4 + u2 lambda_5) and the
+ * component along the axis, with u1 = a x s, u2 = b x s. */
 static inline void leg_multipliers(const hxModel *model, const hxImplicit *implicit, int pack,
                                    hxLegWork *leg) {
   const hxVec3 ground = stage_force(model, implicit, pack, leg);
   const int slot = pack * HX_LANES;
-  hxForce6 handed = {hx_cross(leg->foot.kin.arm, ground),
-                     ground}; /* at the link's centre of mass: by the ground, then by the child */
+  hxForce6 handed = {
+      hx_cross(leg->foot.kin.arm, ground),
+      ground}; /* at the link's centre of mass: from the ground, then from the child */
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint) {
     hxJointWork *k = &leg->joint[joint];
     const hxJointKinematics *kin = &k->reaction.kin;
@@ -95,12 +95,9 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
   }
 }
 
-/* ---- the torso
- * --------------------------------------------------------------------------------------------------------------
- */
+/* ---- the torso ---- */
 
-/* sums over the legs, in every lane: of n numbers that stand one after the other in each pack's
- * struct */
+/* Sums n consecutive numbers of each pack's struct over the legs; the sums are in every lane. */
 static inline void sum_packs(const hxReal *first, size_t stride, int n, hxReal *sum) {
   for (int i = 0; i < n; ++i) {
     hxReal x[HX_PACKS];
@@ -109,7 +106,7 @@ static inline void sum_packs(const hxReal *first, size_t stride, int n, hxReal *
   }
 }
 
-/* (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs */
+/* Solves (I + sum of legs) (dv - g) = push and gyroscopic torque - sum of legs. */
 static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand *command,
                                            const hxWork *work, const hxInertia6 *I,
                                            const hxForce6 *p) {
@@ -134,19 +131,18 @@ static inline hxMotion6 torso_acceleration(const hxModel *model, const hxCommand
       &A.I, (hxForce6){torque, hx_sub3(hx_splat_vec3(command->push_force), legs.f.lin)});
 }
 
-/* ---- dy/dt
- * ------------------------------------------------------------------------------------------------------------------
- */
+/* ---- dy/dt ---- */
 
-/* a - g as the acceleration it is */
-static inline hxMotion6 from_felt(const hxModel *model, hxMotion6 felt) {
+/* Returns the acceleration a from a - g. */
+static inline hxMotion6 with_gravity(const hxModel *model, hxMotion6 felt) {
   return (hxMotion6){felt.ang, hx_add3(felt.lin, hx_splat_vec3(model->gravity))};
 }
 
-/* nu of eq. 20, what positions advance with: v + z dv + s_v in a linearly implicit stage, else v */
+/* Stores the torso's rates. Positions advance with nu of eq. 20: v + z dv + s_v in a linearly
+ * implicit stage, else v. */
 static inline void store_torso_rate(const hxModel *model, const hxPlantMotion *motion,
                                     const hxImplicit *implicit, const hxWork *work, hxRate *rate) {
-  const hxMotion6 dv = from_felt(model, work->torso_acceleration);
+  const hxMotion6 dv = with_gravity(model, work->torso_acceleration);
   hxMotion6 nu = torso_velocity(motion);
   if (implicit) nu = hx_motion_add_scaled(nu, hx_splat(implicit->z), dv);
   if (implicit && implicit->change)
@@ -162,10 +158,11 @@ static inline void store_torso_rate(const hxModel *model, const hxPlantMotion *m
   for (int i = 3; i < 8; ++i) rate->torso_turn[i] = 0.0;
 }
 
+/* Stores a link's rates, with nu of eq. 20 as for the torso. */
 static inline void store_link_rate(const hxModel *model, const hxPlantMotion *motion,
                                    const hxImplicit *implicit, int joint, int slot,
                                    const hxJointWork *k, hxRate *rate) {
-  const hxMotion6 dv = from_felt(model, k->acceleration);
+  const hxMotion6 dv = with_gravity(model, k->acceleration);
   hxMotion6 nu = link_velocity(motion, joint, slot);
   if (implicit) nu = hx_motion_add_scaled(nu, hx_splat(implicit->z), dv);
   if (implicit && implicit->change)
@@ -178,12 +175,13 @@ static inline void store_link_rate(const hxModel *model, const hxPlantMotion *mo
   hx_store_vec3(rate->link_turn[joint], slot, nu.ang);
 }
 
+/* Copies leg 0 into the unused slots of a motion's links. */
 static inline void fill_motion_slots(hxPlantMotion *motion) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int i = 0; i < HX_BODY_STATE; ++i) hx_fill_slots(motion->link[joint][i]);
 }
 
-/* Slots that no pack of this width covers go with leg 0, as in every motion. */
+/* Copies leg 0 into the slots that no pack of this width covers. */
 static inline void fill_rate_slots(hxRate *rate) {
   if (HX_PACKS * HX_LANES >= HX_SLOTS) return;
   fill_motion_slots(&rate->motion);
@@ -191,6 +189,7 @@ static inline void fill_rate_slots(hxRate *rate) {
     for (int i = 0; i < 3; ++i) hx_fill_slots(rate->link_turn[joint][i]);
 }
 
+/* Stores db/dt of all feet. */
 static inline void store_bristle_rates(const hxModel *model, const hxContactState *contact,
                                        const hxImplicit *implicit, const hxWork *work,
                                        hxPlantMotion *rate) {
@@ -200,11 +199,12 @@ static inline void store_bristle_rates(const hxModel *model, const hxContactStat
   for (int i = 0; i < 3 && HX_PACKS * HX_LANES < HX_SLOTS; ++i) hx_fill_slots(rate->bristle[i]);
 }
 
-/* W  what contact damping, friction and gears of all legs take */
+/* Powers that contact damping, friction and gears of all legs dissipate, W. */
 typedef struct {
   hxNumber contact, friction, gear;
 } hxLossPowers;
 
+/* Returns the sums over all legs of the powers that contact, friction and gears dissipate. */
 static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *work) {
   hxReal contact[HX_PACKS], friction[HX_PACKS], gear[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -220,8 +220,8 @@ static inline hxLossPowers hx_loss_powers(const hxModel *model, const hxWork *wo
                         hx_lane(hx_sum_legs(gear), 0)};
 }
 
-/* Powers of motors and pushes, and what contact damping, friction and gears take. They are rates
- * for the solvers of others: a step of ours takes its works from its impulses (eq. 27). */
+/* Stores the powers of motors, pushes and losses. They are rates for an importer's solver: a step
+ * of this integrator computes its works from its impulses (eq. 27). */
 static inline void store_powers(const hxModel *model, const hxCommand *command,
                                 const hxPlantMotion *motion, const hxWork *work,
                                 hxPlantMotion *rate) {
@@ -243,14 +243,14 @@ static inline void store_powers(const hxModel *model, const hxCommand *command,
 /* Impulses of a step's forces, summed over its stages. Shape [joint][pack] and [pack], legs in
  * lanes. */
 typedef struct {
-  hxReal motor[HX_JOINTS][HX_PACKS]; /* N m s  motors on their joints */
-  hxReal gear[HX_JOINTS][HX_PACKS];  /* N m s  gear friction on the joints */
-  hxVec3 foot[HX_PACKS];             /* N s    ground on feet */
-  hxNumber push[6];                  /* N s, N m s  force, then torque on the torso */
+  hxReal motor[HX_JOINTS][HX_PACKS]; /* N m s        motors on their joints */
+  hxReal gear[HX_JOINTS][HX_PACKS];  /* N m s        gear friction on the joints */
+  hxVec3 foot[HX_PACKS];             /* N s          ground on feet */
+  hxNumber push[6];                  /* N s, N m s   force, then torque on the torso */
 } hxImpulses;
 
-/* A stage's share: the forces as the stage's accelerations contain them, with their linearly
- * implicit parts. */
+/* Adds a stage's impulses: weight times the forces that the stage's accelerations contain, with
+ * their linearly implicit parts. */
 static inline void hx_add_impulses(const hxModel *model, const hxCommand *command,
                                    const hxImplicit *implicit, const hxWork *work, double weight,
                                    hxImpulses *sum) {
@@ -261,13 +261,14 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
       const hxJointWork *k = &leg->joint[joint];
       hxReal motor = k->servo.torque, gear = k->servo.friction;
       if (implicit &&
-          model->servo_mode !=
-              HX_SERVO_KINEMATIC) { /* a drive's torque is a multiplier, which has it all */
+          model->servo_mode != HX_SERVO_KINEMATIC) { /* the torque of a kinematic drive is a
+                                                        multiplier, which contains these parts */
         const double z = implicit->z;
-        const hxReal turned = k->turned + (z * z) * k->qdd, sped = k->sped + z * k->qdd;
-        motor -= implicit->slope[pack].motor_stiffness[joint] * turned +
-                 implicit->slope[pack].motor_damping[joint] * sped;
-        gear -= implicit->slope[pack].gear_drag[joint] * sped;
+        const hxReal angle_shift = k->angle_shift + (z * z) * k->qdd,
+                     speed_shift = k->speed_shift + z * k->qdd;
+        motor -= implicit->slope[pack].motor_stiffness[joint] * angle_shift +
+                 implicit->slope[pack].motor_damping[joint] * speed_shift;
+        gear -= implicit->slope[pack].gear_drag[joint] * speed_shift;
       }
       sum->motor[joint][pack] += w * motor;
       sum->gear[joint][pack] += w * gear;
@@ -280,8 +281,9 @@ static inline void hx_add_impulses(const hxModel *model, const hxCommand *comman
   }
 }
 
-/* Everything at (t, y): work, and dy/dt into rate. With implicit, rate is k/h of that stage (eq.
- * 19) instead. The multipliers are found when asked for, and in kinematic mode. */
+/* Evaluates the equations of motion at (t, y): fills work, and stores dy/dt in rate. With
+ * implicit, rate is k/h of that stage (eq. 19) instead. The multipliers are computed on request,
+ * and always in kinematic mode. */
 static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *contact,
                                  const hxCommand *command, double t, const hxPlantMotion *motion,
                                  hxImplicit *implicit, int multipliers, hxWork *work,
@@ -290,14 +292,15 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
   hxForce6 p[HX_PACKS];
   const int reactions = multipliers || model->servo_mode == HX_SERVO_KINEMATIC;
   hx_dynamics_forces(model, contact, command, t, motion, reactions, work);
+  /* the stage's response to the shifts (eq. 20, 21) */
   for (int pack = 0; implicit && pack < HX_PACKS; ++pack) {
     if (!implicit->change) keep_slopes(model, contact, pack, &work->pack[pack], implicit);
     leg_response(implicit, motion, pack, &work->pack[pack]);
     if (has_bristles(model)) bristle_response(implicit, pack, &work->pack[pack]);
   }
 
-  /* leaf to root, the torso, root to leaf; packs side by side, for one's operations fill the
-   * other's waits */
+  /* sweeps: leaf to root, the torso, root to leaf. Packs alternate, so that the operations of one
+   * overlap the latency of the other. */
   for (int joint = HX_JOINTS - 1; joint >= 0; --joint)
     for (int pack = 0; pack < HX_PACKS; ++pack)
       sweep_inertia(model, implicit, joint, pack, &work->pack[pack], &I[pack]);
@@ -312,6 +315,7 @@ static void hx_dynamics_evaluate(const hxModel *model, const hxContactState *con
       sweep_motion(&work->pack[pack].joint[joint], &a);
     if (reactions) leg_multipliers(model, implicit, pack, &work->pack[pack]);
   }
+  /* dy/dt, or k/h of the stage */
   store_torso_rate(model, motion, implicit, work, rate);
   for (int pack = 0; pack < HX_PACKS; ++pack)
     for (int joint = 0; joint < HX_JOINTS; ++joint)

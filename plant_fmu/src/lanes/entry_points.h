@@ -1,26 +1,27 @@
-/* entry_points.h - the functions of a kernel's table, made of the physics on lanes: included once
- * in each kernel_*.c, at its width */
+/* entry_points.h - functions of a kernel's table, built from the physics on lanes; each kernel_*.c
+ * includes it once, at its width */
 #include "../kernel.h"
 #include "coordinates.h"
 #include "dynamics.h"
 #include "integrator.h"
 #include "output.h"
 
-static const double cautious_step = 1e-4; /* s  tried after a reset */
+static const double first_step_size = 1e-4; /* s  first step after a reset */
 
+/* The functions of kernel.h's table, which describes them. */
 static void kernel_start(const hxModel *model, double t, hxState *state) {
   static const hxCommand no_command;
   hxWork work;
   state->time = t;
   state->call_start = state->call_input = 0.0;
-  state->next_step = state->first_step = fmin(cautious_step, model->step_max);
+  state->next_step = state->first_step = fmin(first_step_size, model->step_max);
   state->motion.actuator_work = state->motion.push_work = state->motion.dissipated = 0.0;
   state->evaluations = state->steps = state->rejected = state->touchdowns = 0.0;
   const hxFeet feet = feet_of(model, &state->motion);
   hx_contact_start(model, feet.delta, &state->contact);
   memset(state->motion.bristle, 0, sizeof state->motion.bristle);
   hx_dynamics_forces(model, &state->contact, &no_command, t, &state->motion, 0, &work);
-  hx_moment_here(model, state);
+  hx_moment_update(model, state);
   memset(&state->completed, 0, sizeof state->completed);
   memset(&state->measured, 0, sizeof state->measured);
   for (int pack = 0; pack < HX_PACKS; ++pack)
@@ -62,10 +63,10 @@ static void kernel_switch_contacts(const hxModel *model, const double delta[HX_S
   hx_switch_contacts(model, delta, ddelta, state->time, state);
 }
 
-/* Adds h/2 of the forces at the present and of those kept from the last completed step; keeps the
- * present ones. */
-static void halve_impulses(const hxWork *work, double h, hxCompleted *completed,
-                           hxImpulses *impulses) {
+/* Computes the impulses h/2 (previous forces + present forces), and keeps the present forces as
+ * the previous ones. */
+static void trapezoidal_impulses(const hxWork *work, double h, hxCompleted *completed,
+                                 hxImpulses *impulses) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxLegWork *leg = &work->pack[pack];
     const int slot = pack * HX_LANES;
@@ -106,9 +107,11 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   end.time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
                        &rate);
-  halve_impulses(&work, h, &state->completed, &impulses);
+  trapezoidal_impulses(&work, h, &state->completed, &impulses);
   if (!known)
-    halve_impulses(&work, h, &state->completed, &impulses); /* the first step: as at its end */
+    trapezoidal_impulses(
+        &work, h, &state->completed,
+        &impulses); /* the first step has no previous forces: they equal the present ones */
   hx_reset_peaks(&state->measured);
   if (h > 0.0) {
     hx_step_works(&path, &impulses, &works);
@@ -154,7 +157,7 @@ static void kernel_accelerations(const hxModel *model, const hxState *state,
 
 #define HX_KERNEL_TABLE(title, test)                                                               \
   {.name = title,                                                                                  \
-   .runs_here = test,                                                                              \
+   .is_supported = test,                                                                           \
    .start = kernel_start,                                                                          \
    .integrate = hx_integrate,                                                                      \
    .derivative = kernel_derivative,                                                                \

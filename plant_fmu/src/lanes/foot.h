@@ -1,54 +1,55 @@
-/* foot.h - a sphere at the tibia's tip against compliant ground: where it touches and what it feels
- * there (eq. 14-18) */
+/* foot.h - contact of a spherical foot with compliant ground: kinematics and forces (eq. 14-18) */
 #ifndef HX_FOOT_H
 #define HX_FOOT_H
 
 #include "kinematics.h"
 
-/* The ground: how far a point is above it, and which way is up there. */
+/* Distance of a point from the ground, and the ground's normal. */
 typedef struct {
   hxReal distance; /* m  signed, > 0 above the ground */
-  hxVec3 normal; /* 1  out of the ground, world axes */
+  hxVec3 normal;   /* 1  out of the ground, world axes */
 } hxGround;
 
-/* A sphere against the ground. */
+/* Kinematics of the contact. */
 typedef struct {
-  hxVec3 arm; /* m  tibia's centre of mass to the contact point */
-  hxVec3 normal; /* 1  out of the ground there */
+  hxVec3 arm;           /* m       tibia's centre of mass to the contact point */
+  hxVec3 normal;        /* 1       out of the ground */
   hxReal delta, ddelta; /* m, m/s  penetration, approach speed */
-  hxVec3 velocity; /* m/s  of the foot's material point there */
+  hxVec3 velocity;      /* m/s     of the foot's material at the contact point */
 } hxFootKinematics;
 
-/* Force along the normal and its slopes. */
+/* Normal force and its derivatives. */
 typedef struct {
-  hxReal force; /* N    f_n */
-  hxReal elastic; /* N    its part that is stored: K delta^(3/2) */
+  hxReal force;     /* N    f_n */
+  hxReal elastic;   /* N      its elastic part K delta^(3/2) */
   hxReal stiffness; /* N/m  df_n/ddelta */
   hxReal viscosity; /* N s/m  df_n/d(ddelta) */
 } hxNormalForce;
 
-/* What a foot with bristles feels across the normal. */
+/* Tangential force of a foot with bristles (eq. 16-18). */
 typedef struct {
-  hxVec3 grip; /* 1    -f_t over f_n */
-  hxVec3 rate; /* m/s  db/dt */
-  hxReal stiffness; /* 1/m  secant of grip by b */
-  hxReal damping; /* s/m  of grip by db/dt */
-  hxReal yield; /* 1/s  of db/dt by -b: how fast the bristles let go while they slide */
+  hxVec3 grip;      /* 1    -f_t over f_n */
+  hxVec3 rate;      /* m/s  db/dt */
+  hxReal stiffness; /* 1/m  grip over b (secant) */
+  hxReal damping;   /* s/m  derivative of grip by db/dt */
+  hxReal yield; /* 1/s  derivative of db/dt by -b: rate at which sliding bristles are released */
 } hxBristle;
 
 typedef struct {
   hxFootKinematics kin;
   hxNormalForce normal;
-  hxVec3 slip, force; /* m/s, N  tangential velocity, ground on foot */
+  hxVec3 slip, force; /* m/s, N  tangential velocity, force of the ground on the foot */
   hxReal slip_speed;
-  hxReal drag; /* N s/m  size of the tangential force over the slip speed */
-  hxReal drag_per_load; /* s/m    the same over f_n */
-  hxBristle bristle; /* of the bristle law alone */
+  hxReal drag;          /* N s/m   tangential force over slip speed */
+  hxReal drag_per_load; /* s/m     drag over f_n */
+  hxBristle bristle;    /* set by the bristle law only */
 } hxFootWork;
 
-static const double break_away = 0.7; /* of the presliding: below it a bristle is a spring */
+static const double spring_limit =
+    0.7; /* 1  of the presliding; bristles below it are springs (eq. 16) */
 
-/* The only place a terrain is chosen. */
+/* Returns distance and normal of the ground at a point. All other code is independent of the
+ * terrain. */
 static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
   if (model->terrain_kind == HX_TERRAIN_FLAT)
     return (hxGround){point.z - model->ground_point[2],
@@ -57,8 +58,8 @@ static inline hxGround hx_ground(const hxModel *model, hxVec3 point) {
   return (hxGround){hx_dot(n, hx_sub3(point, hx_splat_vec3(model->ground_point))), n};
 }
 
-/* g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t; the series
- * k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
+/* Returns g of f_t = -mu f_n g(|v_t|) v_t (eq. 15): tanh(k_t v) / v, whose limit at rest is k_t.
+ * The series k_t (1 - (k_t v)^2 / 3) is exact below k_t v = 1e-5. */
 static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
   if (model->friction_law == HX_FRICTION_NONE) return hx_splat(0.0);
   const hxReal x = model->slope * speed;
@@ -67,39 +68,45 @@ static inline hxReal hx_friction(const hxModel *model, hxReal speed) {
                                   hx_tanh_ratio(hx_select(slow, hx_splat(1.0), x)));
 }
 
-/* Elasto-plastic bristles (eq. 16, 17), u = b/b_max within the unit disc: db/dt = v - Y (v.u)+
- * u/|u|, of which friction is the share w = u (3 - u.u)/2 + d room/|(room, d)|, d = 3/2 tau db/dt /
- * b_max. The room that the spring leaves, 1 - |u| (3 - u.u)/2, is all that the damping can have: w
- * never leaves the disc either, and all is C1 where a foot slides, |u| = 1, about which stages
- * scatter. Friction is static where nothing slides and falls with the speed p of what does: mu(p) =
- * mu + (mu_s - mu)/(1 + (p/v_s)^2) (eq. 18). */
+/* Elasto-plastic bristles (eq. 16, 17) with u = b/b_max in the unit disc: db/dt = v - Y (v.u)+
+ * u/|u|.
+ *
+ * The friction force is the share w = u (3 - u.u)/2 + d room/|(room, d)| of mu f_n, with the
+ * damping d = 3/2 tau db/dt / b_max. The spring leaves room = 1 - |u| (3 - u.u)/2 to the damping,
+ * so that w stays within the disc too, and w is C1 at |u| = 1, where a foot slides.
+ *
+ * The friction coefficient falls with the sliding speed p of the bristles: mu(p) = mu + (mu_s -
+ * mu)/(1 + (p/v_s)^2) (eq. 18).
+ */
 static inline hxBristle hx_bristle(const hxModel *model, hxReal closed, hxVec3 b, hxVec3 slip) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxNumber per_length = 1.0 / model->presliding;
   const hxVec3 u = hx_scale(hx_splat(per_length), b);
   const hxReal size = hx_sqrt(hx_dot(u, u)), within = hx_min(size, one);
-  const hxReal s = hx_clip((size - break_away) * (1.0 / (1.0 - break_away)), zero, one);
-  const hxReal let_go =
-      s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) / hx_max(size, hx_splat(break_away));
-  const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -let_go, u));
+  const hxReal s = hx_clip((size - spring_limit) * (1.0 / (1.0 - spring_limit)), zero, one);
+  const hxReal release_rate = s * s * (3.0 - 2.0 * s) * hx_max(hx_dot(slip, u), zero) /
+                              hx_max(size, hx_splat(spring_limit));
+  const hxVec3 rate = hx_scale(closed, hx_add_scaled(slip, -release_rate, u));
   const hxVec3 d = hx_scale(hx_splat(1.5 * model->bristle_damping * per_length), rate);
   const hxReal spring = (1.5 - 0.5 * within * within) / hx_max(size, one);
   const hxReal room = 1.0 - spring * size;
-  const hxReal share = room / hx_sqrt(room * room + hx_dot(d, d) +
-                                      1e-30); /* tiny: no room and no motion is 0, not 0/0 */
+  const hxReal share =
+      room / hx_sqrt(room * room + hx_dot(d, d) +
+                     1e-30); /* 1e-30: without room and motion the share is 0, not 0/0 */
   const hxVec3 w = hx_add_scaled(hx_scale(spring, u), share, d);
-  const hxReal sliding = hx_splat(model->per_stribeck) * let_go * size;
+  const hxReal sliding = hx_splat(model->per_stribeck) * release_rate * size;
   const hxReal mu = model->mu + model->static_rise / (1.0 + sliding * sliding);
   return (hxBristle){
       .grip = hx_scale(mu, w),
       .rate = rate,
       .stiffness = (mu * per_length) * spring,
       .damping = (1.5 * mu * model->bristle_damping * per_length) * share,
-      .yield = per_length * let_go,
+      .yield = per_length * release_rate,
   };
 }
 
-/* f_n = K delta^(3/2) (1 + d ddelta) >= 0 (eq. 14) while the contact is closed */
+/* Returns f_n = K delta^(3/2) (1 + d ddelta) >= 0 of a closed contact (eq. 14), and its
+ * derivatives. */
 static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed, hxReal damping,
                                             hxReal delta, hxReal ddelta) {
   const hxReal zero = hx_splat(0.0);
@@ -116,6 +123,7 @@ static inline hxNormalForce hx_normal_force(const hxModel *model, hxReal closed,
   };
 }
 
+/* Computes contact point, penetration and velocity of the feet from the tibias' motion. */
 static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hxPlantMotion *motion,
                                                   int slot, const hxBody *tibia) {
   const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
@@ -128,8 +136,8 @@ static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hx
                             -hx_dot(velocity, ground.normal), velocity};
 }
 
-/* f_n along the normal, f_t = -mu f_n g(|v_t|) v_t or the bristles' across it. The only place a
- * friction law is chosen. */
+/* Computes the force of the ground on the foot: f_n along the normal, and across it f_t = -mu f_n
+ * g(|v_t|) v_t or the bristles' force. All friction laws are chosen by this function. */
 static inline void hx_foot_force(const hxModel *model, const hxContactState *contact, int slot,
                                  hxVec3 bristle, hxFootWork *foot) {
   const hxFootKinematics *kin = &foot->kin;
@@ -147,7 +155,7 @@ static inline void hx_foot_force(const hxModel *model, const hxContactState *con
   foot->force = hx_add_scaled(hx_scale(foot->normal.force, kin->normal), -foot->drag, foot->slip);
 }
 
-/* W  that friction takes */
+/* Returns the power that friction dissipates, W. */
 static inline hxReal hx_friction_power(const hxModel *model, const hxFootWork *foot) {
   if (model->friction_law == HX_FRICTION_BRISTLE)
     return foot->normal.force * hx_dot(foot->bristle.grip, foot->slip);

@@ -1,8 +1,8 @@
-/* forces.h - where bodies and joints are at (t, y), how they move, and the forces they feel there
+/* forces.h - kinematics of bodies and joints at (t, y), and the forces on them
  *
- * All legs of a pack at once. Points, and the spatial vectors of the sweeps, are from and about the
- * torso's centre of mass. Accelerations are what a body feels, a - g, until they are stored:
- * gravity is then no force at all.
+ * Every function processes all legs of a pack at once. Points and spatial vectors are relative to
+ * the torso's centre of mass. Accelerations are a - g until they are stored, so that gravity needs
+ * no force.
  */
 #ifndef HX_FORCES_H
 #define HX_FORCES_H
@@ -12,15 +12,15 @@
 /* ---- root to leaf: where everything is and what it feels there
  * ------------------------------------------------------------ */
 
-/* along a leg, up to the present link */
+/* Sums along a leg, up to the present link. */
 typedef struct {
-  hxVec3 c, dc, ddc; /* centre of mass from the torso's by the joints alone, its rate, its second
-                        rate without angular accelerations */
+  hxVec3 c, dc, ddc; /* centre of mass from the torso's by the joints alone, its first rate, its
+                        second rate without angular accelerations */
   hxMotion6 bias;    /* sums of dw and P x dw */
 } hxChain;
 
-/* The drive's acceleration: the rheonomic constraint q = q_ref + qd_ref s + qdd_ref s^2/2,
- * s = t - t_command, with Baumgarte (eq. 13). */
+/* Returns the acceleration of a kinematic drive: the rheonomic constraint q = q_ref + qd_ref s +
+ * qdd_ref s^2/2, s = t - t_command, with Baumgarte terms (eq. 13). */
 static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *command, double t,
                                         int joint, int slot, const hxJointWork *k) {
   const hxReal angle_ref = hx_load(&command->angle[joint][slot]),
@@ -33,9 +33,9 @@ static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *c
   return acceleration_ref - 2.0 * model->alpha * slower - model->beta * model->beta * error;
 }
 
-/* dw of eq. 9: rows 4 and 5 of D on it are c = gamma - 2 alpha dPhi - beta^2 Phi, s.dw is 0 or the
- * drive's qdd. With x = w_i x w_j taken out, gamma is Phi |w|^2 - w qd of the relative w, w_ij_j in
- * the child's axes, in which what is left is solved. */
+/* Returns dw of eq. 9: rows 4 and 5 of D dw are c = gamma - 2 alpha dPhi - beta^2 Phi, and s.dw is
+ * 0 or the drive's qdd. Without x = w_i x w_j, gamma is Phi |w|^2 - w qd of the relative angular
+ * velocity w_ij_j; the rest is solved in the child's axes. */
 static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i,
                                 const hxBody *j, hxReal speed, hxReal driven) {
   const hxVec3 w_ij_j = hx_tmul(j->axes, hx_sub3(j->w, w_i)), x = hx_cross(w_i, j->w);
@@ -51,10 +51,10 @@ static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *k
   return hx_add3(x, hx_mul(j->axes, (hxVec3){dx, dy, dz}));
 }
 
-/* a motion about the torso's centre of mass, at c from it */
+/* Returns the linear part at c of a motion about the torso's centre of mass. */
 static inline hxVec3 motion_at(hxMotion6 a, hxVec3 c) { return hx_add3(a.lin, hx_cross(a.ang, c)); }
 
-/* Attitude and inertia of a link. */
+/* Computes orientation, inertia in world axes and gyroscopic torque of a link. */
 static inline void link_pass(const hxModel *model, const hxPlantMotion *motion, int joint, int slot,
                              hxJointWork *k) {
   k->body = hx_link_body(motion, joint, slot);
@@ -62,7 +62,7 @@ static inline void link_pass(const hxModel *model, const hxPlantMotion *motion, 
   k->gyroscopic = hx_cross(hx_sym_mul(k->J, k->body.w), k->body.w);
 }
 
-/* One joint and its child: positions, velocities, bias acceleration and the force it takes. */
+/* Computes position, velocity, bias acceleration and bias force of a joint's child. */
 static inline void joint_pass(const hxModel *model, const hxCommand *command, double t,
                               const hxPlantMotion *motion, int joint, int slot, int reactions,
                               const hxBody *i, hxChain *chain, hxJointWork *k) {
@@ -81,7 +81,8 @@ static inline void joint_pass(const hxModel *model, const hxCommand *command, do
                   ? drive_acceleration(model, command, t, joint, slot, k)
                   : hx_splat(0.0);
 
-  /* rows 1-3 of a_k telescope: ddc - 2 alpha (v_j - v_0 - dc) - beta^2 (r_j - r_0 - c) */
+  /* rows 1-3 of a_k, summed along the leg: ddc - 2 alpha (v_j - v_0 - dc) - beta^2 (r_j - r_0 - c)
+   */
   const hxVec3 dw = joint_bias(model, &kin, i->w, j, k->speed, k->driven);
   const hxVec3 drift = hx_sub3(
       hx_sub3(hx_link_vec3(motion, joint, HX_R, slot), hx_torso_vec3(motion, HX_R)), chain->c);
@@ -101,7 +102,8 @@ static inline void joint_pass(const hxModel *model, const hxCommand *command, do
   if (reactions) k->reaction.kin = kin;
 }
 
-/* first all half-angles, then all angles: their long chains of operations overlap */
+/* Computes all joint angles. All half-angles come first, so that their long chains of operations
+ * overlap. */
 static inline void joint_angles(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
   hxReal sine[HX_JOINTS * HX_PACKS], cosine[HX_JOINTS * HX_PACKS];
   for (int joint = 0, n = 0; joint < HX_JOINTS; ++joint)
@@ -115,6 +117,7 @@ static inline void joint_angles(const hxModel *model, const hxPlantMotion *motio
       work->pack[pack].joint[joint].angle = hx_angle_from_half(sine[n], cosine[n]);
 }
 
+/* Computes all joints of a leg, hip to foot. */
 static inline void leg_pass(const hxModel *model, const hxCommand *command, double t,
                             const hxPlantMotion *motion, const hxBody *torso, int slot,
                             int reactions, hxLegWork *leg) {
@@ -125,6 +128,7 @@ static inline void leg_pass(const hxModel *model, const hxCommand *command, doub
                joint > 0 ? &leg->joint[joint - 1].body : torso, &chain, &leg->joint[joint]);
 }
 
+/* Computes the torques of motor and gear on a joint (eq. 12). */
 static inline void joint_torque(const hxModel *model, const hxCommand *command, int joint, int slot,
                                 hxJointWork *k) {
   k->servo = hx_servo_torque(model, k->angle, k->speed, hx_load(&command->angle[joint][slot]),
@@ -142,18 +146,19 @@ static inline hxMotion6 link_velocity(const hxPlantMotion *m, int joint, int slo
   return (hxMotion6){hx_link_vec3(m, joint, HX_W, slot), hx_link_vec3(m, joint, HX_V, slot)};
 }
 
-/* where the foot touches, from the torso's centre of mass */
+/* Returns the contact point, relative to the torso's centre of mass. */
 static inline hxVec3 contact_point(const hxLegWork *leg) {
   return hx_add3(leg->joint[HX_JOINTS - 1].c, leg->foot.kin.arm);
 }
 
-/* a force on the tibia at x: taken off its p */
+/* Applies a force to the tibia at x: p -= (x x force, force). */
 static inline void push_tibia(hxLegWork *leg, hxVec3 x, hxVec3 force) {
   hxForce6 *p = &leg->joint[HX_JOINTS - 1].p;
   p->lin = hx_sub3(p->lin, force);
   p->ang = hx_sub3(p->ang, hx_cross(x, force));
 }
 
+/* Computes the contact force and applies it to the tibia. */
 static inline void leg_foot(const hxModel *model, const hxContactState *contact,
                             const hxPlantMotion *motion, int slot, hxLegWork *leg) {
   leg->foot.kin = hx_foot_kinematics(model, motion, slot, &leg->joint[HX_JOINTS - 1].body);
@@ -161,6 +166,7 @@ static inline void leg_foot(const hxModel *model, const hxContactState *contact,
   push_tibia(leg, contact_point(leg), leg->foot.force);
 }
 
+/* Computes orientation and inertia of the torso. */
 static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion, hxWork *work) {
   const hxNumber *J = model->torso_inertia;
   const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]),
@@ -169,8 +175,8 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
   work->torso_J = hx_rotate_sym3(work->torso.axes, body);
 }
 
-/* Positions, velocities and forces at (t, y); work is filled up to the sweeps, with what the
- * multipliers take if they are wanted. */
+/* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with
+ * reactions it also keeps what the multipliers need. */
 static inline void hx_dynamics_forces(const hxModel *model, const hxContactState *contact,
                                       const hxCommand *command, double t,
                                       const hxPlantMotion *motion, int reactions, hxWork *work) {

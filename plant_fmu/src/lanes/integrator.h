@@ -1,5 +1,5 @@
-/* integrator.h - from one time to another, stopping at every touch-down; its readable form is
- * models/integrator.py */
+/* integrator.h - time integration with error control that ends a step at every touch-down;
+ * models/integrator.py is the readable form */
 #ifndef HX_INTEGRATOR_H
 #define HX_INTEGRATOR_H
 
@@ -9,31 +9,29 @@
 #include "../method.h"
 #include "measure.h"
 
-static const double step_floor = 1e-11; /* s  below this the error control gives up */
-static const double most_steps[3] = {
-    1e5, 1e5, 1e6}; /* 1, 1/s, 1  a call may take: at least, more for each second, at most */
+static const double step_floor = 1e-11; /* s  the error control fails below this step */
+static const double step_limits[3] = {
+    1e5, 1e5, 1e6}; /* 1, 1/s, 1  limits of a call's steps: base, per second, highest */
 static const double touch_depth[2] = {
-    1e-10, 1e-6}; /* m, m over the tolerance  a touch-down is found when the foot is in by less */
+    1e-10, 1e-6}; /* m, m per tolerance  a touch-down is located to this depth */
 
-/* Sizes against which tolerance is relative: 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s. */
+/* Scales of the error norm (eq. 22): 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s. */
 static const double error_scale[HX_BODY_STATE] = {0.1, 0.1, 0.1, 1, 1, 1, 1, 1, 1, 1, 10, 10, 10};
-static const double bristle_scale =
-    10.0; /* preslidings: at the default tolerance a thousandth of the friction force */
+static const double bristle_scale = 10.0; /* 1  in preslidings */
 
-/* Where a step starts. */
+/* Start of a step and the data that all its trials share. */
 typedef struct {
   const hxModel *model;
-  const hxCommand *command,
-      *ramp; /* what is asked for at command->time, and its change per second; ramp NULL: none */
+  const hxCommand *command, *ramp; /* command and its change per second; ramp NULL: constant */
   const hxContactState *contact;
   const hxMethodRow *method;
   double t;
-  double touch; /* m  how deep a foot may be that has just touched down */
-  double last_step; /* count of steps, kept and rejected, at which the error control gives up */
+  double touch;     /* m  largest depth of a foot that has just touched down */
+  double last_step; /* limit of accepted and rejected steps */
   const hxPlantMotion *y;
 } hxStart;
 
-/* All feet: penetration, approach speed. */
+/* Penetration and approach speed of all feet, m, m/s. */
 typedef struct {
   double delta[HX_SLOTS], ddelta[HX_SLOTS];
 } hxFeet;
@@ -41,9 +39,10 @@ typedef struct {
 typedef struct {
   hxPlantMotion y;
   hxImpulses impulses;
-  double error; /* of the step over the tolerance; 0 without an estimate */
+  double error; /* error of the step over the tolerance; 0 without an estimate */
 } hxTrial;
 
+/* Computes penetration and approach speed of all feet. */
 static inline hxFeet feet_of(const hxModel *model, const hxPlantMotion *motion) {
   hxFeet feet;
   for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES) {
@@ -55,12 +54,10 @@ static inline hxFeet feet_of(const hxModel *model, const hxPlantMotion *motion) 
   return feet;
 }
 
-/* ---- one step
- * ---------------------------------------------------------------------------------------------------------------
- */
+/* ---- one step ---- */
 
-/* base + h sum of weights k, n of them (base NULL: 0), k from entry `first` on; one pass over
- * memory, n and sizes known to the compiler */
+/* Computes base + h sum w_j k_j over n rates, from entry `first` on (base NULL: 0). It is one pass
+ * over memory; n and size are constants for the compiler. */
 static inline void combine_n(double *out, const double *base, double h, const double *weights,
                              const hxRate *k, int n, int first, int size) {
   hxReal w[HX_STAGES];
@@ -72,6 +69,7 @@ static inline void combine_n(double *out, const double *base, double h, const do
   }
 }
 
+/* Calls combine_n with n as a constant. */
 static inline void combine_part(double *out, const double *base, double h, const double *weights,
                                 const hxRate *k, int n, int first, int size) {
   switch (n) {
@@ -92,7 +90,7 @@ static inline void combine_part(double *out, const double *base, double h, const
   }
 }
 
-/* the same from an entry of k to its end; bristles only where they move */
+/* Combines rates from an entry on to the end, bristles only with the bristle law. */
 static inline void combine(const hxModel *model, double *out, const double *base, double h,
                            const double *weights, const hxRate *k, int n, int first) {
   enum { END = HX_TURN_SIZE + HX_BODIES_SIZE };
@@ -102,16 +100,18 @@ static inline void combine(const hxModel *model, double *out, const double *base
               HX_BRISTLE_SIZE);
 }
 
-static inline double larger(double a, double b) { return b > a ? b : a; }
+/* Returns the larger number; a if b is NaN. */
+static inline double larger_of(double a, double b) { return b > a ? b : a; }
 
-/* largest error over scale and tolerance (eq. 22); NaN is the caller's to find */
+/* Returns the largest error over scale and tolerance (eq. 22). NaN is ignored; advance() checks
+ * for it. */
 static double error_norm(const hxModel *model, const hxPlantMotion *error) {
   hxReal links = hx_splat(0.0);
   double largest[HX_LANES];
   double worst = 0.0;
   for (int i = 0; i < HX_BODY_STATE; ++i) {
     const double scale = 1.0 / error_scale[i];
-    worst = larger(worst, scale * fabs(error->torso[i]));
+    worst = larger_of(worst, scale * fabs(error->torso[i]));
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
         links = hx_max(links, scale * hx_abs(hx_load(&error->link[joint][i][slot])));
@@ -121,10 +121,11 @@ static double error_norm(const hxModel *model, const hxPlantMotion *error) {
       links = hx_max(links, 1.0 / (bristle_scale * model->presliding) *
                                 hx_abs(hx_load(&error->bristle[i][slot])));
   hx_store(largest, links);
-  for (int lane = 0; lane < HX_LANES; ++lane) worst = larger(worst, largest[lane]);
+  for (int lane = 0; lane < HX_LANES; ++lane) worst = larger_of(worst, largest[lane]);
   return worst / model->tolerance;
 }
 
+/* Scales all quaternions to unit length. */
 static void normalise_quaternions(hxPlantMotion *m) {
   double *p = &m->torso[HX_P];
   const double scale = 1.0 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
@@ -137,8 +138,8 @@ static void normalise_quaternions(hxPlantMotion *m) {
     }
 }
 
-/* A kinematic drive's command a while after it was given. A rate given for an input takes the place
- * of the input one derivative above it. */
+/* Computes a kinematic drive's command some time after it was given. The rate of an input replaces
+ * the input one derivative above it (eq. 13). */
 static void move_drive(const hxCommand *from, const hxCommand *rate, double elapsed, int joint,
                        int slot, hxCommand *now) {
   const int given = rate->speed[joint][slot] != 0.0;
@@ -152,7 +153,7 @@ static void move_drive(const hxCommand *from, const hxCommand *rate, double elap
       elapsed * (from->speed[joint][slot] + elapsed * (0.5 * a + elapsed * (1.0 / 6.0) * jerk));
 }
 
-/* The command at a time; in kinematic mode drives go on between rates as without (eq. 13). */
+/* Returns the command at time t; in kinematic mode drives extrapolate as in eq. 13. */
 static const hxCommand *command_at(const hxStart *start, double t, hxCommand *now) {
   enum { SIZE = sizeof(hxCommand) / sizeof(double) };
   const double *from = (const double *)start->command, *rate = (const double *)start->ramp;
@@ -166,7 +167,7 @@ static const hxCommand *command_at(const hxStart *start, double t, hxCommand *no
   return now;
 }
 
-/* One step of the method from a start, kept or not. */
+/* Computes one step of the method and its error; the state changes only in its counters. */
 static void try_step(const hxStart *start, double h, hxState *state, hxTrial *trial) {
   const hxMethodRow *m = start->method;
   const hxModel *model = start->model;
@@ -176,6 +177,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
   hxWork work;
   hxCommand now;
   memset(&trial->impulses, 0, sizeof trial->impulses);
+  /* stages: y_i = y_0 + sum a_ij k_j, k_i by eq. 19 */
   for (int i = 0; i < m->stages; ++i) {
     const double t = start->t + m->c[i] * h;
     if (i > 0) {
@@ -190,6 +192,7 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     hx_add_impulses(model, command, stage, &work, h * m->b[i], &trial->impulses);
     state->evaluations += 1.0;
   }
+  /* y_1 = y_0 + sum b_i k_i, error = |sum e_i k_i| */
   memcpy(trial->y.bristle, start->y->bristle, sizeof trial->y.bristle);
   combine(model, trial->y.y, start->y->y, h, m->b, k, m->stages, HX_TURN_SIZE);
   trial->error = 0.0;
@@ -198,26 +201,24 @@ static void try_step(const hxStart *start, double h, hxState *state, hxTrial *tr
     trial->error = error_norm(model, &y);
   }
   trial->y.actuator_work =
-      start->y->actuator_work; /* the accepted step's are added by measure_step */
+      start->y->actuator_work; /* measure_step() adds those of the accepted step */
   trial->y.push_work = start->y->push_work, trial->y.dissipated = start->y->dissipated;
   normalise_quaternions(&trial->y);
   if (model->projection == HX_PROJECTION_STEP) hx_project(model, &trial->y);
 }
 
-/* ---- touch-down
- * -------------------------------------------------------------------------------------------------------------
- */
+/* ---- touch-down ---- */
 
-/* how deep the deepest open foot is in the ground */
-static double open_depth(const hxContactState *contact, const hxFeet *feet) {
+/* Returns the penetration of the deepest open foot, m. */
+static double deepest_open_foot(const hxContactState *contact, const hxFeet *feet) {
   double depth = -HUGE_VAL;
   for (int leg = 0; leg < HX_LEGS; ++leg)
     if (contact->closed[leg] == 0.0 && feet->delta[leg] > depth) depth = feet->delta[leg];
   return depth;
 }
 
-/* Where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between its ends
- * (eq. 24): bisection. */
+/* Returns where on [0, 1] the cubic with these ends and slopes (per unit) reaches a level between
+ * its ends (eq. 24), by bisection. */
 static double cubic_crossing(double from, double slope_from, double to, double slope_to,
                              double level) {
   const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise,
@@ -233,8 +234,8 @@ static double cubic_crossing(double from, double slope_from, double to, double s
   return high;
 }
 
-/* When the first open foot will be half a touch depth in, by the cubics through depths and speeds
- * at two times. */
+/* Returns the time at which the first open foot reaches half the touch depth, by the cubics
+ * through depths and speeds at two times. */
 static double expected_touch(const hxStart *start, double t_low, const hxFeet *low, double t_high,
                              const hxFeet *high) {
   const double h = t_high - t_low, level = 0.5 * start->touch;
@@ -254,14 +255,14 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
                              hxFeet *feet) {
   double low = 0.0, high = h;
   hxFeet feet_low = feet_of(start->model, start->y);
-  for (int guess = 1; open_depth(start->contact, feet) > start->touch && high - low > step_floor;
-       ++guess) {
+  for (int guess = 1;
+       deepest_open_foot(start->contact, feet) > start->touch && high - low > step_floor; ++guess) {
     double middle = guess % 3 ? expected_touch(start, low, &feet_low, high, feet) : low;
     if (!(middle > low && middle < high)) middle = 0.5 * (low + high);
     hxTrial nearer;
     try_step(start, middle, state, &nearer);
     const hxFeet found = feet_of(start->model, &nearer.y);
-    if (open_depth(start->contact, &found) > 0.0)
+    if (deepest_open_foot(start->contact, &found) > 0.0)
       high = middle, *feet = found, *trial = nearer;
     else
       low = middle, feet_low = found;
@@ -269,9 +270,7 @@ static double find_touchdown(const hxStart *start, double h, hxState *state, hxT
   return high;
 }
 
-/* ---- error control
- * ----------------------------------------------------------------------------------------------------------
- */
+/* ---- error control ---- */
 
 /* x^(-1/n) for x in about [1e-4, 1e4], in plain arithmetic: the same on every machine. Newton on
  * r^-n = x rises to its root. */
@@ -298,12 +297,13 @@ static double step_factor(const hxMethodRow *method, double error) {
 }
 
 /* Steps that a call over a time may take: no call runs on for ever. */
+/* Returns the limit of the steps of a call over a time, s. */
 static double steps_allowed(double time) {
-  return fmin(most_steps[0] + most_steps[1] * time, most_steps[2]);
+  return fmin(step_limits[0] + step_limits[1] * time, step_limits[2]);
 }
 
-/* Why a step of h from t cannot be had. */
-static hxStatus give_up(const hxTrial *trial, double t, double h, char *message) {
+/* Writes why no step of h from t succeeds, and returns the status. */
+static hxStatus step_failure(const hxTrial *trial, double t, double h, char *message) {
   const int lost = isnan(trial->error);
   snprintf(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
@@ -317,6 +317,7 @@ static hxStatus give_up(const hxTrial *trial, double t, double h, char *message)
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
 }
 
+/* Returns whether all numbers of a motion are finite: 0 x is NaN otherwise. */
 static int all_finite(const hxPlantMotion *y) {
   hxReal sum = hx_splat(0.0);
   double lanes[HX_LANES], total = 0.0;
@@ -326,11 +327,10 @@ static int all_finite(const hxPlantMotion *y) {
   return total == 0.0;
 }
 
-/* ---- what a step did
- * --------------------------------------------------------------------------------------------------------
- */
+/* ---- what a step did ---- */
 
-/* Work of the push: its impulses times the mean of the torso's velocities at both ends. */
+/* Returns the work of the push: its impulses times the mean of the torso's velocities at both ends
+ * (eq. 27). */
 static double push_work(const hxImpulses *impulses, const hxPlantMotion *from,
                         const hxPlantMotion *to) {
   double work = 0.0;
@@ -339,8 +339,8 @@ static double push_work(const hxImpulses *impulses, const hxPlantMotion *from,
   return work;
 }
 
-/* Adds the works of an accepted step of h to the motion at its end, and what it did to what the
- * state has measured. */
+/* Adds the works of an accepted step of h to the motion at its end, and its integrals and peaks to
+ * the state. */
 static void measure_step(const hxStart *start, double h, const hxMoment *end, hxState *state,
                          hxTrial *trial) {
   hxStepWorks works;
@@ -366,8 +366,8 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
   state->moment = *end;
 }
 
-/* One accepted step of at most h_max, shortened by the error control and by touch-downs; *taken is
- * its length. */
+/* Advances the state by one accepted step of at most h_max, shortened by the error control and by
+ * touch-downs; *taken is its length. */
 static hxStatus advance(const hxStart *start, double h_max, double *next_step, hxState *state,
                         double *taken, char *message) {
   const hxModel *model = start->model;
@@ -375,24 +375,25 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   double h = model->step > 0.0
                  ? h_max
                  : h_max / ceil(fmax(1.0, h_max / *next_step -
-                                              1e-9)); /* equal steps; no more for a last bit */
+                                              1e-9)); /* equal steps; 1e-9: rounding adds no step */
   trial.error = 0.0;
   for (;;) {
     if (model->step == 0.0 && state->steps + state->rejected >= start->last_step)
-      return give_up(&trial, start->t, h, message);
+      return step_failure(&trial, start->t, h, message);
     try_step(start, h, state, &trial);
     if (!all_finite(&trial.y)) trial.error = NAN;
     if (trial.error <= 1.0) break;
     state->rejected += 1.0;
     h *= fmin(step_factor(start->method, trial.error), 0.9);
     if (h < step_floor || (model->step > 0.0 && isnan(trial.error)))
-      return give_up(&trial, start->t, h, message);
+      return step_failure(&trial, start->t, h, message);
   }
   if (model->step == 0.0) {
     const double next = fmin(model->step_max, h * step_factor(start->method, trial.error));
-    /* a step cut short by the end of the interval says little against a longer one */
+    /* a step limited by the end of the interval must not reduce the next step */
     *next_step = state->next_step = h < h_max ? next : fmax(next, state->next_step);
   }
+  /* shorten the step to the first touch-down, measure it, switch contacts */
   hxMoment end;
   hxFeet feet;
   memset(&end, 0, sizeof end);
@@ -400,7 +401,7 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   memcpy(feet.delta, end.delta, sizeof feet.delta);
   memcpy(feet.ddelta, end.ddelta, sizeof feet.ddelta);
   *taken = h;
-  if (open_depth(start->contact, &feet) > 0.0) {
+  if (deepest_open_foot(start->contact, &feet) > 0.0) {
     *taken = find_touchdown(start, h, state, &trial, &feet);
     hx_moment_of(model, &trial.y, &end);
   }
@@ -412,8 +413,8 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   return HX_OK;
 }
 
-/* From state->time to t_end; the last step lands on it exactly. A call that an event broke off goes
- * on as if it had not been. */
+/* Advances from state->time to t_end; the last step ends on t_end exactly. A call that an event
+ * interrupted continues with the same steps. */
 static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                        double t_end, hxEvents *events, hxState *state, char *message) {
   hxStart start = {.model = model,
@@ -425,7 +426,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step,
-                      state->next_step); /* new inputs: a larger error than the last step's */
+                      state->next_step); /* new inputs cause a larger error than the last step's */
   double *next_step = command->time < state->time ? &state->next_step : &first;
   while (state->time < t_end && !(events->stop && events->found)) {
     const double left = t_end - state->time;
@@ -442,6 +443,7 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
   return HX_OK;
 }
 
+/* Advances to t_end in equal steps of at most solver.step. */
 static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                           double t_end, hxEvents *events, hxState *state, char *message) {
   const double t_start = command->time;
@@ -462,11 +464,11 @@ static hxStatus run_fixed(const hxModel *model, const hxCommand *command, const 
   return HX_OK;
 }
 
-/* Advances the state to t_end exactly, or to an event. On failure the state is somewhere on the way
- * and the message says why. */
+/* Advances the state to t_end exactly, or to an event. After a failure the state lies between the
+ * two times and the message gives the reason. */
 static hxStatus hx_integrate(const hxModel *model, const hxCommand *command, const hxCommand *ramp,
                              double t_end, hxEvents *events, hxState *state, char *message) {
-  if (state->moment.stale != 0.0) hx_moment_here(model, state);
+  if (state->moment.stale != 0.0) hx_moment_update(model, state);
   if (command->time == state->time && t_end > state->time) hx_reset_peaks(&state->measured);
   const hxStatus status = (model->step == 0.0 ? run_to : run_fixed)(model, command, ramp, t_end,
                                                                     events, state, message);

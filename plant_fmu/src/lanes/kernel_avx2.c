@@ -1,10 +1,10 @@
-/* kernel_avx2.c - the physics on lanes four legs at a time */
+/* kernel_avx2.c - the physics with four legs per pack, for AVX2 */
 #include "../kernel.h"
 
 #if HX_HAS_X86_KERNELS
 
-/* what follows is compiled for AVX2 without the build knowing, so that an importer's plain compiler
- * call does it too */
+/* The pragmas enable AVX2 without compiler options, so that an importer who compiles the sources
+ * by a plain call gets it too. */
 #include <immintrin.h>
 #include <math.h>
 #include <stdint.h>
@@ -33,5 +33,5 @@ static int has_avx2(void) { return __builtin_cpu_supports("avx2"); }
 const hxKernel hx_kernel_avx2 = HX_KERNEL_TABLE("avx2", has_avx2);
 
 #else
-typedef int hx_no_avx2_kernel; /* a file must not be empty */
+typedef int hx_no_avx2_kernel; /* ISO C forbids an empty file */
 #endif

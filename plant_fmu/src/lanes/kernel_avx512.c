@@ -1,10 +1,10 @@
-/* kernel_avx512.c - the physics on lanes all legs at a time */
+/* kernel_avx512.c - the physics with all legs in one pack, for AVX-512 */
 #include "../kernel.h"
 
 #if HX_HAS_X86_KERNELS
 
-/* what follows is compiled for AVX-512 without the build knowing, so that an importer's plain
- * compiler call does it too */
+/* The pragmas enable AVX-512 without compiler options, so that an importer who compiles the
+ * sources by a plain call gets it too. */
 #include <immintrin.h>
 #include <math.h>
 #include <stdint.h>
@@ -37,5 +37,5 @@ static int has_avx512(void) {
 const hxKernel hx_kernel_avx512 = HX_KERNEL_TABLE("avx512", has_avx512);
 
 #else
-typedef int hx_no_avx512_kernel; /* a file must not be empty */
+typedef int hx_no_avx512_kernel; /* ISO C forbids an empty file */
 #endif

@@ -1,9 +1,9 @@
-/* kernel_baseline.c - the physics on lanes for any processor: two legs at a time, or one where the
- * compiler has no vectors */
+/* kernel_baseline.c - the physics for any processor: two legs per pack, or one where the compiler
+ * has no vector types */
 #include "../kernel.h"
 
 #include "entry_points.h"
 
-static int anywhere(void) { return 1; }
+static int always_available(void) { return 1; }
 
-const hxKernel hx_kernel_baseline = HX_KERNEL_TABLE("baseline", anywhere);
+const hxKernel hx_kernel_baseline = HX_KERNEL_TABLE("baseline", always_available);

@@ -1,30 +1,31 @@
-/* kinematics.h - bodies, joints and constraint equations of one pack of legs */
+/* kinematics.h - kinematics of bodies and joints, and the constraint equations, of one pack of
+ * legs */
 #ifndef HX_KINEMATICS_H
 #define HX_KINEMATICS_H
 
 #include "spatial.h"
 
-/* How a body is turned and turning; the torso is the same in every lane. World axes. */
+/* Orientation and angular velocity of a body, world axes; the torso is the same in every lane. */
 typedef struct {
-  hxMat3 axes; /* its axes: columns of R_WB */
+  hxMat3 axes; /* body axes: columns of R_WB */
   hxVec3 w;    /* angular velocity */
 } hxBody;
 
-/* Joint between parent i and child j. */
+/* Geometry of the joint between parent i and child j, world axes unless stated otherwise. */
 typedef struct {
-  hxVec3 s;          /* axis, fixed in i, world axes */
-  hxReal sx, sy,
-      sz; /* the same in the child's axes (a, b, their normal): (0, 0, 1) but for drift */
-  hxVec3 sP_i, sP_j; /* centres of mass to the joint's point, world axes; body-fixed they are
-                        point_i, point_j */
+  hxVec3 s;          /* joint axis, fixed in the parent */
+  hxReal sx, sy, sz; /* s in the child's axes (a, b, their normal): (0, 0, 1) without drift */
+  hxVec3 sP_i,
+      sP_j; /* centres of mass to the joint's point; point_i and point_j rotated to world axes */
 } hxJointKinematics;
 
-/* Phi (eq. 4) and its rate, D of eq. 2 times the velocities: rows 1-3, rows 4-5. */
+/* Phi (eq. 4) and dPhi/dt = D v (eq. 2): rows 1-3, rows 4-5. */
 typedef struct {
   hxVec3 phi_lin, dphi_lin;
   hxReal phi[2], dphi[2];
 } hxConstraint;
 
+/* These functions read vectors, quaternions and orientations of the torso and of links. */
 static inline hxVec3 hx_torso_vec3(const hxPlantMotion *motion, int row) {
   return hx_splat_vec3(&motion->torso[row]);
 }
@@ -47,7 +48,7 @@ static inline hxBody hx_link_body(const hxPlantMotion *motion, int joint, int sl
                   hx_link_vec3(motion, joint, HX_W, slot)};
 }
 
-/* the same of a joint's parent: the link before, or the torso */
+/* The parent of a joint is the link before it, or the torso. */
 static inline hxVec3 hx_parent_vec3(const hxPlantMotion *motion, int joint, int row, int slot) {
   return joint > 0 ? hx_link_vec3(motion, joint - 1, row, slot) : hx_torso_vec3(motion, row);
 }
@@ -60,8 +61,8 @@ static inline hxBody hx_parent_body(const hxPlantMotion *motion, int joint, int 
   return joint > 0 ? hx_link_body(motion, joint - 1, slot) : hx_torso_body(motion);
 }
 
-/* q from the half-angle in p_rel = conj(p_i zero) p_j, of which the real part and the part along
- * the axis, the child's z, are needed */
+/* Computes sine and cosine of half the joint angle q from p_rel = conj(p_i zero) p_j: its
+ * component along the axis, the child's z, and its real part. */
 static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQuat i, hxQuat j,
                                        hxReal *sine, hxReal *cosine) {
   const hxQuat from = hx_quat_mul(i, hx_load_quat(model->zero, slot));
@@ -69,6 +70,7 @@ static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQu
   *cosine = from.w * j.w + from.x * j.x + from.y * j.y + from.z * j.z;
 }
 
+/* Computes the axis and the points of a joint from the orientations of parent and child. */
 static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, int slot,
                                                     const hxBody *i, const hxBody *j) {
   const hxVec3 s = hx_mul(i->axes, hx_load_vec3(model->s_i, slot));
@@ -80,8 +82,8 @@ static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, i
                              hx_mul(j->axes, hx_load_vec3(model->point_j, slot))};
 }
 
-/* Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s); the rates of rows 4, 5 are (a x s).(w_j - w_i), (b x
- * s).(w_j - w_i). */
+/* Computes Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s) and its rate; rows 4 and 5 of the rate are
+ * (a x s).(w_j - w_i) and (b x s).(w_j - w_i). */
 static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxPlantMotion *motion,
                                                int joint, int slot) {
   const hxBody i = hx_parent_body(motion, joint, slot), j = hx_link_body(motion, joint, slot);
@@ -98,9 +100,8 @@ static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxPla
       .dphi = {k.sy * w_ij_j.z - k.sz * w_ij_j.y, k.sz * w_ij_j.x - k.sx * w_ij_j.z}};
 }
 
-/* Puts links back on their joints, hip to foot: turned by the least turn that brings the child's z
- * on the axis, moved to the point, and what they turn and move otherwise than about the joint taken
- * away. */
+/* Projects a link onto its joint. The smallest rotation aligns the child's z with the axis, a
+ * translation restores the joint's point, and velocities keep only the rotation about the axis. */
 static inline void project_link(const hxModel *model, int joint, int slot, hxPlantMotion *motion) {
   const hxBody i = hx_parent_body(motion, joint, slot), drifted = hx_link_body(motion, joint, slot);
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
@@ -120,6 +121,7 @@ static inline void project_link(const hxModel *model, int joint, int slot, hxPla
                 hx_sub3(hx_add3(v_i, hx_cross(i.w, k.sP_i)), hx_cross(w_j, k.sP_j)));
 }
 
+/* Projects all links onto their joints, hip to foot. */
 static inline void hx_project(const hxModel *model, hxPlantMotion *motion) {
   for (int joint = 0; joint < HX_JOINTS; ++joint)
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)

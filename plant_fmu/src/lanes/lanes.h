@@ -1,9 +1,9 @@
-/* lanes.h - several legs at once: hxReal is HX_LANES doubles, one leg each.
+/* lanes.h - SIMD packs of legs: hxReal holds HX_LANES doubles, one leg in each lane.
  *
- * All arithmetic on legs goes through this type, with the operators of C. The width follows the
- * instruction set; each lane's result does not depend on it, because every operation here is exact
- * IEEE arithmetic lane by lane (no contraction, no libm). The headers in this folder are the
- * physics on lanes: each kernel_*.c includes them once, at its own width.
+ * All arithmetic on legs uses this type with the operators of C. The width follows the instruction
+ * set. The result of a lane does not depend on the width, because every operation is exact IEEE
+ * arithmetic lane by lane (no contraction, no libm). The headers in this folder hold the physics
+ * on lanes; each kernel_*.c includes them once, at its own width.
  */
 #ifndef HX_LANES_H
 #define HX_LANES_H
@@ -20,7 +20,7 @@
 #include "../state.h"
 
 #ifndef HX_TANGENT
-typedef double hxNumber; /* what the structures of state.h and hexapod.h are made of */
+typedef double hxNumber; /* number type of the structures of state.h and hexapod.h */
 
 #ifndef HX_LANES
 #if !defined(__GNUC__)
@@ -42,7 +42,7 @@ typedef double hxReal __attribute__((vector_size(8 * HX_LANES)));
 typedef int64_t hxMask __attribute__((vector_size(8 * HX_LANES)));
 #endif
 
-/* lanes of one pack in another order */
+/* Reorders the lanes of a pack. */
 #if defined(__clang__) || __GNUC__ >= 12
 #define HX_SHUFFLE(x, ...) __builtin_shufflevector(x, x, __VA_ARGS__)
 #else
@@ -76,20 +76,22 @@ static inline hxReal hx_sqrt(hxReal x) {
 }
 #endif
 
+/* Returns the bits of each lane. */
 static inline hxMask hx_bits(hxReal x) {
   hxMask m;
   memcpy(&m, &x, sizeof m);
   return m;
 }
 
+/* Returns the lanes that have these bits. */
 static inline hxReal hx_from_bits(hxMask m) {
   hxReal x;
   memcpy(&x, &m, sizeof x);
   return x;
 }
 
-/* mask ? a : b, lane by lane; b < a ? b : a and a < b ? b : a, which is what these instructions do,
- * NaN and signed zeros included */
+/* Lane by lane: select = mask ? a : b, min = b < a ? b : a, max = a < b ? b : a. The instructions
+ * agree with these formulas, also for NaN and signed zeros. */
 #if HX_LANES == 4 && defined(__AVX__)
 static inline hxReal hx_select(hxMask mask, hxReal a, hxReal b) {
   return _mm256_blendv_pd(b, a, hx_from_bits(mask));
@@ -131,21 +133,21 @@ static inline hxReal hx_expm1(hxReal x) {
   return power * expm1_r + (power - 1.0);
 }
 
-/* tanh(x), exact to a few units in the last place */
+/* Returns tanh(x), exact to a few units in the last place. */
 static inline hxReal hx_tanh(hxReal x) {
   const hxReal e = hx_expm1(2.0 * hx_clip(x, hx_splat(-20.0), hx_splat(20.0)));
   return e / (e + 2.0);
 }
 
-/* tanh(x) / x for x > 0 */
+/* Returns tanh(x) / x for x > 0. */
 static inline hxReal hx_tanh_ratio(hxReal x) {
   const hxReal e = hx_expm1(2.0 * hx_min(x, hx_splat(20.0)));
   return e / ((e + 2.0) * x);
 }
 
-/* The angle 2 atan(y / x) of a half-angle's sine y and cosine x, up to a common factor; in (-pi,
- * pi]. Each tan(half) = y / (x + |(x, y)|); two halvings leave |t| <= tan(pi/8), where the minimax
- * polynomial is exact to 1.3e-18. */
+/* Returns the angle 2 atan(y / x) in (-pi, pi] from the half-angle's sine y and cosine x, which
+ * may have a common factor. Each halving computes tan(half) = y / (x + |(x, y)|). Two halvings
+ * leave |t| <= tan(pi/8), where the minimax polynomial is exact to 1.3e-18. */
 static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   const hxMask back = hx_less(x, hx_splat(0.0));
   const hxReal y2 = y * y;
@@ -161,8 +163,8 @@ static inline hxReal hx_angle_from_half(hxReal y, hxReal x) {
   return 8.0 * (t + t * z * (low + z4 * (mid + z4 * high)));
 }
 
-/* atan2(y, x), 0 at the origin: half the angle has the sine y and the cosine x + r, or r - x and
- * |y| where x + r cancels */
+/* Returns atan2(y, x), 0 at the origin. The half-angle has the sine y and the cosine x + r, or r -
+ * x and |y| where x + r cancels. */
 static inline double hx_atan2(double y, double x) {
   const double r = sqrt(x * x + y * y);
   if (r == 0.0) return 0.0;
@@ -170,11 +172,12 @@ static inline double hx_atan2(double y, double x) {
   return hx_lane(hx_angle_from_half(hx_splat(sine), hx_splat(cosine)), 0);
 }
 
-/* the angle in [-pi/2, pi/2] whose sine is x */
+/* Returns the angle in [-pi/2, pi/2] whose sine is x. */
 static inline double hx_asin(double x) {
   return hx_atan2(x, sqrt(fmax(0.0, (1.0 - x) * (1.0 + x))));
 }
 
+/* Computes sine and cosine of each lane with hx_sin_cos. */
 static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
   double s[HX_LANES], c[HX_LANES];
   hx_store(s, x);
@@ -186,10 +189,12 @@ static inline void hx_lanes_sin_cos(hxReal x, hxReal *sine, hxReal *cosine) {
 #include "complex_step.h"
 #endif
 
-enum { HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES }; /* a pack is HX_LANES legs */
+enum {
+  HX_PACKS = (HX_LEGS + HX_LANES - 1) / HX_LANES
+}; /* packs that hold all legs, HX_LANES legs in each */
 
-/* The sum over the legs, in every lane, in one order whatever the width: ((x0 + x4) + x2) + ((x1 +
- * x5) + x3). */
+/* Returns the sum over the legs, in every lane. The order of additions does not depend on the
+ * width: ((x0 + x4) + x2) + ((x1 + x5) + x3). */
 #if HX_LANES == 2
 static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
   const hxReal x = (pack[0] + pack[2]) + pack[1];
@@ -198,8 +203,9 @@ static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
 #elif HX_LANES == 4
 static inline hxReal hx_sum_legs(const hxReal pack[HX_PACKS]) {
   const hxMask legs = {-1, -1, 0, 0};
-  const hxReal x = pack[0] + hx_select(legs, pack[1],
-                                       hx_splat(-0.0)); /* adding -0 changes nothing, not even -0 */
+  const hxReal x =
+      pack[0] +
+      hx_select(legs, pack[1], hx_splat(-0.0)); /* adding -0 changes no value, not even -0 */
   const hxReal halves = x + HX_SHUFFLE(x, 2, 3, 0, 1);
   return halves + HX_SHUFFLE(halves, 1, 0, 3, 2);
 }

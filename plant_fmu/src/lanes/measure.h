@@ -1,11 +1,11 @@
-/* measure.h - what a step did: works, losses, slip, impulses and peaks of joints and feet
+/* measure.h - measurements of a step: works, losses, slip, impulses and peaks of joints and feet
  *
- * Works and losses are the impulses of the step's own forces times the mean of the speeds at its
- * ends (eq. 27), so that they explain the change of kinetic energy. What is no work is integrated
- * along the step's path between its ends (hxMoment, eq. 28): angles and depths follow cubics
- * through values and rates, sliding velocities parabolas through values and mean. A landing's rise
- * of force is taken over a millisecond (eq. 29): its derivative jumps with every command, so its
- * largest value is that of an instant. Nothing depends on how often anyone looks at the plant.
+ * Works and losses are the impulses of the step's forces times the mean of the speeds at its ends
+ * (eq. 27), so that they equal the change of kinetic energy. Other integrals follow the step's
+ * path between its ends (hxMoment, eq. 28): angles and depths are cubics through values and rates,
+ * sliding velocities are parabolas through values and mean. The loading rate of a landing is taken
+ * over a millisecond (eq. 29), because the force's derivative jumps with every command. The
+ * results do not depend on how often outputs are read.
  */
 #ifndef HX_MEASURE_H
 #define HX_MEASURE_H
@@ -13,20 +13,19 @@
 #include "../contact_law.h"
 #include "dynamics.h"
 
-static const double landing_sample = 1e-4; /* s  between two forces of a landing */
-static const double nearly_sliding = 0.9; /* of the friction cone */
-static const double shortest_bend =
-    1e-7; /* s  in shorter steps second differences of depths are rounding */
+static const double landing_sample = 1e-4; /* s  between two samples of a landing's force */
+static const double nearly_sliding = 0.9;  /* 1  of the friction cone */
+static const double shortest_bend = 1e-7;  /* s  shorter steps: differences are rounding errors */
 static const double half_turn = 3.14159265358979323846;
 
-/* Nodes of a step, at which laws are evaluated: all of them for feet, every second one for motors;
- * and Simpson's weights there. */
+/* Nodes of a step at which forces are evaluated, and Simpson's weights: feet use all nodes, motors
+ * every second one. */
 enum { INTERVALS = 4, MOTOR_STRIDE = 2 };
-enum { LANDING_SAMPLES = 200 }; /* of a landing, which is over 20 ms after touch-down */
+enum { LANDING_SAMPLES = 200 }; /* samples of a landing, which lasts 20 ms */
 static const double foot_weight[INTERVALS + 1] = {1.0 / 12, 4.0 / 12, 2.0 / 12, 4.0 / 12, 1.0 / 12};
 static const double motor_weight[INTERVALS + 1] = {1.0 / 6, 0.0, 4.0 / 6, 0.0, 1.0 / 6};
 
-/* The works and losses of a step, J, one pack's legs in lanes. */
+/* Works and losses of a step, J, legs in lanes. */
 typedef struct {
   hxReal motor[HX_JOINTS][HX_PACKS];
   hxReal mean_torque[HX_JOINTS][HX_PACKS]; /* N m  of the motors */
@@ -36,17 +35,15 @@ typedef struct {
 /* A step between two moments. */
 typedef struct {
   const hxModel *model;
-  const hxContactState *contact;        /* in force during the step */
-  const hxCommand *command[INTERVALS + 1]; /* at its nodes */
-  double t, h;                          /* s  its start and length */
+  const hxContactState *contact;           /* contacts during the step */
+  const hxCommand *command[INTERVALS + 1]; /* commands at its nodes */
+  double t, h;                             /* s  start and length */
   const hxMoment *from, *to;
 } hxPath;
 
-/* ---- moments
- * ----------------------------------------------------------------------------------------------------------------
- */
+/* ---- moments ---- */
 
-/* Angles, speeds and feet of a motion. */
+/* Computes angles, speeds and feet of a motion. */
 static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motion,
                                 hxMoment *moment) {
   const hxBody torso = hx_torso_body(motion);
@@ -76,32 +73,32 @@ static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motio
   }
 }
 
-/* The moment of the state as it is. */
-static inline void hx_moment_here(const hxModel *model, hxState *state) {
+/* Sets the state's moment from its motion and time. */
+static inline void hx_moment_update(const hxModel *model, hxState *state) {
   hx_moment_of(model, &state->motion, &state->moment);
   state->moment.time = state->time;
   state->moment.stale = 0.0;
 }
 
-/* Peaks are those of one call: they begin anew with it. */
+/* Resets the peaks, which are those of one call. */
 static inline void hx_reset_peaks(hxMeasured *measured) {
   memset(measured->peak_force, 0, sizeof measured->peak_force);
   memset(measured->peak_rate, 0, sizeof measured->peak_rate);
 }
 
-/* Slots that no pack of this width covers go with leg 0, as in every motion; a structure begins
- * with so many rows of slots. */
+/* Copies leg 0 into the unused slots of the first rows of a structure. */
 static inline void fill_rows(void *structure, size_t rows) {
   double *first = structure;
   for (size_t row = 0; row < rows; ++row) hx_fill_slots(&first[row * HX_SLOTS]);
 }
 
+/* Copies leg 0 into the unused slots of all measurements. */
 static inline void hx_fill_measured_slots(hxState *state) {
   fill_rows(&state->moment, HX_MOMENT_ROWS);
   fill_rows(&state->measured, HX_MEASURED_ROWS);
 }
 
-/* Touch-downs and lift-offs that are due at a time, and what begins with them. */
+/* Switches the contacts that are due at time t, and starts the measurement of landings. */
 static inline void hx_switch_contacts(const hxModel *model, const double delta[HX_SLOTS],
                                       const double ddelta[HX_SLOTS], double t, hxState *state) {
   const hxContactState before = state->contact;
@@ -117,10 +114,9 @@ static inline void hx_switch_contacts(const hxModel *model, const double delta[H
   if (has_bristles(model)) hx_contact_slacken(&state->contact, &state->motion);
 }
 
-/* ---- works and losses (eq. 27)
- * -----------------------------------------------------------------------------------------------
- */
+/* ---- works and losses (eq. 27) ---- */
 
+/* Returns the mean of two values. */
 static inline hxReal mean_of(const double *from, const double *to) {
   return 0.5 * (hx_load(from) + hx_load(to));
 }
@@ -130,12 +126,13 @@ static inline hxVec3 mean_vec3(const double (*from)[HX_SLOTS], const double (*to
   return hx_scale(hx_splat(0.5), hx_add3(hx_load_vec3(from, slot), hx_load_vec3(to, slot)));
 }
 
-/* 2/5 K delta^(5/2) of a closed foot */
+/* Returns the elastic energy 2/5 K delta^(5/2) of closed feet, J. */
 static inline hxReal stored_in_contact(const hxModel *model, hxReal closed, const double *delta) {
   const hxReal depth = hx_max(hx_load(delta), hx_splat(0.0));
   return closed * (0.4 * model->stiffness) * (depth * depth) * hx_sqrt(depth);
 }
 
+/* Computes works and losses of a step from its impulses (eq. 27). */
 static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
                                  hxStepWorks *works) {
   const hxMoment *from = path->from, *to = path->to;
@@ -161,12 +158,10 @@ static inline void hx_step_works(const hxPath *path, const hxImpulses *impulse,
   }
 }
 
-/* ---- joints
- * -----------------------------------------------------------------------------------------------------------------
- */
+/* ---- joints ---- */
 
-/* The cubic through values and rates (per step) at both ends, x in [0, 1]: value, rate and rate of
- * the rate. */
+/* Cubic through values and rates (per step) at both ends, x in [0, 1]: value, first and second
+ * derivative. */
 typedef struct {
   hxReal value, rate, second;
 } hxCubic;
@@ -179,14 +174,14 @@ static inline hxCubic cubic(hxReal from, hxReal slope_from, hxReal rise, hxReal 
                    2.0 * curve + (6.0 * x) * bend};
 }
 
-/* an angle that passed the half turn is measured from the other side */
+/* Returns the angle in [-pi, pi], of an angle at most one turn outside. */
 static inline hxReal within_turn(hxReal angle) {
   const hxReal low = hx_select(hx_less(hx_splat(half_turn), angle), angle - 2.0 * half_turn, angle);
   return hx_select(hx_less(low, hx_splat(-half_turn)), low + 2.0 * half_turn, low);
 }
 
-/* One joint of a pack: positive and negative work, whose difference is the step's work, and the
- * squared torque's integral. */
+/* Measures one joint: positive and negative work, whose difference is the step's work, and the
+ * integral of the squared torque. */
 static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal work,
                                  hxReal mean_torque, hxMeasured *measured) {
   const hxModel *model = path->model;
@@ -200,7 +195,7 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
     const hxCommand *command = path->command[node];
     const hxCubic q = cubic(angle, slope_from, rise, slope_to, (double)node / INTERVALS);
     const hxReal speed = per_step * q.rate, weight = hx_splat(path->h * motor_weight[node]);
-    hxReal torque = mean_torque; /* of a kinematic drive, which has no law */
+    hxReal torque = mean_torque; /* a kinematic drive has no torque law */
     if (model->servo_mode != HX_SERVO_KINEMATIC)
       torque = hx_motor_torque(
                    model, within_turn(q.value), speed, hx_load(&command->angle[joint][slot]),
@@ -210,12 +205,12 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
     negative += weight * hx_max(-(torque * speed), zero);
     squared += weight * (torque * torque);
   }
-  /* what the path misses of the step's work goes to the larger of both */
+  /* the difference from the step's work goes to the larger part */
   const hxReal rest = work - (positive - negative);
   const hxMask drives = hx_less(negative, positive);
   positive += hx_select(drives, rest, zero);
   negative -= hx_select(drives, zero, rest);
-  const hxReal below = hx_min(positive, negative); /* neither sinks below 0 */
+  const hxReal below = hx_min(positive, negative); /* no part becomes negative */
   const hxReal excess = hx_min(below, zero);
   hx_store(&measured->positive_work[joint][slot],
            hx_load(&measured->positive_work[joint][slot]) + (positive - excess));
@@ -225,23 +220,22 @@ static inline void measure_joint(const hxPath *path, int joint, int slot, hxReal
            hx_load(&measured->torque_squared[joint][slot]) + squared);
 }
 
-/* ---- feet
- * -------------------------------------------------------------------------------------------------------------------
- */
+/* ---- feet ---- */
 
-/* a velocity with its values at both ends and its mean, at x in [0, 1] */
+/* Returns the velocity at x in [0, 1] by the parabola through both ends that has the given mean. */
 static inline hxVec3 sliding(hxVec3 from, hxVec3 to, hxVec3 mean, double x) {
   const hxVec3 ends = hx_add_scaled(hx_scale(hx_splat(1.0 - x * (4.0 - 3.0 * x)), from),
                                     hx_splat(x * (3.0 * x - 2.0)), to);
   return hx_add_scaled(ends, hx_splat(6.0 * x * (1.0 - x)), mean);
 }
 
+/* Returns the part of a across the normal. */
 static inline hxVec3 along_ground(hxVec3 a, hxVec3 normal) {
   return hx_add_scaled(a, -hx_dot(normal, a), normal);
 }
 
-/* Share of an interval in which a force that changes linearly exceeds a limit, and where in the
- * interval that part's middle is. */
+/* Returns the share of an interval in which a linearly changing force exceeds a limit, and the
+ * middle of that part. */
 static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *middle) {
   const hxReal zero = hx_splat(0.0), one = hx_splat(1.0);
   const hxReal a = from - limit, b = to - limit;
@@ -253,7 +247,7 @@ static inline hxReal share_above(hxReal from, hxReal to, double limit, hxReal *m
   return high - low;
 }
 
-/* One pack's feet: slip under load, impulse, peaks. */
+/* Measures one pack of feet: slip under load, impulse, peaks (eq. 28). */
 static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measured) {
   const hxModel *model = path->model;
   const hxMoment *from = path->from, *to = path->to;
@@ -271,6 +265,7 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   hxReal impulse = zero, slipped = zero;
   const hxReal bends = path->h < shortest_bend ? zero : per_step * per_step;
   hxReal last_force = zero, last_speed = zero;
+  /* impulse, peaks and slip under load by Simpson's rule (eq. 28) */
   for (int node = 0; node <= INTERVALS; ++node) {
     const double x = (double)node / INTERVALS;
     const hxCubic depth = cubic(delta, slope_from, rise, slope_to, x);
@@ -295,7 +290,7 @@ static inline void measure_feet(const hxPath *path, int slot, hxMeasured *measur
   hx_store(&measured->slip_distance[slot], hx_load(&measured->slip_distance[slot]) + slipped);
 }
 
-/* Normal force of one leg's foot at x in [0, 1] of a step. */
+/* Returns the normal force of a leg's foot at x in [0, 1] of a step, N. */
 static inline double force_within(const hxPath *path, int leg, double x) {
   const double h = path->h, delta = path->from->delta[leg];
   const hxCubic depth =
@@ -309,8 +304,9 @@ static inline double force_within(const hxPath *path, int leg, double x) {
       0);
 }
 
-/* The samples of one leg's landing that are within a step: the force at times t_n after touch-down,
- * and its rise over the window that ends there (eq. 29). Before touch-down there was none. */
+/* Takes the samples of a leg's landing that lie within a step: forces at times t_n after
+ * touch-down and their rise over the window that ends there (eq. 29). Forces before touch-down are
+ * 0. */
 static inline void measure_landing(const hxPath *path, int leg, hxMeasured *measured) {
   for (; measured->landing_left[leg] > 0.0; measured->landing_left[leg] -= 1.0) {
     const int n = LANDING_SAMPLES + 1 - (int)measured->landing_left[leg];
@@ -324,12 +320,11 @@ static inline void measure_landing(const hxPath *path, int leg, hxMeasured *meas
   }
 }
 
-/* ---- the friction cone
- * ------------------------------------------------------------------------------------------------------
- */
+/* ---- the friction cone ---- */
 
-/* Where a share |f_t|/(mu f_n) is among the bins, whose number is the whole part: bin i begins at
- * 0.9 (i/30)^2, so they are finer where shares are small; the last holds all above 0.9. */
+/* Returns the real-valued bin index of a share |f_t|/(mu f_n); its whole part is the bin. Bin i
+ * begins at 0.9 (i/30)^2, so bins are finer for small shares; the last bin holds all shares above
+ * 0.9. */
 static inline hxReal hx_cone_place(hxReal share) {
   const double last = HX_CONE_BINS - 1;
   return hx_min(last * hx_sqrt((1.0 / nearly_sliding) * share), hx_splat(last));
@@ -339,7 +334,7 @@ static inline int hx_has_cone(const hxModel *model) {
   return model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE;
 }
 
-/* Time of the feet under load by the share of the cone that the step's impulses use. */
+/* Adds the step to the time of feet under load, by the share of the cone that its impulses use. */
 static inline void measure_cone(const hxPath *path, const hxImpulses *impulse,
                                 hxMeasured *measured) {
   double place[HX_SLOTS], pressed[HX_SLOTS];
@@ -359,11 +354,9 @@ static inline void measure_cone(const hxPath *path, const hxImpulses *impulse,
       measured->cone_time[(int)place[leg]] += path->h;
 }
 
-/* ---- the whole step
- * ---------------------------------------------------------------------------------------------------------
- */
+/* ---- the whole step ---- */
 
-/* Adds what a step did to what was measured. */
+/* Adds the measurements of a step. */
 static inline void hx_measure_path(const hxPath *path, const hxImpulses *impulse,
                                    const hxStepWorks *works, hxMeasured *measured) {
   for (int pack = 0; pack < HX_PACKS; ++pack) {

@@ -1,4 +1,4 @@
-/* output.h - what the robot shows, from an evaluation with multipliers */
+/* output.h - outputs of the plant, from an evaluation with multipliers */
 #ifndef HX_OUTPUT_H
 #define HX_OUTPUT_H
 
@@ -7,23 +7,25 @@
 #include "measure.h"
 #endif
 
+/* Copies one lane of a vector. */
 static void get3(hxVec3 a, int lane, hxNumber out[3]) {
   out[0] = hx_lane(a.x, lane);
   out[1] = hx_lane(a.y, lane);
   out[2] = hx_lane(a.z, lane);
 }
 
-/* the pack and lane that hold a leg */
+/* Returns the pack that holds a leg, and its lane. */
 static const hxLegWork *leg_work(const hxWork *work, int leg, int *lane) {
   *lane = leg % HX_LANES;
   return &work->pack[leg / HX_LANES];
 }
 
+/* Returns the kinetic energy of a body, J. */
 static hxReal body_kinetic(hxReal mass, hxSym3 J, hxVec3 v, hxVec3 w) {
   return 0.5 * (mass * hx_dot(v, v) + hx_dot(w, hx_sym_mul(J, w)));
 }
 
-/* of bodies and rotors */
+/* Returns the kinetic energy of bodies and rotors, J. */
 static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *motion,
                                   const hxWork *work) {
   const hxReal torso = body_kinetic(hx_splat(model->torso_mass), work->torso_J,
@@ -43,7 +45,7 @@ static hxNumber hx_kinetic_energy(const hxModel *model, const hxPlantMotion *mot
   return hx_lane(torso + hx_sum_legs(legs), 0);
 }
 
-/* gravity and the elastic part of the contacts, 2/5 K delta^(5/2) each */
+/* Returns the potential energy of gravity and contacts, J; a contact's is 2/5 K delta^(5/2). */
 static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *motion,
                                     const hxWork *work) {
   const hxVec3 g = hx_splat_vec3(model->gravity);
@@ -59,8 +61,8 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
   return hx_lane(hx_sum_legs(legs) - model->torso_mass * hx_dot(g, hx_torso_vec3(motion, HX_R)), 0);
 }
 
-/* joint on child: force -lambda, torque about the joint's point -(u1 lambda_4 + u2 lambda_5); the
- * motor's torque is not in it */
+/* Fills a joint's outputs. The reaction on the child is the force -lambda and, about the joint's
+ * point, the torque -(u1 lambda_4 + u2 lambda_5); the motor's torque is not included. */
 static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int leg, int joint,
                        hxOutput *o) {
   const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.axes.x, s),
@@ -77,6 +79,7 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
   get3(hx_neg(couple), lane, o->reaction_torque[leg][joint]);
 }
 
+/* Returns the size of the tangential force, N. */
 static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, int lane) {
   const hxVec3 grip = foot->bristle.grip;
   return hx_lane(has_bristles(model) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
@@ -84,6 +87,7 @@ static hxNumber tangential_force(const hxModel *model, const hxFootWork *foot, i
                  lane);
 }
 
+/* Fills a foot's outputs. */
 static void fill_foot(const hxModel *model, const hxState *state, const hxFootWork *foot,
                       hxVec3 tibia, int lane, int leg, hxOutput *o) {
   get3(foot->force, lane, o->foot.force[leg]);
@@ -104,6 +108,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
   o->foot.contact[leg] = state->contact.closed[leg] != 0.0;
 }
 
+/* Fills the outputs of torso and IMU. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
   const hxMat3 R = work->torso.axes;
@@ -122,7 +127,7 @@ static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput
   get3(hx_tmul(R, work->torso.w), 0, o->imu.angular_velocity);
 }
 
-/* norms of Phi and dPhi/dt over all joints */
+/* Fills the norms of Phi and dPhi/dt over all joints. */
 static void fill_constraint(const hxModel *model, const hxPlantMotion *motion, hxOutput *o) {
   hxReal position[HX_PACKS], velocity[HX_PACKS];
   for (int pack = 0; pack < HX_PACKS; ++pack) {
@@ -138,6 +143,7 @@ static void fill_constraint(const hxModel *model, const hxPlantMotion *motion, h
   o->constraint.velocity_error = hx_lane(hx_sqrt(hx_sum_legs(velocity)), 0);
 }
 
+/* Fills the energies and the audit's error. */
 static void fill_energy(const hxModel *model, const hxState *state, const hxWork *work,
                         hxOutput *o) {
   const hxPlantMotion *m = &state->motion;
@@ -153,6 +159,7 @@ static void fill_energy(const hxModel *model, const hxState *state, const hxWork
                        m->actuator_work - m->push_work + m->dissipated;
 }
 
+/* Fills all outputs. */
 static void hx_output_fill(const hxModel *model, const hxState *state, const hxWork *work,
                            hxOutput *o) {
   o->time = state->time;
@@ -174,14 +181,14 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
   o->solver.touchdowns = state->touchdowns;
 }
 
-#ifndef HX_TANGENT /* derivatives of state and input do not see them */
+#ifndef HX_TANGENT /* measurements are not functions of state and input, so they have no           \
+                      derivative */
 static int cone_bin(double share) {
   const double place = hx_lane(hx_cone_place(hx_splat(share)), 0);
   return (int)place;
 }
 
-/* rates of the integrals since the start, from an evaluation with multipliers; those of peaks are 0
- */
+/* Fills the rates of the integrals since the start; rates of peaks are 0. */
 static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxOutput *rate) {
   const hxLossPowers losses = hx_loss_powers(model, work);
   rate->energy.contact_loss = losses.contact;
@@ -211,8 +218,8 @@ static void hx_integral_rates_fill(const hxModel *model, const hxWork *work, hxO
 }
 #endif
 
-/* accelerations (linear, then angular), multipliers and motor torques in the order of hexapod.h's
- * bodies */
+/* Fills accelerations (linear, then angular), multipliers and motor torques, in the order of
+ * hexapod.h's bodies. */
 static inline void hx_accelerations_fill(const hxWork *work, const hxPlantMotion *rate,
                                          hxNumber acceleration[HX_BODIES][6],
                                          hxNumber multiplier[HX_BODIES - 1][HX_MULTIPLIERS],

@@ -1,5 +1,5 @@
-/* spatial.h - motions, forces and inertias of a rigid body, angular part first, world axes, at a
- * named point */
+/* spatial.h - spatial vectors and inertias of rigid bodies: angular part first, world axes, about
+ * the point that the caller names */
 #ifndef HX_SPATIAL_H
 #define HX_SPATIAL_H
 
@@ -7,26 +7,27 @@
 
 typedef struct {
   hxVec3 ang, lin;
-} hxMotion6; /* angular and linear acceleration (or velocity, or increment) */
+} hxMotion6; /* angular and linear acceleration, velocity or displacement */
 typedef struct {
   hxVec3 ang, lin;
-} hxForce6;  /* torque and force */
+} hxForce6; /* torque and force */
 
-/* [ C  H ; H^T  A ]: torque = C ang + H lin, force = H^T ang + A lin */
+/* Spatial inertia [ C  H ; H^T  A ]: torque = C ang + H lin, force = H^T ang + A lin. */
 typedef struct {
   hxSym3 C;
   hxMat3 H;
   hxSym3 A;
 } hxInertia6;
 
-/* a rigid body's, about a point from which its centre of mass is at c: C = J - m c~ c~, H = m c~ =
- * h~, A = m */
+/* Spatial inertia of a rigid body about a point; c leads from there to the centre of mass: C = J -
+ * m c~ c~, H = m c~ = h~, A = m. */
 typedef struct {
   hxReal mass;
   hxVec3 h;
   hxSym3 C;
 } hxRigid6;
 
+/* Returns the inertia of a body of mass m and inertia J about its centre of mass at c. */
 static inline hxRigid6 hx_rigid_inertia(hxReal mass, hxSym3 J, hxVec3 c) {
   const hxVec3 h = hx_scale(mass, c);
   const hxReal xx = h.x * c.x, yy = h.y * c.y, zz = h.z * c.z;
@@ -36,16 +37,19 @@ static inline hxRigid6 hx_rigid_inertia(hxReal mass, hxSym3 J, hxVec3 c) {
                      J.xz - h.x * c.z, J.yz - h.y * c.z}};
 }
 
+/* Returns I a of a rigid body. */
 static inline hxForce6 hx_rigid_mul(const hxRigid6 *I, hxMotion6 a) {
   return (hxForce6){hx_add3(hx_sym_mul(I->C, a.ang), hx_cross(I->h, a.lin)),
                     hx_add_scaled(hx_cross(a.ang, I->h), I->mass, a.lin)};
 }
 
+/* Returns I a. */
 static inline hxForce6 hx_inertia_mul(const hxInertia6 *I, hxMotion6 a) {
   return (hxForce6){hx_add3(hx_sym_mul(I->C, a.ang), hx_mul(I->H, a.lin)),
                     hx_add3(hx_tmul(I->H, a.ang), hx_sym_mul(I->A, a.lin))};
 }
 
+/* Returns f . v, the power of a force on a velocity. */
 static inline hxReal hx_power(hxForce6 f, hxMotion6 v) {
   return hx_dot(f.ang, v.ang) + hx_dot(f.lin, v.lin);
 }
@@ -70,6 +74,7 @@ static inline hxSym3 hx_sym_add(hxSym3 A, hxSym3 B) {
   return (hxSym3){A.xx + B.xx, A.yy + B.yy, A.zz + B.zz, A.xy + B.xy, A.xz + B.xz, A.yz + B.yz};
 }
 
+/* Adds the inertia of a rigid body about the same point. */
 static inline void hx_inertia_add_rigid(hxInertia6 *I, const hxRigid6 *r) {
   I->C = hx_sym_add(I->C, r->C);
   I->H.y.x -= r->h.z, I->H.z.x += r->h.y;
@@ -78,7 +83,7 @@ static inline void hx_inertia_add_rigid(hxInertia6 *I, const hxRigid6 *r) {
   I->A.xx += r->mass, I->A.yy += r->mass, I->A.zz += r->mass;
 }
 
-/* r - s U U^T of a rigid body */
+/* Returns r - s U U^T of a rigid body's inertia r. */
 static inline hxInertia6 hx_rigid_downdate(const hxRigid6 *r, hxReal s, hxForce6 U) {
   const hxVec3 a = hx_scale(s, U.ang), l = hx_scale(s, U.lin), h = r->h;
   return (hxInertia6){{r->C.xx - a.x * U.ang.x, r->C.yy - a.y * U.ang.y, r->C.zz - a.z * U.ang.z,
@@ -90,7 +95,7 @@ static inline hxInertia6 hx_rigid_downdate(const hxRigid6 *r, hxReal s, hxForce6
                        -(l.x * U.lin.y), -(l.x * U.lin.z), -(l.y * U.lin.z)}};
 }
 
-/* I - s U U^T */
+/* Subtracts s U U^T from I. */
 static inline void hx_inertia_downdate(hxInertia6 *I, hxReal s, hxForce6 U) {
   const hxVec3 a = hx_scale(s, U.ang), l = hx_scale(s, U.lin);
   I->C.xx -= a.x * U.ang.x, I->C.yy -= a.y * U.ang.y, I->C.zz -= a.z * U.ang.z;
@@ -102,8 +107,7 @@ static inline void hx_inertia_downdate(hxInertia6 *I, hxReal s, hxForce6 U) {
   I->A.xy -= l.x * U.lin.y, I->A.xz -= l.x * U.lin.z, I->A.yz -= l.y * U.lin.z;
 }
 
-/* a symmetric block A that acts at c: [ -c~ A c~  c~ A ; .  A ], as seen about the point that c is
- * from */
+/* Returns the spatial inertia of a symmetric block A that acts at c: [ -c~ A c~  c~ A ; .  A ]. */
 static inline hxInertia6 hx_inertia_at(hxSym3 A, hxVec3 c) {
   const hxVec3 x = {A.xx, A.xy, A.xz}, y = {A.xy, A.yy, A.yz}, z = {A.xz, A.yz, A.zz};
   const hxMat3 H = {hx_cross(c, x), hx_cross(c, y), hx_cross(c, z)};
@@ -113,7 +117,7 @@ static inline hxInertia6 hx_inertia_at(hxSym3 A, hxVec3 c) {
   return (hxInertia6){{Cx.x, Cy.y, Cz.z, Cx.y, Cx.z, Cy.z}, H, A};
 }
 
-/* the inverse of a positive definite block, by cofactors */
+/* Returns the inverse of a positive definite matrix, by cofactors. */
 static inline hxSym3 hx_sym_inverse(hxSym3 S) {
   const hxSym3 c = {S.yy * S.zz - S.yz * S.yz, S.xx * S.zz - S.xz * S.xz,
                     S.xx * S.yy - S.xy * S.xy, S.xz * S.yz - S.xy * S.zz,
@@ -122,7 +126,7 @@ static inline hxSym3 hx_sym_inverse(hxSym3 S) {
   return (hxSym3){r * c.xx, r * c.yy, r * c.zz, r * c.xy, r * c.xz, r * c.yz};
 }
 
-/* a of I a = f, by blocks: (C - H A^-1 H^T) ang = torque - H A^-1 force */
+/* Solves I a = f by blocks: (C - H A^-1 H^T) ang = torque - H A^-1 force. */
 static inline hxMotion6 hx_inertia_solve(const hxInertia6 *I, hxForce6 f) {
   const hxSym3 A = hx_sym_inverse(I->A);
   const hxVec3 a = {A.xx, A.xy, A.xz}, b = {A.xy, A.yy, A.yz}, c = {A.xz, A.yz, A.zz};

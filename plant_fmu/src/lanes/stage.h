@@ -1,12 +1,12 @@
-/* stage.h - what a stage of a linearly implicit method adds to the forces and to the inertia (eq.
- * 19-21); its readable form is models/stage.py */
+/* stage.h - terms that a stage of a linearly implicit method adds to forces and inertia (eq.
+ * 19-21); models/stage.py is the readable form */
 #ifndef HX_STAGE_H
 #define HX_STAGE_H
 
 #include "forces.h"
 
-/* The slopes of this stage's forces, the contact's where it will be a step ahead: a foot that has
- * just touched down has none yet, and W would miss the contact. */
+/* Stores the derivatives of the forces for all stages of a step. The contact's are taken at the
+ * depth expected a step ahead, because a foot that has just touched down has none yet. */
 static inline void keep_slopes(const hxModel *model, const hxContactState *contact, int pack,
                                const hxLegWork *leg, hxImplicit *implicit) {
   const hxFootWork *foot = &leg->foot;
@@ -33,21 +33,23 @@ static inline void keep_slopes(const hxModel *model, const hxContactState *conta
   }
 }
 
-/* N m s/rad  of motor and gear together */
+/* Returns the damping of motor and gear together, N m s/rad. */
 static inline hxReal servo_damping(const hxImplicit *implicit, int pack, int joint) {
   return implicit->slope[pack].motor_damping[joint] + implicit->slope[pack].gear_drag[joint];
 }
 
-/* displacement and velocity change of a body before this stage's own share: dx = s_x + z (v + s_v),
- * dv = s_v */
+/* Displacement and velocity change of a body without this stage's own acceleration: dx = s_x + z
+ * (v + s_v), dv = s_v. */
 typedef struct {
   hxMotion6 x, v;
 } hxShift;
 
+/* Returns dx and dv of a body with velocity v. */
 static inline hxShift shift(double z, hxMotion6 v, hxMotion6 s_x, hxMotion6 s_v) {
   return (hxShift){hx_motion_add_scaled(s_x, hx_splat(z), hx_motion_add(v, s_v)), s_v};
 }
 
+/* Returns the shift of a link. */
 static inline hxShift link_shift(const hxImplicit *implicit, const hxPlantMotion *motion, int joint,
                                  int slot) {
   const hxPlantMotion *s = &implicit->change->motion;
@@ -56,48 +58,50 @@ static inline hxShift link_shift(const hxImplicit *implicit, const hxPlantMotion
   return shift(implicit->z, link_velocity(motion, joint, slot), s_x, link_velocity(s, joint, slot));
 }
 
+/* Returns the shift of the torso. */
 static inline hxShift torso_shift(const hxImplicit *implicit, const hxPlantMotion *motion) {
   const hxPlantMotion *s = &implicit->change->motion;
   const hxMotion6 s_x = {hx_splat_vec3(implicit->change->torso_turn), hx_torso_vec3(s, HX_R)};
   return shift(implicit->z, torso_velocity(motion), s_x, torso_velocity(s));
 }
 
-/* G_v dv + G_x dx: what servos and contact answer the shifts with, added to torques and p */
+/* Adds G_v dv + G_x dx, the response of servos and contact to the shifts, to torques and p. */
 static inline void leg_response(const hxImplicit *implicit, const hxPlantMotion *motion, int pack,
                                 hxLegWork *leg) {
   const hxReal k = implicit->slope[pack].stiffness, drag = implicit->slope[pack].drag,
                rest = implicit->slope[pack].viscosity - drag;
   const hxVec3 n = leg->foot.kin.normal, arm = leg->foot.kin.arm;
-  if (!implicit->change) { /* dx = z v, dv = 0 */
+  if (!implicit->change) { /* first stage: dx = z v, dv = 0 */
     for (int joint = 0; joint < HX_JOINTS; ++joint) {
       hxJointWork *work = &leg->joint[joint];
-      work->turned = implicit->z * work->speed, work->sped = hx_splat(0.0);
-      work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->turned;
+      work->angle_shift = implicit->z * work->speed, work->speed_shift = hx_splat(0.0);
+      work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift;
     }
-    leg->foot_moved = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity),
-    leg->foot_sped = hx_zero3();
+    leg->foot_shift = hx_scale(hx_splat(implicit->z), leg->foot.kin.velocity),
+    leg->foot_speed_shift = hx_zero3();
     leg->response = hx_scale(implicit->z * k * leg->foot.kin.ddelta, n);
     push_tibia(leg, contact_point(leg), leg->response);
     return;
   }
+  /* later stages: shifts of joints and contact point, then their forces */
   hxShift i = torso_shift(implicit, motion), j = i;
   for (int joint = 0; joint < HX_JOINTS; ++joint, i = j) {
     hxJointWork *work = &leg->joint[joint];
     j = link_shift(implicit, motion, joint, pack * HX_LANES);
-    work->turned = hx_dot(work->sweep.S.ang, hx_sub3(j.x.ang, i.x.ang)),
-    work->sped = hx_dot(work->sweep.S.ang, hx_sub3(j.v.ang, i.v.ang));
-    work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->turned +
-                    servo_damping(implicit, pack, joint) * work->sped;
+    work->angle_shift = hx_dot(work->sweep.S.ang, hx_sub3(j.x.ang, i.x.ang)),
+    work->speed_shift = hx_dot(work->sweep.S.ang, hx_sub3(j.v.ang, i.v.ang));
+    work->torque -= implicit->slope[pack].motor_stiffness[joint] * work->angle_shift +
+                    servo_damping(implicit, pack, joint) * work->speed_shift;
   }
   const hxVec3 x = motion_at(j.x, arm), v = motion_at(j.v, arm);
-  leg->foot_moved = x, leg->foot_sped = v;
+  leg->foot_shift = x, leg->foot_speed_shift = v;
   const hxReal along = rest * hx_dot(n, v) + k * hx_dot(n, x);
   leg->response = hx_add_scaled(hx_scale(-along, n), -drag, v);
   push_tibia(leg, contact_point(leg), leg->response);
 }
 
-/* what the bristles' own shift s_b + z db/dt, shared out by how they let go, takes off the foot's
- * force (eq. 21) */
+/* Subtracts the bristles' response to their own shift s_b + z db/dt from the foot's force (eq.
+ * 21). */
 static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegWork *leg) {
   const hxVec3 own = hx_scale(hx_splat(implicit->z), leg->foot.bristle.rate);
   const hxVec3 moved =
@@ -109,8 +113,8 @@ static inline void bristle_response(const hxImplicit *implicit, int pack, hxLegW
   push_tibia(leg, contact_point(leg), hx_neg(leg->bristle_force));
 }
 
-/* The contact's share of W: B = across 1 + along n n^T at the contact point, z c_t and z c_n + z^2
- * k_n - z c_t. */
+/* The contact's part of W at the contact point: B = across 1 + along n n^T, with across = z c_t
+ * and along = z c_n + z^2 k_n - z c_t. */
 typedef struct {
   hxVec3 n;
   hxReal across, along;
@@ -125,12 +129,13 @@ static inline hxContactBlock contact_block(const hxImplicit *implicit, int pack,
   return (hxContactBlock){leg->foot.kin.normal, across, along};
 }
 
-/* B a: what an acceleration of the contact point takes off the foot's force in a stage */
+/* Returns B a, the force by which an acceleration of the contact point reduces the foot's force. */
 static inline hxVec3 contact_resistance(const hxContactBlock *B, hxVec3 a) {
   return hx_add_scaled(hx_scale(B->across, a), B->along * hx_dot(B->n, a), B->n);
 }
 
-/* B as part of the tibia's inertia; what the bias acceleration meets of it goes to p */
+/* Returns B as a part of the tibia's inertia, and adds its product with the bias acceleration to
+ * p. */
 static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit *implicit, int pack,
                                          hxLegWork *leg) {
   const hxContactBlock B = contact_block(implicit, pack, leg);
@@ -143,20 +148,21 @@ static inline hxInertia6 contact_inertia(const hxModel *model, const hxImplicit 
                        x);
 }
 
-/* acceleration of the contact point's material */
+/* Returns the acceleration of the foot's material at the contact point. */
 static inline hxVec3 foot_acceleration(const hxModel *model, const hxLegWork *leg) {
   return hx_add3(motion_at(leg->joint[HX_JOINTS - 1].acceleration, leg->foot.kin.arm),
                  hx_splat_vec3(model->gravity));
 }
 
-/* db/dt of a stage (eq. 21): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the ground, f what
- * the law says */
+/* Returns db/dt of a stage (eq. 21): k = (f + s_v + z a - yield s_b)/(1 + z yield) along the
+ * ground, where f is the bristle law's rate. */
 static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *contact,
                                   const hxImplicit *implicit, int pack, const hxLegWork *leg) {
   hxVec3 rate = leg->foot.bristle.rate;
   if (!implicit) return rate;
-  const hxVec3 n = leg->foot.kin.normal, dv = hx_add_scaled(leg->foot_sped, hx_splat(implicit->z),
-                                                            foot_acceleration(model, leg));
+  const hxVec3 n = leg->foot.kin.normal,
+               dv = hx_add_scaled(leg->foot_speed_shift, hx_splat(implicit->z),
+                                  foot_acceleration(model, leg));
   const hxReal yield = implicit->slope[pack].yield,
                closed = hx_load(&contact->closed[pack * HX_LANES]);
   rate = hx_add_scaled(rate, closed, hx_add_scaled(dv, -hx_dot(n, dv), n));
@@ -166,7 +172,7 @@ static inline hxVec3 bristle_rate(const hxModel *model, const hxContactState *co
   return hx_scale(1.0 / (1.0 + implicit->z * yield), rate);
 }
 
-/* ground on foot, as a stage's accelerations contain it */
+/* Returns the force of the ground on the foot that a stage's accelerations contain. */
 static inline hxVec3 stage_force(const hxModel *model, const hxImplicit *implicit, int pack,
                                  const hxLegWork *leg) {
   if (!implicit) return leg->foot.force;

@@ -1,4 +1,4 @@
-/* vec3.h - vectors, rotations and symmetric matrices of 3-space, one per lane */
+/* vec3.h - vectors, rotation matrices, quaternions and symmetric matrices, one per lane */
 #ifndef HX_VEC3_H
 #define HX_VEC3_H
 
@@ -17,7 +17,7 @@ typedef struct {
   hxReal xx, yy, zz, xy, xz, yz;
 } hxSym3;
 
-/* [component][slot] in memory */
+/* Loads and stores read and write [component][slot] arrays, from a slot on. */
 static inline hxVec3 hx_load_vec3(const hxNumber (*m)[HX_SLOTS], int slot) {
   return (hxVec3){hx_load(&m[0][slot]), hx_load(&m[1][slot]), hx_load(&m[2][slot])};
 }
@@ -45,7 +45,7 @@ static inline hxSym3 hx_load_sym3(const hxNumber (*m)[HX_SLOTS], int slot) {
                   hx_load(&m[3][slot]), hx_load(&m[4][slot]), hx_load(&m[5][slot])};
 }
 
-/* the same in all lanes */
+/* The splat functions copy one vector or quaternion into all lanes. */
 static inline hxVec3 hx_splat_vec3(const hxNumber a[3]) {
   return (hxVec3){hx_splat(a[0]), hx_splat(a[1]), hx_splat(a[2])};
 }
@@ -66,7 +66,7 @@ static inline hxVec3 hx_neg(hxVec3 a) { return (hxVec3){-a.x, -a.y, -a.z}; }
 static inline hxVec3 hx_scale(hxReal s, hxVec3 a) { return (hxVec3){s * a.x, s * a.y, s * a.z}; }
 static inline hxReal hx_dot(hxVec3 a, hxVec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
-/* a + s b */
+/* Returns a + s b. */
 static inline hxVec3 hx_add_scaled(hxVec3 a, hxReal s, hxVec3 b) {
   return (hxVec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
 }
@@ -75,22 +75,24 @@ static inline hxVec3 hx_cross(hxVec3 a, hxVec3 b) {
   return (hxVec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+/* Returns A b. */
 static inline hxVec3 hx_mul(hxMat3 A, hxVec3 b) {
   return (hxVec3){A.x.x * b.x + A.y.x * b.y + A.z.x * b.z, A.x.y * b.x + A.y.y * b.y + A.z.y * b.z,
                   A.x.z * b.x + A.y.z * b.y + A.z.z * b.z};
 }
 
-/* A^T b */
+/* Returns A^T b. */
 static inline hxVec3 hx_tmul(hxMat3 A, hxVec3 b) {
   return (hxVec3){hx_dot(A.x, b), hx_dot(A.y, b), hx_dot(A.z, b)};
 }
 
+/* Returns S b. */
 static inline hxVec3 hx_sym_mul(hxSym3 S, hxVec3 b) {
   return (hxVec3){S.xx * b.x + S.xy * b.y + S.xz * b.z, S.xy * b.x + S.yy * b.y + S.yz * b.z,
                   S.xz * b.x + S.yz * b.y + S.zz * b.z};
 }
 
-/* R of eq. 5; p need not have unit length */
+/* Returns R of eq. 5; p need not have unit length. */
 static inline hxMat3 hx_rotation_matrix(hxQuat p) {
   const hxReal two = 2.0 / (p.w * p.w + p.x * p.x + p.y * p.y + p.z * p.z);
   const hxReal x = two * p.x, y = two * p.y, z = two * p.z;
@@ -101,20 +103,21 @@ static inline hxMat3 hx_rotation_matrix(hxQuat p) {
                   {xz + wy, yz - wx, 1.0 - (xx + yy)}};
 }
 
+/* Returns the quaternion product a b. */
 static inline hxQuat hx_quat_mul(hxQuat a, hxQuat b) {
   return (hxQuat){
       a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 
-/* dp/dt = (0, w) p / 2, w in world axes (eq. 6) */
+/* Returns dp/dt = (0, w) p / 2 with w in world axes (eq. 6). */
 static inline hxQuat hx_quaternion_rate(hxQuat p, hxVec3 w) {
   const hxReal x = 0.5 * w.x, y = 0.5 * w.y, z = 0.5 * w.z;
   return (hxQuat){-x * p.x - y * p.y - z * p.z, x * p.w + y * p.z - z * p.y,
                   y * p.w + z * p.x - x * p.z, z * p.w + x * p.y - y * p.x};
 }
 
-/* R S R^T */
+/* Returns R S R^T. */
 static inline hxSym3 hx_rotate_sym3(hxMat3 R, hxSym3 S) {
   const hxVec3 tx = hx_mul(R, (hxVec3){S.xx, S.xy, S.xz}),
                ty = hx_mul(R, (hxVec3){S.xy, S.yy, S.yz}),

@@ -1,5 +1,6 @@
-"""The chapter on validation: its tables and figures, computed anew by the code of the tests, or
-read from what the benchmarks left.
+"""Makes the tables and figures of the validation page.
+
+The code of the tests computes them, or they are read from the results of the benchmarks.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ READ: Mapping[str, Callable[[], Shown]] = {
 
 
 def fill(folder: Path) -> None:
-    """Puts every result in its place on the page validation.md of a folder."""
+    """Inserts every result into the page validation.md of a folder."""
     page, core = (
         folder / "validation.md",
         ctypes.CDLL(str(shared_library(built(), "plant_fmu", "libhexapod_c"))),

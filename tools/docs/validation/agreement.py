@@ -1,6 +1,4 @@
-"""The C plant against the equations in numpy and against Pinocchio, at random states with feet
-in the ground.
-"""
+"""Compares the C plant with the equations in numpy and with Pinocchio, at random states."""
 
 from __future__ import annotations
 
@@ -21,8 +19,9 @@ SEEDS = range(8)
 
 
 def agreement(core: ct.CDLL) -> Shown:
-    """The largest difference over all robots, servo modes and states, relative to the largest
-    entry.
+    """Returns the largest differences over robots, servo modes and states.
+
+    Differences are relative to the largest entry.
     """
     dense = np.max(
         [difference for robot in ROBOTS.values() for difference in _dense(core, robot)], axis=0

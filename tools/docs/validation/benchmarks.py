@@ -1,6 +1,4 @@
-"""What the benchmarks left in benchmarks/results: agreement with other engines, speed, and the
-worth of the control.
-"""
+"""Reads benchmarks/results: agreement with other engines, speed, and effect of the control."""
 
 from __future__ import annotations
 
@@ -35,7 +33,7 @@ SHOWN = {
 
 
 def machines() -> list[Path]:
-    """The folders with measurements of speed."""
+    """Returns the folders with measurements of speed."""
     return sorted(path.parent for path in RESULTS.glob("*/walks.csv"))
 
 
@@ -45,8 +43,8 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 
 def peers() -> Shown:
-    """How near each engine's finest setting comes to the converged path of the same law, over
-    the family of walks.
+    """Returns the distance of each engine's finest setting from the converged path of the same
+    law.
     """
     best: dict[tuple[str, str], tuple[float, float, str]] = {}
     for key, group in _settings(machines()[-1]):
@@ -79,7 +77,7 @@ def _settings(folder: Path) -> Iterator[tuple[tuple[str, str, str], list[float]]
 
 
 def speed() -> Shown:
-    """What the table of the last benchmark says, but for figures that were not measured."""
+    """Returns the table of the last benchmark without figures that were not measured."""
     rows = [row for row in _rows(machines()[-1] / "table.csv") if row["ours"] != "nan"]
     return Shown(
         columns=("figure", "this plant", "unit", "peer", "theirs"),
@@ -95,7 +93,7 @@ def _figure(text: str) -> str:
 
 
 def control() -> Shown:
-    """Changes from kinematic to compliant control over gaits and speeds, both robots."""
+    """Shows the changes from kinematic to compliant control by gait and speed, for both robots."""
     tables = {
         robot: _changes(RESULTS / "control" / f"grid_{robot}.csv")
         for robot in ("athena", "phantomx_mk4")
@@ -149,7 +147,7 @@ def _changes(path: Path) -> dict[tuple[str, str], float]:
 
 
 PID, WITHOUT, ALL = "slip_pid alone", "all but slip_pid", "all parts"
-ADDED = {  # what the PID changes beside the other parts
+ADDED = {  # effect of the PID beside the other parts
     "slip_per_metre": "PID added to the rest: slip [%]",
     "foot_error_stance": "the same: feet in stance [%]",
     "roll_rms": "the same: roll [%]",
@@ -158,7 +156,7 @@ Cases = Mapping[tuple[str, str], Mapping[str, str]]  # by case and metric
 
 
 def slip_pid() -> Shown:
-    """The slip PID by itself, and what it adds to the other parts, by how wrong the model is."""
+    """Shows the slip PID by itself and beside the other parts, for several model errors."""
     known, sticking, wrong = map(_cases, ("ablation", "sticking", "model_errors"))
     errors = sorted({case.rpartition(", ")[0] for case, _ in wrong})
     plants = {"as modelled": _of_pid(known), "bristle law": _of_pid(sticking)}

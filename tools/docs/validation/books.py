@@ -1,6 +1,4 @@
-"""The energy books: what they leave unexplained, by the tolerance of the integrator, and of
-every shipped scenario.
-"""
+"""Shows the residual of the energy balance, by tolerance and for every shipped scenario."""
 
 from __future__ import annotations
 
@@ -38,7 +36,7 @@ def _recordings() -> dict[float, Recording]:
 
 
 def books() -> Shown:
-    """The same walk at several tolerances."""
+    """Shows the residual of one walk at several tolerances."""
     walks = {}
     for tolerance, recording in _recordings().items():
         work = float(recording.column("energy.actuator_work")[-1])
@@ -80,7 +78,9 @@ COARSE = ("solver.method=rk4", "solver.step=1e-3")
 
 
 def scenarios() -> Shown:
-    """The metric energy_residual: every shipped scenario, a fast walk, a step too coarse."""
+    """Shows energy_residual of every shipped scenario, a fast walk, and a step that is too
+    coarse.
+    """
     with Walker() as walker:
 
         def residuals(name: str, *settings: str) -> str:

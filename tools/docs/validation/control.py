@@ -1,4 +1,4 @@
-"""Both controls at touch-downs, in turns, when pushed, with a wrong model, on other worlds."""
+"""Compares both controls: touch-downs, turns, pushes, wrong models, other worlds."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ GRAVITY = {"earth": 9.81} | WORLDS  # m/s2
 
 
 def touch_down() -> Shown:
-    """The feed-forward torque and the slip of the judged walk by the control period."""
+    """Shows the feed-forward torque and the slip of the judged walk by control period."""
     walks = {period: under_both(f"macro_step={period}") for period in PERIODS}
 
     def draw(figure: Figure) -> None:
@@ -88,13 +88,15 @@ def touch_down() -> Shown:
 
 
 def _torques(result: Result) -> tuple[float, float]:
-    """N m    largest torque_ref of the judged walk, and its largest change from row to row"""
+    """Returns the largest torque_ref of the judged walk and its largest change between rows [N
+    m].
+    """
     told = judged(result).recording.columns(COMMANDED["torque_ref"])
     return float(np.abs(told).max()), float(np.abs(np.diff(told, axis=0)).max())
 
 
 def yaw() -> Shown:
-    """A turn on the spot and a push about the vertical."""
+    """Shows a turn on the spot and a push about the vertical."""
     rows = []
     for title, metric, scale, settings in (
         ("turning at 0.3 rad/s: pitch RMS [mrad]", "pitch_rms", MILLI, (TURN,)),
@@ -108,20 +110,22 @@ def yaw() -> Shown:
 
 
 def _twisted(*settings: str) -> Result:
-    """Compliant control whose PID answers to the feet's common twist, not to their common push."""
+    """Runs compliant control whose PID acts on the feet's common twist, not on their common
+    push.
+    """
     plan = load_scenario("walk_flat", overrides=["control=compliant", *settings])
     with patch.object(compliance, "squeeze", _with_twist):
         return simulate(plan, gains=gains_of(plan))
 
 
 def _with_twist(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """In the place of controller/comply/slip_pid.py's `squeeze`."""
+    """Replaces `squeeze` of controller/comply/slip_pid.py; removes the common push only."""
     total = normal.sum()
     return push if total <= LOAD_FLOOR else np.asarray(push - push.sum() * normal / total)
 
 
 def model_errors() -> Shown:
-    """Walks of plants of which the controller does not know how they differ from its model."""
+    """Shows walks of plants that differ from the controller's model."""
     pairs = [under_both(*settings) for settings in UNKNOWN.values()]
     rows = [
         (title, *(changed(scale * run.metrics[name] for run in pair) for pair in pairs))
@@ -162,7 +166,7 @@ def _seeded_slip(*settings: str) -> float:
 
 
 def worlds() -> Shown:
-    """The judged walk under other gravities, of which plant and controller know."""
+    """Shows the judged walk under other gravities, which plant and controller use."""
     rows = []
     for world, gravity in GRAVITY.items():
         pair = under_both(scenario=world if world in WORLDS else "walk_flat")

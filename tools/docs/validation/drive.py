@@ -1,4 +1,4 @@
-"""The kinematic drive's lag, with the acceleration that the controller plans and without it."""
+"""Shows the lag of kinematic drives with and without the planned acceleration."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ HEADINGS = (
 
 
 def lag() -> Shown:
-    """The judged walk of a robot with kinematic drives, whose commands depend on no measurement."""
+    """Shows the judged walk of a robot with kinematic drives, under kinematic control."""
     told = walk("servo.mode=kinematic", "duration=6")
     untold = _untold(told)
     rows = [_row("planned", told), _row("0", untold)]
@@ -42,7 +42,7 @@ def _row(name: str, result: Result) -> tuple[str, ...]:
 
 
 def _untold(result: Result) -> Result:
-    """The same commands again, but for the accelerations, to a plant read at the macro-steps."""
+    """Repeats the commands of a run without the accelerations."""
     recording = _driven(result.scenario, result.outcome.recording)
     again = replace(result, outcome=replace(result.outcome, recording=recording, every_step=None))
     servo = load_robot(result.scenario.robot).servo

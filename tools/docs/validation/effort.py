@@ -1,4 +1,4 @@
-"""How near feet keep to their plan, what of the friction cone they use, what servos bear."""
+"""Shows deviations of the feet from their plan, use of the friction cone, and servo loads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FINE = "macro_step=0.001"  # distributions over time depend on it
 
 
 def feet() -> Shown:
-    """Planned and real feet in the torso's frame."""
+    """Shows planned and real feet in the torso's frame."""
     pairs = {title: under_both(f"robot={name}") for name, title in ROBOTS.items()}
 
     def draw(figure: Figure) -> None:
@@ -59,7 +59,7 @@ COSTS = {
 
 
 def servos() -> Shown:
-    """RMS torque of each servo over its continuous rating; costs; use of the friction cone."""
+    """Shows the load of each servo, costs, and use of the friction cone."""
     pairs = {name: under_both(f"robot={name}", FINE) for name in ROBOTS}
     loads = {name: [_loads(name, run) for run in pair] for name, pair in pairs.items()}
     places = np.arange(len(LEG_NAMES) * len(JOINT_NAMES))
@@ -90,7 +90,7 @@ def servos() -> Shown:
 
 
 def _loads(name: str, result: Result) -> Array:
-    """(18,) of all servos over the judged walk."""
+    """Returns the load of all servos in the judged walk, RMS torque over rating (18,)."""
     walk = judged(result)
     mean = walk.gained(joint_names("torque_squared")) / walk.duration  # N2 m2
     return np.asarray(np.sqrt(mean) / load_robot(name).servo.torque_continuous)

@@ -1,6 +1,4 @@
-"""Impacts on the ground: the restitution that each law is asked for and what it delivers, and
-how deep the feet sink in.
-"""
+"""Shows impacts on the ground: requested and delivered restitution, and penetration depth."""
 
 from __future__ import annotations
 
@@ -17,8 +15,8 @@ from tools.docs.validation.shown import MARKERS, PALETTE, Shown, short
 ASKED = (0.1, 0.3, 0.5, 0.7, 0.9)
 SPEED = 0.4  # m/s
 GRAVITY = 9.81  # m/s2
-TINY = 1e-9  # m    that the feet are above the ground
-CONTACT_TIME = 0.5  # s    an impact that lasts longer is none
+TINY = 1e-9  # m    height of the feet above the ground
+CONTACT_TIME = 0.5  # s    after it the robot counts as resting on the ground
 NAMES = {
     "exact_restitution": "exact restitution",
     "flores": "Flores",
@@ -28,9 +26,7 @@ NAMES = {
 
 
 def restitution(core: ct.CDLL) -> Shown:
-    """A robot with locked joints that falls flat on six feet: measured at the torso, beside the
-    closed form.
-    """
+    """Shows a robot with locked joints that falls flat on six feet, beside the closed form."""
     measured = {law: [_bounced(core, law, e) for e in ASKED] for law in NAMES}
 
     def draw(figure: Figure) -> None:
@@ -70,9 +66,7 @@ def _bounced(core: ct.CDLL, law: str, e: float, *, speed: float = SPEED) -> floa
 
 
 def under_gravity(core: ct.CDLL) -> Shown:
-    """The exact law at 0.5 with the robot's weight on its feet while they touch: what is left of
-    the restitution, by speed.
-    """
+    """Shows the restitution of the exact law at 0.5 under gravity, by impact speed."""
     speeds, e = (0.05, 0.1, 0.2, 0.3, 0.4, 1.0), 0.5
     alone = [_bounced(core, "exact_restitution", e, speed=speed) for speed in speeds]
     heavy = [_bounced_heavily(core, e, speed) for speed in speeds]
@@ -96,12 +90,12 @@ def under_gravity(core: ct.CDLL) -> Shown:
         ],
         draw=draw,
         size=(7.6, 2.8),
-        alt="Restitution against impact speed: with gravity it falls to nothing as the impact becomes slow",
+        alt="Restitution against impact speed: with gravity it falls to zero for slow impacts",
     )
 
 
 def _bounced_heavily(core: ct.CDLL, e: float, speed: float) -> float:
-    """Of a robot that arrives at its feet with a speed under gravity; 0 when it stays."""
+    """Returns the restitution under gravity, 0 if the robot does not rebound."""
     robot = rigid("exact_restitution", gravity=GRAVITY, restitution=e)
     plant = falling(core, robot, clearance=TINY, speed=speed)
     try:
@@ -112,7 +106,7 @@ def _bounced_heavily(core: ct.CDLL, e: float, speed: float) -> float:
 
 
 def penetration(core: ct.CDLL) -> Shown:
-    """The deepest penetration of an impact, and the energy it costs."""
+    """Shows the deepest penetration of an impact and the energy lost."""
     rows = []
     for law, chi in (
         ("exact_restitution", exact_restitution_chi(0.6)),

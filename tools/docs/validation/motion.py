@@ -1,4 +1,4 @@
-"""Motions with closed forms, through the whole plant."""
+"""Compares motions of the whole plant with their closed forms."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ GRAVITY = 9.81  # m/s2
 
 
 def closed_forms(core: ct.CDLL) -> Shown:
-    """Each with what it should be."""
+    """Shows each motion beside its exact value."""
     rows = [*_fall(core), *_pendulum(core), *_spin(core), *_conserved(core)]
     return Shown(
         columns=("motion", "computed", "exact", "relative difference"),

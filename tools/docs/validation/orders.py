@@ -1,6 +1,4 @@
-"""Orders of convergence of the integrators, on the problems of
-tests/plant/test_plant_integrator.py.
-"""
+"""Shows the integrators' orders on the problems of tests/plant/test_plant_integrator.py."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ Line = tuple[Sequence[float], Sequence[float]]  # steps, errors
 
 
 def orders(core: ct.CDLL) -> Shown:
-    """Error against step of every method, and the slope."""
+    """Shows the error of every method against the step, and the slope."""
     found = {
         name: {method: _line(core, PROBLEMS[name], method) for method in ORDER} for name in TITLES
     }

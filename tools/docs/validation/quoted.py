@@ -1,6 +1,4 @@
-"""The figures that people quote of the judged walk: whether they depend on how often the plant
-is read, and on the friction assumed.
-"""
+"""Shows whether metrics of the judged walk depend on sampling and on the assumed friction."""
 
 from __future__ import annotations
 
@@ -40,8 +38,8 @@ OF_FRICTION = (
 
 
 def intervals() -> Shown:
-    """Every metric of the judged walk with rows 1 ms and 20 ms apart: as a run tells it, and
-    from the rows that are kept alone.
+    """Shows every metric with rows 1 ms and 20 ms apart: of the run, and of the recorded rows
+    alone.
     """
     columns = ["metric"]
     cells: dict[str, list[str]] = {}
@@ -65,7 +63,7 @@ def intervals() -> Shown:
 
 
 def _gap(value: float, reference: float) -> str:
-    """Relative, for people."""
+    """Formats the relative difference in per cent."""
     if not np.isfinite(value / reference if reference else np.nan):
         return "" if value == reference else "-"
     share = 100.0 * (value / reference - 1.0)
@@ -73,8 +71,8 @@ def _gap(value: float, reference: float) -> str:
 
 
 def sampled_again() -> Shown:
-    """What the plant measures against sums over samples of 0.1 ms of the same motion, and the
-    judged walk, whose motion differs by the solver's error.
+    """Compares the plant's measures with sums over samples of 0.1 ms of the same motion, and with
+    the judged walk, whose motion differs by the solver's error.
     """
     servo, rows = load_robot("athena").servo, []
     for control in CONTROLS:
@@ -98,7 +96,7 @@ def sampled_again() -> Shown:
 
 
 def work_by_step() -> Shown:
-    """Cost of transport by macro-step: the plant's, and summed over one sample of power per
+    """Shows the cost of transport by macro-step: the plant's, and from one sample per
     macro-step.
     """
     rows = []
@@ -112,7 +110,7 @@ def work_by_step() -> Shown:
 
 
 def _sampled_cost(result: Result) -> float:
-    """What rows at macro-steps would make of it."""
+    """Returns the cost of transport computed from the rows at macro-steps."""
     part = judged(result)
     power = np.maximum(
         part.recording.columns(joint_names("torque"))
@@ -123,7 +121,7 @@ def _sampled_cost(result: Result) -> float:
 
 
 def friction() -> Shown:
-    """The judged walk on three frictions that hold a foot differently well."""
+    """Shows the judged walk with three laws of friction."""
     runs = {
         (law, control): walk(f"control={control}", *settings)
         for law, settings in LAWS.items()

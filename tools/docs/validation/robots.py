@@ -1,4 +1,4 @@
-"""Robots drawn at random and odd ones: designed for and walked when the site is built."""
+"""Designs gains for robots drawn at random and unusual ones, and runs them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Walks = Iterator[tuple[str, Robot, Scenario]]
 
 
 def walked() -> Shown:
-    """The robots of `make test`, the lightest and heaviest of the rule, and odd ones."""
+    """Shows the robots of `make test`, the lightest and the heaviest one, and unusual ones."""
     rows = []
     with TemporaryDirectory() as folder, Walker() as walker:
         for title, robot, scenario in (*_drawn(Path(folder)), *_odd(Path(folder))):

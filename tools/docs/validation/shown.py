@@ -1,6 +1,4 @@
-"""What a result looks like on a page: a table and, if it has one, a figure, once for light pages
-and once for dark ones.
-"""
+"""Formats a result for a page: a table and a figure for light and for dark pages."""
 
 from __future__ import annotations
 
@@ -18,7 +16,7 @@ THEMES: Mapping[str, Mapping[str, Any]] = {
     "light": {"text.color": "#1f2430", "grid.color": "#9aa4b2", "axes.edgecolor": "#5b6472"},
     "dark": {"text.color": "#cfd6e4", "grid.color": "#6b7688", "axes.edgecolor": "#8791a3"},
 }
-PALETTE = (*figure_style.PALETTE[:5], "#56B4E9")  # black would not be seen on a dark page
+PALETTE = (*figure_style.PALETTE[:5], "#56B4E9")  # black is invisible on a dark page
 MARKERS = "osD^vP"
 
 
@@ -30,11 +28,11 @@ class Shown:
     rows: Iterable[Sequence[str]] = ()
     draw: Callable[[Figure], None] | None = None
     size: tuple[float, float] = (7.6, 3.6)  # inches
-    alt: str = ""  # what the figure shows, for those who cannot see it
+    alt: str = ""  # the figure in words
 
     def markdown(self, folder: Path, stem: str) -> str:
-        """The result in Markdown; its figures are written to `stem`-light.svg and -dark.svg in
-        the folder.
+        """Returns the result in Markdown; writes `stem`-light.svg and `stem`-dark.svg into the
+        folder.
         """
         parts = []
         if self.draw is not None:
@@ -79,5 +77,5 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def short(value: float) -> str:
-    """A small number as it is said: 3e-12."""
+    """Formats a small number: 3.0e-12."""
     return "0" if value == 0.0 else f"{value:.1e}"

@@ -1,4 +1,4 @@
-"""Walks that results show: each is walked once, and gains are designed once."""
+"""Runs the walks of the results; each walk is run once, and gains are designed once."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MILLI = 1e3
 
 @cache
 def walker() -> Walker:
-    """The walker of all results; it records all signals."""
+    """Returns the walker of all results, which records all signals."""
     made = Walker(everything=True)
     atexit.register(made.close)
     return made
@@ -36,7 +36,7 @@ def _designed(robot: Robot, period: float) -> Gains:
 
 
 def gains_of(scenario: Scenario) -> Gains | None:
-    """The gains that a scenario runs with; None under kinematic control."""
+    """Returns the gains of a scenario, None under kinematic control."""
     kinematic = scenario.control == "kinematic"
     return None if kinematic else _designed(known_robot(scenario), scenario.macro_step)
 
@@ -58,35 +58,35 @@ def under_both(*settings: str, scenario: str = "walk_flat") -> tuple[Result, Res
 
 
 def view(result: Result) -> View:
-    """A run as its metrics see it: all macro-steps."""
+    """Returns the macro-steps of a run from which its metrics are computed."""
     return View(result.outcome.judged, result.parameters, result.facts["gait_period"])
 
 
 def judged(result: Result) -> Walk:
-    """The part of a run that its metrics are of."""
+    """Returns the judged part of a run."""
     part = view(result).walk
     assert part is not None
     return part
 
 
 def heading(name: str) -> str:
-    """A metric and its unit."""
+    """Returns a metric's name with its unit."""
     unit = METRICS[name][0]
     return f"`{name}`" + (f" [{unit}]" if unit != "1" else "")
 
 
 def figures(name: str, results: Sequence[Result]) -> list[str]:
-    """A metric of some runs."""
+    """Formats a metric of several runs."""
     return [shown(result.metrics[name]) for result in results]
 
 
 def shown(value: float) -> str:
-    """Three digits, for people."""
+    """Formats a value with three digits."""
     if not np.isfinite(value):
         return "-"
     return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}"
 
 
 def changed(values: Iterable[float], *, told: Callable[[float], str] = shown) -> str:
-    """A figure under kinematic and under compliant control, in one line."""
+    """Formats a figure under kinematic and under compliant control in one line."""
     return "\u00a0→\u00a0".join(map(told, values)).replace("-", "\u2011")
