@@ -1,5 +1,5 @@
-"""Repeats a walk in steps of 0.1 ms and calculates the plant's measures from samples of force,
-velocity, torque and speed.
+"""Repeats a walk in steps of 0.1 ms; reads the plant's measures there, and calculates the same from
+samples of force, velocity, torque and speed.
 """
 
 from __future__ import annotations
@@ -12,13 +12,17 @@ from numpy.typing import NDArray
 from hexapod_cosim.cosim.interface.names import foot_names, foot_vector_names, joint_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.master.signals import COMMANDED
+from hexapod_cosim.cosim.results.walk import Walk
 from hexapod_cosim.cosim.run.run import initialise_plant, make_plan, open_plant
 from hexapod_cosim.cosim.scenario.records import Scenario
+from hexapod_cosim.models import Servo
 
 Array = NDArray[np.float64]
 
 FINE = 1e-4  # s
 LOADED = 0.01  # of the weight
+NEARLY_SLIDING = 0.9  # of the friction cone
+PEAK = foot_names("peak_force")  # N    within the last communication step
 AFTER = 0.020  # s    after touch-down
 WINDOW = 0.001  # s    over which a force rises
 QUANTITIES = {
@@ -51,23 +55,43 @@ class Samples:
         return Samples(self.time[k:], *(part[:, k:] for part in parts))
 
 
-def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Samples:
+@dataclass(frozen=True)
+class Repeated:
+    """A walk driven again in steps of 0.1 ms."""
+
+    samples: Samples
+    recording: Recording  # the plant's outputs at the macro-steps, rows as those of the walk
+
+
+def repeated(scenario: Scenario, recording: Recording, *, begin: float) -> Repeated:
     """Repeats a scenario on the plant with the recorded commands, each held for a macro-step;
-    returns samples after a time [s].
+    samples it after a time [s] and reads the plant's own outputs in the same run.
+
+    Columns that are no output of the plant are those of the given recording.
     """
     names = [name for names in QUANTITIES.values() for name in names]
     joints = [name for names in COMMANDED.values() for name in names]
-    commands, plan, per_step = (
-        recording.columns(joints),
-        make_plan(scenario),
-        round(scenario.macro_step / FINE),
-    )
+    commands, per_step = recording.columns(joints), round(scenario.macro_step / FINE)
     count, first = round(scenario.duration / FINE), round(begin / FINE)
-    rows = np.empty((2, count - first, len(names)))
+    rows, again = np.empty((2, count - first, len(names))), recording.data.copy()
     with open_plant(scenario) as plant:
-        initialise_plant(plant, plan)
+        initialise_plant(plant, make_plan(scenario))
+        outputs = [name for name in plant.names("output") if name in recording.names]
+        places = [recording.names.index(name) for name in outputs]
+        peaks = [recording.names.index(name) for name in PEAK]
         seen, told = plant.block(names), plant.block(joints)
-        for k in range(count):
+        measures, peak = plant.block(outputs), plant.block(PEAK)
+        largest = np.zeros(len(PEAK))
+        for k in range(count + 1):
+            peak.get()
+            largest = np.maximum(largest, peak.values)
+            if k % per_step == 0:
+                measures.get()
+                again[k // per_step, places] = measures.values
+                again[k // per_step, peaks] = largest
+                largest[:] = 0.0
+            if k == count:
+                break
             if k % per_step == 0:
                 told.values[:] = commands[k // per_step]
                 told.set()
@@ -81,7 +105,7 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
     torque, speed, normal, across, velocity = np.split(
         rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2
     )
-    return Samples(
+    samples = Samples(
         FINE * np.arange(first, count, dtype=np.float64),
         torque,
         speed,
@@ -89,6 +113,35 @@ def sampled(scenario: Scenario, recording: Recording, *, begin: float) -> Sample
         across,
         velocity.reshape(2, -1, 6, 3),
     )
+    return Repeated(samples, Recording(recording.names, again))
+
+
+def sampled_metrics(before: Samples, walk: Walk, servo: Servo, *, mu: float) -> dict[str, float]:
+    """Returns the metrics that are made of the plant's measures, from samples alone.
+
+    before: samples that begin at least half a gait cycle before the walk's measured part, for
+    touch-downs that are bounces of a landing before it. Weight, distance [m] and times are those
+    of the walk.
+    """
+    samples = before.after(walk.begin)
+    squares, work = integral(samples.torque**2), driven(samples)
+    load, square = walk.weight * walk.distance, float(squares.sum())
+    use = cone_use(samples, walk.weight, mu)
+    p50, p95 = np.percentile(use, [50.0, 95.0])
+    rates = landing_rates(before, apart=0.5 * walk.period, after=walk.begin)
+    return {
+        "slip_per_metre": float(loaded_slip(samples, walk.weight).sum()) / walk.distance,
+        "cone_use_p50": float(p50),
+        "cone_use_p95": float(p95),
+        "cone_use_over_90": float(np.mean(use > NEARLY_SLIDING)),
+        "peak_force": float(samples.normal.max()) / walk.weight,
+        "loading_rate": float(np.percentile(rates, 95)) / walk.weight,
+        "torque_rms": float(np.sqrt(square / (18.0 * walk.duration))),
+        "servo_load_max": float(np.sqrt(squares.max() / walk.duration)) / servo.torque_continuous,
+        "heat": square / walk.distance,
+        "cost_of_transport": work / load,
+        "electrical_cost": (work + square / servo.motor_constant**2) / load,
+    }
 
 
 def integral(values: Array) -> Array:
@@ -96,10 +149,16 @@ def integral(values: Array) -> Array:
     return np.asarray(0.5 * FINE * values.sum(axis=(0, 1)))
 
 
-def slipped(samples: Samples, weight: float) -> float:
-    """Returns the distance [m] that all feet slide under load on flat ground."""
+def loaded_slip(samples: Samples, weight: float) -> Array:
+    """Returns the distance [m] that each foot slides under load on flat ground (6,)."""
     speed = np.linalg.norm(samples.velocity[..., :2], axis=-1)
-    return float(integral(np.where(samples.normal > LOADED * weight, speed, 0.0)).sum())
+    return integral(np.where(samples.normal > LOADED * weight, speed, 0.0))
+
+
+def cone_use(samples: Samples, weight: float, mu: float) -> Array:
+    """Returns f_t/(mu f_n) of all samples (n,) of feet that bear load."""
+    loaded = samples.normal > LOADED * weight
+    return np.asarray(samples.tangential[loaded] / (mu * samples.normal[loaded]))
 
 
 def driven(samples: Samples) -> float:

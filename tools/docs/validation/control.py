@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from test_conditions import WORLDS
 from test_controller_continuity import LARGEST, steepest
 
+from benchmarks.control.cases import DATA, PARTS, SWITCH, judged_walk, seeds
 from hexapod_cosim.controller.comply import compliance
 from hexapod_cosim.controller.comply.slip_pid import LOAD_FLOOR
 from hexapod_cosim.controller.plane import Array, Plane
@@ -19,7 +20,15 @@ from hexapod_cosim.cosim.run.run import simulate
 from hexapod_cosim.cosim.scenario.records import CONTROLS
 from hexapod_cosim.cosim.scenario.scenario import load_scenario
 from tools.docs.validation.shown import PALETTE, Shown
-from tools.docs.validation.walked import MILLI, changed, gains_of, judged, shown, under_both
+from tools.docs.validation.walked import (
+    MILLI,
+    changed,
+    gains_of,
+    judged,
+    shown,
+    under_both,
+    walker,
+)
 
 PERIODS = (0.001, 0.002, 0.005)  # s
 LEG, JOINT = "LM", "femur"  # the most loaded joint of a tripod
@@ -127,6 +136,35 @@ def model_errors() -> Shown:
     return Shown(columns=("the plant", *UNKNOWN), rows=rows)
 
 
+def slip_pid() -> Shown:
+    """The judged walk of the first seed with none of the parts, with the slip PID alone, with all
+    other parts, and with all.
+    """
+    off = {part: f"{SWITCH}{part}=false" for part in PARTS}
+    others = tuple(text for part, text in off.items() if part != "slip_pid")
+    cases = (tuple(off.values()), others, (off["slip_pid"],), ())
+    columns = (
+        "friction", "none of the parts: slip [m/m]", "PID alone", "by the PID alone [%]",
+        "all but the PID", "all parts", "by the PID added [%]",
+    )  # fmt: skip
+    rows = []
+    for law, settings in {"tanh": (), "bristle": tuple(DATA["judged"]["sticking"])}.items():
+        none, alone, without, every = (_seeded_slip(*settings, *parts) for parts in cases)
+        pairs = ((none, alone), (without, every))
+        cells = [(*map(shown, pair), f"{100.0 * (pair[1] / pair[0] - 1.0):+.1f}") for pair in pairs]
+        rows.append((law, *cells[0], *cells[1]))
+    return Shown(columns=columns, rows=rows)
+
+
+def _seeded_slip(*settings: str) -> float:
+    """m/m    of the judged walk of the first seed under compliant control"""
+    plan = judged_walk("one seed", *settings).plan("compliant", seeds("judged")[0])
+    result = walker().simulate(plan, gains=gains_of(plan))
+    if not (result.completed and result.facts["walk"]["upright"]):
+        raise RuntimeError(f"{settings}: {result.outcome.reason or 'fell'}")
+    return result.metrics["slip_per_metre"]
+
+
 def worlds() -> Shown:
     """Shows the judged walk under other gravities, which plant and controller use."""
     rows = []
@@ -141,4 +179,5 @@ def worlds() -> Shown:
 
 RESULTS: Mapping[str, Callable[[], Shown]] = {
     "touch-down": touch_down, "yaw": yaw, "model-errors": model_errors, "worlds": worlds,
+    "slip-pid-walked": slip_pid,
 }  # fmt: skip
