@@ -29,22 +29,22 @@ START_METHOD = "spawn"  # a fork would copy the locks that threads of this proce
 TASKS_PER_WORKER = 2  # a worker that finishes a task has the next one already
 DIED = "its worker process ended by itself (killed, or out of memory)"
 
-Task = TypeVar("Task")
-Result = TypeVar("Result")
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
 
 _stop: Event | None = None  # set in worker processes only
 
 
 @dataclass(frozen=True)
-class Finished(Generic[Task, Result]):
+class Finished(Generic[_Task, _Result]):
     """A task that a worker has finished, or of which its worker died."""
 
-    task: Task
-    result: Result | None  # None when the worker died
+    task: _Task
+    result: _Result | None  # None when the worker died
     death: str = ""  # how the worker ended; empty when it lives
 
 
-class TaskExecutor(Protocol[Task, Result]):
+class TaskExecutor(Protocol[_Task, _Result]):
     """Runs tasks and returns their results in any order."""
 
     @property
@@ -52,49 +52,49 @@ class TaskExecutor(Protocol[Task, Result]):
         """Number of tasks that run at once."""
         ...
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: _Task) -> None:
         """Queues a task and returns at once."""
         ...
 
-    def wait(self) -> list[Finished[Task, Result]]:
+    def wait(self) -> list[Finished[_Task, _Result]]:
         """Waits until a task is finished. Raises HexapodError when no worker can go on."""
         ...
 
 
-class InProcessExecutor(Generic[Task, Result]):
+class InProcessExecutor(Generic[_Task, _Result]):
     """Runs tasks one by one in the calling process, when they are waited for."""
 
     size = 1
 
-    def __init__(self, run: Callable[[Task], Result]) -> None:
-        self._run, self._tasks = run, deque[Task]()
+    def __init__(self, run: Callable[[_Task], _Result]) -> None:
+        self._run, self._tasks = run, deque[_Task]()
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: _Task) -> None:
         """Queues a task."""
         self._tasks.append(task)
 
-    def wait(self) -> list[Finished[Task, Result]]:
+    def wait(self) -> list[Finished[_Task, _Result]]:
         """Runs the next task. Raises what the task raises."""
         task = self._tasks.popleft()
         return [Finished(task, self._run(task))]
 
 
 @dataclass(frozen=True)
-class _Setup(Generic[Task, Result]):
+class _Setup(Generic[_Task, _Result]):
     """What a worker process is started with; all of it is pickled."""
 
-    run: Callable[[Task], Result]
+    run: Callable[[_Task], _Result]
     stop: Event
     initialise: Callable[[], None] | None
     scratch: Path | None
 
 
-class _Worker(Generic[Task, Result]):
+class _Worker(Generic[_Task, _Result]):
     """One worker process and the tasks it was given, of which it runs the first."""
 
-    def __init__(self, setup: _Setup[Task, Result]) -> None:
+    def __init__(self, setup: _Setup[_Task, _Result]) -> None:
         self._setup = setup
-        self.queue: deque[tuple[Future[Result], Task]] = deque()
+        self.queue: deque[tuple[Future[_Result], _Task]] = deque()
         self._start()
 
     def _start(self) -> None:
@@ -106,7 +106,7 @@ class _Worker(Generic[Task, Result]):
             initargs=(setup.stop, setup.scratch, setup.initialise),
         )
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: _Task) -> None:
         """Queues a task; the process starts with the first one."""
         try:
             with blocked_interrupts():  # inherited by the process: only `stop` ends its tasks
@@ -116,7 +116,7 @@ class _Worker(Generic[Task, Result]):
             future.set_exception(error)
         self.queue.append((future, task))
 
-    def finished(self) -> Iterator[Finished[Task, Result]]:
+    def finished(self) -> Iterator[Finished[_Task, _Result]]:
         """Removes the finished tasks from the queue."""
         while self.queue and self.queue[0][0].done():
             future, task = self.queue.popleft()
@@ -141,18 +141,18 @@ class _Worker(Generic[Task, Result]):
         self._process.shutdown(wait=True, cancel_futures=True)
 
 
-class WorkerPool(Generic[Task, Result]):
+class WorkerPool(Generic[_Task, _Result]):
     """Worker processes of this machine; see worker_pool()."""
 
-    def __init__(self, size: int, setup: _Setup[Task, Result]) -> None:
+    def __init__(self, size: int, setup: _Setup[_Task, _Result]) -> None:
         self.size = size
         self._workers = [_Worker(setup) for _ in range(size)]
 
-    def submit(self, task: Task) -> None:
+    def submit(self, task: _Task) -> None:
         """Queues a task with the worker that has the shortest queue."""
         min(self._workers, key=lambda worker: len(worker.queue)).submit(task)
 
-    def wait(self) -> list[Finished[Task, Result]]:
+    def wait(self) -> list[Finished[_Task, _Result]]:
         """Waits until a task is finished. Raises what the task raises."""
         first = [worker.queue[0][0] for worker in self._workers if worker.queue]
         wait(first, return_when=FIRST_COMPLETED)
@@ -167,11 +167,11 @@ class WorkerPool(Generic[Task, Result]):
 @contextmanager
 def worker_pool(
     size: int,
-    run: Callable[[Task], Result],
+    run: Callable[[_Task], _Result],
     *,
     initialise: Callable[[], None] | None = None,
     scratch: Path | None = None,
-) -> Iterator[WorkerPool[Task, Result]]:
+) -> Iterator[WorkerPool[_Task, _Result]]:
     """Opens a pool whose processes have ended when the block ends, however it ends.
 
     Args:
