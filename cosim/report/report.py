@@ -113,7 +113,7 @@ def write_report(
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     content["warnings"] = [
         f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
-    ] + content.pop("losses")
+    ] + content.pop("overall")
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
     metrics = _metrics(runs, comparison)
@@ -176,7 +176,7 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
         "cards": [],
         "rows": rows,
         "about": "",
-        "losses": [],
+        "overall": [],
         "lead": _robot(run.facts),
     }
 
@@ -193,7 +193,7 @@ def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, A
         "cards": cards(comparison),
         "rows": rows,
         "about": notes,
-        "losses": comparison.losses,
+        "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,
         "lead": lead,
     }
 

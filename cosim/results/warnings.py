@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.balance import run_balance_warnings
 from hexapod_cosim.cosim.results.metrics import energy_residual
 from hexapod_cosim.cosim.results.walk import SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
@@ -35,7 +36,6 @@ from hexapod_cosim.models.terrain import ground_normal
 UPRIGHT = 0.6  # rad
 SUNK = 0.5  # 1
 SUNK_TIME = 0.5  # s    longer than the legs stay bent after a landing
-UNBALANCED = 0.01  # share of the motors' work; a larger energy residual causes a warning
 
 
 def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
@@ -211,10 +211,7 @@ def servo_warnings(recording: Recording, robot: Robot) -> list[str]:
 
 def energy_warnings(view: View) -> list[str]:
     """Warns where the energy balance misses more than metrics of energy can tolerate."""
-    share = energy_residual(view)
-    fix = "tighten solver.tolerance or, with a fixed step, shorten solver.step"
-    text = f"the energy balance does not explain {share:.2%} of the motors' work: {fix}"
-    return [text] if share > UNBALANCED else []
+    return run_balance_warnings(energy_residual(view))
 
 
 def short_run_warnings(view: View) -> list[str]:
