@@ -26,7 +26,7 @@ from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.balance import run_balance_warnings
 from hexapod_cosim.cosim.results.metrics import energy_residual
-from hexapod_cosim.cosim.results.walk import SKIPPED_CYCLES, View, body_height
+from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
 from hexapod_cosim.models.records import STATIC_LAWS
@@ -225,3 +225,18 @@ def short_run_warnings(view: View) -> list[str]:
         f"which is {cycles} whole gait cycles (metrics are of what comes after the first "
         f"{SKIPPED_CYCLES}, and a cycle takes {view.period:g} s); set duration={needed:.6g}"
     ]
+
+
+def missing_metrics_warnings(view: View) -> list[str]:
+    """Warns of metrics that a run of enough cycles lacks, with the reason."""
+    walk, found = view.walk, list[str]()
+    if walk is None:
+        return found
+    if math.isnan(walk.distance) and math.isnan(walk.angle):
+        least = f"{100.0 * LEAST_DISTANCE:g} cm"
+        found.append(f"the robot walked less than {least}: it has no figures per metre")
+    names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
+    told = set(names) <= set(walk.recording.names)
+    if told and not (walk.recording.columns(names) > 0.5).any():
+        found.append("no foot swung: foot_error_swing has no value")
+    return found
