@@ -22,10 +22,12 @@ from hexapod_cosim.cosim.report.accuracy import (
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
+from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
 from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS = "report.html", "plots"
 
@@ -122,6 +124,8 @@ def write_report(
         title=first.facts["title"],
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
+        servos=servo_rows(runs),
+        joints=JOINT_NAMES,
         creep=creep_note(first.facts["parameters"]),
         **content | _accuracy(content["rows"], accuracies, metrics),
         **_facts(runs),

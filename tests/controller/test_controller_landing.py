@@ -87,9 +87,7 @@ def test_a_foot_is_early_that_meets_the_ground_two_millimetres_above_where_it_is
         step(landings, swinging, [0.010] * 6)
     expected = landings.expected(ALL, LOW, NONE)
     step(landings, np.arange(6) == 0, [0.010 + above, *[0.0] * 5])
-    np.testing.assert_array_equal(
-        landings.early(expected, np.full(6, 0.03)), [early, *[False] * 5]
-    )
+    np.testing.assert_array_equal(landings.early(expected, np.full(6, 0.03)), [early, *[False] * 5])
 
 
 @pytest.mark.parametrize(("above", "early"), [(0.0019, False), (0.0021, True)])

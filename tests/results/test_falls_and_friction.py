@@ -266,9 +266,7 @@ STAYED = "the robot walked less than 1 cm: it has no figures per metre"
 NO_SWING = "no foot swung: foot_error_swing has no value"
 
 
-@pytest.mark.parametrize(
-    ("distance", "said"), [(0.0, [STAYED]), (0.0099, [STAYED]), (0.0101, [])]
-)
+@pytest.mark.parametrize(("distance", "said"), [(0.0, [STAYED]), (0.0099, [STAYED]), (0.0101, [])])
 def test_a_walk_shorter_than_a_centimetre_says_why_figures_per_metre_are_missing(
     distance: float, said: list[str]
 ) -> None:
