@@ -217,7 +217,7 @@ def _all_seeds(
     comparison = compare_runs(
         *([run for run in done if run.control == control] for control in CONTROLS)
     )
-    for text in comparison.losses:
+    for text in comparison.warnings if seeds > 1 else comparison.losses:
         warn(text)
     return comparison
 

@@ -106,7 +106,7 @@ def simulate(
                 given=given,
                 engine=walks,
             )
-            write_accuracy(folder.path, result.metrics, checked[plan.control].as_table())
+            write_accuracy(folder.path, checked[plan.control].as_table())
         if plan.outputs.plots:
             with drawing(folder.path):
                 runs = {plan.control: stored_result(result)}

@@ -22,10 +22,12 @@ from hexapod_cosim.cosim.report.accuracy import (
 from hexapod_cosim.cosim.report.headline import cards, creep_note, headline, plain_headline
 from hexapod_cosim.cosim.report.page import NO_VIEWER, render, viewer_script
 from hexapod_cosim.cosim.report.payload import as_json, make_payload
+from hexapod_cosim.cosim.report.servos import servo_rows
 from hexapod_cosim.cosim.results.accuracy import Accuracy
 from hexapod_cosim.cosim.results.comparison import BETTER, METHOD, SAME, WORSE, Change, Comparison
 from hexapod_cosim.cosim.results.metrics import DUST, FLOORS, METRICS, has_net_slip, shown_metrics
 from hexapod_cosim.cosim.results.results import StoredResult
+from hexapod_cosim.models import JOINT_NAMES
 
 REPORT, PLOTS = "report.html", "plots"
 
@@ -113,7 +115,7 @@ def write_report(
     content = _one_run(first) if comparison is None else _comparison(comparison, first.facts)
     content["warnings"] = [
         f"{label}: {text}" for label, run in runs.items() for text in run.facts["warnings"]
-    ] + content.pop("losses")
+    ] + content.pop("overall")
     content["scenario"] = first.scenario if scenario is None else scenario
     content["command"] = first.facts.get("command", "") if command is None else command
     metrics = _metrics(runs, comparison)
@@ -122,6 +124,8 @@ def write_report(
         title=first.facts["title"],
         sections=[section for section in SECTIONS if section.name not in skipped],
         missing=missing,
+        servos=servo_rows(runs),
+        joints=JOINT_NAMES,
         creep=creep_note(first.facts["parameters"]),
         **content | _accuracy(content["rows"], accuracies, metrics),
         **_facts(runs),
@@ -176,7 +180,7 @@ def _one_run(run: StoredResult) -> dict[str, Any]:
         "cards": [],
         "rows": rows,
         "about": "",
-        "losses": [],
+        "overall": [],
         "lead": _robot(run.facts),
     }
 
@@ -193,7 +197,7 @@ def _comparison(comparison: Comparison, facts: Mapping[str, Any]) -> dict[str, A
         "cards": cards(comparison),
         "rows": rows,
         "about": notes,
-        "losses": comparison.losses,
+        "overall": comparison.warnings if len(comparison.seeds) > 1 else comparison.losses,
         "lead": lead,
     }
 

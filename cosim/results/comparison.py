@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.common.files import atomic_text
+from hexapod_cosim.cosim.results.balance import residual_warnings
 from hexapod_cosim.cosim.results.metrics import FLOORS, METRICS
 from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.models import HexapodError
@@ -161,10 +162,25 @@ class Comparison:
             if not run.walked
         ]
 
+    @property
+    def unbalanced(self) -> list[str]:
+        """Warns, in one line per control, of runs whose energy balance does not close."""
+        return [
+            text
+            for control, runs in zip(self.labels, (self.first, self.second), strict=True)
+            for text in residual_warnings(control, [run.metrics["energy_residual"] for run in runs])
+        ]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Describes the falls and the energy balances that do not close, over all seeds."""
+        return [*self.losses, *self.unbalanced]
+
     def as_table(self) -> dict[str, Any]:
-        """Returns a table for JSON: means by control, changes, and numbers of seeds and walks."""
+        """Returns a table for JSON: means, changes, numbers of seeds and walks, warnings."""
         changes = {name: item.as_table() for name, item in self.changes.items()}
-        return {**self.means, "change": changes, "seeds": len(self.first), "walked": self.walked}
+        counts = {"seeds": len(self.first), "walked": self.walked}
+        return {**self.means, "change": changes, **counts, "warnings": self.warnings}
 
 
 def compare_runs(first: Sequence[Summary], second: Sequence[Summary]) -> Comparison:

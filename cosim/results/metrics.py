@@ -55,22 +55,6 @@ class Metric(NamedTuple):
 
 
 _TABLE: dict[str, Metric] = {
-    "slip_per_metre": Metric(
-        "m/m", True, "way slipped by all feet under load, per metre walked", 1e-4
-    ),
-    "slip_net_per_metre": Metric(
-        "m/m",
-        True,
-        "the same, less the creep of the tanh friction law or what bristles give back",
-        1e-4,
-    ),
-    "cone_use_p50": Metric(
-        "1", True, "share of the friction cone that loaded feet use, median over time", 5e-3
-    ),
-    "cone_use_p95": Metric("1", True, "the same, 95th percentile", 5e-3),
-    "cone_use_over_90": Metric(
-        "1", True, "share of the time in which loaded feet use over 90 % of the cone", 5e-3
-    ),
     "foot_error_stance": Metric(
         "m", True, "feet on the ground from where the plan has them, torso frame, RMS", 1e-4
     ),
@@ -105,9 +89,6 @@ _TABLE: dict[str, Metric] = {
     "electrical_cost": Metric(
         "1", True, "positive motor work and copper loss per weight and distance", 5e-3
     ),
-    "slip_per_radian": Metric(
-        "m/rad", True, "way slipped by all feet under load, per radian turned", 1e-4
-    ),
     "path_error_per_radian": Metric(
         "m/rad", True, "distance from the commanded place, per radian turned", 1e-3
     ),
@@ -125,6 +106,25 @@ _TABLE: dict[str, Metric] = {
     ),
     "stability_margin": Metric(
         "m", False, "least distance of the centre of mass from the support polygon's edge", 1e-4
+    ),
+    "cone_use_p50": Metric(
+        "1", True, "share of the friction cone that loaded feet use, median over time", 5e-3
+    ),
+    "cone_use_p95": Metric("1", True, "the same, 95th percentile", 5e-3),
+    "cone_use_over_90": Metric(
+        "1", True, "share of the time in which loaded feet use over 90 % of the cone", 5e-3
+    ),
+    "slip_per_metre": Metric(
+        "m/m", True, "way slipped by all feet under load, per metre walked", 1e-4
+    ),
+    "slip_net_per_metre": Metric(
+        "m/m",
+        True,
+        "slip per metre less the creep of the tanh friction law or what bristles give back",
+        1e-4,
+    ),
+    "slip_per_radian": Metric(
+        "m/rad", True, "way slipped by all feet under load, per radian turned", 1e-4
     ),
     "energy_residual": Metric(
         "1", None, "energy that the balance does not explain, over the motors' work", 0.0

@@ -33,6 +33,7 @@ from hexapod_cosim.models import HexapodError
 RESULTS, PARTIAL = "results", "results.partial"  # stems of recordings
 METRICS_FILE, SCENARIO = "metrics.json", "scenario.toml"
 ACCURACY = "accuracy"  # key of metrics.json, where accuracy was checked
+WARNINGS = "warnings"  # key of metrics.json: the run's, as in run.json
 ABOUT = ("title", "control", "robot", "fmu", "versions")  # facts in the Parquet file
 NEEDED = (  # facts that a report needs
     *("title", "control", "simulated", "wall", "realtime_factor", "finished", "gait_period"),
@@ -109,7 +110,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
         write_commands(recording, files[-1])
     if result.completed:
         files.append(folder / METRICS_FILE)
-        write_json(files[-1], dict(result.metrics))
+        write_json(files[-1], {**result.metrics, WARNINGS: facts[WARNINGS]})
     write_json(folder / RUN_FILE, facts)
     return [*files, folder / RUN_FILE]
 
@@ -155,6 +156,7 @@ def read_result(folder: Path) -> StoredResult:
         raise _damaged(folder / METRICS_FILE, type(metrics).__name__, "a table of metrics")
     view = View(read_recording(folder, RESULTS), facts["parameters"], facts["gait_period"])
     checked = metrics.pop(ACCURACY, None)
+    metrics.pop(WARNINGS, None)  # also in run.json
     accuracy = None
     if checked is not None:
         accuracy = accuracy_from_table(checked, where=str(folder / METRICS_FILE))
@@ -201,9 +203,9 @@ def stored_result(result: Result) -> StoredResult:
     )
 
 
-def write_accuracy(folder: Path, metrics: Mapping[str, Any], accuracy: Mapping[str, Any]) -> None:
-    """Adds the table of an accuracy check to a folder's metrics."""
-    write_json(folder / METRICS_FILE, {**metrics, ACCURACY: accuracy})
+def write_accuracy(folder: Path, accuracy: Mapping[str, Any]) -> None:
+    """Adds the table of an accuracy check to a folder's metrics. Raises HexapodError."""
+    write_json(folder / METRICS_FILE, {**read_json(folder / METRICS_FILE), ACCURACY: accuracy})
 
 
 def read_accuracies(folder: Path) -> dict[str, Accuracy]:

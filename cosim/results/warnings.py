@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 
 from hexapod_cosim.cosim.interface.names import joint_names, vector_names
 from hexapod_cosim.cosim.master.recorder import Recording
+from hexapod_cosim.cosim.results.balance import run_balance_warnings
 from hexapod_cosim.cosim.results.metrics import energy_residual
-from hexapod_cosim.cosim.results.walk import SKIPPED_CYCLES, View, body_height
+from hexapod_cosim.cosim.results.walk import LEAST_DISTANCE, SKIPPED_CYCLES, View, body_height
 from hexapod_cosim.cosim.scenario.records import Scenario
 from hexapod_cosim.models import FRICTION_LAWS, LEG_NAMES, TERRAINS, Robot, Terrain
 from hexapod_cosim.models.records import STATIC_LAWS
@@ -35,7 +36,6 @@ from hexapod_cosim.models.terrain import ground_normal
 UPRIGHT = 0.6  # rad
 SUNK = 0.5  # 1
 SUNK_TIME = 0.5  # s    longer than the legs stay bent after a landing
-UNBALANCED = 0.01  # share of the motors' work; a larger energy residual causes a warning
 
 
 def describe_walk(view: View, robot: Robot) -> dict[str, Any]:
@@ -211,10 +211,7 @@ def servo_warnings(recording: Recording, robot: Robot) -> list[str]:
 
 def energy_warnings(view: View) -> list[str]:
     """Warns where the energy balance misses more than metrics of energy can tolerate."""
-    share = energy_residual(view)
-    fix = "tighten solver.tolerance or, with a fixed step, shorten solver.step"
-    text = f"the energy balance does not explain {share:.2%} of the motors' work: {fix}"
-    return [text] if share > UNBALANCED else []
+    return run_balance_warnings(energy_residual(view))
 
 
 def short_run_warnings(view: View) -> list[str]:
@@ -228,3 +225,18 @@ def short_run_warnings(view: View) -> list[str]:
         f"which is {cycles} whole gait cycles (metrics are of what comes after the first "
         f"{SKIPPED_CYCLES}, and a cycle takes {view.period:g} s); set duration={needed:.6g}"
     ]
+
+
+def missing_metrics_warnings(view: View) -> list[str]:
+    """Warns of metrics that a run of enough cycles lacks, with the reason."""
+    walk, found = view.walk, list[str]()
+    if walk is None:
+        return found
+    if math.isnan(walk.distance) and math.isnan(walk.angle):
+        least = f"{100.0 * LEAST_DISTANCE:g} cm"
+        found.append(f"the robot walked less than {least}: it has no figures per metre")
+    names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
+    told = set(names) <= set(walk.recording.names)
+    if told and not (walk.recording.columns(names) > 0.5).any():
+        found.append("no foot swung: foot_error_swing has no value")
+    return found

@@ -31,6 +31,7 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import (
     describe_walk,
+    missing_metrics_warnings,
     short_run_warnings,
     unused_settings,
     walk_warnings,
@@ -182,13 +183,15 @@ def make_result(
     """
     scenario, setup, drawn = plan.scenario, plan.controller, plan.drawn
     view = View(outcome.judged, parameters, setup.gait.period)
-    short = short_run_warnings(view) if outcome.status == COMPLETED else []
+    missing = []
+    if outcome.status == COMPLETED:
+        missing = [*short_run_warnings(view), *missing_metrics_warnings(view)]
     found = {
         "warnings": [
             *facts["warnings"],
             *unused_settings(scenario, setup.robot),
             *walk_warnings(view, setup.robot),
-            *short,
+            *missing,
         ],
         "gains": None if setup.gains is None else asdict(setup.gains),
         "walk": describe_walk(view, setup.robot),

@@ -5,6 +5,7 @@ is no bump.
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from gains import PERIOD
 from standing import WEIGHT, Laws, make_laws, plan, squeezing
 
@@ -72,6 +73,42 @@ def test_what_is_saved_does_not_change() -> None:
     step(landings, ~FIRST, [0.02] * 6)
     other.restore(state)
     np.testing.assert_array_equal(other.met, np.where(FIRST, 0.01, np.inf))
+
+
+@pytest.mark.parametrize(("above", "early"), [(0.0019, False), (0.0021, True)])
+def test_a_foot_is_early_that_meets_the_ground_two_millimetres_above_where_it_is_expected(
+    above: float, early: bool
+) -> None:
+    """All feet have come down at 10 mm before; now foot 0 meets a bump."""
+    landings = Landings()
+    for swinging in (FIRST, ~FIRST, FIRST, ~FIRST):
+        step(landings, swinging, [0.010] * 6)
+    expected = landings.expected(ALL, LOW, NONE)
+    step(landings, np.arange(6) == 0, [0.010 + above, *[0.0] * 5])
+    np.testing.assert_array_equal(landings.early(expected, np.full(6, 0.03)), [early, *[False] * 5])
+
+
+@pytest.mark.parametrize(("above", "early"), [(0.0019, False), (0.0021, True)])
+def test_a_foot_is_early_only_while_its_path_is_two_millimetres_above_the_common_ground(
+    above: float, early: bool
+) -> None:
+    landings = Landings()
+    for swinging in (FIRST, ~FIRST, FIRST, ~FIRST):
+        step(landings, swinging, [0.010] * 6)
+    expected = landings.expected(ALL, LOW, NONE)
+    step(landings, np.arange(6) == 0, [0.020, *[0.0] * 5])
+    assert landings.early(expected, np.full(6, 0.010 + above))[0] == early
+
+
+@pytest.mark.parametrize(("height", "falls"), [(0.0019, False), (0.0021, True)])
+def test_a_path_less_than_two_millimetres_above_its_end_is_not_well_above_the_ground(
+    height: float, falls: bool
+) -> None:
+    """A foot that comes down at 0.05 m/s falls by 0.05 times the control period."""
+    laws = make_laws(parts=ONLY_TOUCHDOWN)
+    plan(laws, standing="101111", height=height, rise=-0.05)
+    assert laws.planned.well_up.tolist() == [False, falls, False, False, False, False]
+    assert laws.planned.falling[1] == (0.05 * PERIOD if falls else 0.0)
 
 
 def walk(laws: Laws, ground: np.ndarray, steps: int) -> list[np.ndarray]:

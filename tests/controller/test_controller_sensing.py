@@ -10,7 +10,6 @@ from controllers import make, obey, run, squeezed
 from gains import PERIOD
 
 from hexapod_cosim.controller import BodyCommand, Measurement, Parts
-from hexapod_cosim.controller.comply.compliant import STEERING_TIME
 from hexapod_cosim.controller.walk.hold import Sight
 from hexapod_cosim.models.kinematics import axis_quaternion, quaternion_product
 
@@ -89,7 +88,7 @@ def test_reaching_for_missing_ground_is_told_to_the_servos_as_speed() -> None:
 def test_steering_is_led_over_without_a_jump_and_looked_at_afresh_only_when_asked() -> None:
     compliant, ramp = (
         make(compliant=True).compliant,
-        np.minimum(np.arange(41) * PERIOD / STEERING_TIME, 1.0),
+        np.minimum(np.arange(41) * PERIOD / 0.1, 1.0),  # over 0.1 s
     )
     assert compliant is not None
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexapod_cosim.controller import BodyCommand, CommandRamp, FootPaths, LegSolver, make_gait
-from hexapod_cosim.controller.walk.trajectory import PlannedFeet, Twist
+from hexapod_cosim.controller.walk.trajectory import PlannedFeet, Twist, blend
 from hexapod_cosim.models import GAITS, HexapodError, load_robot
 
 PERIOD = 1e-3  # s
@@ -106,6 +106,22 @@ def test_feet_lift_off_and_touch_down_at_rest_on_the_ground(twist: Twist) -> Non
     edge = log["swinging"] & ((log["progress"] < 0.005) | (log["progress"] > 0.995))
     assert edge.any()
     assert np.abs(log["rise"][edge]).max() < 2e-3  # 192 H tau^2 / T at tau = 0.005: 0.4 mm/s
+
+
+@pytest.mark.parametrize(
+    ("progress", "moves"), [(0.09, False), (0.12, True), (0.88, True), (0.91, False)]
+)
+def test_a_foot_moves_along_the_ground_between_a_tenth_and_nine_tenths_of_its_swing(
+    progress: float, moves: bool
+) -> None:
+    done, rate = blend(np.array([progress]))
+    assert bool(rate[0] > 0.0) is moves
+    assert bool(0.0 < done[0] < 1.0) is moves
+    log = steady(Walk(), STRAIGHT, 1000)
+    there = log["swinging"] & (np.abs(log["progress"] - progress) < 0.003)
+    assert there.any()
+    # at a progress of 0.12 the foot has 1 % of its largest speed, which is about 0.3 m/s
+    assert bool(np.abs(ground_velocity(log, STRAIGHT)[there]).min() > 1e-4) is moves
 
 
 def test_the_optional_touch_down_speed_is_reached() -> None:

@@ -248,7 +248,7 @@ def test_a_run_shows_an_error_beside_every_metric_and_keeps_it(call: Call, tmp_p
     assert " ± " not in lines["realtime_factor"]
     assert "Half the macro-step, 0.0025 s" in out
     stored = json.loads((tmp_path / "metrics.json").read_text())
-    assert list(stored) == [*METRICS, "accuracy"]
+    assert list(stored) == [*METRICS, "warnings", "accuracy"]
     assert list(stored["accuracy"]["solver_error"]) == SOLVER_METRICS
 
 

@@ -10,6 +10,10 @@ import pytest
 from command import Call
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
+from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.comparison import compare_runs
+from hexapod_cosim.cosim.results.metrics import METRICS
+from hexapod_cosim.cosim.results.summary import Summary
 from hexapod_cosim.cosim.results.walk import View
 from hexapod_cosim.cosim.results.warnings import energy_warnings, servo_warnings, walk_warnings
 
@@ -72,3 +76,45 @@ def test_a_run_at_a_coarse_fixed_step_reports_its_residual_in_terminal_report_an
     assert warning in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
     assert metrics["energy_residual"] > 0.01
+    assert any(warning in text for text in metrics["warnings"])
+    assert call("report", tmp_path / "out")[0] == 0
+
+
+def seeds_of(control: str, residuals: list[float]) -> list[Summary]:
+    """Completed walks with these energy residuals; all other metrics are 1."""
+    return [
+        Summary(
+            control=control,
+            seed=seed,
+            status=COMPLETED,
+            upright=True,
+            metrics=dict.fromkeys(METRICS, 1.0) | {"energy_residual": residual},
+        )
+        for seed, residual in enumerate(residuals)
+    ]
+
+
+def test_a_comparison_counts_the_runs_of_each_control_whose_energy_balance_misses() -> None:
+    kinematic = seeds_of("kinematic", [0.0099, 0.023, 0.0101])
+    compliant = seeds_of("compliant", [0.0099, 0.001, float("nan")])
+    (text,) = compare_runs(kinematic, compliant).unbalanced
+    expected = "kinematic: the energy balance of 2 of 3 runs misses more than 1 %, at most 2.3 %"
+    assert text.startswith(f"{expected}: tighten solver.tolerance")
+
+
+def test_a_comparison_over_seeds_reports_its_residuals_in_terminal_report_and_metrics(
+    call: Call, tmp_path: Path
+) -> None:
+    """Steps of 1 ms on stiff ground are at the limit of an explicit method."""
+    settings = ("solver.method=rk4", "solver.step=1e-3", "duration=0.4", "macro_step=0.01")
+    changes = [word for text in settings for word in ("--set", text)]
+    code, _, err = call("compare", "stand", "--seeds", "2", "-o", tmp_path / "out", *changes)
+    assert code == 0
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    (warning,) = (text for text in metrics["warnings"] if text.startswith("kinematic: the energy"))
+    assert " of 2 runs misses more than 1 %, at most " in warning
+    assert err.count(warning) == 1
+    page = tmp_path / "out" / "report.html"
+    assert warning in page.read_text(encoding="utf-8")
+    assert call("report", tmp_path / "out")[0] == 0
+    assert warning in page.read_text(encoding="utf-8")

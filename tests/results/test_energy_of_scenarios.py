@@ -27,7 +27,7 @@ def test_the_energy_balance_of_the_other_robot_closes_too(
 ) -> None:
     scenario = load_scenario(name, overrides=[f"control={control}", "robot=phantomx_mk4"])
     missing = walker.simulate(scenario).metrics["energy_residual"]
-    assert missing < (3e-3 if (name, control) == STANDING else 1e-4)
+    assert missing < (2e-3 if (name, control) == STANDING else 1e-4)
 
 
 @pytest.mark.parametrize("name", list_scenarios())
@@ -44,5 +44,5 @@ def test_the_energy_balance_of_every_bundled_scenario_closes(
         ]
         for solver in ((), FAST)
     ]
-    assert missing[0] < (3e-3 if (name, control) == STANDING else 1e-4)
-    assert missing[1] < (3e-3 if (name, control) == STANDING else 1e-3)
+    assert missing[0] < (2e-3 if (name, control) == STANDING else 1e-4)
+    assert missing[1] < 1e-3

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from command import Call
 from numpy.typing import NDArray
 from walks import PARAMETERS, PERIOD, ROBOT, Walk
 
 from hexapod_cosim.cosim.interface.names import foot_names
 from hexapod_cosim.cosim.results.walk import View
-from hexapod_cosim.cosim.results.warnings import describe_fall, friction_warnings
+from hexapod_cosim.cosim.results.warnings import (
+    describe_fall,
+    friction_warnings,
+    missing_metrics_warnings,
+)
 
 Array = NDArray[np.float64]
 STANDING = 0.130  # m
@@ -254,3 +260,34 @@ def test_a_slope_that_friction_does_not_hold_is_warned_of_with_the_acceleration(
     assert friction_warnings(parameters(**SLOPE, **changes)) == [
         f"the robot slides: the ground's slope pulls it downhill {says}"
     ]
+
+
+STAYED = "the robot walked less than 1 cm: it has no figures per metre"
+NO_SWING = "no foot swung: foot_error_swing has no value"
+
+
+@pytest.mark.parametrize(("distance", "said"), [(0.0, [STAYED]), (0.0099, [STAYED]), (0.0101, [])])
+def test_a_walk_shorter_than_a_centimetre_says_why_figures_per_metre_are_missing(
+    distance: float, said: list[str]
+) -> None:
+    """The distance is that of the judged cycles; the torso moves evenly."""
+    walk = Walk()
+    judged = walk.time[-1] - 2.0 * PERIOD
+    walk.set("torso.position[1]", distance * walk.time / judged)
+    assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == said
+
+
+def test_a_robot_whose_feet_never_swing_says_why_there_is_no_error_in_swing() -> None:
+    walk = Walk(planned=True)
+    assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == [NO_SWING]
+    walk.set("controller.LF.swinging", walk.time > walk.time[-1] - 1.0)
+    assert missing_metrics_warnings(View(walk.recording, PARAMETERS, PERIOD)) == []
+
+
+def test_a_run_that_stands_says_in_terminal_and_report_why_metrics_are_missing(
+    call: Call, tmp_path: Path
+) -> None:
+    code, _, err = call("simulate", "stand", "-o", tmp_path, "--set", "duration=3.2")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert code == 0
+    assert all(text in err and text in page for text in (STAYED, NO_SWING))

@@ -17,6 +17,7 @@ from hexapod_cosim.cosim.study.store.manifest import RESULTS, RUNS
 from hexapod_cosim.cosim.study.store.store import Store
 
 FAKE, SLOW, BRIEF = "study_engines:Fake", "study_engines:Slow", "study_engines:Brief"
+LEAKY = "study_engines:Leaky"
 SMALL: dict[str, Any] = {
     "scenario": "walk_flat",
     "seeds": 3,

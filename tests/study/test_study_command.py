@@ -12,7 +12,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from command import COMMAND, Call, assert_refused
-from studies import BRIEF, FAKE, digest, run_quietly
+from studies import BRIEF, FAKE, LEAKY, digest, run_quietly
 
 from hexapod_cosim.cosim.study.plan.reading import load_study
 
@@ -83,6 +83,20 @@ def test_a_warning_and_the_report_name_walks_too_short_for_figures(
     assert call(*words[:3], tmp_path / "none", *words[4:])[2].startswith(
         "warning: The walks are too short for figures"
     )
+
+
+def test_a_warning_and_the_report_name_the_runs_whose_energy_balance_misses(
+    call: Call, athena_fmu: Path, tmp_path: Path
+) -> None:
+    file = study_file(tmp_path, "seeds = 2\n" + ONE_FACTOR)
+    words = ["study", file, "-o", tmp_path / "out", "--engine", LEAKY, "--fmu", athena_fmu]
+    code, _, err = call(*words, "--workers", "0")
+    note = "compliant: the energy balance of 2 of 2 runs misses more than 1 %, at most 12 %"
+    assert code == 0
+    assert err.startswith(f"warning: {note}: tighten solver.tolerance")
+    assert "kinematic" not in err
+    assert note in (tmp_path / "out" / "report.html").read_text()
+    assert note in call("report", tmp_path / "out")[2]
 
 
 def test_one_fmu_for_several_robots_is_refused(

@@ -92,7 +92,7 @@ def test_rows_hold_the_settings_the_figures_and_how_a_run_ended(small: Callable[
     assert (
         walked["friction.mu"],
         walked["gait.name"],
-        walked["slip_per_metre"],
+        walked["foot_error_stance"],
         walked["walked"],
     ) == (0.5, "tripod", 1.25, True)
     assert len({row["identity"] for row in (refused, fallen, walked)}) == 3

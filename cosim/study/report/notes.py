@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hexapod_cosim.cosim.master.loop import COMPLETED
+from hexapod_cosim.cosim.results.balance import balance_warnings
 from hexapod_cosim.cosim.study.plan.records import SOBOL, Study
 from hexapod_cosim.cosim.study.store.results import Results
+from hexapod_cosim.cosim.study.store.table import Overall
 
 NO_WALK = (
     "No run walked to its end, so there are no figures of walks. "
@@ -19,7 +21,8 @@ TOO_SHORT = (
 
 def notes(results: Results) -> list[str]:
     """Returns the notes as sentences."""
-    return [*_of_design(results.study), *_of_missing_runs(results), *_of_walks(results)]
+    found = [*_of_design(results.study), *_of_missing_runs(results), *_of_walks(results)]
+    return [*found, *_of_balances(results.overall)]
 
 
 def _of_design(study: Study) -> Iterator[str]:
@@ -55,3 +58,11 @@ def _of_walks(results: Results) -> Iterator[str]:
         for (case, control), (walked, figured) in walks.items():
             if not figured:
                 yield f"All {walked} {control} walks of {case} are {TOO_SHORT}"
+
+
+def _of_balances(overall: Overall) -> Iterator[str]:
+    """Yields a note for each control with runs whose energy balance does not close."""
+    for control, (missing, largest) in sorted(overall.unbalanced.items()):
+        yield from balance_warnings(
+            control, missing=missing, runs=overall.total[control], largest=largest
+        )
