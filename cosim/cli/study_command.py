@@ -16,7 +16,7 @@ from hexapod_cosim.cosim.study.execute.engines import DEFAULT_ENGINE, ENGINES
 from hexapod_cosim.cosim.study.plan.records import StudyError
 
 EPILOG = (
-    f"A fall is a result of a study. The exit code is {FELL} only when no run walked to its end "
+    f"A fall is a result of a study. Exit code {FELL} only when no run walked to its end "
     "and the robot fell in some of them."
 )
 MAX_WORKERS = 4096

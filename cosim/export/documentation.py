@@ -160,7 +160,7 @@ def _row(name: str, meaning: str, variables: Sequence[Variable], interface: Inte
 
 def _matching(pattern: Pattern, variables: Iterable[Variable]) -> list[Variable]:
     """Returns the variables that a pattern stands for."""
-    expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d\]")
+    expression = re.escape(pattern.name).replace(r"\[i\]", r"\[\d+\]")
     expression = re.sub(
         r"\\\{(\w+)\\\}",
         lambda match: f"(?:{'|'.join(AXES.get(match[1], (r'[xyz]{2}',)))})",

@@ -94,7 +94,7 @@ def simulate(
     return make_result(plan, outcome, parameters, facts | {"warnings": controller.warnings})
 
 
-def _make_recorder(plan: Plan, signals: Signals, controller: Controller) -> Recorder:
+def _make_recorder(plan: RunPlan, signals: Signals, controller: Controller) -> Recorder:
     """Returns the recorder of a run. Raises ScenarioError for unknown columns in outputs.csv."""
     scenario = plan.scenario
     recorder = Recorder(
@@ -110,7 +110,7 @@ def _make_recorder(plan: Plan, signals: Signals, controller: Controller) -> Reco
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class RunPlan:
     """All parts of a run that do not depend on a plant FMU."""
 
     scenario: Scenario
@@ -120,7 +120,7 @@ class Plan:
     drawn: Drawn | None  # None: nothing is varied
 
 
-def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
+def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> RunPlan:
     """Returns the plan of a scenario.
 
     Raises HexapodError for commands that the legs do not reach and where no gains can be designed.
@@ -140,12 +140,12 @@ def make_plan(scenario: Scenario, *, gains: Gains | None = None) -> Plan:
     timed = scenario
     if drawn is not None:
         timed = replace(scenario, commands=delayed(scenario.commands, drawn.command_delay))
-    return Plan(
+    return RunPlan(
         scenario=scenario, robot=own, controller=setup, schedule=make_schedule(timed), drawn=drawn
     )
 
 
-def initialise_plant(plant: Fmu, plan: Plan) -> dict[str, float]:
+def initialise_plant(plant: Fmu, plan: RunPlan) -> dict[str, float]:
     """Initialises a plant with the scenario's parameters and the drawn initial values.
 
     Returns all parameters as they then hold.
@@ -175,7 +175,7 @@ def _check_measurements(plant: Fmu) -> None:
 
 
 def make_result(
-    plan: Plan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]
+    plan: RunPlan, outcome: Outcome, parameters: Mapping[str, float], facts: Mapping[str, Any]
 ) -> Result:
     """Returns the result of a run, with its metrics and warnings.
 

@@ -28,7 +28,7 @@ from hexapod_cosim.cosim.results.result import Result
 from hexapod_cosim.cosim.results.summary import Summary, refused_summary, summarise
 from hexapod_cosim.cosim.run.preparation import Preparation
 from hexapod_cosim.cosim.run.run import (
-    Plan,
+    RunPlan,
     describe,
     different_settings,
     initialise_plant,
@@ -126,7 +126,7 @@ class Walker:
         except HexapodError as error:
             return refused_summary(scenario, error)
 
-    def _plant(self, plan: Plan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
+    def _plant(self, plan: RunPlan, controller: Fmu, fmu: Path | None) -> tuple[Fmu, NativeMaster]:
         """Returns the plant FMU of the plan and the master that connects it to the controller."""
         path = self._preparation.fmu(plan.scenario.robot) if fmu is None else fmu
         bristles = (
@@ -143,7 +143,7 @@ class Walker:
             )
         return self._masters[key]
 
-    def _controller_for(self, plan: Plan) -> Fmu:
+    def _controller_for(self, plan: RunPlan) -> Fmu:
         """Returns the controller FMU, reset, with the parameters of the plan."""
         setup = plan.controller
         if self._controller is None:

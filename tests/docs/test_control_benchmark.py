@@ -276,8 +276,8 @@ def test_the_csv_has_a_line_per_case_and_figure_of_merit(tmp_path: Path) -> None
     assert len(lines) == 1 + 2 * (
         len(METRICS) - 2
     )  # realtime_factor and energy_residual are none of the control
-    assert lines[1].startswith("one,2,2,2,slip_per_metre,0.01,0.01,0,0,0")
-    assert lines[-1].startswith("two,2,0,0,stability_margin,,,")
+    assert lines[1].startswith("one,2,2,2,foot_error_stance,0.01,0.01,0,0,0")
+    assert lines[-1].startswith("two,2,0,0,slip_per_radian,,,")
 
 
 def test_the_command_walks_a_quick_section_without_touching_the_page(

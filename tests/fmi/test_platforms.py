@@ -198,10 +198,9 @@ def compiled(folder: Path, sources: list[Path], *command: str) -> Any:
     with flags for a shared library and some optimisation only.
     """
     out = folder / "plain.so"
-    plant = Path(
-        next(path for name, path in source_files().items() if name == "fmi/fmi2.c")
-    ).parents[1]
-    includes = [f"-I{plant}", f"-I{plant / 'include'}", "-isystem", str(fmi_headers())]
+    plant, root = source_files()["component.c"].parent, source_files()["fmi/fmi2.c"].parents[1]
+    folders = (root, plant, plant / "include")
+    includes = [*(f"-I{folder}" for folder in folders), "-isystem", str(fmi_headers())]
     environment = cross_build.compiler_environment(folder, user_cache())
     subprocess.run(
         [*command, "-O1", "-shared", "-fPIC", *includes, *map(str, sources), "-lm", "-o", str(out)],
