@@ -17,7 +17,7 @@ TYPING := build/typing/hexapod_cosim
 SOURCES := pyproject.toml CMakeLists.txt $(shell find fmi plant_fmu controller_fmu master -type f) $(wildcard cosim/viewer/*.* cosim/viewer/src/*.ts cosim/viewer/src/*/*.ts)
 C_FILES = $(wildcard plant_fmu/src/*.[ch] plant_fmu/src/lanes/*.[ch] fmi/*.[ch] plant_fmu/*.c plant_fmu/include/hexapod/*.h controller_fmu/src/*.[ch] controller_fmu/src/*/*.[ch] controller_fmu/*.c controller_fmu/include/hexapod/*.h master/src/*.c master/include/hexapod/*.h tests/native/*.[ch] benchmarks/native/*.[ch] benchmarks/native/*.cpp examples/*.c examples/c_library/*.c)
 EMPTY :=
-TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native,$(wildcard tests/[a-z]*[a-z])))
+TEST_ROOMS := $(subst $(EMPTY) $(EMPTY),:,$(filter-out tests/native tests/conftest.py,$(wildcard tests/[a-z]*[a-z])))
 SANITIZED_SHORT := $(patsubst %,tests/fmi/test_%.py,fmi fmi3 fmi3_order fmi_state fmi_values fmi_exchange) \
 	$(patsubst %,tests/plant/test_plant_%.py,events coordinates misuse)
 SANITIZED := $(SANITIZED_SHORT) tests/fmi/test_fmi_importers.py tests/fmi/test_endurance.py
@@ -121,6 +121,7 @@ check: setup typing lint-c
 	$(BIN)/python tools/build_viewer.py --check
 	$(BIN)/clang-format --dry-run --Werror $(C_FILES)
 	$(BIN)/python tools/generate.py --check
+	$(BIN)/python tools/rooms.py --check
 
 bench: setup
 	$(BIN)/python -m benchmarks.run
@@ -153,6 +154,7 @@ format: setup
 
 generate: setup
 	$(BIN)/python tools/generate.py
+	$(BIN)/python tools/rooms.py
 	@$(MAKE) --no-print-directory setup
 	$(BIN)/python tools/generate_extras.py
 
