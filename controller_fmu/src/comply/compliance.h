@@ -5,11 +5,11 @@
 
 #include "../sense/burden.h"
 #include "../sense/contact_detection.h"
+#include "../sense/landing.h"
+#include "../sense/touchdown.h"
 #include "foot_law.h"
 #include "hexapod/inside.h"
-#include "../sense/landing.h"
 #include "support.h"
-#include "../sense/touchdown.h"
 
 HX_HIDDEN_BEGIN
 

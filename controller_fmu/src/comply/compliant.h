@@ -3,10 +3,10 @@
 #ifndef HX_COMPLIANT_H
 #define HX_COMPLIANT_H
 
-#include "compliance.h"
-#include "hexapod/inside.h"
 #include "../walk/hold.h"
 #include "../walk/trajectory.h"
+#include "compliance.h"
+#include "hexapod/inside.h"
 
 HX_HIDDEN_BEGIN
 

@@ -3,8 +3,8 @@
 #ifndef HX_FOOT_LAW_H
 #define HX_FOOT_LAW_H
 
-#include "hexapod/inside.h"
 #include "../plane.h"
+#include "hexapod/inside.h"
 #include "slip_pid.h"
 #include "suspension.h"
 

@@ -3,8 +3,8 @@
 #ifndef HX_POSTURE_H
 #define HX_POSTURE_H
 
-#include "hexapod/inside.h"
 #include "../plane.h"
+#include "hexapod/inside.h"
 
 HX_HIDDEN_BEGIN
 

@@ -3,9 +3,9 @@
 #ifndef HX_SLIP_PID_H
 #define HX_SLIP_PID_H
 
+#include "../plane.h"
 #include "hexapod/controller.h"
 #include "hexapod/inside.h"
-#include "../plane.h"
 
 HX_HIDDEN_BEGIN
 

@@ -3,8 +3,8 @@
 #ifndef HX_SUPPORT_H
 #define HX_SUPPORT_H
 
-#include "hexapod/inside.h"
 #include "../walk/inverse_dynamics.h"
+#include "hexapod/inside.h"
 
 HX_HIDDEN_BEGIN
 

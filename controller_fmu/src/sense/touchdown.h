@@ -1,4 +1,5 @@
-/* touchdown.h - ground that is met too early or too late (C36). Python: controller/sense/touchdown.py. */
+/* touchdown.h - ground that is met too early or too late (C36). Python:
+ * controller/sense/touchdown.py. */
 #ifndef HX_TOUCHDOWN_H
 #define HX_TOUCHDOWN_H
 

@@ -3,9 +3,9 @@
 #ifndef HX_HOLD_H
 #define HX_HOLD_H
 
+#include "../plane.h"
 #include "hexapod/controller.h"
 #include "hexapod/inside.h"
-#include "../plane.h"
 
 HX_HIDDEN_BEGIN
 

@@ -3,9 +3,9 @@
 #ifndef HX_INVERSE_DYNAMICS_H
 #define HX_INVERSE_DYNAMICS_H
 
+#include "../comply/posture.h"
 #include "hexapod/inside.h"
 #include "kinematics.h"
-#include "../comply/posture.h"
 
 HX_HIDDEN_BEGIN
 

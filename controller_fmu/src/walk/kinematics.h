@@ -3,9 +3,9 @@
 #ifndef HX_LEG_KINEMATICS_H
 #define HX_LEG_KINEMATICS_H
 
+#include "../plane.h"
 #include "hexapod/controller.h"
 #include "hexapod/inside.h"
-#include "../plane.h"
 
 HX_HIDDEN_BEGIN
 
