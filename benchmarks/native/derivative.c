@@ -65,7 +65,7 @@ static void report(const hxKernel *kernel, const Visited *visited, int repeats, 
 
 static int only(const char *name, int multipliers, const Visited *visited, double *sum) {
   for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel) {
-    if (strcmp((*kernel)->name, name) != 0 || !(*kernel)->runs_here()) continue;
+    if (strcmp((*kernel)->name, name) != 0 || !(*kernel)->is_supported()) continue;
     measure(*kernel, visited, multipliers, sum);
     return 0;
   }
@@ -85,7 +85,7 @@ int main(int argc, char **argv) {
   if (argc == 5) return only(argv[3], atoi(argv[4]), &visited, &sum);
   printf("{");
   for (const hxKernel *const *kernel = hx_kernels; *kernel; ++kernel) {
-    if (!(*kernel)->runs_here()) continue;
+    if (!(*kernel)->is_supported()) continue;
     printf("%s", comma);
     report(*kernel, &visited, atoi(argv[2]), &sum);
     comma = ", ";
