@@ -63,7 +63,7 @@ OWN_STEPS = (2e-3, 1e-3, 5e-4)
 
 
 def ours() -> list[Series]:
-    """Returns our integrators."""
+    """Returns the series of the plant's own integrators."""
     implicit = [
         Series(engine=OURS, method=name, settings=TOLERANCES, adaptive=True, quick=True)
         for name in ("rosw3", "ros2")

@@ -147,7 +147,7 @@ class Instant:
         )
 
     def close(self) -> None:
-        """Does nothing."""
+        """Releases nothing, because this engine holds no files or FMUs."""
 
 
 class Timed:

@@ -53,7 +53,7 @@ class Walk:
 
     @property
     def steps(self) -> int:
-        """Macro-steps."""
+        """Returns the number of macro-steps of the walk."""
         return round(DURATION / STEP)
 
 

@@ -75,7 +75,7 @@ class HoldGains:
 
 @dataclass(frozen=True, kw_only=True)
 class LimitGains:
-    """What commands never exceed."""
+    """Limits of the corrections that compliant control adds to the commands."""
 
     speed: float  # rad/s    fastest change of a joint angle's correction
     torque: float  # N m    largest feed-forward torque

@@ -28,30 +28,30 @@ SPEEDS = ("speed_limit",)
 
 @dataclass(frozen=True)
 class Size:
-    """Factors on figures that suit robots of the usual size. 1: as they are."""
+    """Factors on the requirements of robots of the usual size; 1 leaves them unchanged."""
 
     length: float
 
     @property
     def time(self) -> float:
-        """Of times; rates go with its inverse."""
+        """Returns the factor on times; its inverse is the factor on rates."""
         return math.sqrt(self.length)
 
     @property
     def speed(self) -> float:
-        """Of speeds."""
+        """Returns the factor on speeds."""
         return self.length / self.time
 
 
 def size_of(robot: Robot) -> Size:
-    """By the mean length of the legs."""
+    """Returns the factors of a robot, from the mean length of its legs."""
     legs = LegSolver(robot)
     length = float((np.abs(legs.coxa_length) + legs.femur + legs.tibia).mean())
     return Size(length / min(max(length, SHORTEST), LONGEST))
 
 
 def requirements_for(robot: Robot, **given: Any) -> Requirements:
-    """What the design asks for by a robot's size and servos; what is given is taken as it is.
+    """Returns the requirements for a robot's size and servos; given values are used unchanged.
 
     Stiff servos bound the suspension's deflection: beside theirs it is the gain of the
     suspension's loop, which would have no margins.
@@ -70,7 +70,10 @@ def requirements_for(robot: Robot, **given: Any) -> Requirements:
 
 
 def sag(robot: Robot) -> float:
-    """m    of a leg's servos in the stance under a third of the weight, the legs' mean"""
+    """Returns the sag [m] of a leg on its servos in the stance under a third of the weight.
+
+    It is the mean over the legs.
+    """
     vertical = LegSolver(robot).jacobian(robot.stance)[:, 2]
     softness = float((vertical**2).sum(axis=1).mean() / robot.servo.kp)
     return softness * robot.weight / TRIPOD_LEGS

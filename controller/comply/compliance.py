@@ -125,7 +125,7 @@ class Compliance(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """All laws at rest."""
+        """Puts all laws to rest: no corrections, all sensors trusted, no offsets."""
         for part in (self.law, self.detector, self.watch, self.touchdown, self.landings):
             part.reset()
         self.burden.reset()

@@ -35,7 +35,7 @@ class FootLaw(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """All at rest."""
+        """Puts the laws of all feet to rest: no answer, deflection, rate or load."""
         self.pid.reset()
         self.answer: Plane = np.zeros(LEGS, dtype=np.complex128)
         self.deflection, self.rate, self.load = np.zeros((3, LEGS))

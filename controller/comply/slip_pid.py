@@ -56,7 +56,7 @@ class SlipPid(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """All at rest."""
+        """Sets the filtered forces and the integrals of all feet to zero."""
         self.force: Plane = np.zeros(LEGS, dtype=np.complex128)  # N    e of the last period
         self.smooth = self.force  # N    e', filtered
         self.integral = self.force  # N    i

@@ -154,7 +154,7 @@ def quick_margins(loop: Response, omega: Array) -> LoopMargins:
 
 
 def loop_margins(loop: Response, omega: Array) -> LoopMargins:
-    """The same by python-control."""
+    """Returns the margins of one loop, as python-control computes them."""
     data = control.frd(loop, omega, smooth=True)
     gains, phases, _, _, crossings, _ = control.stability_margins(data, returnall=True)
     more = [g for g in gains if g > 1.0]  # the gain that may come on top

@@ -61,7 +61,7 @@ class SensorWatch(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """All sensors are believed."""
+        """Trusts all force sensors again and forgets their contradictions."""
         self.contradicted, self.left = np.zeros((2, LEGS))
 
     def busy(self) -> bool:

@@ -39,7 +39,7 @@ class Touchdown(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """No offsets."""
+        """Sets the height offsets of all feet to zero."""
         self.offset, self.late = np.zeros((2, LEGS))
 
     def busy(self) -> bool:

@@ -37,7 +37,8 @@ ONE_LEG = {
 }
 WITHOUT_TWIN = {"total_weight", "plane_acceleration", "step_at"}
 PREFIX = re.compile(
-    r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|foot_law|gait|hold|inverse_dynamics|leg_solver|landings"
+    r"^hx_((burden|compliance|compliant|contact_detector|sensor_watch|controller|foot_law|gait"
+    r"|hold|inverse_dynamics|leg_solver|landings"
     r"|posture|slip_pid|suspension|support|touchdown|command_ramp|foot_paths)_)?"
 )
 FUNCTION = re.compile(r"^(?:static )?(?:const )?\w+ \*?(\w+)\([^;]*?\) \{", re.MULTILINE)

@@ -12,12 +12,12 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from command import COMMAND, Call, assert_refused
+from dask_cluster import HELPERS
 from studies import BRIEF, FAKE, LEAKY, digest, run_quietly
 
 from hexapod_cosim.cosim.study.plan.reading import load_study
 
 HERE = Path(__file__).resolve().parent
-HELPERS = os.pathsep.join(str(HERE.parent / room) for room in ("support", "study"))
 MANY = "seeds = 3000\n"  # parts of 1024 runs
 KINEMATIC = 'controls = ["kinematic"]\n'
 GRIP = "seeds = 2\n[set]\nfriction.mu = 0.5\n"
