@@ -14,8 +14,8 @@ LAYERS = (
     ("table",),
     ("resources",),
     ("instance",),
-    ("step", "exchange", "state", "call"),
-    ("arrays",),
+    ("step", "exchange", "state"),
+    ("call", "arrays"),
     ("fmi2", "fmi3"),
 )
 LAYER_OF = {name: index for index, layer in enumerate(LAYERS) for name in layer}
