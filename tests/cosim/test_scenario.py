@@ -13,7 +13,7 @@ import pytest
 
 from hexapod_cosim.controller import Controller, Parts, make_gait
 from hexapod_cosim.cosim.common.toml_text import to_toml
-from hexapod_cosim.cosim.run.run import known_robot
+from hexapod_cosim.cosim.run.preparation import known_robot
 from hexapod_cosim.cosim.scenario.records import MAX_STEPS, Variation
 from hexapod_cosim.cosim.scenario.scenario import (
     list_scenarios,
