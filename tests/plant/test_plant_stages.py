@@ -178,6 +178,30 @@ class StuckStages(DenseStages):
         return nu, a + u, self.bristle_rate + np.einsum("lij,i->lj", grips, s_v + z * (a + u))
 
 
+def plant_rate(core: ct.CDLL, plant: Plant, command: Command) -> Array:
+    """Returns the rates of the plant's bodies at its state (247,)."""
+    result, power = np.zeros((19, 13)), np.zeros(3)
+    core.hx_probe_rate(
+        ct.c_void_p(plant.handle),
+        ct.byref(inputs(command)),
+        ct.c_double(0.0),
+        pointer(result),
+        pointer(power),
+    )
+    return result.ravel()
+
+
+def standing_loads(robot: Robot, body: Array) -> Array:
+    """Returns the normal forces on feet at rest (6,) [N]."""
+    damping = standing_damping(robot, body)
+    return np.array(
+        [
+            normal_force(robot.contact, damping[leg], foot.penetration, 0.0)
+            for leg, foot in enumerate(foot_contacts(robot, body))
+        ]
+    )
+
+
 @pytest.mark.parametrize("static", [0.0, 0.9])
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
 def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
@@ -188,12 +212,8 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
     body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
     u = np.random.default_rng(3).uniform(-0.3, 0.3, (6, 3)) * [1.0, 1.0, 0.0]
-    b, plant, there, m = (
-        u * robot.friction.presliding,
-        Plant(core, robot),
-        Plant(core, robot),
-        coefficients(core, method),
-    )
+    b, m = u * robot.friction.presliding, coefficients(core, method)
+    plant, there = Plant(core, robot), Plant(core, robot)
 
     def put(target: Plant, bodies: Array, bristles: Array) -> Array:
         target.bodies = bodies
@@ -202,37 +222,16 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
         )
 
     def rate(_: Array) -> Array:
-        result, power = np.zeros((19, 13)), np.zeros(3)
-        core.hx_probe_rate(
-            ct.c_void_p(there.handle),
-            ct.byref(inputs(command)),
-            ct.c_double(0.0),
-            pointer(result),
-            pointer(power),
-        )
-        return result.ravel()
+        return plant_rate(core, there, command)
 
     put(plant, body, b)
-    damping = standing_damping(robot, body)
-    load = [
-        normal_force(robot.contact, damping[leg], foot.penetration, 0.0)
-        for leg, foot in enumerate(foot_contacts(robot, body))
-    ]
-    G_b = (
-        -(static or 0.7)
-        * np.array(load)
-        * (3.0 - np.sum(u * u, axis=1))
-        / (2.0 * robot.friction.presliding)
-    )
+    G_b = -(static or 0.7) * standing_loads(robot, body) * (3.0 - np.sum(u * u, axis=1))
+    G_b = G_b / (2.0 * robot.friction.presliding)
     stages = StuckStages(
         robot, law_slopes(robot, command, body), rate, h * m.gamma, G_b, np.zeros((6, 3))
     )
-    k, nu, alpha, k_b = (
-        np.zeros((7, 247)),
-        np.zeros((7, 114)),
-        np.zeros((7, 114)),
-        np.zeros((7, 6, 3)),
-    )
+    k, k_b = np.zeros((7, 247)), np.zeros((7, 6, 3))
+    nu, alpha = np.zeros((2, 7, 114))
     for i in range(m.stages):
         y = (body.ravel() + h * m.a[i] @ k).reshape(19, 13)
         stages.bristle_rate = put(there, y, b + h * np.tensordot(m.a[i], k_b, 1))

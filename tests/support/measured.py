@@ -102,18 +102,16 @@ def repeated(scenario: Scenario, recording: Recording, *, begin: float) -> Repea
             if k >= first:
                 seen.get()
                 rows[1, k - first] = seen.values
+    times = FINE * np.arange(first, count, dtype=np.float64)
+    return Repeated(as_samples(times, rows), Recording(recording.names, again))
+
+
+def as_samples(times: Array, rows: Array) -> Samples:
+    """Splits rows (2, times, variables) by the quantities."""
     torque, speed, normal, across, velocity = np.split(
         rows, np.cumsum([len(each) for each in QUANTITIES.values()])[:-1], axis=2
     )
-    samples = Samples(
-        FINE * np.arange(first, count, dtype=np.float64),
-        torque,
-        speed,
-        normal,
-        across,
-        velocity.reshape(2, -1, 6, 3),
-    )
-    return Repeated(samples, Recording(recording.names, again))
+    return Samples(times, torque, speed, normal, across, velocity.reshape(2, -1, 6, 3))
 
 
 def sampled_metrics(before: Samples, walk: Walk, servo: Servo, *, mu: float) -> dict[str, float]:
