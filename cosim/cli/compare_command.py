@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import tomlkit
 import typer
 
 from hexapod_cosim.cosim.cli.accuracy_check import CheckAccuracy, check_accuracy, show_accuracy
@@ -36,7 +37,6 @@ from hexapod_cosim.cosim.cli.terminal import (
     warn,
 )
 from hexapod_cosim.cosim.common.files import RUN_FILE, write_json, write_text
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.interrupts import deferred_interrupts
 from hexapod_cosim.cosim.master.loop import COMPLETED
 from hexapod_cosim.cosim.report.accuracy import with_errors
@@ -256,7 +256,7 @@ def _table(comparison: Comparison, checked: Mapping[str, Accuracy]) -> dict[str,
 def _store(plan: Scenario, comparison: Comparison, folder: Path, command: str) -> list[Path]:
     """Writes scenario, metrics and run.json; returns these files and seeds.csv."""
     # without the control, since both were run
-    text = to_toml({key: value for key, value in plan.to_table().items() if key != "control"})
+    text = tomlkit.dumps({key: value for key, value in plan.to_table().items() if key != "control"})
     write_text(folder / SCENARIO, text)
     write_json(folder / METRICS_FILE, _table(comparison, {}))
     write_json(

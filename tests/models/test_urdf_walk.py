@@ -11,11 +11,11 @@ from pathlib import Path
 
 import fmpy
 import pytest
+import tomlkit
 from command import Call, assert_refused
 from disguised_urdf import disguised, stances
 from foreign_urdf import SIDE, athena_table, spider_table, spider_urdf
 
-from hexapod_cosim.cosim.common.toml_text import to_toml
 from hexapod_cosim.cosim.master.recorder import Recording
 from hexapod_cosim.cosim.results.recordings import read_recording
 from hexapod_cosim.cosim.results.results import RESULTS
@@ -32,7 +32,7 @@ def files(tmp_path: Path) -> Path:
     (tmp_path / "spider.urdf").write_text(spider_urdf(), encoding="utf-8")
     table = spider_table()
     table["gait"] |= {"stride": 0.07, "step_height": 0.03}
-    (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
+    (tmp_path / "ours.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
     (tmp_path / "side.toml").write_text(
         f"{SIDE}\n[gait]\nperiod = 1.0\nstride = 0.07\nstep_height = 0.03\n", encoding="utf-8"
     )
@@ -79,7 +79,7 @@ def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Pa
     offset.
     """
     table = athena_table()
-    (tmp_path / "ours.toml").write_text(to_toml(table), encoding="utf-8")
+    (tmp_path / "ours.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
     tibia, quarter = table["links"]["tibia"], 0.5 * math.pi
     tibia |= {
         "length": 0.0,
@@ -88,7 +88,7 @@ def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Pa
         "inertia": [*tibia["inertia"][2::-1], 0.0, 0.0, 0.0],
     }
     tibia |= {key: tibia[key] - quarter for key in ("angle_min", "angle_max", "stance")}
-    (tmp_path / "hanging.toml").write_text(to_toml(table), encoding="utf-8")
+    (tmp_path / "hanging.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
     ours, hanging = (
         walked(call, tmp_path / f"{name}.toml", tmp_path / name, 2.0)
         for name in ("ours", "hanging")
