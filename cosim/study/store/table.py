@@ -6,6 +6,7 @@ results.parquet only.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -70,7 +71,7 @@ class Overall:
 MAX_REASONS = 30  # that are shown
 MAX_KINDS = 1000  # of failures that are counted apart, which bounds the memory
 OTHER = "other reasons"
-DIGITS = str.maketrans("0123456789", "#" * 10)
+NUMBER = re.compile(r"[0-9#]+(?:\.[0-9#]+)?")
 
 
 def point_at(block: Block, place: int, study: Study) -> Point:
@@ -202,11 +203,4 @@ def _reason(row: Row) -> str:
     So reasons that differ in numbers only are counted together.
     """
     text = str(row["reason"] or row["warnings"].partition(" | ")[0] or "the robot fell")
-    return _without_numbers(text)
-
-
-def _without_numbers(text: str) -> str:
-    words = text.translate(DIGITS)
-    while "##" in words:
-        words = words.replace("##", "#")
-    return words.replace("#.#", "#")
+    return NUMBER.sub("#", text)
