@@ -98,6 +98,13 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def without_none(content: Any) -> Any:
+    """Returns nested values without None, which JSON has for infinities and TOML lacks."""
+    if isinstance(content, Mapping):
+        return {key: without_none(value) for key, value in content.items() if value is not None}
+    return [without_none(value) for value in content] if isinstance(content, list) else content
+
+
 def not_writable(path: Path, error: OSError) -> HexapodError:
     """Returns the error for a path that cannot be written."""
     fix = "choose another place with -o"

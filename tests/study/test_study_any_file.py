@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
@@ -191,7 +192,7 @@ def test_a_file_changed_at_random_is_a_study_or_refused_with_a_reason(seed: int)
             continue
         schema_of(study)
         source = json.loads(to_json(study.source))  # as a folder keeps it
-        assert tomlkit.dumps(source)
+        assert tomllib.loads(tomlkit.dumps(source)) == source
         again = study_from_table(
             source,
             where="manifest.json",
