@@ -19,7 +19,7 @@ from hexapod_cosim.models.dynamics import Command
 
 
 def refused(plant: Plant, call: Callable[[], Any], status: int, pattern: str) -> None:
-    """Asserts that the call fails with this status and message and changes nothing."""
+    """Asserts that a call fails with this status and message and leaves the plant unchanged."""
     before = plant.save()
     with pytest.raises(PlantError, match=pattern) as caught:
         call()
@@ -248,8 +248,8 @@ def test_every_status_has_a_name(core: ct.CDLL) -> None:
 
 @pytest.mark.parametrize("settings", [{}, {"step": 1e-7}])
 def test_no_call_runs_on_for_ever(core: ct.CDLL, settings: dict[str, float]) -> None:
-    """An extreme push with error control, and a far too small step, fail within a bounded number of
-    evaluations.
+    """A call with error control under an extreme push, and a call with a far too small step, fail
+    within a bounded number of evaluations.
     """
     plant = Plant(core, changed(load_robot("athena"), solver=settings))
     before = plant.save()
