@@ -507,7 +507,7 @@ def test_a_saved_state_that_is_damaged_is_refused(controller_core: ct.CDLL) -> N
     damaged[len(saved) // 2] ^= 1
     for bad, reason in (
         (bytes(damaged), "damaged"),
-        (saved[:-8], "size"),
+        (saved[:-8], "bytes, expected"),
         (b"x" * len(saved), "version"),
     ):
         with pytest.raises(NativeError, match=reason):

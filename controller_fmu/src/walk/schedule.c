@@ -49,7 +49,7 @@ hxStatus hx_controller_reset(hxController *controller, const hxControllerDefinit
   char message[HX_MESSAGE_SIZE];
   if (!isfinite(t))
     return refuse(controller, HX_INVALID_ARGUMENT,
-                  "start time: got a number that is not finite, expected seconds");
+                  "start time: got a number that is not finite, expected a finite time in s");
   const hxStatus status = hx_controller_definition_check(definition, message);
   if (status != HX_OK) return refuse(controller, status, message);
   hx_controller_compile(definition, &controller->model);
@@ -153,16 +153,21 @@ void hx_controller_get_state(const hxController *controller, void *bytes) {
 
 hxStatus hx_controller_set_state(hxController *controller, const void *bytes, size_t size) {
   hxSaved saved;
-  if (size != sizeof saved)
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: its size is not that of this version's states; save it again");
+  if (size != sizeof saved) {
+    snprintf(controller->message, HX_MESSAGE_SIZE,
+             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
+             sizeof saved);
+    return HX_BAD_STATE;
+  }
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: not one of this version; save it again with this version");
+    return refuse(
+        controller, HX_BAD_STATE,
+        "saved state: got one of another version, expected one of this version; save it again");
   if (saved.checksum != checksum(&saved))
-    return refuse(controller, HX_BAD_STATE,
-                  "saved state: damaged, its checksum does not match; save it again");
+    return refuse(
+        controller, HX_BAD_STATE,
+        "saved state: got a damaged one, expected one whose checksum is right; save it again");
   memcpy(&controller->model, &saved.model, sizeof saved.model);
   memcpy(&controller->state, &saved.state, sizeof saved.state);
   controller->ahead.known = 0;
