@@ -380,7 +380,7 @@ def test_inputs_that_change_at_a_rate_are_taken_as_they_are_at_each_tick(
     assert ramped.save() == stepped_input.save()
 
 
-def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
+def test_reading_outputs_changes_nothing(controller_core: ct.CDLL) -> None:
     native = NativeController(controller_core, setup_of())
     stepped(native, 0, 50)
     saved = native.save()
@@ -393,7 +393,9 @@ def test_looking_changes_nothing(controller_core: ct.CDLL) -> None:
 
 
 @pytest.mark.parametrize("between", ["nothing", "another input", "a restored state", "a reset"])
-def test_a_step_after_a_look_is_the_step_without(controller_core: ct.CDLL, between: str) -> None:
+def test_reading_outputs_does_not_change_the_next_step(
+    controller_core: ct.CDLL, between: str
+) -> None:
     """output() stores its tick for the step that follows, to be used only with the same state and
     the same input.
     """

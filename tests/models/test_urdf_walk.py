@@ -74,7 +74,7 @@ def test_a_urdf_robot_of_any_size_is_given_a_gait_of_one_froude_number(tmp_path:
     assert gait.step_height == pytest.approx(0.5 * gait.stride)
 
 
-def test_where_a_joint_counts_from_is_a_matter_of_words(call: Call, tmp_path: Path) -> None:
+def test_the_zero_of_a_joint_angle_does_not_change_the_walk(call: Call, tmp_path: Path) -> None:
     """At angle 0 the tibias hang straight down, as most URDFs draw them: the length is 0 and the
     offset contains all.
     """

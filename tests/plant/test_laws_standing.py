@@ -238,7 +238,9 @@ def marched(
 
 @pytest.mark.parametrize("mode", ["position", "kinematic"])
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str, law: str) -> None:
+def test_walking_keeps_the_energy_balance_and_the_joints(
+    core: ct.CDLL, mode: str, law: str
+) -> None:
     robot = changed(load_robot("athena"), servo={"mode": mode}, friction={"law": law})
     seen = marched(core, robot)
     last, turnover = seen[-1].energy, max(output.energy.dissipated for output in seen)
@@ -252,7 +254,7 @@ def test_walking_keeps_the_energy_books_and_the_joints(core: ct.CDLL, mode: str,
 
 
 @pytest.mark.parametrize("law", ["tanh", "bristle"])
-def test_the_books_close_with_the_tolerance(core: ct.CDLL, law: str) -> None:
+def test_the_energy_balance_closes_with_the_tolerance(core: ct.CDLL, law: str) -> None:
     """Steps of a method of order 3 become 10 times shorter for a thousandth of the tolerance. Works
     are of order 2 in the step (eq. 27), so their error becomes 100 times smaller.
     """

@@ -19,7 +19,7 @@ from hexapod_cosim.models.dynamics import Command
 from hexapod_cosim.models.statics import settled
 
 H = 5e-3  # s
-BOOKS = 1e-4  # of the motors' work: the energy residual after a minute
+BALANCE = 1e-4  # of the motors' work: the energy residual after a minute
 DRIFT = 1e-6  # m and 1, sum over all joints after ten minutes
 PROJECTED = 1e-13  # the same with projection after every step: rounding
 RENUMBERED = 1e-9  # m and rad: rounding after a second of walking
@@ -48,11 +48,11 @@ def walk(core: ct.CDLL, robot: Robot, duration: float) -> Plant:
 
 
 @pytest.mark.parametrize("robot", ["athena", "phantomx_mk4"])
-def test_the_energy_books_of_a_minute_balance(core: ct.CDLL, robot: str) -> None:
+def test_the_energy_balance_of_a_minute_closes(core: ct.CDLL, robot: str) -> None:
     """The PhantomX's servos work at their limits."""
     energy = walk(core, load_robot(robot), 60.0).output().energy
     assert energy.actuator_work > 10.0
-    assert abs(energy.residual) < BOOKS * energy.actuator_work
+    assert abs(energy.residual) < BALANCE * energy.actuator_work
 
 
 def test_ten_minutes_of_walking_leave_the_joints_together(core: ct.CDLL) -> None:
@@ -80,13 +80,13 @@ def test_steep_friction_and_hard_feet_cost_at_most_twice_the_steps(core: ct.CDLL
         )
 
 
-def test_the_books_of_feet_that_stick_balance(core: ct.CDLL) -> None:
+def test_the_energy_balance_of_feet_that_stick_closes(core: ct.CDLL) -> None:
     """The residual is a tenth of the usual one at a tenth of the usual tolerance, because works are
     of order 2 in the step (eq. 27).
     """
     robot = changed(load_robot("athena"), friction={"law": "bristle"}, solver={"tolerance": 1e-5})
     energy = walk(core, robot, 5.0).output().energy
-    assert abs(energy.residual) < 0.1 * BOOKS * energy.actuator_work
+    assert abs(energy.residual) < 0.1 * BALANCE * energy.actuator_work
 
 
 @pytest.mark.parametrize("name", ["athena", "phantomx_mk4"])

@@ -73,7 +73,7 @@ def test_another_input_after_a_stop_is_a_call_of_its_own(core: ct.CDLL) -> None:
     assert (early > late).all()
 
 
-def test_without_a_stop_events_are_told_all_the_same(core: ct.CDLL) -> None:
+def test_events_are_reported_without_a_stop_too(core: ct.CDLL) -> None:
     command, plain, told = command_of(ATHENA), dropped(core, ATHENA), dropped(core, ATHENA)
     plain.step(END, command)
     assert told.step_to_event(END, command, stop=False)

@@ -219,7 +219,7 @@ def samples(
     return pieces, ends
 
 
-def test_the_parts_add_up_to_the_books(core: ct.CDLL, robot: Robot) -> None:
+def test_the_parts_add_up_to_the_energy_balance(core: ct.CDLL, robot: Robot) -> None:
     for output in samples(core, robot, 5e-3)[1][::10]:
         works = float(np.sum(output.positive_work) - np.sum(output.negative_work))
         losses = output.energy.contact_loss + output.energy.friction_loss + output.energy.gear_loss
@@ -264,7 +264,7 @@ def test_what_is_measured_is_what_fine_samples_add_up_to(core: ct.CDLL, robot: R
     assert max(output.foot.peak_force_rate.max() for output in coarse) > 0.9 * float(rise.max())
 
 
-def test_the_way_of_looking_changes_no_integral_and_loses_no_peak(
+def test_the_interval_of_reading_changes_no_integral_and_loses_no_peak(
     core: ct.CDLL, robot: Robot
 ) -> None:
     often = [after for _, after in samples(core, robot, 1e-3)[0]]
@@ -329,7 +329,7 @@ def test_measures_come_back_with_a_saved_state(core: ct.CDLL, robot: Robot) -> N
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("rosw3", 1e-4), ("ros2", 0.1)])
-def test_the_books_close_where_motors_are_on_their_torque_speed_line(
+def test_the_energy_balance_closes_where_motors_are_on_their_torque_speed_line(
     core: ct.CDLL, name: str, tolerance: float
 ) -> None:
     """The legs swing so fast that the torque-speed line limits the motors.

@@ -48,7 +48,9 @@ def test_a_state_of_another_size_is_refused(core: ct.CDLL, size: int) -> None:
     plant = midway(core)
     saved = plant.save() + bytes(16)
     cut = size if size in (0, 8) and size != +8 else len(saved) - 16 + size
-    refused(plant, lambda: plant.restore(saved[:cut]), BAD_STATE, "saved state: got .* bytes, expected")
+    refused(
+        plant, lambda: plant.restore(saved[:cut]), BAD_STATE, "saved state: got .* bytes, expected"
+    )
 
 
 BAD_NUMBERS = (math.nan, math.inf, -math.inf)

@@ -47,7 +47,7 @@ def test_restoring_at_any_point_gives_the_same_bits_in_another_instance(
     assert len(touching) > 1  # in the air as well as in contact
 
 
-def test_looking_at_outputs_accelerations_or_bytes_changes_nothing(core: ct.CDLL) -> None:
+def test_reading_outputs_accelerations_or_bytes_changes_nothing(core: ct.CDLL) -> None:
     robot = load_robot("phantomx_mk4")
     plant = Plant(core, robot, **landing(robot))
     for saved in trail(Plant(core, robot, **landing(robot)), 8):
@@ -82,7 +82,7 @@ def test_a_reset_goes_back_to_the_exact_start(core: ct.CDLL, law: str) -> None:
     assert trail(plant, 6) == first
 
 
-def test_setting_the_bodies_starts_the_books_anew_at_the_same_time(core: ct.CDLL) -> None:
+def test_setting_the_bodies_restarts_the_energy_balance_at_the_same_time(core: ct.CDLL) -> None:
     robot = load_robot("athena")
     plant = Plant(core, robot, **landing(robot))
     trail(plant, 8)
