@@ -50,7 +50,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   double body[HX_BODIES][HX_BODY_STATE];
   if (!isfinite(t))
     return fail(plant, HX_INVALID_ARGUMENT,
-                "start time: got a number that is not finite, expected seconds");
+                "start time: got a number that is not finite, expected a finite time in s");
   const hxStatus status = hx_definition_check(definition, message);
   if (status != HX_OK) return fail(plant, status, message);
   memset(&plant->model, 0, sizeof plant->model);
@@ -94,8 +94,9 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   int finite;
   const hxCommand *ramp = ramp_from_rate(rate, &change, &finite);
   if (!finite)
-    return fail(plant, HX_INVALID_ARGUMENT,
-                "rates of inputs: got a number that is not finite, expected units per second");
+    return fail(
+        plant, HX_INVALID_ARGUMENT,
+        "rates of inputs: got a number that is not finite, expected finite rates per second");
   if (!(t_end >= plant->state.time && t_end <= DBL_MAX)) {
     snprintf(plant->message, HX_MESSAGE_SIZE,
              "end of step: got %.17g s, expected a finite time of at least %.17g s", t_end,
@@ -158,16 +159,21 @@ void hx_plant_get_state(const hxPlant *plant, void *bytes) {
 
 hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   hxSavedPlant saved;
-  if (size != sizeof saved)
-    return fail(plant, HX_BAD_STATE,
-                "saved state: its size is not that of this version's states; save it again");
+  if (size != sizeof saved) {
+    snprintf(plant->message, HX_MESSAGE_SIZE,
+             "saved state: got %zu bytes, expected %zu; save it again with this version", size,
+             sizeof saved);
+    return HX_BAD_STATE;
+  }
   memcpy(&saved, bytes, sizeof saved);
   if (saved.magic != magic || saved.version != saved_version || saved.size != sizeof saved)
-    return fail(plant, HX_BAD_STATE,
-                "saved state: not one of this version; save it again with this version");
+    return fail(
+        plant, HX_BAD_STATE,
+        "saved state: got one of another version, expected one of this version; save it again");
   if (saved.checksum != checksum(&saved))
-    return fail(plant, HX_BAD_STATE,
-                "saved state: damaged, its checksum does not match; save it again");
+    return fail(
+        plant, HX_BAD_STATE,
+        "saved state: got a damaged one, expected one whose checksum is right; save it again");
   plant->model = saved.model;
   plant->state = saved.state;
   return HX_OK;
@@ -260,7 +266,7 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
       largest(largest(0.0, d_input, sizeof *d_input / sizeof(double)), dx, HX_COORDINATES);
   if (!isfinite(scale))
     return fail(plant, HX_INVALID_ARGUMENT,
-                "derivatives: got a direction that is not finite, expected numbers");
+                "derivatives: got a direction that is not finite, expected finite numbers");
   hx_command_from_input(&point.command, input, plant->state.time);
   hx_command_from_input(&point.d_command, d_input ? d_input : &no_input, 0.0);
   hx_plant_get_coordinates(plant, &point.x);
@@ -273,7 +279,8 @@ hxStatus hx_plant_tangent(hxPlant *plant, const hxInput *input, const hxInput *d
   return HX_OK;
 #else
   return fail(plant, HX_INVALID_ARGUMENT,
-              "derivatives: this binary's compiler has no complex numbers; use another");
+              "derivatives: got a call in a binary without complex numbers, expected another "
+              "compiler's binary; build the plant with gcc or clang");
 #endif
 }
 
@@ -291,7 +298,8 @@ hxStatus hx_plant_set_bodies(hxPlant *plant, const double body[HX_BODIES][HX_BOD
   for (int b = 0; b < HX_BODIES; ++b)
     for (int i = 0; i < HX_BODY_STATE; ++i)
       if (!isfinite(body[b][i]))
-        return fail(plant, HX_INVALID_ARGUMENT, "body state: got a number that is not finite");
+        return fail(plant, HX_INVALID_ARGUMENT,
+                    "body state: got a number that is not finite, expected finite numbers");
   hx_motion_from_bodies(&plant->model, body, &plant->state.motion);
   hx_kernel()->start(&plant->model, plant->state.time, &plant->state);
   return HX_OK;

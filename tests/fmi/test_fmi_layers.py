@@ -1,4 +1,6 @@
-"""The C files of the FMI layer call each other in one direction only: see fmi/instance.h."""
+"""Tests that the C files of the FMI layer call each other in one direction only; fmi/instance.h
+describes the layers.
+"""
 
 from __future__ import annotations
 

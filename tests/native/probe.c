@@ -1,7 +1,7 @@
-/* probe.c - the plant's internal functions for the tests, one leg (one lane) at a time.
+/* probe.c - exports the plant's internal functions for the tests, one leg (one lane) at a time.
  *
- * Compiled into the shared library with HX_PROBE only. Vectors and matrices cross as rows of
- * doubles.
+ * It is compiled into the shared library with HX_PROBE only. Vectors and matrices are passed as
+ * rows of doubles.
  */
 #include <stddef.h>
 #include <string.h>
@@ -231,8 +231,9 @@ static void put_column(hxForce6 f, int j, double out[6][6]) {
   for (int i = 0; i < 6; ++i) out[i][j] = column[i];
 }
 
-/* as 6 x 6, angular part first, from the origin: a body with mass and J at c; that less s U U^T, by
- * both ways; a block A at c and the body less s U U^T; the inverse of the last, column by column */
+/* Computes four 6 x 6 inertias about the origin, angular part first: of a body with mass and J at
+ * c; of the body less s U U^T, by two functions; of these plus a block A at c; and the inverse of
+ * the last, column by column. */
 HX_API void hx_probe_inertia(double mass, const double J[3][3], const double A[3][3],
                              const double c[3], double s, const double U[6], double out[4][6][6]) {
   const hxRigid6 body = hx_rigid_inertia(hx_splat(mass), take_sym3(J), hx_splat_vec3(c));
@@ -259,7 +260,7 @@ HX_API double hx_probe_contact_damping(const hxPlant *plant, double impact_speed
   return hx_contact(plant->model.contact_law)->damping(&plant->model, impact_speed);
 }
 
-/* out: force, elastic part, stiffness, viscosity */
+/* Computes the normal force. out: force, elastic part, stiffness, viscosity. */
 HX_API void hx_probe_normal_force(const hxPlant *plant, double closed, double damping, double delta,
                                   double ddelta, double out[4]) {
   const hxNormalForce f = hx_normal_force(&plant->model, hx_splat(closed), hx_splat(damping),
@@ -272,7 +273,7 @@ HX_API double hx_probe_friction(const hxPlant *plant, double speed) {
   return hx_lane(hx_friction(&plant->model, hx_splat(speed)), 0);
 }
 
-/* command: angle, speed, torque; out: torque, friction, stiffness, damping */
+/* Computes a servo. command: angle, speed, torque; out: torque, friction, stiffness, damping. */
 HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
                            const double command[3], double out[4]) {
   const hxServo servo =
@@ -282,14 +283,14 @@ HX_API void hx_probe_servo(const hxPlant *plant, double angle, double speed,
   out[2] = hx_lane(servo.stiffness, 0), out[3] = hx_lane(servo.damping + servo.drag, 0);
 }
 
-/* out: distance, normal */
+/* Computes the ground at a point. out: distance, normal. */
 HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double out[4]) {
   const hxGround ground = hx_ground(&plant->model, hx_splat_vec3(point));
   out[0] = hx_lane(ground.distance, 0);
   put3(ground.normal, 0, out + 1);
 }
 
-/* the plant's contacts after a switch; state: closed, damping, impact speed */
+/* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
 HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
                                    const double ddelta[HX_LEGS], double state[3][HX_LEGS]) {
   double slots[2][HX_SLOTS] = {{0}};
@@ -313,7 +314,8 @@ static void evaluate(hxPlant *plant, const hxInput *input, double age, hxImplici
                        &plant->state.motion, implicit, 1, work, rate);
 }
 
-/* out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz */
+/* Computes a joint. out: Phi 5, dPhi 5, s, s_i^P, s_j^P, angle, speed, inertia xx yy zz xy xz yz.
+ */
 HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int joint,
                            double out[27]) {
   hxWork work;
@@ -333,8 +335,8 @@ HX_API void hx_probe_joint(hxPlant *plant, const hxInput *input, int leg, int jo
   for (int i = 0; i < 6; ++i) out[21 + i] = hx_lane(J[i], lane);
 }
 
-/* out: point, velocity, normal, penetration, approach speed, force on the foot, its slopes
- * stiffness, viscosity, drag as a step of length `ahead` takes them */
+/* Computes a foot. out: point, velocity, normal, penetration, approach speed, force on the foot,
+ * and the force's derivatives (stiffness, viscosity, drag) for a step of length `ahead`. */
 HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double ahead,
                           double out[17]) {
   hxWork work;
@@ -353,8 +355,8 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   out[16] = hx_lane(implicit.slope[pack].drag, lane);
 }
 
-/* dy/dt under a command given `age` seconds ago: bodies, and the powers of motors, push and
- * everything that dissipates */
+/* Computes dy/dt under a command that is `age` seconds old: of the bodies, and the powers of
+ * motors, push and dissipation. */
 HX_API void hx_probe_rate(hxPlant *plant, const hxInput *input, double age,
                           double body[HX_BODIES][HX_BODY_STATE], double power[3]) {
   hxWork work;
@@ -372,7 +374,7 @@ static void fill_bristles(const double z[HX_LEGS][3], hxPlantMotion *motion) {
   }
 }
 
-/* Sets the bristles; rate: their db/dt. */
+/* Sets the bristles and computes their rates db/dt. */
 HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double z[HX_LEGS][3],
                               double rate[HX_LEGS][3]) {
   hxWork work;
@@ -383,7 +385,7 @@ HX_API void hx_probe_bristles(hxPlant *plant, const hxInput *input, const double
     for (int i = 0; i < 3; ++i) rate[leg][i] = all.motion.bristle[i][leg];
 }
 
-/* a change from (v, w) of s_x and of s_v: rows of the bodies */
+/* Writes the changes s_x and s_v, rows of the bodies (linear, angular), into a rate. */
 static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6],
                        hxRate *change) {
   memset(change, 0, sizeof *change);
@@ -400,9 +402,9 @@ static void put_change(const double s_x[HX_BODIES][6], const double s_v[HX_BODIE
   }
 }
 
-/* k/h of a stage (eq. 19) with h gamma = z after changes s_x, s_v (linear, angular rows): the
- * bodies' rates and the angular velocities theirs stand for. The slopes are this point's, `ahead`
- * of it. */
+/* Computes k/h of a stage (eq. 19) with h gamma = z after the changes s_x and s_v (rows linear,
+ * angular): the rates of the bodies, and the angular velocities of their quaternions' rates. The
+ * derivatives of the forces are those at this state for a step of length `ahead`. */
 HX_API void hx_probe_stage(hxPlant *plant, const hxInput *input, double z, double ahead,
                            const double s_x[HX_BODIES][6], const double s_v[HX_BODIES][6],
                            double body[HX_BODIES][HX_BODY_STATE], double turn[HX_BODIES][3]) {
@@ -427,7 +429,8 @@ HX_API void hx_probe_stain_stack(int byte) {
   for (size_t i = 0; i < sizeof stain; ++i) stain[i] = (char)byte;
 }
 
-/* dy/dt by the i-th kernel; its name, or NULL when there is none or it does not run here */
+/* Computes dy/dt with the i-th kernel. Returns its name, or NULL when there is none or the
+ * processor does not support it. */
 HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
                                    double body[HX_BODIES][HX_BODY_STATE]) {
   hxCommand command;
@@ -441,7 +444,7 @@ HX_API const char *hx_probe_kernel(int i, hxPlant *plant, const hxInput *input,
   return hx_kernels[i]->name;
 }
 
-/* shape: stages, order, error order; the rest as in hxMethodRow */
+/* Copies a row of the methods. shape: stages, order, error order; others as in hxMethodRow. */
 HX_API void hx_probe_method(int method, int shape[3], double *gamma, double a[HX_STAGES][HX_STAGES],
                             double g[HX_STAGES][HX_STAGES], double c[HX_STAGES],
                             double b[HX_STAGES], double e[HX_STAGES]) {

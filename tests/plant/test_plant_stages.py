@@ -1,5 +1,5 @@
-"""A step of the integrator, stage by stage, against the textbook's formula: the dense system of
-eq. 19 and 20, bristles of eq. 21.
+"""Tests a step of the integrator, stage by stage, against the dense systems of eq. 19 and 20, and
+for bristles of eq. 21.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hexapod_cosim.models.records import Array
 
 @dataclass(frozen=True)
 class Tableau:
-    """A row of the plant's methods."""
+    """A row of the plant's table of methods."""
 
     stages: int
     gamma: float
@@ -44,7 +44,7 @@ def coefficients(core: ct.CDLL, method: str) -> Tableau:
 
 
 def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Array]:
-    """dy/dt of bodies (247,), by the plant put there."""
+    """Returns dy/dt of the bodies (247,), which the plant computes from them."""
 
     def rate(y: Array) -> Array:
         plant.bodies = y.reshape(19, 13)
@@ -63,8 +63,9 @@ def rates(core: ct.CDLL, plant: Plant, command: Command) -> Callable[[Array], Ar
 
 @dataclass
 class DenseStages:
-    """The stages of eq. 19 one after the other, solved as the dense system: nu (114,) that
-    positions advance with, and alpha.
+    """Computes the stages of eq. 19 one after the other as dense systems.
+
+    Each yields nu (114,), with which positions advance, and the accelerations alpha.
     """
 
     robot: Robot
@@ -73,8 +74,8 @@ class DenseStages:
     z: float
 
     def solve(self, body: Array, s_x: Array, s_v: Array) -> tuple[Array, Array]:
-        """W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0; alpha = a +
-        u, nu = v + s_v + z alpha.
+        """Solves W u + D^T mu = G_v (s_v + z a) + G_x (s_x + z (v + s_v) + z^2 a), D u = 0 and
+        returns alpha = a + u and nu = v + s_v + z alpha.
         """
         z, v, a = (
             self.z,
@@ -92,7 +93,7 @@ class DenseStages:
 
 
 def body_rates(body: Array, nu: Array, alpha: Array) -> Array:
-    """(247,) dy/dt of positions that advance with nu."""
+    """Returns dy/dt (247,) of bodies whose positions advance with nu."""
     w = nu.reshape(19, 6)
     turns = np.array(
         [quaternion_rate(p, turn) for p, turn in zip(body[:, 3:7], w[:, 3:6], strict=True)]
@@ -102,12 +103,12 @@ def body_rates(body: Array, nu: Array, alpha: Array) -> Array:
 
 @pytest.mark.parametrize("method", ["rosw3", "ros2"])
 def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str) -> None:
-    """Contact and servo keep the first stage's slopes, masses and joints are each stage's own; h
-    is many of friction's times.
+    """The slopes of contacts and servos are those of the first stage, masses and joints are those
+    of each stage. The step h is many time constants of friction.
     """
     h, robot = 2e-3, changed(load_robot("athena"), solver={"method": method, "step": 2e-3})
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
-    body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
+    body[:, 2] += 1.5e-4 - 4e-4  # all feet are in the ground
     plant, there = Plant(core, robot), Plant(core, robot)
     plant.bodies = body
 
@@ -137,15 +138,18 @@ def test_an_implicit_step_is_that_of_the_dense_stages(core: ct.CDLL, method: str
 
 @dataclass
 class StuckStages(DenseStages):
-    """The same on bristles that do not let go, for which eq. 21 has beta = 0. rate leaves their
-    own in bristle_rate.
+    """Computes the same stages with bristles below the spring limit, for which eq. 21 has beta = 0.
+
+    `rate` stores the rates of the bristles in `bristle_rate`.
     """
 
     G_b: Array  # (6,) N/m
     bristle_rate: Array  # (6, 3) m/s
 
     def grips(self, body: Array) -> Array:
-        """(6, 114, 3) what a force along flat ground on each foot does to the bodies."""
+        """Returns (6, 114, 3): the generalised forces on the bodies by a unit force along flat
+        ground on each foot.
+        """
         G = np.zeros((6, 114, 3))
         for leg, foot in enumerate(foot_contacts(self.robot, body)):
             tibia = 3 * (leg + 1)
@@ -157,8 +161,8 @@ class StuckStages(DenseStages):
     def solve_stuck(
         self, body: Array, s_x: Array, s_v: Array, s_b: Array
     ) -> tuple[Array, Array, Array]:
-        """W has z^2 G_b at each foot more, the right side G_b (s_b + z (db/dt + s_v + z a)): nu,
-        alpha and k_b/h.
+        """Adds z^2 G_b at each foot to W, and G_b (s_b + z (db/dt + s_v + z a)) to the right side;
+        returns nu, alpha and k_b/h.
         """
         z, grips = self.z, self.grips(body)
         a = self.rate(body.ravel()).reshape(19, 13)[:, 7:13].ravel()
@@ -210,7 +214,7 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
     h, friction = 2e-3, {"law": "bristle", "mu_static": static}
     robot = changed(load_robot("athena"), solver={"method": method, "step": h}, friction=friction)
     body, command = resting(robot, 1), Command(angle_ref=robot.stance)
-    body[:, 2] += 1.5e-4 - 4e-4  # all feet in the ground
+    body[:, 2] += 1.5e-4 - 4e-4  # all feet are in the ground
     u = np.random.default_rng(3).uniform(-0.3, 0.3, (6, 3)) * [1.0, 1.0, 0.0]
     b, m = u * robot.friction.presliding, coefficients(core, method)
     plant, there = Plant(core, robot), Plant(core, robot)
@@ -262,8 +266,8 @@ def test_an_implicit_step_on_bristles_is_that_of_the_dense_stages(
 def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
     core: ct.CDLL, size: float, deciding: range, margin: float
 ) -> None:
-    """Scales 0.1 m, 1 (quaternion), 1 m/s, 10 rad/s; the smaller a robot, the more its turning
-    counts. The first step tried is 1e-4 s.
+    """The error scales are 0.1 m, 1 (quaternion), 1 m/s and 10 rad/s; the smaller a robot, the more
+    its rotation counts. The first step that is tried has 1e-4 s.
     """
     h, robot = 1e-4, scaled(PROBLEMS["tumbling"].robot, size)
     start = PROBLEMS["tumbling"].start | {
@@ -293,8 +297,8 @@ def test_a_step_is_rejected_when_its_largest_scaled_error_exceeds_the_tolerance(
 
 @pytest.mark.parametrize("margin", [0.99, 1.01])
 def test_bristles_count_by_their_error_over_ten_preslidings(core: ct.CDLL, margin: float) -> None:
-    """Feet set sliding on slack bristles, short and weak ones: what is first to go wrong. The
-    first step tried is 1e-4 s.
+    """The feet slide on slack bristles that are short and weak, so their error is the largest. The
+    first step that is tried has 1e-4 s.
     """
     h, m, still = 1e-4, coefficients(core, "bs32"), Command(angle_ref=load_robot("athena").stance)
     robot = changed(

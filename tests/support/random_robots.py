@@ -66,7 +66,7 @@ COUNT = 30
 GRAVITY = 9.81  # m/s2
 PERIOD = 0.005  # s    of the controller
 CYCLES = 8.0  # 1    of a walk, the ramp to its speed included
-TRIPODS = ((0, 2, 4), (1, 3, 5))  # LF LR RM and LM RF RR
+TRIPODS = ((0, 2, 4), (1, 3, 5))  # the two tripods LF LR RM and LM RF RR
 MARGIN = 0.25  # 1    of the hips' height, from the centre of mass to a tripod's edge
 
 

@@ -9,8 +9,7 @@
 
 #include "work.h"
 
-/* ---- root to leaf: where everything is and what it feels there
- * ------------------------------------------------------------ */
+/* ---- root to leaf: kinematics and forces ---- */
 
 /* Sums along a leg, up to the present link. */
 typedef struct {

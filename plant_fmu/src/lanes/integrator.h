@@ -250,7 +250,7 @@ static double expected_touch(const hxStart *start, double t_low, const hxFeet *l
 }
 
 /* Shortens a step that ends below the ground to one that ends on it: each guess is a step of its
- * own; every third halves what is left, should the cubics crawl. */
+ * own; every third halves what is left, in case the cubics converge slowly. */
 static double find_touchdown(const hxStart *start, double h, hxState *state, hxTrial *trial,
                              hxFeet *feet) {
   double low = 0.0, high = h;
@@ -296,8 +296,7 @@ static double step_factor(const hxMethodRow *method, double error) {
   return 0.9 * inverse_root(error, n);
 }
 
-/* Steps that a call over a time may take: no call runs on for ever. */
-/* Returns the limit of the steps of a call over a time, s. */
+/* Returns the largest number of steps in a call over a time, s, so that every call ends. */
 static double steps_allowed(double time) {
   return fmin(step_limits[0] + step_limits[1] * time, step_limits[2]);
 }
@@ -307,11 +306,10 @@ static hxStatus step_failure(const hxTrial *trial, double t, double h, char *mes
   const int lost = isnan(trial->error);
   snprintf(message, HX_MESSAGE_SIZE,
            lost ? "the motion is not finite any more at t = %.9g s (step %.3g s); check masses, "
-                  "stiffness and inputs, or let the error "
-                  "control choose the step (solver.step = 0)"
-                : "the error control gives up at t = %.9g s (step %.3g s), where it finds no step "
-                  "that takes the motion on in reasonable "
-                  "time; check the inputs for extreme values, raise solver.tolerance or use a "
+                  "stiffness and inputs, or let the error control choose the step (solver.step = 0)"
+                : "the error control finds no step that meets the tolerance, or needs too many "
+                  "steps, at t = %.9g s (step %.3g s); check the inputs for extreme values, raise "
+                  "solver.tolerance or use a "
                   "linearly implicit solver.method",
            t, h);
   return lost ? HX_NOT_FINITE : HX_STEP_TOO_SMALL;
@@ -327,7 +325,7 @@ static int all_finite(const hxPlantMotion *y) {
   return total == 0.0;
 }
 
-/* ---- what a step did ---- */
+/* ---- measures of a step ---- */
 
 /* Returns the work of the push: its impulses times the mean of the torso's velocities at both ends
  * (eq. 27). */

@@ -114,7 +114,7 @@ static inline hxReal hx_abs(hxReal x) { return hx_from_bits(hx_bits(x) & INT64_M
  * (2^k - 1) */
 static inline hxReal hx_expm1(hxReal x) {
   const double round =
-      6755399441055744.0; /* 1.5 * 2^52: adding and taking it away rounds to an integer */
+      6755399441055744.0; /* 1.5 * 2^52: adding and subtracting it rounds to an integer */
   const double ln2_high = 6.93147180369123816490e-01,
                ln2_low = 1.90821492927058770002e-10; /* ln 2 in two pieces */
   const hxReal shifted = x * 1.4426950408889634 + round;
