@@ -1,4 +1,7 @@
-"""How the robot walks: joint commands from a body velocity and from foot forces."""
+"""Controls the robot: computes joint commands from a body velocity and from foot forces.
+
+Imports `models`.
+"""
 
 from hexapod_cosim.controller.controller import (
     Controller,

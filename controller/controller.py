@@ -1,4 +1,4 @@
-"""From body command and measurement to joint commands, once a period. C: controller.c.
+"""Computes joint commands from body command and measurement, once per period. C: controller.c.
 
     command -> ramp -> foot paths -> rolling -> posture -> inverse kinematics ---------> angle_ref
                           ^                                      |                           ^
@@ -6,10 +6,10 @@
                           ^--- measured angles, attitude        measured forces --^          v
                                                                                         torque_ref
 
-Kinematic control is the first line alone: the commands, without any measurement. Speeds, forces and
-accelerations are differences of successive steps. So every period the step after the present one is
-planned, and three steps are kept: before, now and after. Where a leg lifts off or touches down, a
-new section of the walk begins and the differences begin with it.
+Kinematic control is the first line alone: it uses no measurement. Speeds, forces and accelerations
+are differences of successive steps. So every period the step after the present one is planned, and
+three steps are kept: before, now and after. When a leg lifts off or touches down, a new section of
+the walk begins; no difference reaches across the boundary of two sections.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ CLOCK_TOLERANCE = 0.01  # 1    of a period, between the time given and the steps
 
 
 class ControllerError(HexapodError):
-    """A controller that cannot be built, or is called out of step."""
+    """The controller cannot be built, or was called at a wrong time."""
 
 
 def _zeros() -> Array:
@@ -60,7 +60,7 @@ def _upright() -> Array:
 
 @dataclass
 class Measurement:
-    """What the robot senses. The arrays belong to the caller, who updates them in place."""
+    """Sensor values of the robot. The arrays belong to the caller, who updates them in place."""
 
     angle: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
@@ -73,7 +73,7 @@ class Measurement:
 
 @dataclass
 class JointCommand:
-    """What the servos are told. The arrays belong to the controller, which rewrites them."""
+    """Commands to the servos. The arrays belong to the controller, which rewrites them."""
 
     angle_ref: Array = field(default_factory=_zeros)  # rad    (6, 3)
     speed_ref: Array = field(default_factory=_zeros)  # rad/s    (6, 3)
@@ -84,7 +84,7 @@ class JointCommand:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Internals for recorders and tests: arrays of six legs that change at every step."""
+    """Internal quantities for recorders and tests: arrays of six legs that change at every step."""
 
     swinging: Mask  # planned to be in the air
     planned: Array  # m    (6, 3) centres of the feet as commanded, torso frame, uncorrected
@@ -95,21 +95,21 @@ class Diagnostics:
 
 
 class PlannedStep(NamedTuple):
-    """One planned step: what depends on the command alone. Feet in the walking frame, (6,) each."""
+    """One planned step, which depends on the command alone. Feet (6,) are in the walking frame."""
 
     value: Array  # (6,) commanded vx vy yaw_rate height roll pitch
     posture: Posture
     feet: PlannedFeet
     activation: Array  # 1    of the legs
-    lowering: Array  # m    by what the ground will give way
-    height: Array  # m    of the feet, lowered
-    shift: Plane  # m    of the feet by the ground rolling off them
+    lowering: Array  # m    lowering of the feet by the indentation of the ground (C21)
+    height: Array  # m    of the lowered feet
+    shift: Plane  # m    of the feet due to rolling (C9)
     pose: Pose  # of the legs
     masses: Masses | None  # of the links; None under kinematic control
 
 
 def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[str, ...]:
-    """Whether gains are of another robot or period [s], and what they were not designed for."""
+    """Returns warnings of gains for another robot or period [s], and the caveats of the gains."""
     if gains is None:
         return ()
     mismatch = gains.mismatch(robot, period=period)
@@ -119,9 +119,9 @@ def gains_warnings(robot: Robot, gains: Gains | None, period: float) -> tuple[st
 class Controller(Stateful):
     """Walks a robot, under kinematic control or with `gains` under compliant control.
 
-    `warnings` lists what is doubtful about the set-up (gains of another robot or period); nothing
-    in it stops the run. Raises RobotError for a joint pattern without closed-form kinematics,
-    ControllerError for an impossible period.
+    `warnings` lists problems of the set-up that do not prevent a run, such as gains of another
+    robot. Raises RobotError for a joint pattern without closed-form kinematics, ControllerError for
+    an impossible period.
     """
 
     STATE = (
@@ -159,9 +159,9 @@ class Controller(Stateful):
         still, nothing = np.zeros(LEGS, dtype=np.complex128), np.zeros(LEGS)
         self.diagnostics = Diagnostics(_flags(), _zeros(), still, nothing, _flags(), _flags())
         self._start: float | None = None  # s    time of the first step
-        self._count = 0  # steps done
+        self._count = 0  # completed steps
         self._at = 0  # the present step, counted from the begin of its section
-        self._last = math.inf  # the step at which the command comes to rest and is planned afresh
+        self._last = math.inf  # the step at which the ramp ends, where a new section begins
         self._cut = True  # the present step is the last of its section
         self._before: PlannedStep | None = None
         self._now: PlannedStep
@@ -171,9 +171,9 @@ class Controller(Stateful):
     # ------------------------------------------------------------------------------- planning
 
     def _look_ahead(self, ahead: int, number: int) -> tuple[Array, Posture, Twist]:
-        """The command so many periods ahead: its value, the posture and the motion of the body.
+        """Returns command value, posture and body motion `ahead` periods after the present step.
 
-        number: periods since the section began, for what the slow loops add.
+        number: periods since the section began, on which the addition of the slow loops depends.
         """
         value, rate = self.ramp.ahead(ahead)
         vx, vy, yaw_rate = value[:3].tolist()
@@ -184,7 +184,7 @@ class Controller(Stateful):
         return value, Posture.of(value[3:], rate[3:]), twist
 
     def _lower(self, feet: PlannedFeet) -> tuple[Array, Array]:
-        """The activations of the legs (6,) and by how much their feet are lowered (6,) [m]."""
+        """Returns the activations of the legs (6,) and the lowering of their feet (6,) [m]."""
         if self.compliant is None:
             return np.ones(LEGS), np.zeros(LEGS)
         support, paths = self.compliant.support, self.paths
@@ -196,7 +196,7 @@ class Controller(Stateful):
         return activation, support.lowering(feet.plane, activation)
 
     def place_legs(self, posture: Posture, plane: Plane, height: Array) -> tuple[Plane, Pose]:
-        """The shift of the feet as the ground rolls off them (C9) [m], and the legs.
+        """Returns the shift of the feet due to rolling (C9) [m], and the pose of the legs.
 
         A tibia that pitches by dB rolls the sphere of its foot by -R dB along the outward direction
         of the leg. The shift s changes B itself: s = R (C + s dC/du) is solved by one Newton step.
@@ -211,7 +211,7 @@ class Controller(Stateful):
         return shift, legs.pose(*posture.see_place(plane + shift, height))
 
     def _lay_out(self, value: Array, posture: Posture, feet: PlannedFeet) -> PlannedStep:
-        """Turns planned feet into legs and point masses."""
+        """Computes the pose of the legs and the point masses for planned feet."""
         activation, lowering = self._lower(feet)
         height = feet.height - lowering
         shift, pose = self.place_legs(posture, feet.plane, height)
@@ -221,7 +221,10 @@ class Controller(Stateful):
         return PlannedStep(value, posture, feet, activation, lowering, height, shift, pose, masses)
 
     def _plan_step(self, number: int, ahead: int, before: PlannedStep) -> PlannedStep:
-        """The step so many periods after the section began, `ahead` of the present command."""
+        """Plans the step `number` periods after the section began.
+
+        ahead: periods from the present step to it; before: the step before it.
+        """
         value, posture, twist = self._look_ahead(ahead, number)
         return self._lay_out(value, posture, self.paths.walk(number, twist, before.feet))
 
@@ -238,12 +241,12 @@ class Controller(Stateful):
         self._at = 0
         self._after = self._plan_step(1, 1, self._now)
 
-    def _advance(self, told: bool) -> None:
-        """Goes to the next step, as planned, and plans the one after it.
+    def _advance(self, command_changed: bool) -> None:
+        """Makes the planned step the present one, and plans the step after it.
 
-        told: the command has changed, so that the plan is void.
+        command_changed: the plan no longer applies, and a new section begins.
         """
-        if told or self._after is None:
+        if command_changed or self._after is None:
             self._plan_afresh()
         assert self._after is not None
         self._before, self._now, self._after = self._now, self._after, None
@@ -258,7 +261,7 @@ class Controller(Stateful):
     # --------------------------------------------------------------------------------- joints
 
     def _rate_of(self, name: str) -> Any:
-        """The rate of a quantity of the present step per second, one-sided at a section's end."""
+        """Returns the rate of a quantity per second by differences, one-sided at section ends."""
         if self._before is None:
             return np.zeros(LEGS)
         before = getattr(self._before, name)
@@ -267,16 +270,16 @@ class Controller(Stateful):
         return (getattr(self._after, name) - before) / (2.0 * self.period)
 
     def _show_planned(self) -> Array:
-        """The feet as the command plans them: on their paths, rolling, not lowered.
+        """Returns the planned centres of the feet (6, 3), torso frame [m].
 
-        Returns their centres in the torso frame (6, 3) [m].
+        They are those of the paths with the shift due to rolling, without the lowering.
         """
         now = self._now
         plane, height = now.posture.see_place(now.feet.plane + now.shift, now.feet.height)
         return rows_of(plane.real, plane.imag, height)
 
     def _follow_paths(self) -> None:
-        """Joint commands that lead the feet along their paths (C10 to C14)."""
+        """Computes the joint commands that move the feet along their paths (C10 to C14)."""
         now, out, shown = self._now, self._out, self.diagnostics
         feet = Feet(
             plane=now.feet.plane + now.shift,
@@ -299,7 +302,7 @@ class Controller(Stateful):
         shown.planned[...] = self._show_planned()
 
     def _ask(self, compliant: Compliant) -> Stance:
-        """What the present step asks of compliant control (C15 to C20)."""
+        """Returns planned loads and geometry of the present step for the laws (C15 to C20)."""
         before, now, after, speed = self._before, self._now, self._after, self._out.speed_ref
         assert now.masses is not None
         motion = Neighbours((None, now.masses, None), (None, now.pose, None))
@@ -324,7 +327,7 @@ class Controller(Stateful):
     # ---------------------------------------------------------------------------------- steps
 
     def reset(self) -> None:
-        """Standing in the stance, all memory cleared; the next step is the first."""
+        """Puts the robot in its stance and clears all memory; the next step is the first."""
         self.ramp.reset()
         if self.compliant is not None:
             self.compliant.reset()
@@ -338,26 +341,29 @@ class Controller(Stateful):
         self._follow_paths()
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Restores a state returned by save(): the steps after it are the same again."""
+        """Restores a state returned by save(); the following steps repeat exactly."""
         super().restore(state)
         self._follow_paths()
         self._show(*self._shown)
 
     def _show(self, shift: Array, fallback: Mask) -> None:
-        """Puts the corrections of the feet (6, 3) [m] and fallbacks (6,) into the diagnostics."""
+        """Copies corrections of the feet (6, 3) [m] and fallbacks (6,) into the diagnostics."""
         shown = self.diagnostics
         shown.shift[...], shown.lift[...] = shift[:, 0] + 1j * shift[:, 1], shift[:, 2]
         shown.fallback[...] = fallback
         self._shown = shift, fallback
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
-        """The joint commands for [t, t + period). The result's arrays are reused by the next step.
+        """Returns the joint commands for [t, t + period). The next step reuses the arrays.
 
         Args:
-            t: time [s]; the first step may come at any time, later ones a period apart. Raises
-                ControllerError otherwise.
-            command: what the torso should do; changes are ramped over a gait period.
-            measurement: sensor values at t; kinematic control does not look at it.
+            t: time [s]. The first step may be at any time; each later one is a period after the
+                step before.
+            command: desired motion of the torso; changes are ramped over a gait period.
+            measurement: sensor values at t; kinematic control does not use them.
+
+        Raises:
+            ControllerError: t is not the time of the next step.
         """
         first = self._start is None
         due = t if self._start is None else self._start + (self._count + 1) * self.period
@@ -368,14 +374,14 @@ class Controller(Stateful):
                 expected=f"t = {due} s",
                 fix="step once per period, or reset the controller",
             )
-        told = self.ramp.aim(command)
-        # absurd commands lead to legs that do not reach, which is reported
+        command_changed = self.ramp.aim(command)
+        # extreme commands overflow; the legs do not reach such targets, and this is reported
         with np.errstate(over="ignore", invalid="ignore"):
-            if first:  # the first step is the stance itself, whatever is commanded
+            if first:  # the first step is the stance itself, for every command
                 self._start = t
             else:
                 self._count += 1
-                self._advance(told)
+                self._advance(command_changed)
             self._follow_paths()
             if self.compliant is not None:
                 shift = self.compliant.step(self._ask(self.compliant), measurement, self._out)

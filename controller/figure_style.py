@@ -1,7 +1,7 @@
-"""How all static figures look.
+"""Defines the style of all static figures.
 
-They are as wide as a page of two columns, in its size of type, with colours that colour-blind
-readers can tell apart.
+Their width and font size suit a page of two columns, and colour-blind readers can distinguish the
+colours.
 """
 
 from __future__ import annotations

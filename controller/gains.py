@@ -1,7 +1,4 @@
-"""Gains of the compliant control: what the laws run with, and what they were designed for.
-
-They are kept in a TOML file.
-"""
+"""Defines the gains of compliant control, their requirements and margins, and their TOML file."""
 
 from __future__ import annotations
 
@@ -16,16 +13,16 @@ from typing import Any, TypeVar
 from hexapod_cosim.models import HexapodError, Robot, nearest_name
 
 FORMAT = 2
-TRIPOD_LEGS = 3  # legs that share the weight in the hardest gait: loads are counted in weight / 3
+TRIPOD_LEGS = 3  # legs that share the weight in a tripod gait: the unit of load is weight / 3
 
 
 class GainsError(HexapodError):
-    """Gains that cannot be read, or cannot be used."""
+    """Gains cannot be designed, read or used."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SlipGains:
-    """PID from tangential force [N] to the force [N] that a leg is relieved of (C25).
+    """PID from the tangential force [N] to the force [N] by which a leg yields (C25).
 
     The shift of the foot is C times that force (C28).
     In continuous time: (kp + ki/s + kd s/(derivative_time s + 1)) / (filter_time s + 1).
@@ -36,9 +33,9 @@ class SlipGains:
     kd: float  # s
     derivative_time: float  # s    filter of the derivative, > 0
     filter_time: float  # s    force filter, > 0
-    load_time: float  # s    smoothing of the measured load that the answer goes with, > 0
-    tracking_time: float  # s    anti-windup: the integral gives way to the clamp this fast
-    limit: float  # 1    largest answer, in thirds of the weight
+    load_time: float  # s    smoothing of the measured load that scales the force, > 0
+    tracking_time: float  # s    anti-windup: the integral follows the limited force, > 0
+    limit: float  # 1    largest force, in thirds of the weight
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,22 +52,22 @@ class SuspensionGains:
 class SupportGains:
     """Feed-forward of the planned load."""
 
-    handover_time: float  # s    in which one set of legs hands the weight to the next, > 0
+    handover_time: float  # s    duration of the change of load between two sets of legs, > 0
     weight_time: float  # s    smoothing of the measured weight that the plan is scaled by, > 0
 
 
 @dataclass(frozen=True, kw_only=True)
 class HoldGains:
-    """Slow loops: torso attitude and height over the ground, and the walked way."""
+    """Slow loops: torso attitude and height over the ground, and the path walked."""
 
     attitude_rate: float  # 1/s    integral of roll and pitch
     height_rate: float  # 1/s    integral of the height
     ground_time: float  # s    smoothing of the ground's measured inclination, > 0
     angle_limit: float  # rad    largest correction of roll and pitch
-    height_limit: float  # m    and of the height
-    path_rate: float  # 1/s    from way and heading lost to a change of the commanded velocity
-    speed_limit: float  # m/s    largest such change
-    turn_limit: float  # rad/s    and of the yaw rate
+    height_limit: float  # m    largest correction of the height
+    path_rate: float  # 1/s    gain from deviations of the path to the added velocity
+    speed_limit: float  # m/s    largest added velocity
+    turn_limit: float  # rad/s    largest added yaw rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +80,7 @@ class LimitGains:
 
 @dataclass(frozen=True, kw_only=True)
 class Requirements:
-    """What a design must meet. The figures suit legs of 0.22 to 0.44 m; for others: size.py."""
+    """Requirements of a design. The defaults suit legs of 0.22 to 0.44 m; for others: size.py."""
 
     phase_margin: float = 60.0  # deg    at least, both loops
     gain_margin: float = 8.0  # dB    at least, the same
@@ -114,23 +111,23 @@ class Requirements:
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """What a design reached: the worst over stances, loads and eigenvalues of the sampled loop."""
+    """Margins of a design: the worst over stances, loads and eigenvalues of the sampled loop."""
 
     slip_crossover: float  # rad/s
     slip_phase_margin: float  # deg
     slip_gain_margin: float  # dB
-    slip_delay_margin: float  # s    further delay that is borne
+    slip_delay_margin: float  # s    further delay at which the loop becomes unstable
     slip_rejection: float  # 1    steady slip speed with the law over without it
     suspension_phase_margin: float  # deg
     suspension_gain_margin: float  # dB
-    support_torque: float  # N m    largest that a leg of a standing tripod asks of a servo
+    support_torque: float  # N m    largest torque of a servo in a standing tripod
     spectral_radius: float  # 1    of the whole closed loop, all feet and both laws together, < 1
-    binding: str  # the requirement that kept the tangential loop from more gain
+    binding: str  # the requirement that limited the gain of the tangential loop
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """A designed set; `robot_hash` and `period` say what it is for."""
+    """A designed set of gains for the robot `robot_hash` and the controller period `period`."""
 
     robot: str
     robot_hash: str
@@ -145,7 +142,7 @@ class Gains:
     caveats: tuple[str, ...] = ()  # stances that are left out, and why; what was not reached
 
     def mismatch(self, robot: Robot, *, period: float) -> str | None:
-        """Why these gains are not for this robot and period; None when they are."""
+        """Returns why these gains are not for this robot and period [s]; None when they are."""
         if self.robot_hash != robot.hash:
             designed, present = self.robot_hash[:12], robot.hash[:12]
             return (

@@ -1,4 +1,4 @@
-"""Saving and restoring what a part of the controller remembers between two steps."""
+"""Saves and restores the states of the controller's parts."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Points and directions of a plane as complex numbers x + i y. C: plane.h.
+"""Represents vectors of a plane as complex numbers x + i y. C: plane.h.
 
-A turn by an angle is then one product. Horizontal vectors are written x + i y, vectors in the
-vertical plane of a leg u + i w (outward and up).
+A rotation is then one product. Horizontal vectors are x + i y, vectors in the vertical plane of a
+leg u + i w (outward and up).
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ LEGS = len(LEG_NAMES)
 
 
 def along(a: Any, b: Any) -> Any:
-    """Re(a^* b), the dot product of two vectors of a plane."""
+    """Returns Re(a^* b), the dot product of two vectors of a plane."""
     return a.real * b.real + a.imag * b.imag
 
 
 def across(a: Any, b: Any) -> Any:
-    """Im(a^* b), the cross product of two vectors of a plane."""
+    """Returns Im(a^* b), the cross product of two vectors of a plane."""
     return a.real * b.imag - a.imag * b.real
 
 
 def square(a: Any) -> Any:
-    """The squared length of a vector of a plane."""
+    """Returns the squared length of a vector of a plane."""
     return a.real * a.real + a.imag * a.imag
 
 
 def cis(angle: Any) -> Any:
-    """e^(i angle) of an angle [rad], a number or an array."""
+    """Returns e^(i angle) of an angle [rad], a number or an array."""
     if isinstance(angle, float):
         return complex(math.cos(angle), math.sin(angle))
     return np.cos(angle) + 1j * np.sin(angle)
 
 
 def rows_of(x: Array, y: Array, z: Array) -> Array:
-    """(6, 3) rows x y z of three arrays (6,)."""
+    """Returns the rows x y z (6, 3) of three arrays (6,)."""
     return np.array((x, y, z)).T
 
 
 def clamp(x: Any, low: Any, high: Any) -> Any:
-    """The numbers x, limited to [low, high]."""
+    """Returns the numbers x, limited to [low, high]."""
     return np.minimum(np.maximum(x, low), high)

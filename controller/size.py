@@ -1,9 +1,9 @@
-"""How large a robot is beside those that the design's figures are for, and what it is asked for.
+"""Scales the requirements of the design with the size of the robot.
 
 Robots of one shape and density whose lengths are l times as large walk alike, with times that are
-sqrt(l) times as long (Froude's number, v^2/(g l)). The figures of the requirements, round as they
-are, suit legs of SHORTEST to LONGEST, an octave that holds both robots of the package. Beyond it
-lengths, times, speeds and rates grow or shrink with the legs.
+sqrt(l) times as long (Froude's number, v^2/(g l)). The default requirements suit legs of SHORTEST
+to LONGEST, which include both robots of the package. For other legs, lengths, times, speeds and
+rates are scaled.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def size_of(robot: Robot) -> Size:
 def requirements_for(robot: Robot, **given: Any) -> Requirements:
     """Returns the requirements for a robot's size and servos; given values are used unchanged.
 
-    Stiff servos bound the suspension's deflection: beside theirs it is the gain of the
-    suspension's loop, which would have no margins.
+    The deflection of the suspension is limited to YIELD times that of the servos: their ratio is
+    the gain of the suspension's loop, which would have no margins otherwise.
     """
     size, usual = size_of(robot), Requirements()
     factors = (

@@ -81,12 +81,12 @@ class Start:
 
     @property
     def method(self) -> Method:
-        """The solver's method."""
+        """Returns the solver's method."""
         return METHOD[self.robot.solver.method]
 
     @property
     def touch(self) -> float:
-        """Largest depth of a foot that has just touched down [m]."""
+        """Returns the largest depth of a foot that has just touched down [m]."""
         return max(TOUCH_DEPTH[0], TOUCH_DEPTH[1] * self.robot.solver.tolerance)
 
 

@@ -1,1 +1,4 @@
-"""The compliant control: slip PID, virtual suspension, feed-forward support and posture."""
+"""Corrects the planned joint commands by foot forces: slip PID, suspension, support, posture.
+
+Imports `sense`, `walk`, `gains`, `memory`, `parts` and `plane`.
+"""

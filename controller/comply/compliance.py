@@ -1,18 +1,18 @@
-"""The force laws of compliant control: from planned load and measured foot forces to the joints.
+"""Applies the force laws: turns planned load and measured foot forces into joint corrections.
 
-C: compliance.c. In a period these steps follow each other:
+C: compliance.c. Every period consists of these steps:
 
-1. Contacts. The detector says which feet touch the ground (C23). Where that contradicts the plan,
-   a sensor may be wrong (C34) or the ground may lie higher or lower than planned (C35, C36).
-2. Inputs. Of the forces beyond the planned ones the squeeze is what the slip PID answers (C24), the
-   normal force beyond the planned share what the virtual suspension answers (C26).
-3. Weight. The plan is scaled by the weight that the feet measure (C30): a payload is carried too.
-4. Laws. PID and suspension answer by forces (C25 to C27).
-5. Joints. The angles are corrected by what the servos yield under these forces (C28); the torques
-   are those of the planned load (C29).
+1. Contacts. The detector decides which feet touch the ground (C23). If a contact contradicts the
+   plan, a sensor may be wrong (C34) or the ground may be higher or lower than planned (C35, C36).
+2. Inputs. The planned forces are subtracted from the measured ones. The slip PID responds to the
+   squeeze (C24), the virtual suspension to the normal force above the planned share (C26).
+3. Weight. The plan is scaled by the measured weight (C30), so that a payload is carried too.
+4. Laws. PID and suspension compute correcting forces (C25 to C27).
+5. Joints. The angles are corrected by the deflection of the servos under these forces (C28); the
+   torques are those of the planned load (C29).
 
-When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` takes all of
-this away and kinematic control is left (C33).
+When the whole robot slides, its joints cannot follow or it is far too heavy, `trust` goes to 0 and
+the robot walks under kinematic control (C33).
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from hexapod_cosim.controller.sense.touchdown import EARLY, Touchdown
 from hexapod_cosim.controller.walk.inverse_dynamics import Demand
 
 SLIDING_DRAG = 0.55  # 1    common tangential over normal force beyond the plan: only a robot that
-# slides has it, or one on a slope of 29 degrees
-CALM_CYCLES = 0.5  # 1    gait cycles without it until the feet are trusted again
+# slides exceeds it, or one on a slope of 29 degrees
+CALM_CYCLES = 0.5  # 1    gait cycles without sliding until the feet are trusted again
 SLIDING_TIME = 0.04  # s    longer than a foot skids when it touches down
 SETTLED_SHARE = 0.5  # 1    of the weight: feet that carry less together have only just landed
 JOINTS_FOLLOW, JOINTS_DO_NOT = 0.35, 0.45  # 1    share of the time with too high joint speeds
@@ -48,7 +48,7 @@ HIGH_SHARE = 0.25  # 1    of the step height: a foot planned higher is certainly
 
 
 class Plan(NamedTuple):
-    """What a step asks of the laws; (6,) and walking frame unless said otherwise."""
+    """Planned loads and contacts of one step; (6,) in the walking frame unless stated otherwise."""
 
     own: Array  # N m    (6, 3) torques for the legs' own weight and motion
     carry: Array  # N m    (6, 3) torques for the planned load
@@ -62,27 +62,27 @@ class Plan(NamedTuple):
     needed: float  # N m    scalar: the largest of `carry`
     swinging: Mask  # planned in the air
     falling: Array  # m    by which feet well above the ground come down in a period
-    hurried: bool  # scalar: some joint is asked for more speed than its servo has
+    hurried: bool  # scalar: the plan exceeds the speed limit of some joint
 
 
 class Compliance(Stateful):
-    """The laws of all feet.
+    """Force laws of all feet.
 
-    Attributes, (6,) unless said otherwise:
-        law, detector, watch, touchdown, landings, burden: the parts that laws and decisions are
-            made of.
+    Attributes, (6,) unless stated otherwise:
+        law, detector, watch, touchdown, landings, burden: components with a state of their own.
         bend: (6, 3) corrections of the joint angles [rad].
-        torque: (6, 3) for the servos [N m].
-        shift: (6, 3) of the feet that comes of `bend`, walking frame [m].
-        doubted: sensors that are not believed.
+        torque: (6, 3) feed-forward torques of the servos [N m].
+        shift: (6, 3) displacement of the feet due to `bend`, walking frame [m].
+        doubted: sensors that are replaced by the plan.
         fallback: legs that walk without feedback.
-        grip: part of its share that a leg is given back as it loads [1].
-        slack: some leg is given its share back (scalar).
+        grip: factor on the planned load of a leg that is regaining contact [1].
+        slack: some grip may be below 1 (scalar).
         scale: measured over planned weight (scalar) [1].
-        trust: 1, or less while the plan of the load is not to be relied on (scalar) [1].
-        outrun: the joints cannot follow (scalar).
-        asked: share of the time in which joints are asked for too much speed (scalar) [1].
-        dragged, sliding: periods for which the robot has slid, and until it is trusted again.
+        trust: factor on all corrections and torques (scalar) [1].
+        outrun: the joints cannot follow the plan (scalar).
+        asked: share of the time in which the plan exceeds the joints' speed limit (scalar) [1].
+        dragged: periods for which the robot has been sliding (scalar).
+        sliding: periods that remain until feedback resumes after sliding (scalar).
     """
 
     STATE = (
@@ -102,7 +102,11 @@ class Compliance(Stateful):
         step_height: float,
         period: float,
     ) -> None:
-        """weight: of the robot [N]; cycle, step_height: of its gait [s, m]; kp: of its servos."""
+        """Computes the constants of the laws and resets their state.
+
+        weight: of the robot [N]; cycle, step_height: of its gait [s, m]; kp: of its servos
+        [N m/rad]; period [s].
+        """
         self.parts, self.period = parts, period
         self.share = weight / TRIPOD_LEGS  # N
         self.settled = SETTLED_SHARE * weight  # N
@@ -137,7 +141,7 @@ class Compliance(Stateful):
 
     @property
     def touching(self) -> Mask:
-        """(6,) feet on the ground, as far as the sensors are believed."""
+        """Returns the feet (6,) on the ground; a doubted sensor is replaced by the plan."""
         return self.detector.touching
 
     def plan(
@@ -151,13 +155,15 @@ class Compliance(Stateful):
         swinging: Mask,
         hurried: bool = False,
     ) -> Plan:
-        """What a step asks of the laws.
+        """Returns the plan of a step, from which the laws compute their corrections.
 
         Args:
+            demand: forces and torques that the planned motion needs.
+            shares: planned forces on the feet.
             feet: (6,) contact points x + i y, walking frame [m].
             height, rise: (6,) of the paths over the stance [m, m/s].
             swinging: (6,) legs planned in the air.
-            hurried: some joint is asked for more speed than its servo has.
+            hurried: the plan exceeds the speed limit of some joint.
         """
         supports = 1.0 if self.parts.support else 0.0
         well_up = height > EARLY
@@ -181,16 +187,16 @@ class Compliance(Stateful):
     # ------------------------------------------------------------------------------ contacts
 
     def _replace_forces(self, plan: Plan, force: Array) -> Array:
-        """The forces, where a sensor is not believed those of the plan, (6, 3) [N]."""
+        """Returns the forces (6, 3) [N], with those of doubted sensors replaced by the plan."""
         planned = plan.shares.activation > 0.5
         self.detector.touching = np.where(self.doubted, planned, self.touching)
         return np.where(self.doubted[:, None], self.scale * plan.shares.forces(), force)
 
     def _judge_sensors(self, plan: Plan, met: Array, force: Array) -> Array:
-        """Which sensors are believed (C34); all feet's are not once those of a tripod are not.
+        """Decides which sensors are doubted (C34): all of them once a tripod's are.
 
-        met: (6,) heights at which the feet meet the ground without any bump [m]. Returns the forces
-        (6, 3) to go by [N].
+        met: (6,) heights at which the feet are expected to meet the ground [m]. Returns the forces
+        (6, 3) that the laws use [N].
         """
         total = float(force[self.touching, 2].sum())
         high = plan.height > self.high + met
@@ -200,16 +206,16 @@ class Compliance(Stateful):
         return self._replace_forces(plan, force) if doubted.any() else force
 
     def _meet_ground(self, plan: Plan, met: Array) -> None:
-        """Answers ground that is met early or late (C36). met: as in _judge_sensors()."""
+        """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
         self.slack = True
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.falling, 0.0)
         self.touchdown.step(self.touching, falling, plan.swinging, plan.standing)
 
     def _examine_contacts(self, plan: Plan, force: Array) -> Array:
-        """Decides between a wrong sensor and ground that is met early or late.
+        """Decides between a wrong sensor and an early or late contact.
 
-        Returns the forces (6, 3) to go by [N].
+        Returns the forces (6, 3) that the laws use [N].
         """
         met = self.landings.expected(self.touching, plan.height, plan.swinging)
         if self.parts.fallback:
@@ -221,7 +227,7 @@ class Compliance(Stateful):
         return force
 
     def _contacts_differ(self, plan: Plan) -> bool:
-        """Whether contacts contradict the plan, or did so and the answer to it is under way."""
+        """Returns whether contacts contradict the plan, or a response to it is still under way."""
         certain = plan.standing | plan.well_up
         differs = ((self.touching != plan.standing) & certain).any()
         return bool(differs) or self.watch.busy() or self.touchdown.busy()
@@ -229,10 +235,10 @@ class Compliance(Stateful):
     # ------------------------------------------------------------------------ inputs and weight
 
     def _update_trust(self, plan: Plan, drag: float) -> None:
-        """Gives the plan of the load up while it does not hold (C33).
+        """Updates the trust (C33), which falls while the planned load does not apply.
 
-        It does not hold for a robot that slides, whose joints cannot follow or that is far too
-        heavy. drag: the common tangential force of the feet beyond the plan over the normal one.
+        It does not apply to a robot that slides, whose joints cannot follow, or that is far too
+        heavy. drag: common tangential force of the feet above the plan, over the normal force [1].
         """
         self.asked += self.follow_cycle * (float(plan.hurried) - self.asked)
         self.outrun = self.asked > (JOINTS_FOLLOW if self.outrun else JOINTS_DO_NOT)
@@ -250,7 +256,7 @@ class Compliance(Stateful):
         self.fallback = self.doubted | (goal == 0.0)
 
     def _law_inputs(self, plan: Plan, force: Array) -> tuple[Plane, Array, float]:
-        """The squeeze (6,) and normal forces (6,) felt, and the sum of the latter [N] (C24)."""
+        """Returns the squeeze (6,), the normal forces (6,) and their sum [N] (C24)."""
         horizontal = force[:, 0] + 1j * force[:, 1]
         felt = np.where(self.touching, horizontal - self.scale * plan.shares.push, 0.0)
         normal = np.where(self.touching, force[:, 2], 0.0)
@@ -263,9 +269,9 @@ class Compliance(Stateful):
         return squeeze(felt, normal, plan.feet), normal, total
 
     def _update_weight(self, plan: Plan, total: float) -> None:
-        """Follows the measured over the planned weight (C30), and what the servos carry of it.
+        """Updates the ratio of measured to planned weight (C30) and the load of the servos.
 
-        total: the sum of the normal forces felt [N].
+        total: sum of the measured normal forces [N].
         """
         if not self.doubted.any():
             ratio = total / max(plan.weight, LOAD_FLOOR)
@@ -275,33 +281,33 @@ class Compliance(Stateful):
         self.burden.step(plan.needed, self.scale)
 
     def _excess(self, plan: Plan, normal: Array) -> Array:
-        """(6,) normal forces beyond the shares [N], 0 of feet that have none (C26)."""
+        """Returns the normal forces (6,) above the planned shares [N]; 0 without a share (C26)."""
         live = self.parts.suspension & (plan.shares.activation > 0.0)
         return np.where(live, normal - self.scale * plan.shares.normal, 0.0)
 
     # ------------------------------------------------------------------------------------ laws
 
     def _limit_answers(self) -> None:
-        """Limits the answers of the PID, their direction kept; the integrals give way (C27)."""
+        """Limits the PID's forces without turning them; the integrals follow (C27)."""
         law = self.law
         wanted = law.answer
         law.answer = wanted * (self.largest / np.maximum(np.abs(wanted), self.largest))
         law.pid.integral = law.pid.integral + self.tracking * (law.answer - wanted)
 
     def _limit_deflections(self) -> None:
-        """At its stop a suspension stands still."""
+        """Limits the deflections of the suspensions; beyond the limit their rate is 0."""
         law = self.law
         law.rate = np.where(np.abs(law.deflection) > self.deepest, 0.0, law.rate)
         law.deflection = clamp(law.deflection, -self.deepest, self.deepest)
 
     def _step_laws(self, plan: Plan, push: Plane, normal: Array, excess: Array) -> Array:
-        """The laws one period on, limited, and the forces that they answer by (C25 to C27).
+        """Advances the laws by one period and returns the correcting forces (6, 3) [N].
 
-        push, normal, excess: (6,) [N]. Returns (6, 3) [N].
+        They are those of C25 to C27. push, normal, excess: (6,) [N].
         """
         law = self.law
         law.step(push, excess, normal * (1.0 / self.share))
-        # no single one is beyond its limit when all together are not
+        # the sum of squares bounds each of them: usually no limit is reached
         if square(law.answer).sum() > self.largest**2:
             self._limit_answers()
         if (law.deflection * law.deflection).sum() > self.deepest**2:
@@ -310,8 +316,8 @@ class Compliance(Stateful):
         given = law.answer * (freedom * np.minimum(law.load, LARGEST_LOAD))
         vertical = (plan.lever[:, :, 2] ** 2).sum(axis=1)
         lift = law.deflection / (self.softness * vertical)  # z/C_zz, C = J kp^-1 J^T
-        # a foot in the air forgets, within the time in which a leg gives up its load; and all
-        # forget what they may not take away
+        # the integral of a foot in the air decays with the time constant of the load; all
+        # integrals decay by the part of the squeeze that must remain (C32)
         kept = 1.0 - (1.0 - freedom) * self.follow_load
         forgets = plan.swinging & ~self.touching
         law.pid.integral = law.pid.integral * np.where(forgets, kept * self.memory, kept)
@@ -320,9 +326,10 @@ class Compliance(Stateful):
     # ---------------------------------------------------------------------------------- joints
 
     def _restore_grip(self, plan: Plan, torque: Array) -> Array:
-        """Gives a leg that stands only in the plan its share back as it loads (C29).
+        """Scales the planned load of each leg by its grip, which grows as the leg loads (C29).
 
-        torque: (6, 3) for the planned load [N m]. Returns what is left of it.
+        A leg that should stand and does not touch the ground has grip 0. torque: (6, 3) for the
+        planned load [N m]. Returns the scaled torques (6, 3) [N m].
         """
         grip = self.grip + self.follow_load * (1.0 - self.grip)
         self.grip = np.where(plan.standing & ~self.touching, 0.0, grip)
@@ -330,7 +337,9 @@ class Compliance(Stateful):
         return torque * self.grip[:, None]
 
     def _limit_joints(self, wanted: Array, torque: Array) -> None:
-        """Leads the bends to the wanted ones and sets the torques, both limited (C28, C29)."""
+        """Moves the angle corrections to the wanted ones and sets the torques, both limited (C28,
+        C29).
+        """
         if not self.parts.limits:
             self.bend, self.torque = wanted, torque
             return
@@ -351,7 +360,7 @@ class Compliance(Stateful):
         self._limit_joints(bend * self.trust, (torque + plan.own) * self.trust)
 
     def step(self, plan: Plan, force: Array) -> None:
-        """One period on.
+        """Advances all laws by one period.
 
         force: (6, 3) of the ground on the feet, walking frame [N].
         """

@@ -1,16 +1,15 @@
-"""Compliant control around its laws: from the sensors to the corrected feet. C: compliant.c.
+"""Corrects the planned joint commands by the sensors, once per period. C: compliant.c.
 
-Every period the controller has a plan of the step at hand (controller.py): joint angles, the forces
-that the feet should feel, and the torques that carry them. Compliant control corrects that plan by
-what the robot senses:
+Every period controller.py provides a plan of the present step: joint angles, the forces on the
+feet, and the torques for these forces. Compliant control corrects the plan by the measurements:
 
     foot forces -- sense (C22) --> force laws (compliance.py, C23 to C36) --> bend, torque, offset
     joint angles, attitude -- look, every 40 ms --> slow loops (hold.py, C37 to C40) --> lift, v, w
     planned angles + bend + climb (offset + lift) ---> angle_ref (C41)
 
-The force laws answer at once, by the joint angles and torques of this period. The slow loops answer
-in part at once, by lifting the feet (posture), and in part by an addition to the commanded velocity
-(path), which the next steps are planned with.
+The force laws act in the same period, on joint angles and torques. Of the slow loops, posture lifts
+the feet in the same period; path adds to the commanded velocity with which the next steps are
+planned.
 """
 
 from __future__ import annotations
@@ -37,11 +36,11 @@ from hexapod_cosim.models import Robot
 if TYPE_CHECKING:
     from hexapod_cosim.controller.controller import JointCommand, Measurement
 
-STEERING_TIME = 0.1  # s    in which a change of the added velocity is led over
+STEERING_TIME = 0.1  # s    duration of the ramp from one added velocity to the next
 
 
 class Stance(NamedTuple):
-    """What a step asks, and where it is."""
+    """Plan, command and geometry of the present step."""
 
     plan: Plan  # of the laws
     climb: Array  # rad/m    (6, 3) motion of the joints as a foot rises
@@ -52,7 +51,7 @@ class Stance(NamedTuple):
 
 
 class Steering(NamedTuple):
-    """What the lost way adds to the commanded velocity, led over from one value to the next."""
+    """A ramp of the velocity that the path loop adds to the commanded one."""
 
     begin: Twist
     goal: Twist
@@ -69,10 +68,10 @@ class Compliant(Stateful):
         laws: the force laws.
         hold: the slow loops.
         steering: of the path.
-        count: periods done.
-        offset: (6,) of early and late touch-downs at the last period [m].
+        count: number of completed periods.
+        offset: (6,) height offsets of early and late touch-downs at the last period [m].
         moving: the offsets have just changed.
-        stance: what the last step asked; not part of the state.
+        stance: that of the last step; not part of the state.
     """
 
     STATE = ("laws", "hold", "steering", "count", "offset", "moving")
@@ -104,7 +103,7 @@ class Compliant(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """All laws at rest, nothing seen."""
+        """Resets all laws and the slow loops to their initial states."""
         self.laws.reset()
         self.hold.reset()
         self.steering, self.count = NO_STEERING, 0
@@ -113,7 +112,7 @@ class Compliant(Stateful):
     # ------------------------------------------------------------------------------- steering
 
     def addition(self, steps: int) -> Twist:
-        """What is added to the commanded velocity so many periods after the first planned (C40)."""
+        """Returns the addition to the commanded velocity `steps` periods after the first (C40)."""
         begin, goal, past = self.steering
         part = min((past + steps) / self.leading, 1.0)
         return Twist(
@@ -122,9 +121,10 @@ class Compliant(Stateful):
         )
 
     def steer(self, steps: int, *, moves: bool, afresh: bool) -> None:
-        """Before new steps are planned: takes over what the slow loops ask for (C40).
+        """Starts a ramp to the velocity that the path loop adds (C40).
 
-        That happens when a leg lifts off or touches down, and at a stop.
+        It is called before new steps are planned. A ramp starts when a leg lifts off or touches
+        down, and when the robot stops.
 
         Args:
             steps: periods since the last planning.
@@ -142,7 +142,7 @@ class Compliant(Stateful):
     # -------------------------------------------------------------------------------- sensors
 
     def _sense(self, measurement: Measurement, posture: Posture) -> Array:
-        """The foot forces in the walking frame (C22), (6, 3) [N]: f_K = R_KT R_TW f_W."""
+        """Returns the foot forces (6, 3) in the walking frame [N]: f_K = R_KT R_TW f_W (C22)."""
         w, x, y, z = measurement.quaternion.tolist()
         xx, yy, zz = x * x, y * y, z * z
         rotation = np.array(
@@ -156,7 +156,7 @@ class Compliant(Stateful):
         return force if posture.level else np.asarray(force @ posture.rotation.T)
 
     def _look(self, measurement: Measurement, stance: Stance) -> None:
-        """Shows the slow loops where the standing feet are."""
+        """Passes feet, loads and attitude, as measured, to the slow loops."""
         legs, angle = self.legs, measurement.angle
         w, x, y, z = measurement.quaternion.tolist()
         foot = legs.forward(angle)
@@ -182,7 +182,7 @@ class Compliant(Stateful):
     # ----------------------------------------------------------------------------------- step
 
     def _correct(self, angle: Array, climb: Array, raised: Array) -> Array:
-        """The joint angles (6, 3) [rad], bent by the laws and with the feet raised (C41).
+        """Returns the joint angles (6, 3) [rad] with the laws' corrections and raised feet (C41).
 
         climb: (6, 3) motion of the joints as a foot rises [rad/m]; raised: (6,) [m].
         """
@@ -190,7 +190,7 @@ class Compliant(Stateful):
         return np.asarray(clamp(corrected, self.legs.angle_min, self.legs.angle_max))
 
     def step(self, stance: Stance, measurement: Measurement, output: JointCommand) -> Array:
-        """One period on: corrects the joint commands of this step in place (C41).
+        """Advances compliant control by one period and corrects `output` in place (C41).
 
         Returns the shift of the feet by all corrections, walking frame (6, 3) [m].
         """

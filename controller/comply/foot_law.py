@@ -1,4 +1,4 @@
-"""The linear part of the laws of all feet: slip PID, virtual suspension and smoothed load.
+"""Computes the linear part of the force laws: slip PID, virtual suspension and smoothed load.
 
 C: foot_law.c.
 """
@@ -17,13 +17,13 @@ from hexapod_cosim.controller.plane import LEGS, Array, Plane
 
 
 class FootLaw(Stateful):
-    """The laws of six feet.
+    """Slip PIDs and suspensions of six feet.
 
     Attributes, (6,) each:
-        pid: the PIDs against slip.
-        answer: of the PIDs, x + i y [N].
+        pid: the slip PIDs.
+        answer: output forces of the PIDs, x + i y [N].
         deflection, rate: of the suspensions [m, m/s].
-        load: of the feet, smoothed, in thirds of the weight [1].
+        load: smoothed load of the feet in thirds of the weight [1].
     """
 
     STATE = ("pid", "answer", "deflection", "rate", "load")
@@ -41,11 +41,11 @@ class FootLaw(Stateful):
         self.deflection, self.rate, self.load = np.zeros((3, LEGS))
 
     def step(self, push: Plane, excess: Array, load: Array) -> None:
-        """One period on.
+        """Advances the laws by one period.
 
         Args:
-            push: (6,) tangential forces to give way to, x + i y [N] (C25).
-            excess: (6,) normal forces to give way to [N] (C26).
+            push: (6,) tangential forces that the PIDs reduce, x + i y [N] (C25).
+            excess: (6,) normal forces above the planned shares [N] (C26).
             load: (6,) measured loads in thirds of the weight [1] (C27).
         """
         z, rate, a, b = self.deflection, self.rate, self.a, self.b

@@ -1,7 +1,7 @@
-"""Height, roll and pitch of the torso over its feet (C10). C: posture.c.
+"""Converts vectors between torso frame and walking frame (C10). C: posture.c.
 
-The walking frame K is the torso frame of a robot at its nominal height and level posture; the torso
-frame T lies in it at a height and is turned by R_KT, roll about x first and then pitch about y.
+The walking frame K is the torso frame of a robot at its nominal height and level posture. The torso
+frame T is above it by a height and turned by R_KT, roll about x first and then pitch about y.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from hexapod_cosim.controller.walk.kinematics import Feet
 
 
 class Posture(NamedTuple):
-    """The torso in the walking frame."""
+    """Height and attitude of the torso in the walking frame, and their rates."""
 
-    level: bool  # height, roll, pitch and their rates are all 0: nothing to turn
+    level: bool  # height, roll, pitch and their rates are all 0: the frames coincide
     height: float  # m
     rotation: Array  # 1    (3, 3) R_KT
     rate: float  # m/s    of the height
@@ -26,7 +26,10 @@ class Posture(NamedTuple):
 
     @classmethod
     def of(cls, value: Array, rate: Array) -> Posture:
-        """The posture of height, roll and pitch (3,) [m, rad, rad] and their rates per second."""
+        """Returns the posture for height, roll and pitch (3,) [m, rad, rad] and their rates.
+
+        rate: (3,) per second.
+        """
         height, roll, pitch = value.tolist()
         height_rate, roll_rate, pitch_rate = rate.tolist()
         if not any((height, roll, pitch, height_rate, roll_rate, pitch_rate)):
@@ -39,20 +42,20 @@ class Posture(NamedTuple):
         return cls(False, height, rotation, height_rate, spin)
 
     def turn(self, plane: Any, z: Any) -> tuple[Any, Any]:
-        """R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
+        """Returns R_KT p of vectors p = (x + i y, z) of any shape: torso axes to walking axes."""
         return (plane, z) if self.level else _product(self.rotation, plane, z)
 
     def turn_back(self, plane: Any, z: Any) -> tuple[Any, Any]:
-        """R_TK p of vectors p = (x + i y, z) of any shape: walking axes to torso axes."""
+        """Returns R_TK p of vectors p = (x + i y, z) of any shape: walking axes to torso axes."""
         return (plane, z) if self.level else _product(self.rotation.T, plane, z)
 
     def see_place(self, plane: Any, height: Any) -> tuple[Any, Any]:
-        """Points of the walking frame (x + i y, z) [m] in the torso frame."""
+        """Converts points (x + i y, z) [m] from the walking frame to the torso frame."""
         # p_T = R_TK (p_K - height e_z)
         return self.turn_back(plane, height - self.height)
 
     def see(self, feet: Feet) -> Feet:
-        """Feet of the walking frame, places and velocities, in the torso frame."""
+        """Converts positions and velocities of feet from the walking frame to the torso frame."""
         if self.level:
             return feet
         x, y, z = self.spin

@@ -1,11 +1,10 @@
-"""The law against slip: from tangential forces on the feet to forces that the servos give way to.
+"""Computes the slip PID: tangential forces on the feet to forces by which the legs yield.
 
-C: slip_pid.c. A foot that the ground pushes by f while the leg holds it is being squeezed against
-its neighbours, or dragged. Giving way takes the load off the contact, and with it the creep
-f/(mu f_n k_t). Forces that move the body are left alone: of the tangential forces beyond the plan
-only the squeeze (C24) is answered, which has neither a sum nor a moment about the vertical. The
-answer is that of a PID, the same for every foot and direction (C25), discretised by Tustin's rule.
-How it reaches the joints is (C28).
+C: slip_pid.c. Standing legs squeeze each other through the ground. A leg that yields reduces the
+tangential force f on its foot, and with it the creep f/(mu f_n k_t). Forces that move the body must
+remain. So the PID acts on the squeeze alone (C24): the part of the tangential forces above the plan
+whose sum and moment about the vertical are zero. The PID is the same for every foot and direction
+(C25) and is discretised by Tustin's rule. Equation C28 turns its force into joint angles.
 """
 
 from __future__ import annotations
@@ -16,12 +15,12 @@ from hexapod_cosim.controller.gains import SlipGains
 from hexapod_cosim.controller.memory import Stateful
 from hexapod_cosim.controller.plane import LEGS, Array, Plane
 
-LOAD_FLOOR = 1e-6  # N    below it no foot carries anything
-LEAST_SPREAD = 1e-4  # m2    of the feet about their centre: less takes no moment about the vertical
+LOAD_FLOOR = 1e-6  # N    a smaller sum of loads cannot be divided by
+LEAST_SPREAD = 1e-4  # m2    mean square distance of the feet from their centre: below it no twist
 
 
 def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
-    """Tangential forces less what pushes and turns the body as one, shared by load (C24).
+    """Subtracts the common push and twist, shared by load, from tangential forces (C24).
 
     Args:
         push: (n,) tangential forces x + i y beyond the planned ones [N].
@@ -29,7 +28,7 @@ def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
         feet: (n,) places of the feet, x + i y [m].
 
     Returns:
-        (n,) e [N].
+        (n,) the squeeze e, x + i y [N].
     """
     total = normal.sum()
     if total <= LOAD_FLOOR:
@@ -43,10 +42,10 @@ def squeeze(push: Plane, normal: Array, feet: Plane) -> Plane:
 
 
 class SlipPid(Stateful):
-    """The PIDs of all feet, at rest at first.
+    """Slip PIDs of all feet.
 
-    Forces are complex numbers x + i y: the gains are real, so that both directions are answered
-    alike and do not mix.
+    Forces are complex numbers x + i y. The gains are real, so that both directions are treated
+    equally and do not mix.
     """
 
     STATE = ("force", "smooth", "integral", "slope")
@@ -63,7 +62,7 @@ class SlipPid(Stateful):
         self.slope = self.force  # N    d, filtered derivative
 
     def step(self, force: Plane) -> Plane:
-        """The answers u of this period to forces e (C25), (6,) x + i y each [N]."""
+        """Advances the PIDs by one period: returns u for forces e (C25), (6,) x + i y [N]."""
         h, gains, old = self.period, self.gains, self.smooth
         tf, td = gains.filter_time, gains.derivative_time
         # e' = (h (e + e-) + (2 T_f - h) e'-)/(2 T_f + h)

@@ -1,4 +1,7 @@
-"""Design of the compliant control with python-control: offline, before the walk."""
+"""Designs the gains of compliant control with python-control, before the walk.
+
+Imports the rest of `controller`.
+"""
 
 from hexapod_cosim.controller.design.plots import plot_design
 from hexapod_cosim.controller.design.standing import StandingPlant

@@ -1,6 +1,4 @@
-"""The whole closed loop of a standing plant: all feet, both laws, delays, in one discrete
-system.
-"""
+"""Builds the closed loop of a standing plant as one discrete system, with both laws and delays."""
 
 from __future__ import annotations
 
@@ -20,12 +18,12 @@ from hexapod_cosim.controller.plane import Array
 from hexapod_cosim.controller.walk.kinematics import LegSolver
 from hexapod_cosim.models import Robot
 
-RISE = 0.05  # s
-PLACES = 3  # x, y and yaw of the robot, which nothing holds
+RISE = 0.05  # s    duration of the ramp of a disturbance
+FREE_COORDINATES = 3  # x, y and yaw of the robot, which nothing controls
 
 
 def parallel(system: control.StateSpace, count: int) -> control.StateSpace:
-    """`count` of a system of one input and one output side by side."""
+    """Returns `count` copies of a system of one input and one output in parallel."""
     return control.ss(
         *(np.kron(np.eye(count), matrix) for matrix in (system.A, system.B, system.C, system.D)),
         system.dt,
@@ -33,31 +31,35 @@ def parallel(system: control.StateSpace, count: int) -> control.StateSpace:
 
 
 def compliant_law(robot: Robot, plant: StandingPlant, laws: Laws) -> control.StateSpace:
-    """From the standing feet's forces (3 n) to what their servos are relieved of (3 n)."""
+    """Returns the laws as a system from foot forces (3 n) to the forces (3 n) by which legs yield.
+
+    Both are those of the standing feet.
+    """
     loads, vertical = answers(robot, plant)
     count, period = len(loads), laws.period
     flat, up = axes_of(count)
     order = np.eye(3 * count)[[*flat, *up]]
-    seen, told = (
-        block_diag(squeeze_matrix(robot, plant), np.eye(count)) @ order,
-        order.T * np.concatenate([np.repeat(loads, 2), vertical]),
-    )
+    inputs = block_diag(squeeze_matrix(robot, plant), np.eye(count)) @ order
+    outputs = order.T * np.concatenate([np.repeat(loads, 2), vertical])
     pid, spring = laws.systems
     both = control.append(parallel(pid, 2 * count), parallel(spring, count))
     late = parallel(delay(laws.delays, period=period), 3 * count)
-    return control.ss(both.A, both.B @ seen, told @ both.C, told @ both.D @ seen, period) * late
+    through = outputs @ both.D @ inputs
+    return control.ss(both.A, both.B @ inputs, outputs @ both.C, through, period) * late
 
 
 def closed_loop(robot: Robot, plant: StandingPlant, laws: Laws) -> control.StateSpace:
-    """Forces of the standing feet (3 n) after a disturbance (3 n) that acts as a relief does,
-    both laws at work.
+    """Returns the loop from disturbances (3 n) to forces of the standing feet (3 n), both closed.
+
+    A disturbance is added to the forces by which the legs yield.
     """
     return control.feedback(relieved(robot, plant), compliant_law(robot, plant, laws), sign=1)
 
 
 def splay(robot: Robot, plant: StandingPlant) -> Array:
-    """(3 n) horizontal forces of unit length with which the standing legs splay against each other:
-    outwards, less the common push and twist.
+    """Returns the forces (3 n) of unit length by which the standing legs push each other outwards.
+
+    They are horizontal and contain no common push or twist.
     """
     feet = LegSolver(robot).forward(plant.angle)[plant.standing]
     flat, _ = axes_of(len(feet))
@@ -69,8 +71,9 @@ def splay(robot: Robot, plant: StandingPlant) -> Array:
 
 
 def rising(time: Array) -> Array:
-    """1    a disturbance that comes within RISE and stays; a jump would be a blow by the speeds
-    that the servos are told
+    """Returns a ramp from 0 to 1 within RISE.
+
+    A jump would give the servos an impulse of commanded speed.
     """
     return np.asarray(np.clip((time + time[1]) / RISE, 0.0, 1.0))
 
@@ -78,8 +81,9 @@ def rising(time: Array) -> Array:
 def disturbed(
     system: control.StateSpace, disturbance: Array, *, duration: float
 ) -> tuple[Array, Array]:
-    """Times (steps,) [s] and outputs (outputs, steps) of a discrete system after a rising
-    disturbance (inputs,).
+    """Returns times (steps,) [s] and outputs (outputs, steps) of a discrete system's response.
+
+    disturbance: final values (inputs,) of the ramps at the inputs.
     """
     time = np.arange(round(duration / system.dt)) * system.dt
     return time, np.asarray(
@@ -90,11 +94,12 @@ def disturbed(
 
 
 def spectral_radius(system: control.StateSpace, *, feet: int) -> float:
-    """Largest size of a closed loop's eigenvalues but those of what nothing holds.
+    """Returns the largest magnitude of a closed loop's eigenvalues that are not 1 by construction.
 
-    These are exactly 1: the robot's place, and each foot's on the ground, which the integrals keep;
-    squeezed or not they are at rest.
+    The position of the robot and that of each foot on the ground are not controlled: their
+    eigenvalues are exactly 1.
     """
     values = np.linalg.eigvals(system.A)
-    moving: Array = np.abs(values)[np.argsort(np.abs(values - 1.0))][PLACES + 2 * feet :]
-    return float(moving.max())
+    by_distance = np.abs(values)[np.argsort(np.abs(values - 1.0))]
+    controlled: Array = by_distance[FREE_COORDINATES + 2 * feet :]
+    return float(controlled.max())

@@ -1,6 +1,4 @@
-"""The two laws as python-control systems, as they run: discrete, with the delays of sensors and
-computing.
-"""
+"""Builds both laws as discrete python-control systems, with the delays of sensors and computing."""
 
 from __future__ import annotations
 
@@ -19,14 +17,14 @@ ROUNDING = 1e-9  # 1    of a period
 
 
 def slip_law(gains: SlipGains) -> control.TransferFunction:
-    """The PID with its force filter in continuous time, force to force."""
+    """Returns the PID with its force filter in continuous time, from force to force."""
     s = control.tf("s")
     pid = gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)
     return pid / (gains.filter_time * s + 1.0)
 
 
 def sampled_slip_law(gains: SlipGains, *, period: float) -> control.StateSpace:
-    """The same as it runs (Tustin, part by part)."""
+    """Returns the PID as the controller runs it, discretised part by part by Tustin's rule."""
     s = control.tf("s")
     smooth = control.sample_system(1.0 / (gains.filter_time * s + 1.0), period, method="bilinear")
     integral = control.sample_system(1.0 / s, period, method="bilinear")
@@ -37,7 +35,10 @@ def sampled_slip_law(gains: SlipGains, *, period: float) -> control.StateSpace:
 
 
 def slip_response(gains: SlipGains, omega: Array, *, period: float) -> Response:
-    """Its response in closed form, for searching."""
+    """Returns the frequency response (frequencies,) of sampled_slip_law() in closed form.
+
+    omega: frequencies [rad/s].
+    """
     z = np.exp(1j * omega * period)
     s = 2.0 / period * (z - 1.0) / (z + 1.0)
     pid = gains.kp + gains.ki / s + gains.kd * s / (gains.derivative_time * s + 1.0)
@@ -45,9 +46,10 @@ def slip_response(gains: SlipGains, omega: Array, *, period: float) -> Response:
 
 
 def sampled_suspension(gains: SuspensionGains, *, period: float) -> control.StateSpace:
-    """The suspension as it runs, force to deflection: x+ = A x + B f and the new z is used at once.
+    """Returns the suspension as the controller runs it, from force to deflection.
 
-    The matrix exponential is scipy's, independently of suspension.discretise() and equal to it.
+    x+ = A x + B f, and the output is the new deflection. The matrix exponential is scipy's, so that
+    it is independent of suspension.discretise().
     """
     from scipy.linalg import expm  # noqa: PLC0415  slow to import
 
@@ -60,21 +62,19 @@ def sampled_suspension(gains: SuspensionGains, *, period: float) -> control.Stat
 
 
 def delay_steps(needs: Requirements, *, period: float) -> int:
-    """Periods that pass between a force and the command that answers it; parts of one count
-    whole.
-    """
+    """Returns the delay from a force to the command that responds to it, in whole periods."""
     return math.ceil(needs.delay_periods - ROUNDING) + math.ceil(
         needs.force_delay / period - ROUNDING
     )
 
 
 def delay_response(steps: int, omega: Array, *, period: float) -> Response:
-    """A delay of whole periods."""
+    """Returns the frequency response (frequencies,) of a delay of whole periods."""
     return np.asarray(np.exp(-1j * omega * period * steps))
 
 
 def delay(steps: int, *, period: float) -> control.StateSpace:
-    """The same as a system."""
+    """Returns a delay of whole periods as a system."""
     chain = np.eye(steps, k=-1)
     if not steps:
         return control.ss([], [], [], [[1.0]], period)
@@ -83,7 +83,7 @@ def delay(steps: int, *, period: float) -> control.StateSpace:
 
 @dataclass(frozen=True, kw_only=True)
 class Laws:
-    """Both laws at work with a period [s], `delays` of them late."""
+    """Both laws with a period [s], delayed by `delays` periods."""
 
     slip: SlipGains
     suspension: SuspensionGains
@@ -92,13 +92,13 @@ class Laws:
 
     @cached_property
     def systems(self) -> tuple[control.StateSpace, control.StateSpace]:
-        """The PID and the suspension as they run, without the delay."""
+        """Returns the PID and the suspension as the controller runs them, without the delay."""
         return sampled_slip_law(self.slip, period=self.period), sampled_suspension(
             self.suspension, period=self.period
         )
 
     def responses(self, omega: Array) -> tuple[Response, Response]:
-        """Of the PID and of the suspension (frequencies,)."""
+        """Returns the frequency responses (frequencies,) of PID and suspension, with the delay."""
         late = delay_response(self.delays, omega, period=self.period)
         spring = response(sampled_suspension(self.suspension, period=self.period), omega)[:, 0, 0]
         return slip_response(self.slip, omega, period=self.period) * late, spring * late

@@ -1,9 +1,8 @@
-"""Loops of many feet that share one law: the law times an eigenvalue of the plant, at every
-frequency (generalised Nyquist).
+"""Computes the eigenloci of plants with many feet, and the margins of loops (generalised Nyquist).
 
 All feet and directions have the same law l(z), so det(1 + l P) = product of (1 + l lambda_i) over
-the eigenvalues of the plant's response P: every eigenlocus is a loop of one input and one output,
-and has margins.
+the eigenvalues lambda_i of the plant's response P. Each eigenlocus times the law is therefore a
+loop of one input and one output, and has margins.
 """
 
 from __future__ import annotations
@@ -31,19 +30,17 @@ from hexapod_cosim.models import Robot
 
 Response = NDArray[np.complex128]
 Plants = Mapping[str, StandingPlant]
-SLOWEST = 0.1  # rad/s
-RANK = 1e-6  # 1    of a singular value
+SLOWEST = 0.1  # rad/s    lowest frequency of a grid
+RANK = 1e-6  # 1    smaller singular values count as 0
 
 
 def frequencies(period: float, count: int, *, slowest: float = SLOWEST) -> Array:
-    """rad/s    a logarithmic grid up to the Nyquist frequency"""
+    """Returns a logarithmic grid (count,) of frequencies up to the Nyquist frequency [rad/s]."""
     return np.geomspace(slowest, math.pi / period * 0.999, count)
 
 
 def response(system: control.StateSpace, omega: Array) -> Response:
-    """C (z I - A)^-1 B + D at z = e^(i omega h), all frequencies at once: (frequencies, outputs,
-    inputs).
-    """
+    """Returns C (z I - A)^-1 B + D at z = e^(i omega h): (frequencies, outputs, inputs)."""
     z = np.exp(1j * omega * system.dt)[:, None, None]
     states = system.nstates
     right = np.broadcast_to(system.B.astype(np.complex128), (len(omega), *system.B.shape))
@@ -51,30 +48,31 @@ def response(system: control.StateSpace, omega: Array) -> Response:
 
 
 def eigenloci(robot: Robot, plant: StandingPlant, omega: Array) -> tuple[Response, Response]:
-    """Of a standing plant, as loops of negative feedback: tangential (2 n - 3, frequencies) and
-    vertical (n, frequencies) [N/m].
+    """Returns the tangential (2 n - 3, frequencies) and vertical (n, frequencies) eigenloci.
 
-    The common push and twist of all feet are no squeeze and have no locus.
+    They are those of a plant on n standing feet, for negative feedback. The common push and twist
+    of all feet are no squeeze and have no locus. omega: (frequencies,) [rad/s].
     """
     answer = response(relieved(robot, plant), omega)
     loads, vertical = answers(robot, plant)
     flat, up = axes_of(len(loads))
-    fight = squeeze_matrix(robot, plant)
-    left, size, _ = np.linalg.svd(fight)
+    squeezing = squeeze_matrix(robot, plant)
+    left, size, _ = np.linalg.svd(squeezing)
     basis = left[:, size > RANK]
-    tangential = basis.T @ fight @ answer[:, flat][:, :, flat] * np.repeat(loads, 2) @ basis
+    tangential = basis.T @ squeezing @ answer[:, flat][:, :, flat] * np.repeat(loads, 2) @ basis
     return tracked(np.linalg.eigvals(-tangential)), tracked(
         np.linalg.eigvals(-answer[:, up][:, :, up] * vertical)
     )
 
 
 def tracked(values: NDArray[Any]) -> Response:
-    """Eigenvalues (frequencies, n) as continuous loci (n, frequencies): each goes on with the
-    nearest.
+    """Sorts eigenvalues (frequencies, n) into continuous loci (n, frequencies).
+
+    From one frequency to the next, the sum of the distances within the loci is least.
     """
     loci = values.astype(np.complex128)
-    for before, here in pairwise(loci):
-        here[:] = here[linear_sum_assignment(np.abs(before[:, None] - here))[1]]
+    for before, after in pairwise(loci):
+        after[:] = after[linear_sum_assignment(np.abs(before[:, None] - after))[1]]
     return np.ascontiguousarray(loci.T)
 
 
@@ -87,7 +85,7 @@ class Loci:
     values: Response  # (loci, frequencies)
 
     def finer(self, times: int) -> Loci:
-        """With as many times the frequencies, by linear interpolation."""
+        """Returns the loci on a grid with `times` as many frequencies, by linear interpolation."""
         places = np.arange(len(self.omega))
         between = np.linspace(0.0, places[-1], times * len(self.omega))
         values = np.array([np.interp(between, places, locus) for locus in self.values])
@@ -99,9 +97,7 @@ class Loci:
 
 
 def all_loci(robot: Robot, plants: Plants, omega: Array) -> tuple[Loci, Loci]:
-    """Tangential and vertical eigenloci of all plants, without the laws: the plants' own change
-    slowly with the frequency.
-    """
+    """Returns the tangential and vertical eigenloci of all plants, without the laws."""
     found = {name: eigenloci(robot, plant, omega) for name, plant in plants.items()}
     tangential, vertical = (
         Loci(
@@ -115,7 +111,7 @@ def all_loci(robot: Robot, plants: Plants, omega: Array) -> tuple[Loci, Loci]:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopMargins:
-    """Of one loop; inf where it has no crossing."""
+    """Margins of one loop; inf where it has no crossing."""
 
     gain: float  # dB
     phase: float  # deg
@@ -124,8 +120,9 @@ class LoopMargins:
 
 
 def critical_size(loops: Response) -> Array:
-    """1    (n,) largest size of each loop (n, frequencies) where it crosses the negative real
-    axis, by linear interpolation; 0: nowhere
+    """Returns the largest magnitude (n,) at which each loop crosses the negative real axis [1].
+
+    loops: (n, frequencies), interpolated linearly. A loop without a crossing has 0.
     """
     before, after = loops[:, :-1], loops[:, 1:]
     crossed = (before.imag * after.imag < 0.0) & (before.real < 0.0) & (after.real < 0.0)
@@ -136,7 +133,7 @@ def critical_size(loops: Response) -> Array:
 
 
 def quick_margins(loop: Response, omega: Array) -> LoopMargins:
-    """Margins of a loop (frequencies,) by linear interpolation."""
+    """Estimates the margins of a loop (frequencies,) by linear interpolation."""
     size, gap, critical = np.abs(loop), np.abs(np.angle(-loop)), float(critical_size(loop[None])[0])
     unity = np.flatnonzero((size[:-1] - 1.0) * (size[1:] - 1.0) < 0.0)
     part = np.log(size[unity]) / (np.log(size[unity]) - np.log(size[unity + 1]))
@@ -157,7 +154,7 @@ def loop_margins(loop: Response, omega: Array) -> LoopMargins:
     """Returns the margins of one loop, as python-control computes them."""
     data = control.frd(loop, omega, smooth=True)
     gains, phases, _, _, crossings, _ = control.stability_margins(data, returnall=True)
-    more = [g for g in gains if g > 1.0]  # the gain that may come on top
+    more = [g for g in gains if g > 1.0]  # factors by which the gain may grow
     delays = np.radians(np.mod(phases, 360.0)) / crossings
     return LoopMargins(
         gain=20.0 * math.log10(min(more)) if more else math.inf,

@@ -1,5 +1,6 @@
-"""Figures of a design: Bode and Nyquist diagrams of all eigenloci, answers to disturbances,
-margins over delay and load.
+"""Draws figures of a design: Bode and Nyquist diagrams, disturbance responses, margins.
+
+The diagrams show all eigenloci; margins are drawn over delay and load.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ NAMES = ("bode", "nyquist", "step", "margins")
 def plot_design(robot: Robot, gains: Gains, plants: Plants, directory: str | Path) -> list[Path]:
     """Writes `bode`, `nyquist`, `step` and `margins` as SVG and PNG; returns the paths.
 
-    robot, plants: what the gains were designed for. Raises GainsError when they are another
-    robot's, or the figures cannot be written.
+    robot, plants: those that the gains were designed for. Raises GainsError for gains of another
+    robot, or when the figures cannot be written.
     """
     if robot.hash != gains.robot_hash:
         fix = "pass the robot they were designed for"
@@ -106,7 +107,7 @@ def _save(figure: Any, folder: Path, name: str) -> list[Path]:
 
 
 def _legend_below(figure: Any, *of: Any) -> None:
-    """One legend for all axes, of what is drawn in some of them."""
+    """Draws one legend below the axes, with the labels of all of them."""
     found = {
         label: line
         for axes in of
@@ -116,7 +117,7 @@ def _legend_below(figure: Any, *of: Any) -> None:
 
 
 def _each(loops: Response, draw: Callable[..., Any]) -> None:
-    """Draws all loci, last and on top the one that comes nearest to -1."""
+    """Draws all loci; the one that comes nearest to -1 is drawn last, on top."""
     worst = int(np.abs(1.0 + loops).min(axis=1).argmin())
     for k, loop in enumerate(loops):
         if k != worst:
@@ -200,9 +201,7 @@ def _nyquist(loops: list[Response], omega: Array, gains: Gains) -> Any:
 
 
 def _nominal(robot: Robot, plants: Plants) -> StandingPlant:
-    """Of the plants on most legs, where these can work against each other in all ways, the one
-    nearest to a third of the weight a leg.
-    """
+    """Returns the plant on the most legs whose mean load is nearest to a third of the weight."""
     most = max(plant.standing.sum() for plant in plants.values())
     return min(
         (plant for plant in plants.values() if plant.standing.sum() == most),
@@ -246,7 +245,7 @@ def _step(robot: Robot, plants: Plants, laws: Laws, gains: Gains) -> Any:
 def _margins(
     robot: Robot, plants: Plants, loci: tuple[Loci, Loci], loops: list[Response], gains: Gains
 ) -> Any:
-    """Least margins of all loops, further delay or one load chosen."""
+    """Draws the least margins of all loops over further delay, and over the load."""
     figure, grid = _figure(2, 2, gains, sharey="row", sharex="col")
     needs, load = (
         gains.requirements,
@@ -287,8 +286,9 @@ def _margins(
 
 
 def _least(loops: Response, omega: Array) -> tuple[float, float]:
-    """Least gain [dB] and phase [deg] margins of loops; where none has a crossing the scale's
-    end. Negative: unstable.
+    """Returns the least gain [dB] and phase [deg] margins of loops; negative: unstable.
+
+    Without a crossing it is the end of the figure's scale.
     """
     critical, phase = (
         float(critical_size(loops).max()),

@@ -1,9 +1,8 @@
-"""What the design starts from: the standing robot as a linear system, and what the controller does
-to it.
+"""Defines the plant that the gains are designed for: the standing robot as a linear system.
 
-The controller speaks to a leg in forces: G (3,) [N] is what its servos are told to push less. The
-joints' angles are bent by J^T G / kp, which shifts the foot's target by C G, C = J J^T / kp. A foot
-that sticks then answers with the force -G.
+The laws respond with a force G (3,) [N] at each foot. The joint angles are corrected by J^T G / kp,
+which shifts the foot's target by C G, C = J J^T / kp. The force on a sticking foot then changes by
+-G.
 """
 
 from __future__ import annotations
@@ -31,49 +30,50 @@ ANGLES = FORCES = 3 * LEGS
 class StandingPlant:
     """The plant linearised about a pose in which some legs stand.
 
-    system: sampled at the controller's period, inputs held over it. Inputs: 18 angle_ref, 18
-    speed_ref, 18 torque_ref. Outputs: 18 foot forces (ground on foot, world axes), then whatever
-    else. Legs slowest.
+    system: sampled at the controller's period, with inputs held over it. Inputs: 18 angle_ref, 18
+    speed_ref, 18 torque_ref. Outputs: 18 foot forces (ground on foot, world axes), then others.
+    The leg is the slowest index of each group.
     """
 
     system: control.StateSpace
     angle: Array  # rad    (6, 3)
     force: Array  # N    (6, 3) ground on foot
-    torque: Array  # N m    (6, 3) that the servos were told, to carry it
+    torque: Array  # N m    (6, 3) torque_ref of the servos
     standing: Mask  # (6,)
 
     def load(self, robot: Robot) -> Array:
-        """1    (n,) normal forces of the standing feet in thirds of the weight"""
+        """Returns the normal forces of the standing feet (n,) in thirds of the weight [1]."""
         return np.asarray(self.force[self.standing, 2] / weight_share(robot))
 
 
 def weight_share(robot: Robot) -> float:
-    """N    one leg's share of the weight while three legs stand"""
+    """Returns a third of the robot's weight [N], one leg's share while three legs stand."""
     return robot.weight / TRIPOD_LEGS
 
 
 def relieved(robot: Robot, plant: StandingPlant) -> control.StateSpace:
-    """Forces of the standing feet (3 n) after forces G (3 n) that their servos are relieved of
-    [N], both legs slowest.
+    """Returns the plant as a system from forces G (3 n) to forces of the standing feet (3 n) [N].
+
+    The foot is the slowest index of both.
     """
-    chosen, told = np.repeat(plant.standing, 3), np.zeros((ANGLES, FORCES))
+    chosen, bends = np.repeat(plant.standing, 3), np.zeros((ANGLES, FORCES))
     for leg, jacobian in enumerate(LegSolver(robot).jacobian(plant.angle)):
         rows = slice(JOINTS * leg, JOINTS * (leg + 1))
-        told[rows, rows] = jacobian.T / robot.servo.kp
+        bends[rows, rows] = jacobian.T / robot.servo.kp
     system = plant.system
     return control.ss(
-        system.A, system.B[:, :ANGLES] @ told[:, chosen], system.C[:FORCES][chosen], 0, system.dt
+        system.A, system.B[:, :ANGLES] @ bends[:, chosen], system.C[:FORCES][chosen], 0, system.dt
     )
 
 
 def squeeze_matrix(robot: Robot, plant: StandingPlant) -> Array:
-    """(2 n, 2 n) e = S f: the horizontal forces of the standing feet less their common push and
-    twist, by the law that runs.
+    """Returns S (2 n, 2 n) of e = S f: f without the common push and twist of the standing feet.
+
+    f are their horizontal forces. S is computed by squeeze(), the function that the controller
+    runs.
     """
-    normal, feet = (
-        plant.force[plant.standing, 2],
-        LegSolver(robot).forward(plant.angle)[plant.standing],
-    )
+    normal = plant.force[plant.standing, 2]
+    feet = LegSolver(robot).forward(plant.angle)[plant.standing]
     places = feet[:, 0] + 1j * feet[:, 1]
     columns = [
         squeeze(unit[::2] + 1j * unit[1::2], normal, places) for unit in np.eye(2 * len(normal))
@@ -84,8 +84,9 @@ def squeeze_matrix(robot: Robot, plant: StandingPlant) -> Array:
 
 
 def answers(robot: Robot, plant: StandingPlant) -> tuple[Array, Array]:
-    """What a standing foot's G is per answer of its laws: (n,) loads [1] of the PID's force,
-    (n,) 1/C_zz [N/m] of the suspension's z.
+    """Returns the factors from the outputs of the laws to G of the standing feet (C27).
+
+    They are the loads (n,) of the PID's force [1], and 1/C_zz (n,) of the suspension's z [N/m].
     """
     jacobian = LegSolver(robot).jacobian(plant.angle)[plant.standing]
     vertical = (jacobian[:, 2] ** 2).sum(axis=1) / robot.servo.kp
@@ -93,6 +94,6 @@ def answers(robot: Robot, plant: StandingPlant) -> tuple[Array, Array]:
 
 
 def axes_of(count: int) -> tuple[Places, Places]:
-    """Places of the horizontal (2 n) and the vertical (n) entries among the 3 n of n feet."""
+    """Returns the indices of the horizontal (2 n) and vertical (n) entries in vectors (3 n)."""
     places = np.arange(3 * count).reshape(count, 3)
     return places[:, :2].reshape(-1), places[:, 2]

@@ -1,8 +1,8 @@
-"""Gains by requirement, with python-control.
+"""Designs gains that meet requirements, with python-control.
 
-The tangential PID gets the most integral action that keeps the margins of every eigenlocus of every
-plant; the suspension the deflection, frequency and damping asked for, or a lower frequency where
-the margins demand it.
+The slip PID gets the largest integral gain at which every eigenlocus of every plant keeps its
+margins. The suspension gets the required deflection, frequency and damping, or a lower frequency
+where the margins need it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from hexapod_cosim.controller.design.loci import (
     response,
 )
 from hexapod_cosim.controller.design.standing import StandingPlant, weight_share
-from hexapod_cosim.controller.design.verify import Judge, nominal, support_torque, verify
+from hexapod_cosim.controller.design.verify import MarginFinder, nominal, support_torque, verify
 from hexapod_cosim.controller.gains import (
     POSITIVE,
     Gains,
@@ -50,15 +50,15 @@ from hexapod_cosim.controller.gains import (
 from hexapod_cosim.controller.size import requirements_for, size_of
 from hexapod_cosim.models import LEG_NAMES, Robot
 
-LEADS = (0.0, 0.001, 0.003, 0.01, 0.1)  # s    tried kp/ki, by the robot's size
-CURVATURES = (0.0, 1e-5, 2e-5, 5e-5, 2e-4, 5e-4)  # s2    tried kd/ki, by its square
+LEADS = (0.0, 0.001, 0.003, 0.01, 0.1)  # s    candidates of kp/ki, scaled by the robot's size
+CURVATURES = (0.0, 1e-5, 2e-5, 5e-5, 2e-4, 5e-4)  # s2    candidates of kd/ki, by its square
 DERIVATIVE_PERIODS = 2.0  # 1    filter of the derivative in controller periods
-SEARCHED, FINER = 100, 4  # frequencies, and how many times as many with the laws, which turn faster
-FREQUENCY_STEPS, FREQUENCY_FACTOR = 24, 0.85  # 1    how far the suspension's frequency may give way
-SAFETY, SPARE = 0.98, 0.5  # 1, deg    the search's frequencies may miss the worst by a hair
-BACK_OFF, BACK_OFFS = 0.95, 40  # 1    of the gain where they miss it by more, and how often
-TINY = 1e-9  # 1    size of a loop that stops nothing
-SAME = 1e-9  # relative, of periods
+SEARCHED, FINER = 100, 4  # frequencies of the plants' loci; factor for loops, which turn faster
+FREQUENCY_STEPS, FREQUENCY_FACTOR = 24, 0.85  # 1    attempts with a lower suspension frequency
+SAFETY, SPARE = 0.98, 0.5  # 1, deg    reserve, as the grid may miss the worst frequency
+BACK_OFF, BACK_OFFS = 0.95, 40  # 1    reduction of the gain at a missed margin, and attempts
+TINY = 1e-9  # 1    floor of a loop's magnitude
+SAME = 1e-9  # 1    relative tolerance of periods
 
 
 def design_gains(
@@ -69,11 +69,16 @@ def design_gains(
     requirements: Requirements | None = None,
     left_out: Sequence[str] = (),
 ) -> Gains:
-    """Gains of a robot for a controller period [s] from its standing plants, by name.
+    """Designs the gains of a robot for a controller period [s].
 
-    requirements: by default those for its size;  left_out: stances that there are no plants of,
-    and why; those in which its servos do not carry it are added. Raises GainsError when no gains
-    meet the requirements: which one is missed, what was reached, what was asked for.
+    Args:
+        plants: the standing robot, linearised in its stances, by name.
+        requirements: by default those for the robot's size.
+        left_out: stances without a plant, and why. They become caveats of the gains, and so do
+            stances in which the servos do not carry the robot.
+
+    Raises:
+        GainsError: no gains meet the requirements; the message says which one is missed.
     """
     needs = requirements_for(robot) if requirements is None else requirements
     _check(robot, needs, plants, period=period)
@@ -83,11 +88,11 @@ def design_gains(
     tangential, vertical = (loci.finer(FINER) for loci in all_loci(robot, plants, omega))
     slip, binding = design_slip(tangential, needs, period=period, time=time)
     suspension = design_suspension(robot, vertical, needs, period=period)
-    judge, late = Judge(robot, plants, period=period), delay_steps(needs, period=period)
+    finder, late = MarginFinder(robot, plants, period=period), delay_steps(needs, period=period)
     laws = Laws(slip=slip, suspension=suspension, period=period, delays=late)
-    laws, reached = _backed_off(judge, tangential, laws, needs)
+    laws, reached = _backed_off(finder, tangential, laws, needs)
     margins, shortfalls = verify(
-        robot, plants, judge, vertical, laws, needs, slip=reached, binding=binding
+        robot, plants, finder, vertical, laws, needs, slip=reached, binding=binding
     )
     return Gains(
         robot=robot.name,
@@ -111,7 +116,7 @@ def design_gains(
 
 
 def _taken(kind: type[Any], needs: Requirements) -> Any:
-    """A section of the gains that the requirements hold as it is."""
+    """Returns a section of the gains whose values are those of the requirements."""
     return kind(**{entry.name: getattr(needs, entry.name) for entry in fields(kind)})
 
 
@@ -144,23 +149,23 @@ def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) 
     for name, plant in plants.items():
         if not math.isclose(plant.system.dt, period, rel_tol=SAME):
             raise GainsError(
-                "a plant sampled otherwise",
+                "a plant sampled with another period",
                 got=plant.system.dt,
                 expected=f"{period} s",
-                fix="sample it anew",
+                fix="linearise it with the controller's period",
                 where=name,
             )
 
 
 def _backed_off(
-    judge: Judge, loci: Loci, laws: Laws, needs: Requirements
+    finder: MarginFinder, loci: Loci, laws: Laws, needs: Requirements
 ) -> tuple[Laws, LoopMargins]:
-    """Laws whose tangential loops keep their margins by python-control's judgement; and these.
+    """Reduces the gain until the tangential loops keep their margins by python-control.
 
-    The search's frequencies may step over a resonance: then the gain gives way.
+    The search's grid may miss a resonance. Returns the laws and the margins of their loops.
     """
     for _ in range(BACK_OFFS):
-        found = judge.worst(loci, 0, laws)
+        found = finder.worst(loci, 0, laws)
         if found.phase >= needs.phase_margin and found.gain >= needs.gain_margin:
             return laws, found
         slip = laws.slip
@@ -168,13 +173,13 @@ def _backed_off(
             laws,
             slip=replace(slip, kp=BACK_OFF * slip.kp, ki=BACK_OFF * slip.ki, kd=BACK_OFF * slip.kd),
         )
-    return laws, judge.worst(loci, 0, laws)
+    return laws, finder.worst(loci, 0, laws)
 
 
 def carried(robot: Robot, plants: Plants, needs: Requirements) -> tuple[Plants, tuple[str, ...]]:
-    """The plants of stances in which the servos carry the robot within their share of torque.
+    """Returns the plants whose servos carry the robot within torque_share, and texts on the others.
 
-    And texts that say in which they do not. Raises GainsError when they carry it in none.
+    Raises GainsError when the servos carry the robot in no stance.
     """
     most = needs.torque_share * robot.servo.torque_max
     torque = {
@@ -213,9 +218,10 @@ def _legs(plant: StandingPlant) -> str:
 def design_slip(
     loci: Loci, needs: Requirements, *, period: float, time: float = 1.0
 ) -> tuple[SlipGains, str]:
-    """Among shapes kp/ki, kd/ki the one with the largest ki at which every locus keeps its margins.
+    """Returns the gains with the largest ki at which every locus keeps its margins.
 
-    And what stopped that ki. time: of the robot's size (size.py), which the shapes go with.
+    All candidates of kp/ki and kd/ki are tried; time: scales them by the robot's size (size.py).
+    Also returns the name of the margin and the plant that limit ki.
     """
     late = delay_response(delay_steps(needs, period=period), loci.omega, period=period)
     best, binding = (
@@ -238,7 +244,10 @@ def design_slip(
 def slip_gains(
     ki: float, lead: float, curvature: float, needs: Requirements, *, period: float
 ) -> SlipGains:
-    """Gains of a shape; the derivative and the anti-windup go with period and filter."""
+    """Returns the gains for ki, kp/ki (lead) and kd/ki (curvature).
+
+    The filter of the derivative follows the period, the anti-windup period and force filter.
+    """
     return SlipGains(
         kp=ki * lead,
         ki=ki,
@@ -252,17 +261,14 @@ def slip_gains(
 
 
 def _largest_gain(loops: Response, needs: Requirements, loci: Loci) -> tuple[float, str]:
-    """Scale of unit-gain loops at which the worst just keeps its margins, and which margin of which
-    plant that is.
+    """Returns the largest factor on unit-gain loops that keeps all margins, and what limits it.
 
-    Out of the sector of the phase margin beyond gain 1 at all frequencies: more than the margin at
-    the crossings asks for.
+    A loop may not enter the sector of the phase margin with a gain above 1 at any frequency, which
+    is more than the phase margin at the crossings requires.
     """
     inside = np.abs(np.angle(-loops)) < math.radians(needs.phase_margin + SPARE)
-    near, critical = (
-        np.where(inside, np.abs(loops), TINY).max(axis=1),
-        np.maximum(critical_size(loops), TINY),
-    )
+    near = np.where(inside, np.abs(loops), TINY).max(axis=1)
+    critical = np.maximum(critical_size(loops), TINY)
     allowed = {
         "phase_margin": 1.0 / near,
         "gain_margin": 10.0 ** (-needs.gain_margin / 20.0) / critical,
@@ -275,16 +281,13 @@ def _largest_gain(loops: Response, needs: Requirements, loci: Loci) -> tuple[flo
 def design_suspension(
     robot: Robot, loci: Loci, needs: Requirements, *, period: float
 ) -> SuspensionGains:
-    """k from the deflection under a third of the weight, m from the frequency, b from the damping
-    ratio.
+    """Returns the suspension for the required deflection, frequency and damping ratio.
 
-    A stiff leg on a soft suspension asks for more margin than the wanted frequency leaves: then the
-    frequency gives way.
+    The stiffness follows from the deflection under a third of the weight. The frequency is lowered
+    until the loops of stiff legs keep their margins.
     """
-    stiffness, late = (
-        weight_share(robot) / needs.deflection,
-        delay_response(delay_steps(needs, period=period), loci.omega, period=period),
-    )
+    stiffness = weight_share(robot) / needs.deflection
+    late = delay_response(delay_steps(needs, period=period), loci.omega, period=period)
     gains = suspension_gains(stiffness, needs.frequency, needs)
     for step in range(FREQUENCY_STEPS):
         gains = suspension_gains(stiffness, needs.frequency * FREQUENCY_FACTOR**step, needs)
@@ -299,7 +302,10 @@ def design_suspension(
 
 
 def suspension_gains(stiffness: float, frequency: float, needs: Requirements) -> SuspensionGains:
-    """A mass on that spring with the natural frequency [Hz] and the damping ratio asked for."""
+    """Returns the suspension for a stiffness [N/m] and a natural frequency [Hz].
+
+    The damping ratio is that of the requirements.
+    """
     mass = stiffness / (2.0 * math.pi * frequency) ** 2
     return SuspensionGains(
         mass=mass,

@@ -1,6 +1,4 @@
-"""What a design reached, in discrete time, by python-control; and whether it is what was asked
-for.
-"""
+"""Verifies a design in discrete time with python-control: its margins against the requirements."""
 
 from __future__ import annotations
 
@@ -28,15 +26,15 @@ from hexapod_cosim.controller.size import requirements_for, size_of
 from hexapod_cosim.models import Robot
 
 JUDGED = 400  # frequencies
-STEADY = 1e-2  # rad/s    slow against every creep, by the robot's size
-NOMINAL = (0.8, 1.25)  # 1    mean loads at which the steady slip is told
+STEADY = 1e-2  # rad/s    slow against every creep; scaled by the robot's size
+NOMINAL = (0.8, 1.25)  # 1    range of mean loads for which the steady slip is computed
 CRITERIA = ("gain", "phase", "delay")
 
 
 def verify(
     robot: Robot,
     plants: Plants,
-    judge: Judge,
+    finder: MarginFinder,
     vertical: Loci,
     laws: Laws,
     needs: Requirements,
@@ -44,13 +42,13 @@ def verify(
     slip: LoopMargins,
     binding: str,
 ) -> tuple[Margins, tuple[str, ...]]:
-    """Margins of the worst loops and the stability of all feet together.
+    """Returns the margins of the worst loops, and texts on default requirements that are not met.
 
-    And texts that say what was missed of what only the robot's size asks for. slip: margins of the
-    tangential loops;  vertical: loci of the search. Raises GainsError for margins that are missed,
-    and for what was missed and asked for by other figures than those of the robot's size.
+    slip: margins of the tangential loops; vertical: loci of the search. Raises GainsError for an
+    unstable loop, for missed margins, and for a missed bandwidth or slip rejection that differs
+    from the default for the robot's size.
     """
-    suspension = judge.worst(vertical, 1, laws)
+    suspension = finder.worst(vertical, 1, laws)
     margins = Margins(
         slip_crossover=slip.crossover,
         slip_phase_margin=slip.phase,
@@ -75,9 +73,10 @@ def verify(
 
 
 def _shortfalls(robot: Robot, margins: Margins, needs: Requirements) -> Iterator[str]:
-    """What the law against slip does not reach: a robot walks without, so only who asks is refused.
+    """Yields texts on default requirements that the slip PID does not meet.
 
-    Legs that creep as fast as the law answers have no crossover and little rejection.
+    A robot walks without the PID, so only requirements that a user has set raise GainsError. Legs
+    whose feet creep as fast as the PID responds have no crossover and little rejection.
     """
     usual = requirements_for(robot)
     for name, reached, asked, met in (
@@ -103,19 +102,22 @@ def _shortfalls(robot: Robot, margins: Margins, needs: Requirements) -> Iterator
 
 
 def support_torque(robot: Robot, plants: Plants) -> float:
-    """N m    largest feed-forward torque of a servo in the stances near the nominal load"""
+    """Returns the largest feed-forward torque of a servo in stances near the nominal load [N m]."""
     return max(
         float(np.abs(plant.torque).max()) for plant in plants.values() if nominal(robot, plant)
     )
 
 
 def nominal(robot: Robot, plant: StandingPlant) -> bool:
-    """Whether its feet carry about the robot's own weight."""
+    """Returns whether the feet of a plant carry about the robot's own weight."""
     return bool(NOMINAL[0] <= plant.load(robot).mean() <= NOMINAL[1])
 
 
 def _slowest(robot: Robot, plants: Plants, laws: Laws) -> float:
-    """Largest spectral radius of the whole closed loops. Raises GainsError when one is unstable."""
+    """Returns the largest spectral radius of the closed loops.
+
+    Raises GainsError for an unstable loop.
+    """
     worst = 0.0
     for name, plant in plants.items():
         radius = spectral_radius(closed_loop(robot, plant, laws), feet=int(plant.standing.sum()))
@@ -141,26 +143,29 @@ def _missed(robot: Robot, what: str, *, got: object, expected: str) -> GainsErro
     )
 
 
-class Judge:
-    """Margins by python-control of those loops that a quick estimate finds worst."""
+class MarginFinder:
+    """Computes margins by python-control, for those loops that a quick estimate finds worst."""
 
     def __init__(self, robot: Robot, plants: Plants, *, period: float) -> None:
         self._omega = frequencies(period, JUDGED, slowest=SLOWEST / size_of(robot).time)
         self._loci = cache(lambda name: eigenloci(robot, plants[name], self._omega))
 
     def worst(self, loci: Loci, which: int, laws: Laws) -> LoopMargins:
-        """Of the tangential (which = 0) or the vertical (1) loops; loci: those of the search."""
+        """Returns the least margins of the tangential (which = 0) or the vertical (1) loops.
+
+        loci: those of the search.
+        """
         law, fine = laws.responses(loci.omega)[which], laws.responses(self._omega)[which]
         found = [quick_margins(locus * law, loci.omega) for locus in loci.values]
-        judged = [
+        computed = [
             self._margins(loci.names[_least(found, criterion)], which, fine, criterion)
             for criterion in CRITERIA
         ]
         least = {
-            criterion: min(getattr(margins, criterion) for margins in judged)
+            criterion: min(getattr(margins, criterion) for margins in computed)
             for criterion in CRITERIA
         }
-        return LoopMargins(**least, crossover=max(margins.crossover for margins in judged))
+        return LoopMargins(**least, crossover=max(margins.crossover for margins in computed))
 
     def _margins(self, name: str, which: int, law: Response, criterion: str) -> LoopMargins:
         loops = self._loci(name)[which] * law
@@ -173,8 +178,9 @@ def _least(found: Sequence[LoopMargins], criterion: str) -> int:
 
 
 def steady_slip(robot: Robot, plants: Plants, laws: Laws) -> float:
-    """Steady slip with the tangential law over that without it, worst of the squeezes that feet
-    near their nominal load can have.
+    """Returns the steady slip with the slip PID over that without it [1].
+
+    It is the worst of all squeezes of all plants near the nominal load.
     """
     omega = np.array([STEADY / size_of(robot).time])
     law = laws.responses(omega)[0]

@@ -1,1 +1,4 @@
-"""What the controller concludes from measured forces: contacts, touch-downs, landings, burden."""
+"""Derives contacts, touch-downs, landings and the carried weight from measured foot forces.
+
+Imports `memory` and `plane`.
+"""

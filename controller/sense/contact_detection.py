@@ -1,11 +1,10 @@
-"""What the foot force sensors say, and whether they can be believed. C: contact_detection.c.
+"""Detects contacts from foot forces, and faulty force sensors. C: contact_detection.c.
 
 A foot touches down when its force rises above one threshold and lifts off when it falls below a
-lower one, so that noise on a force near either does not toggle it (C23). A sensor is not believed
-any more when it contradicts the plan for too long: a force on a foot in the middle of its swing, or
-none on a foot that is planned to carry its load while the other feet do not carry the whole weight
-in its place (C34). It is believed again when it has not contradicted anything for one and a half
-gait cycles.
+lower one, so that noise near a threshold does not toggle the contact (C23). A sensor is doubted
+when it contradicts the plan for too long: it reports a force on a foot in the middle of its swing,
+or none on a foot that should carry its load while all feet together lack weight (C34). It is
+trusted again after one and a half gait cycles without a contradiction.
 """
 
 from __future__ import annotations
@@ -17,45 +16,48 @@ from hexapod_cosim.controller.plane import LEGS, Array, Mask
 
 TOUCH = 0.02  # 1    of the weight: a foot with more has touched down
 LIFT = 0.005  # 1    of the weight: a foot with less has lifted off
-AIRBORNE_TIME = 0.06  # s    a force this long on a foot in mid-swing is a contradiction
-ABSENT_TIME = 0.10  # s    none this long on a foot that should carry: both exceed the sensors' lag
+AIRBORNE_TIME = 0.06  # s    longest plausible force on a foot in mid-swing
+ABSENT_TIME = 0.10  # s    longest plausible lack of force on a standing foot; both exceed the lag
 MISSING_SHARE = 0.92  # 1    of the weight: with less, the force of some foot is not reported
-MEMORY_CYCLES = 1.5  # 1    gait cycles without contradiction until a sensor is believed again
+MEMORY_CYCLES = 1.5  # 1    gait cycles without contradiction until a sensor is trusted again
 
 
 class ContactDetector(Stateful):
-    """Touch-down and lift-off with hysteresis. `touching`: (6,) feet on the ground."""
+    """Detects touch-down and lift-off with hysteresis. `touching`: (6,) feet on the ground."""
 
     STATE = ("touching",)
 
     def __init__(self, weight: float) -> None:
-        """weight: of the robot [N]."""
+        """Starts with all feet in the air. weight: of the robot [N]."""
         self.weight = weight
         self.reset()
 
     def reset(self) -> None:
-        """All feet in the air."""
+        """Sets all feet to be in the air."""
         self.touching: Mask = np.zeros(LEGS, dtype=np.bool_)
 
     def step(self, normal: Array) -> Mask:
-        """One period on under normal forces (6,) [N] (C23). Returns `touching`."""
+        """Updates and returns `touching` for normal forces (6,) [N] (C23)."""
         limit = np.where(self.touching, LIFT * self.weight, TOUCH * self.weight)
         self.touching = normal > limit
         return self.touching
 
 
 class SensorWatch(Stateful):
-    """Which foot sensors contradict the plan for too long (C34).
+    """Finds the foot sensors that contradict the plan for too long (C34).
 
     Attributes, (6,) each:
         contradicted: for how long a sensor has contradicted the plan [s].
-        left: time until a sensor is believed again [s].
+        left: time until a sensor is trusted again [s].
     """
 
     STATE = ("contradicted", "left")
 
     def __init__(self, weight: float, *, cycle: float, period: float) -> None:
-        """weight: of the robot without payload [N]; cycle: of the gait [s]."""
+        """Starts with all sensors trusted.
+
+        weight: of the robot without payload [N]; cycle: of the gait [s]; period [s].
+        """
         self.period, self.missing = period, MISSING_SHARE * weight
         self.memory = MEMORY_CYCLES * cycle
         self.reset()
@@ -65,16 +67,16 @@ class SensorWatch(Stateful):
         self.contradicted, self.left = np.zeros((2, LEGS))
 
     def busy(self) -> bool:
-        """Whether some sensor contradicts the plan or is not believed."""
+        """Returns whether some sensor contradicts the plan or is doubted."""
         return bool(self.contradicted.any() or self.left.any())
 
     @property
     def doubted(self) -> Mask:
-        """(6,) sensors that are not believed."""
+        """Returns the sensors (6,) that are not trusted."""
         return self.left > 0.0
 
     def look(self, touching: Mask, total: float, standing: Mask, high: Mask) -> Mask:
-        """One period on. Returns `doubted`.
+        """Advances the times by one period and returns `doubted`.
 
         Args:
             touching: (6,) feet that report a force.

@@ -1,10 +1,10 @@
-"""How high above the ends of their paths the feet meet the ground (C35). C: landing.c.
+"""Predicts the height above the end of its path at which each foot meets the ground (C35).
 
-On level ground under a torso that lies as planned that is 0. A torso that sags or leans, or feet
-that sink in, let all feet meet the ground early, step after step; a bump lets one foot meet it
-early, once. So a foot is expected to meet the ground at the least height at which the other feet
-have met it last, or which they have reached in their swing without meeting it; or as high as it did
-itself a step before.
+C: landing.c. On level ground with the torso as planned this height is 0. A torso that sags or
+leans, or ground that yields, lets all feet meet the ground early at every step; a bump lets one
+foot meet it early once. The expected height of a foot is therefore the least height at which
+another foot last met the ground, or to which it has come down in its swing without contact. It is
+the foot's own height of the step before, if that is larger.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from hexapod_cosim.controller.sense.touchdown import EARLY
 
 
 def _least_of_others(values: Array) -> Array:
-    """(6,) the least of the other five values; 0 where that is infinite."""
+    """Returns for each foot the least value of the other five (6,); 0 where it is infinite."""
     first, second = np.sort(values)[:2]
     least = np.where(np.arange(LEGS) == values.argmin(), second, first)
     return np.where(np.isfinite(least), least, 0.0)
 
 
 class Landings(Stateful):
-    """The last landings of all feet.
+    """Heights of the last landings of all feet.
 
     Attributes, (6,) each:
-        met: height of the path over its end when the foot last came down [m]; inf until it has.
-        before: the same at the landing before that [m]; 0 until there was one.
-        flew: the foot has been off the ground in a swing since.
+        met: height of the path above its end at the last landing [m]; inf before the first one.
+        before: the same at the landing before that [m]; 0 before there was one.
+        flew: the foot has left the ground since its last landing.
     """
 
     STATE = ("met", "before", "flew")
@@ -40,12 +40,12 @@ class Landings(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """No foot has come down yet."""
+        """Removes all recorded landings."""
         self.met, self.before = np.full(LEGS, math.inf), np.zeros(LEGS)
         self.flew: Mask = np.zeros(LEGS, dtype=np.bool_)
 
     def look(self, touching: Mask, height: Array, swinging: Mask) -> None:
-        """One period on.
+        """Records the landings of this period.
 
         Args:
             touching: (6,) feet that report a force.
@@ -60,15 +60,17 @@ class Landings(Stateful):
         self.flew = (self.flew | swinging) & ~touching
 
     def expected(self, touching: Mask, height: Array, swinging: Mask) -> Array:
-        """Where each foot meets the ground without any bump (C35), (6,) [m].
+        """Returns the heights (6,) at which the feet are expected to meet the ground [m] (C35).
 
-        It is 0 while nothing tells. Arguments are those of look().
+        They are 0 before the first landing. Arguments are those of look().
         """
-        told = np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)
-        return np.maximum(_least_of_others(told), self.before)
+        known = np.where(swinging & ~touching, np.maximum(height, 0.0), self.met)
+        return np.maximum(_least_of_others(known), self.before)
 
     def early(self, expected: Array, height: Array) -> Mask:
-        """(6,) feet that met the ground early and are still above where feet met it before (C36).
+        """Returns the feet (6,) that met the ground early (C36).
+
+        Their paths are still above the heights of earlier landings.
 
         expected: (6,) from expected() [m]; height: (6,) of the paths over their ends [m].
         """

@@ -1,4 +1,4 @@
-"""How the robot walks from a command alone: gait, foot paths, inverse kinematics and dynamics.
+"""Plans the walk from the command: gait, foot paths, inverse kinematics and dynamics, slow loops.
 
 Imports `memory` and `plane`.
 """

@@ -1,4 +1,4 @@
-"""Gaits: which leg is in the air when. C: gait.c.
+"""Defines gaits: the times at which each leg stands and swings. C: gait.c.
 
 The phase of a leg is its offset plus the gait clock, modulo 1; below the duty factor it stands,
 above it swings (C2). The offsets are OpenSHC's multiplier x offset / (stance + swing), given there
@@ -33,12 +33,12 @@ class Pattern:
 
     @property
     def duty(self) -> float:
-        """The least duty factor with which the offsets hand over without a gap."""
+        """Returns the least duty factor at which the offsets leave no gap in the support."""
         return self.stance / (self.stance + self.swing)
 
     @property
     def offsets(self) -> tuple[float, ...]:
-        """(6,) phase offsets in [0, 1), legs in the order LF LM LR RF RM RR."""
+        """Returns the phase offsets (6,) in [0, 1), legs in the order LF LM LR RF RM RR."""
         parts = self.stance + self.swing
         return tuple((self.multipliers[k] * self.offset % parts) / parts for k in AROUND_TO_LEGS)
 
@@ -87,15 +87,15 @@ class Gait:
             )
 
     def phase(self, clock: float) -> NDArray[np.float64]:
-        """(6,) phase of each leg in [0, 1) at a gait clock in cycles."""
+        """Returns the phases of the legs (6,) in [0, 1) at a gait clock in cycles."""
         return (np.array(self.offsets) + clock) % 1.0
 
     def stance(self, clock: float) -> NDArray[np.bool_]:
-        """(6,) which legs stand at a gait clock in cycles."""
+        """Returns the legs (6,) that stand at a gait clock in cycles."""
         return self.phase(clock) < self.duty
 
     def start_clock(self) -> float:
-        """A clock at which the legs of the largest offset are about to lift off."""
+        """Returns the clock at which the legs of the largest offset lift off."""
         return self.duty - max(self.offsets)
 
 
@@ -108,11 +108,11 @@ def make_gait(
     step_height: float | None = None,
     touchdown_speed: float = 0.0,
 ) -> Gait:
-    """A gait by name; what is not given is taken from the robot's own gait.
+    """Makes a gait by name; other arguments default to those of the robot's own gait.
 
-    Another gait than the robot's gets the natural duty factor of its pattern. The default period
-    keeps the time of the robot's swing, so that no duty factor asks more speed of the joints than
-    the robot's own gait does.
+    Another gait than the robot's gets the duty factor of its pattern. The default period keeps the
+    duration of the robot's swing, so that the gait needs no higher joint speeds than the robot's
+    own.
 
     Raises HexapodError: unknown name (with the nearest valid one), impossible values.
     """

@@ -1,11 +1,11 @@
-"""Slow loops on what the standing legs say about the torso: its posture and the way it has walked.
+"""Controls posture and path of the torso slowly, by the positions of the standing feet.
 
-C: hold.c. Feet that stand are fixed points, so where the joint encoders see them tells how the
-torso lies (C37). The tilt against the feet and the tilt that the attitude sensor measures give the
-inclination of the ground; smoothed it is what the torso is held parallel to, while quick tilts are
-those of the sensor (C38). From one look to the next, the feet that stood all the time tell the way
-of the torso over the ground (C39); what it has lost against the command is added to the commanded
-velocity (C40).
+C: hold.c. Standing feet are fixed to the ground, so their positions by the joint encoders give the
+height and tilt of the torso over them (C37). This tilt and that of the attitude sensor give the
+inclination of the ground. The torso is held parallel to the smoothed inclination; fast tilts are
+corrected by the sensor (C38). Between two looks, the feet that stood all the time give the path of
+the torso over the ground (C39); its deviation from the command is corrected by an addition to the
+commanded velocity (C40).
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from hexapod_cosim.controller.parts import Parts
 from hexapod_cosim.controller.plane import LEGS, Array, Plane, cis, clamp
 
 LOOK_TIME = 0.04  # s    between two looks, at least a period
-LOADED = 0.3  # 1    thirds of the weight on a foot that certainly does not slip along
-DETERMINANT_FLOOR = 1e-6  # m4    feet on one line tell no tilt
+LOADED = 0.3  # 1    thirds of the weight; a foot with more load does not slide
+DETERMINANT_FLOOR = 1e-6  # m4    feet on one line determine no plane
 
 
 class Sight(NamedTuple):
-    """What is seen at a look; feet (6,) in the walking frame."""
+    """Measurements at a look; feet (6,) are in the walking frame."""
 
-    plane: Plane  # m    where the encoders see the contact points, x + i y
-    height: Array  # m    where the encoders see the centres of the feet, z
-    planned: Plane  # m    where the contact points were planned, x + i y
-    planned_height: Array  # m    where the centres of the feet were planned, z
+    plane: Plane  # m    contact points by the encoders, x + i y
+    height: Array  # m    centres of the feet by the encoders, z
+    planned: Plane  # m    planned contact points, x + i y
+    planned_height: Array  # m    planned centres of the feet, z
     load: Array  # 1    thirds of the weight
     tilt: Array  # rad    (2,) roll and pitch beyond the commanded ones
     yaw: float  # rad
@@ -40,7 +40,7 @@ class Sight(NamedTuple):
 
 
 def fit_plane(feet: Plane, height: Array, weight: Array) -> Array | None:
-    """The plane height = c + s_x x + s_y y of least weighted squares (C37).
+    """Fits the plane height = c + s_x x + s_y y by weighted least squares (C37).
 
     Args:
         feet: (6,) x + i y [m].
@@ -66,12 +66,12 @@ def fit_plane(feet: Plane, height: Array, weight: Array) -> Array | None:
 
 
 class Hold(Stateful):
-    """Corrections of posture and way.
+    """Corrections of posture and path.
 
     Attributes:
         lift: (6,) of the feet [m].
         velocity, yaw_rate: additions to the commanded ones [m/s, rad/s].
-        way, heading: lost so far, ground frame [m, rad].
+        way, heading: deviation of the path from the command, ground frame [m, rad].
         ground: (2,) inclination of the ground, roll and pitch [rad]; None: not known yet.
         angle, height: (2,) roll and pitch and the height of the correction [rad, m].
         last: contact points (6,) turned by the yaw [m], their loads (6,) [1] and the yaw [rad] at
@@ -88,7 +88,7 @@ class Hold(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """Nothing seen yet."""
+        """Removes all corrections and measurements."""
         self.lift, self.velocity, self.yaw_rate = np.zeros(LEGS), 0j, 0.0
         self.way, self.heading = 0j, 0.0
         self.ground: Array | None = None
@@ -115,7 +115,10 @@ class Hold(Stateful):
         self.lift = seen.planned.real * pitch - seen.planned.imag * roll - self.height
 
     def _add_lost_way(self, seen: Sight, feet: Plane) -> None:
-        """Adds what was lost since the last look (C39). feet: (6,) turned by the yaw [m]."""
+        """Adds the deviation of the path since the last look (C39).
+
+        feet: (6,) contact points turned by the yaw [m].
+        """
         if self.last is None:
             return
         before, loads, yaw = self.last
@@ -130,7 +133,7 @@ class Hold(Stateful):
         self.heading += seen.yaw_rate * self.time - turned
 
     def _hold_path(self, seen: Sight) -> None:
-        """Leads the robot back to its way (C39, C40)."""
+        """Computes the added velocity that leads the robot back to its path (C39, C40)."""
         gains, turned = self.gains, complex(cis(seen.yaw))
         feet = turned * seen.plane
         self._add_lost_way(seen, feet)
@@ -141,7 +144,7 @@ class Hold(Stateful):
         self.yaw_rate = min(max(turn, -gains.turn_limit), gains.turn_limit)
 
     def look(self, seen: Sight) -> None:
-        """Brings the corrections up to date."""
+        """Updates the corrections."""
         if self.parts.posture:
             self._hold_posture(seen)
         if self.parts.path:

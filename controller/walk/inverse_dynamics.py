@@ -1,11 +1,11 @@
-"""What the planned motion demands of servos and ground: inverse dynamics of all legs.
+"""Computes the servo torques and ground forces that the planned motion needs (inverse dynamics).
 
-C: inverse_dynamics.c. A leg is three point masses. Seen in its own vertical plane, which turns with
-the coxa, a point is U = u + i w (outward, up) and Y to the side; from above that plane points along
-e^(i psi). Accelerations are second differences of three successive planned steps. The joint torques
-are those of (C15); what the ground must give the robot as a whole is (C16). A force f of the ground
-on the foot asks -J^T f of the joints, J of the contact point (C17). Left out: what the turning of
-the torso does to the turning of the legs, and the inertia of the links about their long axes.
+C: inverse_dynamics.c. A leg is three point masses. In its own vertical plane, which turns with the
+coxa, a point is U = u + i w (outward, up) and Y to the side; this plane has the heading e^(i psi).
+Accelerations are second differences of three successive planned steps. The joint torques are C15,
+the force and moment of the ground on the whole robot C16. A force f of the ground on the foot needs
+the joint torques -J^T f, J of the contact point (C17). Neglected: the coupling of the torso's
+rotation with that of the legs, and the inertia of the links about their long axes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Wrench = tuple[Any, ...]  # push, weight, moment, twist of (C16)
 
 
 class Masses(NamedTuple):
-    """Where the point masses are at one step; (6, 3): legs, links."""
+    """Positions of the point masses at one step; (6, 3): legs, links."""
 
     point: Plane  # m    (6, 3) U, from where the coxa axis meets the hip
     place: Plane  # m    (6, 3) x + i y, walking frame
@@ -37,14 +37,14 @@ class Masses(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What a planned motion demands at one step."""
+    """Torques and ground forces that a planned motion needs at one step."""
 
     torque: Array  # N m    (6, 3) for the legs' own weight and motion, their feet free
     lever: Array  # m    (6, 3, 3) J^T: joint torques per force on the contact point, walking axes
-    push: complex  # N    horizontal force that the ground must give the robot, walking frame
-    weight: float  # N    the vertical force
-    moment: complex  # N m    what the sum of p f_n over the feet must be
-    twist: float  # N m    what the sum of Im(p^* f_h) must be, the moment about the vertical
+    push: complex  # N    horizontal force of the ground on the robot, walking frame
+    weight: float  # N    vertical force of the ground on the robot
+    moment: complex  # N m    sum of p f_n over the feet
+    twist: float  # N m    sum of Im(p^* f_h) over the feet, the moment about the vertical
 
 
 class Neighbours(NamedTuple):
@@ -55,7 +55,7 @@ class Neighbours(NamedTuple):
 
 
 class InverseDynamics:
-    """Of one robot. `legs`: its kinematics; `period` [s] lies between two steps."""
+    """Inverse dynamics of one robot. legs: its kinematics; period: between two steps [s]."""
 
     def __init__(self, robot: Robot, legs: LegSolver, *, period: float) -> None:
         self.legs, self.period = legs, period
@@ -78,7 +78,7 @@ class InverseDynamics:
         self.pitch_inertia = inertia[..., 1]  # kg m2    (6, 3)
 
     def rest(self) -> Demand:
-        """What the robot demands in its stance."""
+        """Returns the demand of the robot standing in its stance."""
         x, y, z = self.stance.T
         pose = self.legs.pose(x + 1j * y, z)
         level = Posture.of(np.zeros(3), np.zeros(3))
@@ -87,11 +87,11 @@ class InverseDynamics:
         return self.demand(alone, np.zeros_like(pose.angle), level)
 
     def place(self, pose: Pose, way: complex, turn: float, posture: Posture) -> Masses:
-        """Where the point masses are.
+        """Returns the positions of the point masses.
 
         Args:
             pose: the legs, torso frame.
-            way, turn: of the walking frame over the ground [m, rad].
+            way, turn: position and heading of the walking frame in the ground frame [m, rad].
             posture: of the torso in the walking frame.
         """
         legs, turned = self.legs, cis(turn)
@@ -118,7 +118,7 @@ class InverseDynamics:
         )
 
     def _acceleration(self, before: Any, now: Any, after: Any) -> Any:
-        """The second difference of three steps, of numbers and points alike."""
+        """Returns the second difference of numbers or points at three steps, per second squared."""
         return (after - 2.0 * now + before) / (self.period * self.period)
 
     def _add_force(self, total: Wrench, push: Any, lift: Any, place: Any, height: Any) -> Wrench:
@@ -136,7 +136,7 @@ class InverseDynamics:
     def _demand_torso(
         self, total: Wrench, masses: tuple[Masses | None, Masses, Masses | None]
     ) -> Wrench:
-        """Adds what the torso demands to push, weight, moment and twist (C16)."""
+        """Adds the forces that the torso needs to push, weight, moment and twist (C16)."""
         before, now, after = masses
         acceleration, up, spin = 0j, 0.0, 0j
         if before is not None and after is not None:
@@ -154,7 +154,7 @@ class InverseDynamics:
     def _demand_links(
         self, masses: tuple[Masses | None, Masses, Masses | None]
     ) -> tuple[Plane, Array]:
-        """m (a + g) of the links: horizontal and vertical, (6, 3) each [N], walking frame."""
+        """Returns m (a + g) of the links, horizontal and vertical (6, 3) [N], walking axes."""
         before, now, after = masses
         if before is None or after is None:
             return np.zeros((LEGS, 3), dtype=np.complex128), self.mass * self.gravity
@@ -164,7 +164,7 @@ class InverseDynamics:
         return push, self.mass * (up + self.gravity)
 
     def _demand_torques(self, motion: Neighbours, push: Plane, lift: Array, speed: Array) -> Array:
-        """The joint torques (C15), (6, 3) [N m].
+        """Returns the joint torques (6, 3) [N m] (C15).
 
         push, lift: (6, 3) forces that the links need, torso frame [N]; speed: (6, 3) [rad/s].
         """
@@ -188,7 +188,7 @@ class InverseDynamics:
         return np.asarray(torque)
 
     def _lever_of(self, pose: Pose, posture: Posture) -> Array:
-        """J^T of the contact points (C17), (6, 3, 3) [m]: rows joints, columns walking axes."""
+        """Returns J^T of the contact points (6, 3, 3) [m] (C17): joints by walking axes."""
         femur = pose.foot - 1j * self.legs.radius
         tibia = femur - self.legs.femur * pose.femur
         row = np.empty((LEGS, 3), dtype=np.complex128)
@@ -200,7 +200,7 @@ class InverseDynamics:
         return np.array((row.real, row.imag, up)).transpose(1, 2, 0)
 
     def demand(self, motion: Neighbours, speed: Array, posture: Posture) -> Demand:
-        """What the middle one of three steps demands.
+        """Returns the demand of the middle one of three steps.
 
         Args:
             motion: the steps.

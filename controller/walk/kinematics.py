@@ -1,4 +1,4 @@
-"""Closed-form kinematics of six three-joint legs in the torso frame. C: kinematics.c.
+"""Computes the kinematics of six three-joint legs in closed form, torso frame. C: kinematics.c.
 
 Geometry (docs/architecture.md): the coxa turns about +z, the femur about -y, the tibia about +y;
 the tip of a link is (length, offset_y, offset_z) in the link's frame. Seen in the coxa frame, a leg
@@ -33,7 +33,7 @@ class Feet(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """The legs, each in its own vertical plane; torso frame."""
+    """Pose of the legs, each in its own vertical plane; torso frame."""
 
     point: Plane  # m    (6,) from the coxa axis to the foot, x + i y
     heading: Plane  # 1    (6,) e^(i psi), the outward direction of the leg
@@ -41,11 +41,11 @@ class Pose(NamedTuple):
     femur: Plane  # 1    (6,) e^(i A)
     tibia: Plane  # 1    (6,) e^(i B)
     angle: Array  # rad    (6, 3) without joint limits
-    lost: Mask  # (6,) the foot is out of reach: these are the nearest angles
+    lost: Mask  # (6,) the target is out of reach: `angle` is the nearest pose
 
 
 class Joints(NamedTuple):
-    """What the servos can be told."""
+    """Joint angles and speeds within the limits of the joints."""
 
     angle: Array  # rad    (6, 3)
     speed: Array  # rad/s    (6, 3)
@@ -82,7 +82,7 @@ class LegSolver:
         self.radius = robot.foot.radius  # m
 
     def forward(self, angle: Array) -> Array:
-        """The centres of the feet at joint angles (C11).
+        """Returns the centres of the feet at joint angles (C11).
 
         Args:
             angle: (..., 6, 3) joint angles [rad].
@@ -100,11 +100,11 @@ class LegSolver:
         return np.asarray(np.stack([forward, aside, z], axis=-1) + self.hip.T)
 
     def rolling(self, angle: Array) -> Array:
-        """How far the round feet have rolled outwards since the stance (C9), (6,) [m]."""
+        """Returns the distances that the feet have rolled outwards since the stance (6,) [m]."""
         return np.asarray(self.radius * (angle[..., 2] - angle[..., 1] - self.stance_pitch))
 
     def pose(self, plane: Plane, height: Array) -> Pose:
-        """Inverse kinematics without joint limits (C12): every target gives a pose.
+        """Solves the inverse kinematics without joint limits (C12); every target gives a pose.
 
         Args:
             plane, height: (6,) centres of the feet, x + i y and z, torso frame [m].
@@ -131,7 +131,7 @@ class LegSolver:
         return Pose(point, heading, foot, femur, tibia, angle, lost)
 
     def speeds(self, pose: Pose, velocity: Plane | float, rise: Array | float) -> Array:
-        """Joint speeds of feet that move with given velocities (C13).
+        """Returns the joint speeds for given velocities of the feet (C13).
 
         Args:
             velocity, rise: (6,) velocities of x + i y and of z, torso frame [m/s].
@@ -151,9 +151,9 @@ class LegSolver:
         return speed
 
     def solve(self, pose: Pose, velocity: Plane, rise: Array) -> Joints:
-        """Angles within the joints' limits and speeds that servos can reach.
+        """Returns angles and speeds limited to those that the joints can reach.
 
-        A joint that is held by its angle limit has no speed. Arguments are those of speeds().
+        The speed of a joint at its angle limit is 0. Arguments are those of speeds().
         """
         angle = clamp(pose.angle, self.angle_min, self.angle_max)
         held = ~(np.abs(pose.angle - angle) <= FLAG_TOLERANCE)
@@ -163,10 +163,10 @@ class LegSolver:
     def accelerations(
         self, neighbour: Pose | None, ahead: float, angle: Array, speed: Array
     ) -> Array:
-        """Joint accelerations that lead to the angles of a neighbouring step (C14).
+        """Returns the joint accelerations that reach the angles of a neighbouring step (C14).
 
-        A joint that its limits hold, of angle or of speed, has none, and none has more than
-        reverses the largest speed within that time.
+        They are 0 at a limit of angle or speed. No acceleration exceeds that which reverses the
+        largest speed within the time between the steps.
 
         Args:
             neighbour: the pose of the neighbouring step; None: no accelerations.
@@ -184,10 +184,10 @@ class LegSolver:
         way = clamp(neighbour.angle, self.angle_min, self.angle_max) - angle - ahead * speed
         return np.where(held, 0.0, clamp(2.0 * way / (ahead * ahead), -most, most))
 
-    # what the design and the static checks use; the running controller does not
+    # the design and the static checks use the following; the running controller does not
 
     def jacobian(self, angle: Array) -> Array:
-        """(6, 3, 3) velocity of the foot's centre, torso axes, per joint speed [m/rad].
+        """Returns the velocity of each foot's centre per joint speed (6, 3, 3) [m/rad], torso axes.
 
         Rows are axes, columns joints. angle: (6, 3) [rad].
         """
@@ -209,9 +209,9 @@ class LegSolver:
         return jacobian
 
     def inverse(self, foot: Array) -> Array:
-        """(6, 3) joint angles [rad] of feet (6, 3) in the torso frame [m].
+        """Returns the joint angles (6, 3) [rad] for feet (6, 3) in the torso frame [m].
 
-        Raises ReachError with leg, target and reach when a foot cannot get there.
+        Raises ReachError with leg, target and reach when a foot cannot reach its target.
         """
         points = np.asarray(foot, dtype=np.float64)
         wrong = ~np.isfinite(points).all(axis=1)

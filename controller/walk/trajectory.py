@@ -1,4 +1,4 @@
-"""Where the feet should be: from the body command to the paths of the feet. C: trajectory.c.
+"""Computes the paths of the feet from the body command. C: trajectory.c.
 
 The walking frame K is the torso frame of a robot at its nominal height and level posture. It moves
 over the ground with the velocity v = vx + i vy and the yaw rate w. Horizontal points are complex
@@ -37,7 +37,7 @@ SMALL_ANGLE = 1e-12  # rad    below it sin(a)/a is 1
 
 @dataclass(frozen=True)
 class BodyCommand:
-    """What the torso should do, in its own frame."""
+    """Desired velocity of the torso, in its own frame, and posture."""
 
     vx: float = 0.0  # m/s    forward
     vy: float = 0.0  # m/s    to the left
@@ -54,7 +54,7 @@ class CommandRamp(Stateful):
 
     Attributes:
         target: the command that the ramp leads to.
-        steps: periods since that command was given; the owner counts them.
+        steps: periods since that command was given; the controller counts them.
     """
 
     STATE = ("target", "steps", "_goal", "_cubic")
@@ -66,24 +66,24 @@ class CommandRamp(Stateful):
         self.reset()
 
     def reset(self) -> None:
-        """The zero command, at rest."""
+        """Sets the command to zero, at rest."""
         self.target, self._goal = BodyCommand(), np.zeros(6)
         self._cubic = np.zeros((4, 6))
         self.steps = self.end
 
     def settled(self) -> bool:
-        """Whether the value is the target, and at rest."""
+        """Returns whether the ramp has reached its target."""
         return self.steps >= self.end
 
     def moves(self) -> bool:
-        """Whether the body is commanded to move, and not only to change its posture."""
+        """Returns whether the body is commanded to move, and not only to change its posture."""
         target = self.target
         return (target.vx, target.vy, target.yaw_rate) != (0.0, 0.0, 0.0)
 
     def aim(self, target: BodyCommand) -> bool:
-        """Heads for a command. Returns whether it is a new one.
+        """Starts a ramp to a command. Returns whether the command is a new one.
 
-        Raises HexapodError when a number of it is not finite.
+        Raises HexapodError for a number that is not finite.
         """
         if target == self.target:
             return False
@@ -102,9 +102,9 @@ class CommandRamp(Stateful):
         return True
 
     def ahead(self, steps: int) -> tuple[Array, Array]:
-        """The command so many periods ahead, (6,) vx vy yaw_rate height roll pitch, and its rate.
+        """Returns the command `steps` periods ahead, and its rate per second.
 
-        The rate is per second.
+        Each is (6,): vx vy yaw_rate height roll pitch.
         """
         number = self.steps + steps
         if number >= self.end:
@@ -120,14 +120,14 @@ class CommandRamp(Stateful):
 
 
 class Twist(NamedTuple):
-    """The motion of the body at one step: of the command and of what leads it back to its way."""
+    """Motion of the body at one step: the command with the addition of the path loop."""
 
     velocity: complex  # m/s    vx + i vy
     yaw_rate: float  # rad/s
 
 
 def blend(tau: Array) -> tuple[Array, Array]:
-    """The horizontal progress s in [0, 1] at the parts tau of a swing, and ds/dtau (C6)."""
+    """Returns the horizontal progress s in [0, 1] at the parts tau of a swing, and ds/dtau (C6)."""
     y = np.minimum(np.maximum((2.0 * tau - 1.0) / (1.0 - 2.0 * DWELL), -1.0), 1.0)
     y4 = y * y * y * y
     flat = 1.0 - y4
@@ -136,7 +136,7 @@ def blend(tau: Array) -> tuple[Array, Array]:
 
 
 def hop(tau: Array, *, top: float, down: float) -> tuple[Array, Array]:
-    """The lift z of the foot at the parts tau of a swing, and dz/dtau [m] (C7).
+    """Returns the lift z of the foot at the parts tau of a swing, and dz/dtau [m] (C7).
 
     top: the step height; down: the touch-down speed times the duration of the swing [m].
     """
@@ -147,7 +147,7 @@ def hop(tau: Array, *, top: float, down: float) -> tuple[Array, Array]:
 
 
 def travel(twist: Twist, time: Array | float) -> Plane:
-    """The way [m] under a constant twist for a time [s]: v (e^(i w t) - 1)/(i w) (C3)."""
+    """Returns the displacement [m] after a time [s] of constant twist (C3)."""
     if twist.yaw_rate == 0.0:
         return np.asarray(twist.velocity * time)
     half = 0.5 * twist.yaw_rate * time
@@ -159,9 +159,9 @@ def travel(twist: Twist, time: Array | float) -> Plane:
 
 
 class PlannedFeet(NamedTuple):
-    """The feet at one step, (6,) each unless said otherwise, as the command plans them.
+    """Planned feet at one step, (6,) each unless stated otherwise.
 
-    Walking frame, but `goal`, `pull`, `way` and `turn`: ground frame.
+    They are in the walking frame, except `goal`, `pull`, `way` and `turn`: ground frame.
     """
 
     plane: Plane  # m    centres, x + i y
@@ -170,33 +170,37 @@ class PlannedFeet(NamedTuple):
     rise: Array  # m/s    of z
     phase: Array  # 1    in [0, 1)
     blend: Array  # 1    s of swinging feet, else 0
-    goal: Plane  # m    where a swinging foot will touch down, where a standing one stands
-    pull: Plane  # m    (goal - foot)/(1 - s) of swinging feet, 0 of standing ones
-    way: complex  # m    scalar: of the walking frame over the ground
-    turn: float  # rad    scalar: of the walking frame over the ground
+    goal: Plane  # m    landing point of a swinging foot, position of a standing one
+    pull: Plane  # m    q of C5, (goal - foot)/(1 - s), of swinging feet; 0 of standing ones
+    way: complex  # m    scalar: position of the walking frame, D of C3
+    turn: float  # rad    scalar: heading of the walking frame, theta of C3
     twist: Twist  # of the body
 
 
 class FootPaths(Stateful):
-    """The paths of the feet, between a lift-off or touch-down and the next.
+    """Paths of the feet within a section of the walk.
 
-    The same legs are in the air throughout such a section of the walk.
+    A section lasts from one lift-off or touch-down to the next; the same legs are in the air
+    throughout.
 
-    Attributes, (6,) each unless said otherwise:
+    Attributes, (6,) each unless stated otherwise:
         walking: the gait clock runs (scalar).
         before: periods from the begin of the walk to the first step of the section (scalar).
         swinging: legs in the air.
-        standing: legs on the ground by the clock; one with nowhere to step neither stands by it nor
-            swings.
+        standing: legs that stand by the gait clock. A leg that skips its step stands although the
+            clock says that it swings: it is neither in `standing` nor in `swinging`.
         lifted: legs that lift off at the begin of the section.
-        stayed: legs that had nowhere to step at their last lift-off and stood through their swing.
-        stays: legs that will have nowhere to step at their next one: home under a body at rest.
+        stayed: legs that skipped their last step.
+        stays: legs that will skip their next step: in their stance under a body at rest.
     """
 
     STATE = ("walking", "before", "swinging", "standing", "lifted", "stayed", "stays")
 
     def __init__(self, gait: Gait, home: Array, *, period: float) -> None:
-        """home: (6, 3) centres of the feet in the stance, torso frame [m]; period [s]."""
+        """Puts all feet in the stance.
+
+        home: (6, 3) centres of the feet in the stance, torso frame [m]; period [s].
+        """
         self.gait, self.period = gait, period
         self.swing_time = gait.period * (1.0 - gait.duty)
         # from the lift-off to the middle of the next stance
@@ -216,12 +220,12 @@ class FootPaths(Stateful):
         self.reset()
 
     def _phase_after(self, number: int) -> Array:
-        """(6,) the phases so many periods after the begin of the walk (C2)."""
+        """Returns the phases (6,) `number` periods after the begin of the walk (C2)."""
         clock = self.offset + number * self.period / self.gait.period
         return np.asarray(clock - np.floor(clock))
 
     def _rest(self, plane: Plane) -> PlannedFeet:
-        """Standing still with the feet at `plane`, the gait clock rewound."""
+        """Stops the gait clock at its begin; returns feet that stand still at `plane`."""
         nothing, none = np.zeros(LEGS), np.zeros(LEGS, dtype=np.bool_)
         still = np.zeros(LEGS, dtype=np.complex128)
         self.walking, self.before = False, 0
@@ -242,11 +246,11 @@ class FootPaths(Stateful):
         )
 
     def reset(self) -> PlannedFeet:
-        """All feet in the stance, the gait clock stopped."""
+        """Puts all feet in the stance and stops the gait clock; returns the feet."""
         return self._rest(self.home)
 
     def _lift_off(self) -> None:
-        """Which legs are in the air in the coming section, by the gait clock."""
+        """Sets the legs that stand and lift off in the coming section by the gait clock."""
         stood = self._phase_after(self.before) < self.gait.duty
         self.standing = self._phase_after(self.before + 1) < self.gait.duty
         self.lifted = stood & ~self.standing
@@ -255,10 +259,11 @@ class FootPaths(Stateful):
         self.stays = np.zeros(LEGS, dtype=np.bool_)
 
     def _come_home(self, swung: Mask, now: PlannedFeet) -> tuple[bool, Plane]:
-        """Keeps the feet that are home there.
+        """Lets feet that are in their stance positions skip their steps.
 
-        swung: (6,) legs that were in the air until now. Returns whether all feet are home and on
-        the ground, and where the feet are (6,) [m], those that have just landed at their goals.
+        swung: (6,) legs that were in the air until now. Returns whether all feet stand in their
+        stance positions, and the positions of the feet (6,) [m]; a foot that has just landed is at
+        its goal.
         """
         landed = swung & self.standing
         feet = np.where(landed, cis(-now.turn) * (now.goal - now.way), now.plane)
@@ -268,17 +273,17 @@ class FootPaths(Stateful):
         return bool(home.all() and not (self.swinging | self.lifted).any()), feet
 
     def _progress(self, phase: Array) -> Array:
-        """(6,) the parts tau of their swings that legs at these phases have done."""
+        """Returns the completed parts tau of the swings (6,) at these phases (C2)."""
         return (phase - self.gait.duty) / (1.0 - self.gait.duty)
 
     def _ground_of(self, feet: PlannedFeet) -> Plane:
-        """(6,) where the feet are on the ground (C5) [m]."""
+        """Returns the feet (6,) in the ground frame [m] (C5)."""
         return feet.goal - feet.pull * (1.0 - feet.blend)
 
     def _place_feet(self, feet: PlannedFeet, carried: Plane) -> PlannedFeet:
-        """Places and velocities of feet whose phases, goals, pulls and frame are known (C5 to C8).
+        """Computes positions and velocities of feet with known phases, goals and pulls (C5 to C8).
 
-        carried: (6,) where the feet were on the ground at the step before [m].
+        carried: (6,) feet at the step before, ground frame [m].
         """
         back, tau = cis(-feet.turn), self._progress(feet.phase)
         s, slope = blend(tau)
@@ -300,7 +305,7 @@ class FootPaths(Stateful):
         )
 
     def _set_out(self, now: PlannedFeet, twist: Twist) -> PlannedFeet:
-        """The present step once more, with the legs in the air that will be in the section."""
+        """Computes the present step again, with the legs that swing in the new section."""
         phase = self._phase_after(self.before)
         s = np.where(self.swinging, blend(self._progress(phase))[0], 0.0)
         pull = np.where(self.swinging, now.pull, 0.0)
@@ -318,7 +323,7 @@ class FootPaths(Stateful):
             twist: the motion of the body now.
 
         Returns:
-            The feet at the present step, from which the section sets out.
+            The feet at the present step, from which the section starts.
         """
         if not self.walking and not going:
             return self._rest(now.plane)
@@ -335,9 +340,9 @@ class FootPaths(Stateful):
         return self._set_out(now, twist)
 
     def reach(self, number: int) -> bool:
-        """Whether the step so many periods after the first still belongs to the section.
+        """Returns whether the step `number` periods after the first belongs to the section.
 
-        It does as long as no leg lifts off or touches down before it.
+        It does if no leg lifts off or touches down before it.
         """
         if not self.walking or number == 1:
             return True
@@ -345,12 +350,12 @@ class FootPaths(Stateful):
         return bool((stands == self.standing).all())
 
     def _landing(self, tau: Array, twist: Twist) -> Plane:
-        """The landing points (C4), (6,) ground frame relative to the present place [m]."""
+        """Returns the landing points (6,) in the walking frame [m] (C4)."""
         ahead = self.landing_lead - tau * self.swing_time
         return np.asarray(cis(twist.yaw_rate * ahead) * self.home + travel(twist, ahead))
 
     def _odometry(self, before: PlannedFeet, twist: Twist) -> tuple[complex, float]:
-        """Way [m] and turn [rad] of the walking frame since the begin of the walk (C3)."""
+        """Returns position [m] and heading [rad] of the walking frame in the ground frame (C3)."""
         last = before.twist
         mean = Twist(
             0.5 * (twist.velocity + last.velocity),
@@ -360,7 +365,10 @@ class FootPaths(Stateful):
         return complex(way), before.turn + mean.yaw_rate * self.period
 
     def walk(self, number: int, twist: Twist, before: PlannedFeet) -> PlannedFeet:
-        """The feet so many periods after the first step of the section, from the step before."""
+        """Returns the feet `number` periods after the first step of the section.
+
+        before: the step before it.
+        """
         if not self.walking:
             return before
         way, turn = self._odometry(before, twist)

@@ -25,7 +25,7 @@ from hexapod_cosim.controller import (
 from hexapod_cosim.controller.controller import gains_warnings
 from hexapod_cosim.controller.design import StandingPlant, design_gains, plot_design
 from hexapod_cosim.controller.design.closed import (
-    PLACES,
+    FREE_COORDINATES,
     closed_loop,
     disturbed,
     spectral_radius,
@@ -181,7 +181,7 @@ def test_all_feet_and_both_laws_together_are_stable(gains: Gains) -> None:
         assert spectral_radius(loop, feet=feet) < 1.0, name
         held = np.abs(np.linalg.eigvals(loop.A) - 1.0) < AT_ONE
         # what nothing holds is exactly 1, and nothing else is
-        assert held.sum() == PLACES + 2 * feet
+        assert held.sum() == FREE_COORDINATES + 2 * feet
 
 
 def test_the_gain_margin_is_where_the_closed_loop_becomes_unstable(gains: Gains) -> None:
@@ -416,7 +416,7 @@ def test_a_robot_a_period_or_plants_that_do_not_fit_are_refused() -> None:
         design_gains(limp, PERIOD, plants=plants)
     with pytest.raises(GainsError, match="impossible controller period"):
         design_for(robot, -0.1)
-    with pytest.raises(GainsError, match="a plant sampled otherwise"):
+    with pytest.raises(GainsError, match="a plant sampled with another period"):
         design_gains(robot, 0.004, plants=plants)
 
 

@@ -258,7 +258,7 @@ int hx_foot_paths_reach(const hxFootPathsModel *model, const hxFootPaths *paths,
   return 1;
 }
 
-/* Returns the landing point (C4), ground frame, relative to the present position. */
+/* Returns the landing point (C4) in the walking frame. */
 static hxPlane landing(const hxFootPathsModel *model, int leg, double tau, hxTwist twist) {
   const double ahead = model->landing_lead - tau * model->swing_time;
   return hx_plane_add(hx_times(hx_cis(twist.yaw_rate * ahead), model->home[leg]),
