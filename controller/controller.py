@@ -319,7 +319,7 @@ class Controller(Stateful):
             height=now.feet.height - self.paths.home_height,
             rise=now.feet.rise,
             swinging=self.paths.swinging,
-            hurried=bool((np.abs(speed) >= self.legs.speed_max).any()),
+            overspeed=bool((np.abs(speed) >= self.legs.speed_max).any()),
         )
         climb = self.legs.speeds(now.pose, 0.0, 1.0)
         return Stance(plan, climb, now.value, now.posture, now.feet.plane, now.height)

@@ -62,7 +62,7 @@ class Plan(NamedTuple):
     needed: float  # N m    scalar: the largest of `carry`
     swinging: Mask  # planned in the air
     falling: Array  # m    by which feet well above the ground come down in a period
-    hurried: bool  # scalar: the plan exceeds the speed limit of some joint
+    overspeed: bool  # scalar: the plan exceeds the speed limit of some joint
 
 
 class Compliance(Stateful):
@@ -76,19 +76,19 @@ class Compliance(Stateful):
         doubted: sensors that are replaced by the plan.
         fallback: legs that walk without feedback.
         grip: factor on the planned load of a leg that is regaining contact [1].
-        slack: some grip may be below 1 (scalar).
+        regaining: some grip may be below 1 (scalar).
         scale: measured over planned weight (scalar) [1].
         trust: factor on all corrections and torques (scalar) [1].
-        outrun: the joints cannot follow the plan (scalar).
-        asked: share of the time in which the plan exceeds the joints' speed limit (scalar) [1].
-        dragged: periods for which the robot has been sliding (scalar).
-        sliding: periods that remain until feedback resumes after sliding (scalar).
+        lagging: the joints cannot follow the plan (scalar).
+        overspeed_share: share of the time in which the plan exceeds the joints' speed limit (scalar) [1].
+        slide_periods: periods for which the robot has been sliding (scalar).
+        recovery_periods: periods that remain until feedback resumes after sliding (scalar).
     """
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "slack", "scale", "trust", "outrun", "asked", "dragged",
-        "sliding",
+        "doubted", "fallback", "grip", "regaining", "scale", "trust", "lagging", "overspeed_share", "slide_periods",
+        "recovery_periods",
     )  # fmt: skip
 
     def __init__(
@@ -135,9 +135,9 @@ class Compliance(Stateful):
         self.burden.reset()
         self.bend, self.torque, self.shift = np.zeros((3, LEGS, 3))
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
-        self.grip, self.slack = np.ones(LEGS), False
+        self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.trust = 0.0, 1.0
-        self.outrun, self.asked, self.dragged, self.sliding = False, 0.0, 0, 0
+        self.lagging, self.overspeed_share, self.slide_periods, self.recovery_periods = False, 0.0, 0, 0
 
     @property
     def touching(self) -> Mask:
@@ -153,7 +153,7 @@ class Compliance(Stateful):
         height: Array,
         rise: Array,
         swinging: Mask,
-        hurried: bool = False,
+        overspeed: bool = False,
     ) -> Plan:
         """Returns the plan of a step, from which the laws compute their corrections.
 
@@ -163,7 +163,7 @@ class Compliance(Stateful):
             feet: (6,) contact points x + i y, walking frame [m].
             height, rise: (6,) of the paths over the stance [m, m/s].
             swinging: (6,) legs planned in the air.
-            hurried: the plan exceeds the speed limit of some joint.
+            overspeed: the plan exceeds the speed limit of some joint.
         """
         supports = 1.0 if self.parts.support else 0.0
         well_up = height > EARLY
@@ -181,7 +181,7 @@ class Compliance(Stateful):
             needed=float(np.abs(carry).max()),
             swinging=swinging,
             falling=np.where(well_up, np.maximum(-self.period * rise, 0.0), 0.0),
-            hurried=hurried,
+            overspeed=overspeed,
         )
 
     # ------------------------------------------------------------------------------ contacts
@@ -207,7 +207,7 @@ class Compliance(Stateful):
 
     def _meet_ground(self, plan: Plan, met: Array) -> None:
         """Adapts the foot heights to early and late contacts (C36). met: as in _judge_sensors()."""
-        self.slack = True
+        self.regaining = True
         early = self.landings.early(met, plan.height)
         falling = np.where(early, plan.falling, 0.0)
         self.touchdown.step(self.touching, falling, plan.swinging, plan.standing)
@@ -240,14 +240,14 @@ class Compliance(Stateful):
         It does not apply to a robot that slides, whose joints cannot follow, or that is far too
         heavy. drag: common tangential force of the feet above the plan, over the normal force [1].
         """
-        self.asked += self.follow_cycle * (float(plan.hurried) - self.asked)
-        self.outrun = self.asked > (JOINTS_FOLLOW if self.outrun else JOINTS_DO_NOT)
-        self.dragged = self.dragged + 1 if drag > SLIDING_DRAG else 0
-        if self.dragged * self.period > SLIDING_TIME:
-            self.sliding = self.calm
-        elif self.sliding:
-            self.sliding -= 1
-        goal = 0.0 if self.sliding or self.outrun or self.burden.overburdened else 1.0
+        self.overspeed_share += self.follow_cycle * (float(plan.overspeed) - self.overspeed_share)
+        self.lagging = self.overspeed_share > (JOINTS_FOLLOW if self.lagging else JOINTS_DO_NOT)
+        self.slide_periods = self.slide_periods + 1 if drag > SLIDING_DRAG else 0
+        if self.slide_periods * self.period > SLIDING_TIME:
+            self.recovery_periods = self.calm
+        elif self.recovery_periods:
+            self.recovery_periods -= 1
+        goal = 0.0 if self.recovery_periods or self.lagging or self.burden.overburdened else 1.0
         if self.trust == goal:
             return
         self.trust += self.follow_load * (goal - self.trust)
@@ -333,7 +333,7 @@ class Compliance(Stateful):
         """
         grip = self.grip + self.follow_load * (1.0 - self.grip)
         self.grip = np.where(plan.standing & ~self.touching, 0.0, grip)
-        self.slack = bool((self.grip < GRIPPED).any())
+        self.regaining = bool((self.grip < GRIPPED).any())
         return torque * self.grip[:, None]
 
     def _limit_joints(self, wanted: Array, torque: Array) -> None:
@@ -353,7 +353,7 @@ class Compliance(Stateful):
         """
         strength = self.burden.strength if self.parts.limits else 1.0
         torque = plan.carry * (strength * self.scale)
-        if self.slack:
+        if self.regaining:
             torque = self._restore_grip(plan, torque)
         bend = self.softness * (plan.lever @ answer[:, :, None])[:, :, 0]
         self.shift = (bend[:, None, :] @ plan.lever)[:, 0, :]  # J bend

@@ -185,14 +185,14 @@ static void ask(const hxControllerModel *model, hxControllerState *state, hxStan
   hxDemand demand;
   hx_inverse_dynamics_demand(&model->laws.dynamics, model->leg, &motion, output->speed_ref,
                              &now->posture, &demand);
-  plan->hurried = 0;
+  plan->overspeed = 0;
   for (int k = 0; k < HX_LEGS; ++k) {
     feet[k] = hx_plane_add(now->feet.plane[k], now->shift[k]);
     height[k] = now->feet.height[k] - model->paths.home_height[k];
     plan->shares.activation[k] = now->activation[k];
     plan->swinging[k] = state->paths.swinging[k];
     for (int joint = 0; joint < HX_JOINTS; ++joint)
-      plan->hurried |= fabs(output->speed_ref[k][joint]) >= model->leg[k].speed_max;
+      plan->overspeed |= fabs(output->speed_ref[k][joint]) >= model->leg[k].speed_max;
     hx_leg_solver_speeds(&model->leg[k], &now->pose[k], hx_plane(0.0, 0.0), 1.0, stance->climb[k]);
   }
   hx_support_shares(feet, &demand, &plan->shares);

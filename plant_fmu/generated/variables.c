@@ -1076,7 +1076,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{e1f0fbc2-55ad-4470-93c0-6529e3b31e94}";
+const char hx_default_guid[] = "{40079afb-4763-485d-9a13-d56361f83ae4}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "check.h"
 #include "contact_law.h"
 #include "kernel.h"
 #include "robot.h"
 #include "tangent.h"
+#include "validation.h"
 
 /* A saved state: a header that identifies it, then the plant's model and state. */
 typedef struct {

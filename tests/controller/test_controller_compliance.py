@@ -505,10 +505,10 @@ def test_a_robot_that_outruns_its_joints_goes_over_to_kinematic_control() -> Non
     """
     laws, force = make_laws(), squeezing()
     run(laws, force, 400)
-    for share, outrun in ((0.4, False), (0.5, True), (0.4, True), (0.3, False)):
+    for share, lagging in ((0.4, False), (0.5, True), (0.4, True), (0.3, False)):
         for cycle in range(12):
             for k in range(100):
-                plan(laws, hurried=k % 10 < round(10 * share))
+                plan(laws, overspeed=k % 10 < round(10 * share))
                 laws.feel(force)
-            assert cycle < 6 or laws.outrun is outrun
-        assert bool(laws.fallback.all()) is outrun
+            assert cycle < 6 or laws.lagging is lagging
+        assert bool(laws.fallback.all()) is lagging

@@ -69,7 +69,7 @@ def plan(
     standing: str = ALL,
     height: float = RAISED,
     rise: float = 0.0,
-    hurried: bool = False,
+    overspeed: bool = False,
 ) -> None:
     """Plans a step in which these legs stand and the others are in the air, at a height [m] and a
     vertical speed [m/s].
@@ -86,7 +86,7 @@ def plan(
         height=height * air,
         rise=rise * air,
         swinging=~stands,
-        hurried=hurried,
+        overspeed=overspeed,
     )
 
 

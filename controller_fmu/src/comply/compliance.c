@@ -124,7 +124,7 @@ static void meet_ground(const hxComplianceModel *model, const hxPlan *plan,
                         const double met[HX_LEGS], hxCompliance *laws) {
   double falling[HX_LEGS];
   int early[HX_LEGS];
-  laws->slack = 1;
+  laws->regaining = 1;
   hx_landings_early(&laws->landings, met, plan->height, early);
   for (int leg = 0; leg < HX_LEGS; ++leg) falling[leg] = early[leg] ? plan->falling[leg] : 0.0;
   hx_touchdown_step(model->period, laws->touching, falling, plan->swinging, plan->standing,
@@ -159,14 +159,15 @@ static int contacts_differ(const hxPlan *plan, const hxCompliance *laws) {
  * normal force. */
 static void update_trust(const hxComplianceModel *model, const hxPlan *plan, double drag,
                          hxCompliance *laws) {
-  laws->asked += model->follow_cycle * ((double)plan->hurried - laws->asked);
-  laws->outrun = laws->asked > (laws->outrun ? joints_follow : joints_do_not);
-  laws->dragged = drag > sliding_drag ? laws->dragged + 1 : 0;
-  if ((double)laws->dragged * model->period > sliding_time)
-    laws->sliding = model->calm;
-  else if (laws->sliding)
-    --laws->sliding;
-  const double goal = laws->sliding || laws->outrun || laws->burden.overburdened ? 0.0 : 1.0;
+  laws->overspeed_share += model->follow_cycle * ((double)plan->overspeed - laws->overspeed_share);
+  laws->lagging = laws->overspeed_share > (laws->lagging ? joints_follow : joints_do_not);
+  laws->slide_periods = drag > sliding_drag ? laws->slide_periods + 1 : 0;
+  if ((double)laws->slide_periods * model->period > sliding_time)
+    laws->recovery_periods = model->calm;
+  else if (laws->recovery_periods)
+    --laws->recovery_periods;
+  const double goal =
+      laws->recovery_periods || laws->lagging || laws->burden.overburdened ? 0.0 : 1.0;
   if (laws->trust == goal) return;
   laws->trust += model->follow_load * (goal - laws->trust);
   if (fabs(goal - laws->trust) < 1.0 - gripped) laws->trust = goal;
@@ -282,12 +283,12 @@ static void step_laws(const hxComplianceModel *model, const hxPlan *plan,
 /* Takes its share from a leg that does not touch the ground where it should stand, and gives it
  * back gradually once the leg touches (C29). */
 static void restore_grip(const hxComplianceModel *model, const hxPlan *plan, hxCompliance *laws) {
-  laws->slack = 0;
+  laws->regaining = 0;
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     laws->grip[leg] += model->follow_load * (1.0 - laws->grip[leg]);
     if (plan->standing[leg] && !laws->touching[leg]) laws->grip[leg] = 0.0;
     for (int joint = 0; joint < HX_JOINTS; ++joint) laws->torque[leg][joint] *= laws->grip[leg];
-    laws->slack |= laws->grip[leg] < gripped;
+    laws->regaining |= laws->grip[leg] < gripped;
   }
 }
 
@@ -310,7 +311,7 @@ static void actuate(const hxComplianceModel *model, const hxPlan *plan,
   for (int leg = 0; leg < HX_LEGS; ++leg)
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       laws->torque[leg][joint] = plan->carry[leg][joint] * (strength * laws->scale);
-  if (laws->slack) restore_grip(model, plan, laws);
+  if (laws->regaining) restore_grip(model, plan, laws);
   for (int leg = 0; leg < HX_LEGS; ++leg) {
     const double *f = answer[leg];
     double *shift = laws->shift[leg];

@@ -44,7 +44,7 @@ typedef struct hxPlan {
   double needed; /* N m, largest element of carry */
   int swinging[HX_LEGS];
   double falling[HX_LEGS]; /* m, by which feet well above the ground move down in a period */
-  int hurried; /* a joint would need more speed than its servo has */
+  int overspeed; /* the plan exceeds the speed limit of some joint */
 } hxPlan;
 
 typedef struct hxCompliance {
@@ -61,13 +61,14 @@ typedef struct hxCompliance {
   /* walks without feedback, because the sensor is not trusted, the robot slides, or its joints do
    * not follow */
   int fallback[HX_LEGS];
-  double grip[HX_LEGS]; /* 1, part of its share that a leg has got back while it loads */
-  int slack; /* some leg has not got its whole share back */
+  double grip[HX_LEGS]; /* 1, factor on the planned load of a leg that is regaining contact */
+  int regaining; /* some grip may be below 1 */
   double scale; /* 1    measured over planned weight */
   double trust; /* 1, below 1 while the robot slides or its joints cannot follow */
-  int outrun;
-  double asked; /* 1, share of the time in which paths need more speed than a servo has */
-  int64_t dragged, sliding; /* steps: duration of the dragging; time until feet are trusted again */
+  int lagging; /* the joints cannot follow the plan */
+  double overspeed_share; /* 1, share of the time in which the plan exceeds a speed limit */
+  int64_t slide_periods; /* steps for which the robot has been sliding */
+  int64_t recovery_periods; /* steps that remain until feedback resumes after sliding */
 } hxCompliance;
 
 void hx_compliance_compile(const hxControllerDefinition *definition, hxComplianceModel *model);

@@ -1,6 +1,6 @@
-/* check.h - checks of inputs; hx_definition_check is public */
-#ifndef HX_CHECK_H
-#define HX_CHECK_H
+/* validation.h - checks of inputs; hx_definition_check is public */
+#ifndef HX_VALIDATION_H
+#define HX_VALIDATION_H
 
 #include "hexapod/hexapod.h"
 #include "hexapod/inside.h"
