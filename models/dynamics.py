@@ -213,6 +213,29 @@ def drive_acceleration(robot: Robot, body: Array, command: Command) -> Array:
     )
 
 
+def constraint_equations(robot: Robot, body: Array, command: Command) -> tuple[Array, Array]:
+    """Returns D and c of the rows D dv = c of eq. 1 (c: eq. 7) at bodies (19, 13).
+
+    In kinematic mode each joint adds the row G dv = drive_acceleration (eq. 13).
+    """
+    joints = constraints(robot, body)
+    c = (
+        joints.gamma
+        - 2.0 * robot.baumgarte.alpha * joints.dphi
+        - robot.baumgarte.beta**2 * joints.phi
+    )
+    if robot.servo.mode != "kinematic":
+        return joints.D, c
+    drive = drive_acceleration(robot, body, command).ravel()
+    return np.vstack([joints.D, joints.G]), np.concatenate([c, drive])
+
+
+def solve_constrained(W: Array, right: Array, D: Array, c: Array) -> Array:
+    """Solves [W D^T; D 0] [dv; lambda] = [right; c]. Returns dv, then the multipliers."""
+    none = np.zeros((len(c), len(c)))
+    return np.linalg.solve(np.block([[W, D.T], [D, none]]), np.concatenate([right, c]))
+
+
 @dataclass(frozen=True)
 class Accelerations:
     """The solution of eq. 1."""
@@ -228,8 +251,8 @@ def accelerations(
 ) -> Accelerations:
     """Solves eq. 1 for bodies (19, 13), whose joints may have drifted.
 
-    damping (6,) and bristle (6, 3) are those of `applied_forces`. In kinematic mode each joint adds
-    the row G dv = drive_acceleration, whose multiplier is minus the motor's torque.
+    damping (6,) and bristle (6, 3) are those of `applied_forces`. In kinematic mode the multiplier
+    of a joint's additional row is minus the motor's torque.
     """
     joints = constraints(robot, body)
     motor, gear = joint_torques(robot, body, command)
@@ -237,19 +260,8 @@ def accelerations(
         applied_forces(robot, body, command, damping, bristle).ravel()
         + joints.G.T @ (motor + gear).ravel()
     )
-    c = (
-        joints.gamma
-        - 2.0 * robot.baumgarte.alpha * joints.dphi
-        - robot.baumgarte.beta**2 * joints.phi
-    )
-    D = joints.D
-    if robot.servo.mode == "kinematic":
-        drive_rows = drive_acceleration(robot, body, command).ravel()
-        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive_rows])
-    none = np.zeros((len(c), len(c)))
-    solution = np.linalg.solve(
-        np.block([[mass_matrix(robot, body), D.T], [D, none]]), np.concatenate([g, c])
-    )
+    D, c = constraint_equations(robot, body, command)
+    solution = solve_constrained(mass_matrix(robot, body), g, D, c)
     dv, multiplier, drive = np.split(solution, [6 * BODIES, 6 * BODIES + len(joints.phi)])
     motor = -drive.reshape(LEGS, JOINTS) if robot.servo.mode == "kinematic" else motor
     return Accelerations(dv.reshape(BODIES, 6), multiplier.reshape(-1, MULTIPLIERS), motor, gear)

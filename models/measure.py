@@ -194,7 +194,7 @@ def _joints(
         h * np.tensordot(MOTOR_WEIGHTS, part, 1)
         for part in (np.maximum(power, 0.0), np.maximum(-power, 0.0), torque**2)
     )
-    # the difference from the step's work goes to the larger part
+    # the difference from the step's work is added to the larger part
     rest = work - (positive - negative)
     drives = positive > negative
     positive, negative = (

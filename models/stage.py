@@ -1,5 +1,6 @@
-"""Computes a stage of the integrator (eq. 20) with dense matrices; plant_fmu/src/lanes/stage.h is
-the fast form.
+"""Computes a stage of the integrator (eq. 20) with dense matrices.
+
+The fast form is plant_fmu/src/lanes/stage.h.
 
 A linearly implicit stage solves eq. 1 with the stiff part of the forces evaluated at the end of the
 stage. With z = 0 it is eq. 1 itself, the stage of an explicit method.
@@ -24,10 +25,9 @@ from hexapod_cosim.models.contact import (
 )
 from hexapod_cosim.models.dynamics import (
     Command,
-    Constraints,
     applied_forces,
+    constraint_equations,
     constraints,
-    drive_acceleration,
     joint_torques,
     mass_matrix,
 )
@@ -150,25 +150,6 @@ def tangential_jacobians(robot: Robot, body: Array) -> list[Array]:
     return found
 
 
-def constrained_solution(
-    robot: Robot, body: Array, command: Command, joints: Constraints, W: Array, right: Array
-) -> Array:
-    """Returns alpha (114,) of W alpha = right (114,) under the constraints of the joints (19, 13).
-
-    The arguments are those of `solve_stage` and its constraints and matrices.
-    """
-    # [W  D^T; D  0] [alpha; lambda] = [right; c];  a kinematic drive adds G alpha = qdd
-    c = joints.gamma - 2.0 * robot.baumgarte.alpha * joints.dphi
-    c = c - robot.baumgarte.beta**2 * joints.phi
-    D = joints.D
-    if robot.servo.mode == "kinematic":
-        drive = drive_acceleration(robot, body, command).ravel()
-        D, c = np.vstack([D, joints.G]), np.concatenate([c, drive])
-    none = np.zeros((len(c), len(c)))
-    both = np.linalg.solve(np.block([[W, D.T], [D, none]]), np.concatenate([right, c]))
-    return np.asarray(both[: 6 * BODIES])
-
-
 def solve_stage(
     robot: Robot,
     body: Array,
@@ -190,14 +171,14 @@ def solve_stage(
         change: s_x (114,), s_v (114,) and s_b (6, 3), the sums of g_ij k_j over earlier stages.
     """
     s_x, s_v, s_b = change
-    v, joints = body[:, 7:13].ravel(), constraints(robot, body)
+    v, G = body[:, 7:13].ravel(), constraints(robot, body).G
     G_x, G_v = slope_matrices(robot, body, slopes)
     rate = law_bristle_rates(robot, body, bristle, damping)
 
     # W = M - z G_v - z^2 G_x;  right = g + G_v s_v + G_x (s_x + z (v + s_v))
     motor, gear = joint_torques(robot, body, command)
     g = applied_forces(robot, body, command, damping, bristle).ravel()
-    g += joints.G.T @ (motor + gear).ravel()
+    g += G.T @ (motor + gear).ravel()
     W = mass_matrix(robot, body) - z * G_v - z * z * G_x
     right = g + G_v @ s_v + G_x @ (s_x + z * (v + s_v))
 
@@ -207,7 +188,9 @@ def solve_stage(
         spring = slopes.bristle[leg] / (1.0 + z * slopes.beta[leg])
         W += z * z * spring * T.T @ T
         right -= spring * T.T @ (s_b[leg] + z * (rate[leg] + T @ s_v))
-    alpha = constrained_solution(robot, body, command, joints, W, right)
+    # [W  D^T; D  0] [alpha; lambda] = [right; c]
+    D, c = constraint_equations(robot, body, command)
+    alpha = solve_constrained(W, right, D, c)[: 6 * BODIES]
 
     # nu = v + s_v + z alpha;  k_b/h = (db/dt + s_v + z alpha - beta s_b)/(1 + z beta)
     for leg, T in enumerate(along):

@@ -55,7 +55,7 @@ def main() -> int:
 
 
 def arrows() -> Arrows:
-    """Every room and the rooms that it imports or includes."""
+    """Returns every room and the rooms that it imports or includes."""
     found: dict[str, set[str]] = {}
     for path in python_files():
         room = python_room(path.relative_to(ROOT).with_suffix("").parts)
@@ -68,13 +68,16 @@ def arrows() -> Arrows:
 
 
 def python_files() -> Iterator[Path]:
-    """The modules of the Python package."""
+    """Returns the modules of the Python package."""
     for folder in ("models", "controller", "cosim"):
         yield from sorted((ROOT / folder).rglob("*.py"))
 
 
 def python_room(parts: tuple[str, ...]) -> str | None:
-    """The room of a module from the parts of its name; None for the package above the rooms."""
+    """Returns the room of a module, or None for the package above the rooms.
+
+    parts: of the module's name.
+    """
     if parts[0] != "cosim":
         return parts[0]
     if len(parts) < 3 or parts[-1] == "__init__":
@@ -83,7 +86,7 @@ def python_room(parts: tuple[str, ...]) -> str | None:
 
 
 def imported_rooms(path: Path) -> Iterator[str]:
-    """The rooms whose modules a file imports, wherever in it."""
+    """Returns the rooms whose modules a file imports, at its top or within functions."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{PACKAGE}."):
             for alias in node.names:
@@ -94,7 +97,7 @@ def imported_rooms(path: Path) -> Iterator[str]:
 
 
 def included_rooms(room: str) -> set[str]:
-    """The rooms whose headers the C files of a room include."""
+    """Returns the rooms whose headers the C files of a room include."""
     headers = {other: {path.name for path in c_files(other)} for other in C_ROOMS}
     own, found = headers[room], set()
     for path in c_files(room):
@@ -108,13 +111,13 @@ def included_rooms(room: str) -> set[str]:
 
 
 def c_files(room: str) -> list[Path]:
-    """The C sources and headers of a room that people write."""
+    """Returns the C sources and headers of a room, except generated ones."""
     files = (ROOT / room).rglob("*.[ch]")
     return sorted(path for path in files if "generated" not in path.parts)
 
 
 def reduced(found: Arrows) -> Arrows:
-    """The arrows without those that follow from others."""
+    """Returns the arrows without those that follow from others."""
 
     def below(room: str) -> frozenset[str]:
         further = [below(other) for other in found[room]]
@@ -131,7 +134,7 @@ def reduced(found: Arrows) -> Arrows:
 
 
 def levels(found: Arrows) -> dict[str, int]:
-    """The row of each room, from the ground up: one above the highest room that it imports.
+    """Returns the row of each room: one above the highest room that it imports.
 
     Raises ValueError when rooms import each other in a circle.
     """
@@ -152,7 +155,7 @@ def levels(found: Arrows) -> dict[str, int]:
 
 
 def drawn(found: Arrows) -> str:
-    """The picture as SVG: rows of boxes, those that import nothing at the bottom."""
+    """Returns the picture as SVG: rows of boxes, those that import nothing at the bottom."""
     rows: dict[int, list[str]] = {}
     for room, level in levels(found).items():
         rows.setdefault(level, []).append(room)
@@ -175,7 +178,7 @@ def drawn(found: Arrows) -> str:
 def ordered(
     row: Iterable[str], few: Arrows, places: Mapping[str, tuple[float, float]]
 ) -> list[str]:
-    """A row from left to right, each room near the middle of what it imports."""
+    """Returns a row from left to right, each room near the middle of what it imports."""
 
     def middle(room: str) -> tuple[float, str]:
         below = [places[other][0] for other in few[room]]
@@ -185,14 +188,14 @@ def ordered(
 
 
 def arrow(start: tuple[float, float], end: tuple[float, float]) -> str:
-    """A curve from the lower edge of one box to the upper edge of another."""
+    """Returns a curve from the lower edge of one box to the upper edge of another."""
     (x0, y0), (x1, y1) = (start[0], start[1] + BOX[1] / 2), (end[0], end[1] - BOX[1] / 2 - 2)
     bend = (y1 - y0) / 2
     return f'<path d="M{x0:g} {y0:g} C{x0:g} {y0 + bend:g} {x1:g} {y1 - bend:g} {x1:g} {y1:g}"/>'
 
 
 def box(room: str, x: float, y: float) -> str:
-    """A room as a box with its name."""
+    """Returns a room as a box with its name."""
     kind = ' class="c"' if room.endswith("(C)") else ""
     left, top = x - BOX[0] / 2, y - BOX[1] / 2
     shape = f'<rect{kind} x="{left:g}" y="{top:g}" width="{BOX[0]}" height="{BOX[1]}"/>'

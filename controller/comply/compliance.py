@@ -80,15 +80,15 @@ class Compliance(Stateful):
         scale: measured over planned weight (scalar) [1].
         trust: factor on all corrections and torques (scalar) [1].
         lagging: the joints cannot follow the plan (scalar).
-        overspeed_share: share of the time in which the plan exceeds the joints' speed limit (scalar) [1].
+        overspeed_share: share of the time in which the plan exceeds a speed limit (scalar) [1].
         slide_periods: periods for which the robot has been sliding (scalar).
         recovery_periods: periods that remain until feedback resumes after sliding (scalar).
     """
 
     STATE = (
         "law", "detector", "watch", "touchdown", "landings", "burden", "bend", "torque", "shift",
-        "doubted", "fallback", "grip", "regaining", "scale", "trust", "lagging", "overspeed_share", "slide_periods",
-        "recovery_periods",
+        "doubted", "fallback", "grip", "regaining", "scale", "trust", "lagging", "overspeed_share",
+        "slide_periods", "recovery_periods",
     )  # fmt: skip
 
     def __init__(
@@ -137,7 +137,8 @@ class Compliance(Stateful):
         self.doubted, self.fallback = np.zeros((2, LEGS), dtype=np.bool_)
         self.grip, self.regaining = np.ones(LEGS), False
         self.scale, self.trust = 0.0, 1.0
-        self.lagging, self.overspeed_share, self.slide_periods, self.recovery_periods = False, 0.0, 0, 0
+        self.lagging, self.overspeed_share = False, 0.0
+        self.slide_periods, self.recovery_periods = 0, 0
 
     @property
     def touching(self) -> Mask:

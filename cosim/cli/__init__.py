@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _wants_json(given: Sequence[str]) -> bool:
-    """Whether --json was typed, even on a command line that cannot be parsed."""
+    """Returns whether --json was given, even on a command line that cannot be parsed."""
     return "--json" in given
 
 

@@ -1,4 +1,4 @@
-"""The command `hexapod compare`: one walk under both controls, over several seeds."""
+"""Defines the command `hexapod compare`: one walk under both controls, over several seeds."""
 
 from __future__ import annotations
 

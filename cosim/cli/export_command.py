@@ -1,4 +1,4 @@
-"""`hexapod export`: FMUs, packages and robot descriptions."""
+"""Defines `hexapod export`, which writes FMUs, packages and robot descriptions."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def _refuse_unused_options(context: typer.Context, written: str) -> None:
 
 
 def _fmu_path(output: Path | None, name: str) -> Path:
-    """The path of the FMU to write. Raises HexapodError for a folder or another suffix."""
+    """Returns the path of the FMU to write. Raises HexapodError for a folder or another suffix."""
     path = output or Path(f"{name}.fmu")
     if path.is_dir():
         raise HexapodError(

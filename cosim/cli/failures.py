@@ -1,6 +1,6 @@
-"""How a command ends: exit codes, and error messages on stderr and, with --json, on stdout.
+"""Defines exit codes, and prints error messages on stderr and, with --json, on stdout.
 
-Imports nothing slow: `main` needs it before it can handle Ctrl-C.
+It has no slow imports, because `main` needs it before it can handle Ctrl-C.
 """
 
 from __future__ import annotations

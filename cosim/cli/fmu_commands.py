@@ -1,4 +1,4 @@
-"""`hexapod validate` and `hexapod design`."""
+"""Defines the commands `hexapod validate` and `hexapod design`."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _show_design(gains: Gains, deviation: float) -> None:
 
 
 def design_rows(gains: Gains) -> list[tuple[str, str, str]]:
-    """The rows of the table of requirements: name, required value, reached value."""
+    """Returns the rows of the table of requirements: name, required value, reached value."""
     needs, reached, spring = gains.requirements, gains.margins, gains.suspension
     frequency = math.sqrt(spring.stiffness / spring.mass) / (2.0 * math.pi)
     rows = (

@@ -1,4 +1,4 @@
-"""The command `hexapod list`."""
+"""Defines the command `hexapod list`."""
 
 from __future__ import annotations
 

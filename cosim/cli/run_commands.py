@@ -1,4 +1,4 @@
-"""The commands `hexapod simulate` and `hexapod report`."""
+"""Defines the commands `hexapod simulate` and `hexapod report`."""
 
 from __future__ import annotations
 

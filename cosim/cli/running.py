@@ -115,8 +115,9 @@ def command_line(
 
 
 def checked_engine(name: str | None, *, runs: int) -> str:
-    """One of ENGINES; where none is given, Python for one run and compiled for many. Raises
-    HexapodError.
+    """Returns the engine; by default Python for one run and compiled for several.
+
+    Raises HexapodError for a name that is not in ENGINES.
     """
     if name is None:
         return "python" if runs == 1 else "compiled"

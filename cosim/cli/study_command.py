@@ -1,4 +1,4 @@
-"""The command `hexapod study`, which runs a study."""
+"""Defines the command `hexapod study`, which runs a study."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, an
 
 
 def is_given(context: typer.Context, name: str) -> bool:
-    """Whether an option was typed rather than left at its default."""
+    """Returns whether an option was given on the command line."""
     source = context.get_parameter_source(name)
     return source is not None and source.name == "COMMANDLINE"
 

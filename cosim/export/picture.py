@@ -114,7 +114,7 @@ class Box:
         return self.centre[:2] - reach, self.centre[:2] + reach
 
     def meet(self, x: Array, y: Array) -> tuple[Array, Points]:
-        """As Capsule.meet: z where a ray from the eye enters the last of the three slabs."""
+        """Returns z where a ray from the eye enters the last of three slabs, as Capsule.meet."""
         offset = np.stack([x - self.centre[0], y - self.centre[1]])
         across = np.tensordot(self.axes.T[:, :2], offset, axes=1)  # (3, height, width)
         slope = np.where(np.abs(self.axes[2]) < 1e-12, 1e-12, self.axes[2])

@@ -32,7 +32,11 @@ TORSO: tuple[Group, ...] = (
         "position, attitude and their rates",
         ("torso.position", "torso.quaternion", "torso.velocity", "torso.angular_velocity"),
     ),
-    ("command", "what the torso is told to do", tuple(f"command.{name}" for name in BODY)),
+    (
+        "command",
+        "commanded velocity and posture of the torso",
+        tuple(f"command.{name}" for name in BODY),
+    ),
     ("imu", "an ideal inertial sensor", ("imu.specific_force", "imu.angular_velocity")),
 )
 HALF_SIZE = 100.0  # the icon's coordinates run from -100 to 100

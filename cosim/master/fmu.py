@@ -359,7 +359,7 @@ class Fmu:
             return math.nan
         try:
             return float(self._slave.getRealStatus(LAST_SUCCESSFUL_TIME))
-        except Exception:  # fmpy's own error type: the FMU does not tell the time
+        except Exception:  # fmpy's own error type: the FMU does not report the time
             return math.nan
 
     def close(self) -> None:

@@ -30,7 +30,7 @@ Progress = Callable[[float], None]  # simulated time since the start [s]
 
 
 class JointController(Protocol):
-    """What the master needs of a controller."""
+    """Interface of a controller that the master needs."""
 
     def step(self, t: float, command: BodyCommand, measurement: Measurement) -> JointCommand:
         """Returns the joint commands that hold from t [s] for one macro-step."""
@@ -38,7 +38,7 @@ class JointController(Protocol):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a run ended. A run that did not complete keeps the rows recorded until then."""
+    """Outcome of a run. A run that did not complete keeps the rows recorded until then."""
 
     status: str  # COMPLETED, FAILED or INTERRUPTED
     reason: str  # a sentence; "" when completed
@@ -109,7 +109,7 @@ def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDA
 
 
 def _leg_vectors(quantity: str, size: int) -> tuple[str, ...]:
-    """Column names of a vector quantity of the controller, leg by leg."""
+    """Returns the column names of a vector quantity of the controller, leg by leg."""
     stems = [f"controller.{leg}.{quantity}" for leg in LEG_NAMES]
     return tuple(name for stem in stems for name in vector_names(stem, size))
 

@@ -27,7 +27,7 @@ class Block(Protocol):
 
 
 class Plant(Protocol):
-    """What the master needs of a plant. Times are in s."""
+    """Interface of a plant that the master needs. Times are in s."""
 
     def names(self, causality: str, kind: str = "Real") -> list[str]:
         """Returns the names of all variables of a causality and FMI type."""

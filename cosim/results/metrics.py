@@ -233,7 +233,7 @@ def shown_metrics(runs: Mapping[str, Mapping[str, float | None]], *, net_slip: b
 
 
 def has_net_slip(parameters: Mapping[str, float]) -> bool:
-    """Whether slip_net_per_metre is meaningful: under the tanh law it only inverts that law."""
+    """Returns whether slip_net_per_metre is meaningful: under the tanh law it only inverts it."""
     return parameters.get("friction.law", TANH) != TANH
 
 

@@ -68,7 +68,7 @@ def polygon_margins(feet: Array, standing: Mask, centre: Array) -> Array:
 
 
 def _hull_margins(feet: Array, centre: Array) -> Array:
-    """As polygon_margins, for feet (n, 2, rows) that all stand."""
+    """Returns what polygon_margins() does, for feet (n, 2, rows) that all stand."""
     first, last = np.array(list(combinations(range(len(feet)), 2))).T
     begin = feet[first]  # (pairs, 2, rows)
     edge = feet[last] - begin

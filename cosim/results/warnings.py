@@ -236,7 +236,7 @@ def missing_metrics_warnings(view: View) -> list[str]:
         least = f"{100.0 * LEAST_DISTANCE:g} cm"
         found.append(f"the robot walked less than {least}: it has no figures per metre")
     names = [f"controller.{leg}.swinging" for leg in LEG_NAMES]
-    told = set(names) <= set(walk.recording.names)
-    if told and not (walk.recording.columns(names) > 0.5).any():
+    recorded = set(names) <= set(walk.recording.names)
+    if recorded and not (walk.recording.columns(names) > 0.5).any():
         found.append("no foot swung: foot_error_swing has no value")
     return found

@@ -22,7 +22,7 @@ STREAM = 1  # of random numbers; the noise of the sensors is drawn from the seed
 POSITION, QUATERNION = vector_names("initial.position"), vector_names("initial.quaternion", 4)
 ANGLE = [f"initial.{name}" for name in joint_names("angle")]
 
-# what no set-up by hand makes exact: a tenth of a degree of attitude and of joint angles (a step of
+# accuracy of a set-up by hand: a tenth of a degree of attitude and of joint angles (a step of
 # the servos' encoders is 1.5 mrad), 1 mm of height, and a tenth of a second of command delay
 STANDARD = Variation(attitude=2e-3, height=1e-3, joint_angle=2e-3, command_delay=0.1)
 

@@ -116,4 +116,4 @@ def _run_step(folder: str, description: Any, token: str) -> None:
 
 
 def _ignore_message(*_: object) -> None:
-    """A logger that ignores messages."""
+    """Ignores a log message."""

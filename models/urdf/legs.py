@@ -36,10 +36,8 @@ class FoundLeg:
     table: dict[str, Any]
     joints: tuple[str, str, str]
     reversed: tuple[str, ...]  # joints counted the other way round
-    radius: float | None  # m    of the foot, where the URDF says it
-    footless: (
-        RobotError | None
-    )  # nothing says where the foot is; to be raised unless someone else does
+    radius: float | None  # m    of the foot, where the URDF states it
+    footless: RobotError | None  # the error to raise if the position of the foot is given nowhere
     servo: tuple[Branch, Branch, Branch]
 
 

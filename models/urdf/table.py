@@ -67,7 +67,7 @@ SIZES = {
     "speed_max": "velocity",
     "coulomb_friction": "friction",
 }  # servo's, and a joint's in the URDF
-WHOLE = ("contact", "friction", "baumgarte", "solver", "terrain")  # sections a URDF says nothing of
+WHOLE = ("contact", "friction", "baumgarte", "solver", "terrain")  # sections that URDF lacks
 SECTIONS: dict[str, type[Any]] = {
     "torso": Torso,
     "foot": Foot,

@@ -28,6 +28,6 @@ class Chunk:
         return [Chunk((order,), deaths, suspect=True) for order in self.orders]
 
 
-# a chunk that comes back with fewer results than orders was not run to its end
+# a chunk that returns fewer results than orders was not run to its end
 FinishedChunk: TypeAlias = Finished[Chunk, list[RunResult]]
 ChunkExecutor: TypeAlias = TaskExecutor[Chunk, list[RunResult]]

@@ -35,7 +35,7 @@ FETCH_TIMEOUT = 5.0  # s    for the transfer of a chunk's results, before the wo
 WORKER_EVENTS = ("add-worker", "remove-worker")
 JOB_PREFIX = "hexapod-"  # of the names of jobs, followed by their client's
 DIED = "its worker of the cluster died"
-FIX_RESUME = "start the study again when it is back: it goes on, all runs stored so far are kept"
+FIX_RESUME = "start the study again when it is back; it continues, and all stored runs are kept"
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class _RemovedWorker:
     """The event that a worker has left the cluster."""
 
     address: str
-    expected: bool = False  # whether it was told to leave
+    expected: bool = False  # whether it was requested to leave
 
 
 class ClusterExecutor:

@@ -1,4 +1,4 @@
-"""What runs on a worker of a Dask cluster: the job, which is sent there once, and its chunks."""
+"""Runs chunks on a worker of a Dask cluster, to which the job is sent once."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ ProgressSink = Callable[[int, int], None]  # numbers of new runs, and of those t
 
 @dataclass(frozen=True)
 class ResultSink:
-    """Where the results of a study go: its store and the display of progress."""
+    """Receives the results of a study: its store and the display of progress."""
 
     study: Study
     store: Store

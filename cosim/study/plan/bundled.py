@@ -6,5 +6,5 @@ from pathlib import Path
 
 
 def list_studies() -> dict[str, Path]:
-    """The studies that come with the package, by name."""
+    """Returns the studies that come with the package, by name."""
     return {path.stem: path for path in sorted((Path(__file__).parent / "studies").glob("*.toml"))}

@@ -1,6 +1,4 @@
-"""Studies from TOML files: every key judged, every factor tried on the scenario before the first
-run.
-"""
+"""Reads studies from TOML files and checks every key and factor before the first run."""
 
 from __future__ import annotations
 

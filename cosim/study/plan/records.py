@@ -33,7 +33,7 @@ SAMPLERS = ("tpe", "nsga2", "random")
 
 
 class StudyError(HexapodError):
-    """A study that cannot be run, or cannot go on."""
+    """A study cannot be run or continued."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -183,5 +183,5 @@ def _of_pid(cells: Cases, before: str = "") -> list[str]:
     slips = [kinematic, *(value(part) for part in (PID, WITHOUT, ALL))]
     gains = [(slips[1], kinematic), *((value(ALL, name), value(WITHOUT, name)) for name in ADDED)]
     changes = [100.0 * (after / plain - 1.0) for after, plain in gains]
-    told = (f"{each:+.1f}" if np.isfinite(each) else "-" for each in changes)
-    return [*map(shown, slips), *told]
+    texts = (f"{each:+.1f}" if np.isfinite(each) else "-" for each in changes)
+    return [*map(shown, slips), *texts]

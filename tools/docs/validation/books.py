@@ -93,7 +93,7 @@ def scenarios() -> Shown:
             controls = [f"control={each}" for each in CONTROLS]
             plans = [load_scenario(name, overrides=[each, *settings]) for each in controls]
             runs = [walker.simulate(plan) for plan in plans]
-            return changed((run.metrics["energy_residual"] for run in runs), told=short)
+            return changed((run.metrics["energy_residual"] for run in runs), form=short)
 
         def row(name: str, *settings: str) -> list[str]:
             return [residuals(name, *settings, *more) for more in SOLVERS.values()]

@@ -62,9 +62,10 @@ def touch_down() -> Shown:
         for k, (period, (_, compliant)) in enumerate(walks.items()):
             part = judged(compliant).recording
             rows = part.time <= part.time[0] + compliant.facts["gait_period"]
-            told, label = part.column(f"{LEG}.{JOINT}.torque_ref")[rows], f"{MILLI * period:g} ms"
+            torque = part.column(f"{LEG}.{JOINT}.torque_ref")[rows]
+            label = f"{MILLI * period:g} ms"
             style = {"color": PALETTE[k], "label": label, "linewidth": 1.0}
-            axes.step(part.time[rows], told, where="post", **style)
+            axes.step(part.time[rows], torque, where="post", **style)
         axes.set(xlabel="time [s]", ylabel=f"torque_ref of {LEG}.{JOINT} [N m]")
         axes.legend(title="control period", ncols=3)
 
@@ -87,11 +88,12 @@ def touch_down() -> Shown:
 
 
 def _torques(result: Result) -> tuple[float, float]:
-    """Returns the largest torque_ref of the judged walk and its largest change between rows [N
-    m].
+    """Returns the largest torque_ref of the judged walk, and its largest change between rows.
+
+    Both are in N m.
     """
-    told = judged(result).recording.columns(COMMANDED["torque_ref"])
-    return float(np.abs(told).max()), float(np.abs(np.diff(told, axis=0)).max())
+    torque = judged(result).recording.columns(COMMANDED["torque_ref"])
+    return float(np.abs(torque).max()), float(np.abs(np.diff(torque, axis=0)).max())
 
 
 def yaw() -> Shown:
@@ -136,8 +138,9 @@ def model_errors() -> Shown:
 
 
 def slip_pid() -> Shown:
-    """The judged walk of the first seed with none of the parts, with the slip PID alone, with all
-    other parts, and with all.
+    """Shows the judged walk of the first seed with different parts of compliant control.
+
+    These are none, the slip PID alone, all other parts, and all.
     """
     off = {part: f"{SWITCH}{part}=false" for part in PARTS}
     others = tuple(text for part, text in off.items() if part != "slip_pid")
@@ -156,7 +159,7 @@ def slip_pid() -> Shown:
 
 
 def _seeded_slip(*settings: str) -> float:
-    """m/m    of the judged walk of the first seed under compliant control"""
+    """Returns the slip of the judged walk of the first seed under compliant control [m/m]."""
     plan = judged_walk("one seed", *settings).plan("compliant", seeds("judged")[0])
     result = walker().simulate(plan)
     if not (result.completed and result.facts["walk"]["upright"]):

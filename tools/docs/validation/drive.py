@@ -25,9 +25,8 @@ HEADINGS = (
 
 def lag() -> Shown:
     """Shows the judged walk of a robot with kinematic drives, under kinematic control."""
-    told = walk("servo.mode=kinematic", "duration=6")
-    untold = _untold(told)
-    rows = [_row("planned", told), _row("0", untold)]
+    planned = walk("servo.mode=kinematic", "duration=6")
+    rows = [_row("planned", planned), _row("0", _without_accelerations(planned))]
     columns = ("acceleration_ref", "largest lag of a joint [mrad]", "RMS [mrad]", *HEADINGS)
     return Shown(columns=columns, rows=rows)
 
@@ -41,7 +40,7 @@ def _row(name: str, result: Result) -> tuple[str, ...]:
     return name, *(shown(float(value)) for value in values)
 
 
-def _untold(result: Result) -> Result:
+def _without_accelerations(result: Result) -> Result:
     """Repeats the commands of a run without the accelerations."""
     recording = _driven(result.scenario, result.outcome.recording)
     again = replace(result, outcome=replace(result.outcome, recording=recording, every_step=None))
@@ -56,7 +55,7 @@ def _driven(scenario: Scenario, recording: Recording) -> Recording:
     data[:, [recording.names.index(name) for name in ACCELERATION]] = 0.0
     with open_plant(scenario) as plant:
         initialise_plant(plant, make_plan(scenario))
-        told, blocks = plant.block(joints), []
+        inputs, blocks = plant.block(joints), []
         for names in (plant.names("output"), plant.names("output", "Boolean")):
             kept = [name for name in names if name in recording.names]
             places = [recording.names.index(name) for name in kept]
@@ -66,8 +65,8 @@ def _driven(scenario: Scenario, recording: Recording) -> Recording:
                 block.get()
                 data[k, places] = block.values
             if k + 1 < len(data):
-                told.values[:] = commands[k]
-                told.set()
+                inputs.values[:] = commands[k]
+                inputs.set()
                 plant.step(k * h, h)
     return Recording(recording.names, data)
 

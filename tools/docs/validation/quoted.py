@@ -84,9 +84,9 @@ def sampled_again() -> Shown:
         own = sampled_metrics(again.samples, seen.walk, servo, mu=mu)
         measured = compute_metrics(seen, servo=servo, realtime_factor=np.nan)
         for name, value in own.items():
-            told, judged_one = measured[name], result.metrics[name]
-            values = (f"{each:.5g}" for each in (judged_one, told, value))
-            gaps = (_gap(told, value), _gap(judged_one, told))
+            plant_value, walk_value = measured[name], result.metrics[name]
+            values = (f"{each:.5g}" for each in (walk_value, plant_value, value))
+            gaps = (_gap(plant_value, value), _gap(walk_value, plant_value))
             rows.append((f"`{name}`", control, *values, *gaps))
     columns = (
         "metric", "control", "judged walk", "sampled run: the plant's", "of samples",

@@ -28,13 +28,13 @@ def walker() -> Walker:
 
 @cache
 def walk(*settings: str, scenario: str = "walk_flat") -> Result:
-    """A shipped scenario, by default the judged walk, with some settings."""
+    """Runs a shipped scenario, by default the judged walk, with some settings."""
     plan = load_scenario(scenario, overrides=settings)
     return walker().simulate(plan)
 
 
 def under_both(*settings: str, scenario: str = "walk_flat") -> tuple[Result, Result]:
-    """The same under both controls, kinematic first. Raises RuntimeError unless both walk."""
+    """Runs it under both controls, kinematic first. Raises RuntimeError unless both walk."""
     first, second = (walk(f"control={name}", *settings, scenario=scenario) for name in CONTROLS)
     for result in (first, second):
         if not (result.completed and result.facts["walk"]["upright"]):
@@ -72,6 +72,6 @@ def shown(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:#.3g}"
 
 
-def changed(values: Iterable[float], *, told: Callable[[float], str] = shown) -> str:
+def changed(values: Iterable[float], *, form: Callable[[float], str] = shown) -> str:
     """Formats a figure under kinematic and under compliant control in one line."""
-    return "\u00a0→\u00a0".join(map(told, values)).replace("-", "\u2011")
+    return "\u00a0→\u00a0".join(map(form, values)).replace("-", "\u2011")
