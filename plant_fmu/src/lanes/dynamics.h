@@ -89,8 +89,8 @@ static inline void leg_multipliers(const hxModel *model, const hxImplicit *impli
       k->servo.torque = k->torque - k->servo.friction;
     }
     k->reaction.lambda_lin = lin;
-    k->reaction.lambda[0] = (along * kin->sy - hx_dot(about_joint, k->body.axes.y)) * inverse_sz;
-    k->reaction.lambda[1] = (hx_dot(about_joint, k->body.axes.x) - along * kin->sx) * inverse_sz;
+    k->reaction.lambda[0] = (along * kin->sy - hx_dot(about_joint, k->body.R_WB.y)) * inverse_sz;
+    k->reaction.lambda[1] = (hx_dot(about_joint, k->body.R_WB.x) - along * kin->sx) * inverse_sz;
     handed = (hxForce6){hx_add3(about_joint, hx_cross(kin->sP_i, lin)), lin};
   }
 }

@@ -128,7 +128,7 @@ static inline hxFootKinematics hx_foot_kinematics(const hxModel *model, const hx
                                                   int slot, const hxBody *tibia) {
   const hxVec3 r = hx_link_vec3(motion, HX_JOINTS - 1, HX_R, slot),
                v = hx_link_vec3(motion, HX_JOINTS - 1, HX_V, slot);
-  const hxVec3 to_centre = hx_mul(tibia->axes, hx_load_vec3(model->point_foot, slot));
+  const hxVec3 to_centre = hx_mul(tibia->R_WB, hx_load_vec3(model->point_foot, slot));
   const hxGround ground = hx_ground(model, hx_add3(r, to_centre));
   const hxVec3 arm = hx_add_scaled(to_centre, hx_splat(-model->foot_radius), ground.normal);
   const hxVec3 velocity = hx_add3(v, hx_cross(tibia->w, arm));

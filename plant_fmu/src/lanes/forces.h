@@ -37,7 +37,7 @@ static inline hxReal drive_acceleration(const hxModel *model, const hxCommand *c
  * velocity w_ij_j; the rest is solved in the child's axes. */
 static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *kin, hxVec3 w_i,
                                 const hxBody *j, hxReal speed, hxReal driven) {
-  const hxVec3 w_ij_j = hx_tmul(j->axes, hx_sub3(j->w, w_i)), x = hx_cross(w_i, j->w);
+  const hxVec3 w_ij_j = hx_tmul(j->R_WB, hx_sub3(j->w, w_i)), x = hx_cross(w_i, j->w);
   const hxReal twice = hx_splat(2.0 * model->alpha),
                rest = hx_dot(w_ij_j, w_ij_j) - model->beta * model->beta;
   const hxReal along = driven - hx_dot(kin->s, x), inverse_sz = 1.0 / kin->sz;
@@ -47,7 +47,7 @@ static inline hxVec3 joint_bias(const hxModel *model, const hxJointKinematics *k
       kin->sy * rest - w_ij_j.y * speed - twice * (kin->sz * w_ij_j.x - kin->sx * w_ij_j.z);
   const hxReal dz = kin->sz * along + kin->sy * c4 - kin->sx * c5;
   const hxReal dx = (c5 + kin->sx * dz) * inverse_sz, dy = (kin->sy * dz - c4) * inverse_sz;
-  return hx_add3(x, hx_mul(j->axes, (hxVec3){dx, dy, dz}));
+  return hx_add3(x, hx_mul(j->R_WB, (hxVec3){dx, dy, dz}));
 }
 
 /* Returns the linear part at c of a motion about the torso's centre of mass. */
@@ -57,7 +57,7 @@ static inline hxVec3 motion_at(hxMotion6 a, hxVec3 c) { return hx_add3(a.lin, hx
 static inline void link_pass(const hxModel *model, const hxPlantMotion *motion, int joint, int slot,
                              hxJointWork *k) {
   k->body = hx_link_body(motion, joint, slot);
-  k->J = hx_rotate_sym3(k->body.axes, hx_load_sym3(model->joint[joint].inertia, slot));
+  k->J = hx_rotate_sym3(k->body.R_WB, hx_load_sym3(model->joint[joint].inertia, slot));
   k->gyroscopic = hx_cross(hx_sym_mul(k->J, k->body.w), k->body.w);
 }
 
@@ -171,7 +171,7 @@ static inline void torso_pass(const hxModel *model, const hxPlantMotion *motion,
   const hxSym3 body = {hx_splat(J[0]), hx_splat(J[1]), hx_splat(J[2]),
                        hx_splat(J[3]), hx_splat(J[4]), hx_splat(J[5])};
   work->torso = hx_torso_body(motion);
-  work->torso_J = hx_rotate_sym3(work->torso.axes, body);
+  work->torso_J = hx_rotate_sym3(work->torso.R_WB, body);
 }
 
 /* Computes positions, velocities and forces at (t, y). Fills work except for the sweeps; with

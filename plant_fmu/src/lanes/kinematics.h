@@ -7,7 +7,7 @@
 
 /* Orientation and angular velocity of a body, world axes; the torso is the same in every lane. */
 typedef struct {
-  hxMat3 axes; /* body axes: columns of R_WB */
+  hxMat3 R_WB; /* body axes to world axes; its columns x, y, z are the body's axes */
   hxVec3 w;    /* angular velocity */
 } hxBody;
 
@@ -15,8 +15,7 @@ typedef struct {
 typedef struct {
   hxVec3 s;          /* joint axis, fixed in the parent */
   hxReal sx, sy, sz; /* s in the child's axes (a, b, their normal): (0, 0, 1) without drift */
-  hxVec3 sP_i,
-      sP_j; /* centres of mass to the joint's point; point_i and point_j rotated to world axes */
+  hxVec3 sP_i, sP_j; /* point_i and point_j in world axes */
 } hxJointKinematics;
 
 /* Phi (eq. 4) and dPhi/dt = D v (eq. 2): rows 1-3, rows 4-5. */
@@ -73,13 +72,13 @@ static inline void hx_joint_half_angle(const hxJointModel *model, int slot, hxQu
 /* Computes the axis and the points of a joint from the orientations of parent and child. */
 static inline hxJointKinematics hx_joint_kinematics(const hxJointModel *model, int slot,
                                                     const hxBody *i, const hxBody *j) {
-  const hxVec3 s = hx_mul(i->axes, hx_load_vec3(model->s_i, slot));
+  const hxVec3 s = hx_mul(i->R_WB, hx_load_vec3(model->s_i, slot));
   return (hxJointKinematics){s,
-                             hx_dot(j->axes.x, s),
-                             hx_dot(j->axes.y, s),
-                             hx_dot(j->axes.z, s),
-                             hx_mul(i->axes, hx_load_vec3(model->point_i, slot)),
-                             hx_mul(j->axes, hx_load_vec3(model->point_j, slot))};
+                             hx_dot(j->R_WB.x, s),
+                             hx_dot(j->R_WB.y, s),
+                             hx_dot(j->R_WB.z, s),
+                             hx_mul(i->R_WB, hx_load_vec3(model->point_i, slot)),
+                             hx_mul(j->R_WB, hx_load_vec3(model->point_j, slot))};
 }
 
 /* Computes Phi = (r_j + s_j^P - r_i - s_i^P, a.s, b.s) and its rate; rows 4 and 5 of the rate are
@@ -90,7 +89,7 @@ static inline hxConstraint hx_joint_constraint(const hxModel *model, const hxPla
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
   const hxJointKinematics k = hx_joint_kinematics(&model->joint[joint], slot, &i, &j);
-  const hxVec3 w_ij_j = hx_tmul(j.axes, hx_sub3(j.w, i.w)); /* child's axes */
+  const hxVec3 w_ij_j = hx_tmul(j.R_WB, hx_sub3(j.w, i.w)); /* child's axes */
   const hxVec3 v_j = hx_link_vec3(motion, joint, HX_V, slot);
   return (hxConstraint){
       .phi_lin =
@@ -106,7 +105,7 @@ static inline void project_link(const hxModel *model, int joint, int slot, hxPla
   const hxBody i = hx_parent_body(motion, joint, slot), drifted = hx_link_body(motion, joint, slot);
   const hxVec3 r_i = hx_parent_vec3(motion, joint, HX_R, slot),
                v_i = hx_parent_vec3(motion, joint, HX_V, slot);
-  const hxVec3 s = hx_mul(i.axes, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.axes.z;
+  const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(model->joint[joint].s_i, slot)), z = drifted.R_WB.z;
   const hxReal twice = 1.0 + hx_dot(z, s), scale = 1.0 / hx_sqrt(2.0 * twice);
   const hxVec3 u = hx_scale(scale, hx_cross(z, s));
   const hxQuat turn = {scale * twice, u.x, u.y, u.z};

@@ -57,7 +57,7 @@ static inline void hx_moment_of(const hxModel *model, const hxPlantMotion *motio
       hx_joint_half_angle(m, slot, hx_parent_quat(motion, joint, slot),
                           hx_link_quat(motion, joint, slot), &sine, &cosine);
       hx_store(&moment->angle[joint][slot], hx_angle_from_half(sine, cosine));
-      const hxVec3 s = hx_mul(i.axes, hx_load_vec3(m->s_i, slot));
+      const hxVec3 s = hx_mul(i.R_WB, hx_load_vec3(m->s_i, slot));
       hx_store(&moment->speed[joint][slot], hx_dot(s, hx_sub3(j.w, i.w)));
     }
     const hxFootKinematics foot = hx_foot_kinematics(model, motion, slot, &j);

@@ -65,8 +65,8 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
  * point, the torque -(u1 lambda_4 + u2 lambda_5); the motor's torque is not included. */
 static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int leg, int joint,
                        hxOutput *o) {
-  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.axes.x, s),
-               u2 = hx_cross(k->body.axes.y, s);
+  const hxVec3 s = k->reaction.kin.s, u1 = hx_cross(k->body.R_WB.x, s),
+               u2 = hx_cross(k->body.R_WB.y, s);
   const hxVec3 couple =
       hx_add_scaled(hx_scale(k->reaction.lambda[0], u1), k->reaction.lambda[1], u2);
   o->angle[leg][joint] = hx_lane(k->angle, lane);
@@ -111,7 +111,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxFootWo
 /* Fills the outputs of torso and IMU. */
 static void fill_torso(const hxPlantMotion *motion, const hxWork *work, hxOutput *o) {
   const hxNumber *m = motion->torso;
-  const hxMat3 R = work->torso.axes;
+  const hxMat3 R = work->torso.R_WB;
   hxNumber x[3], y[3], z[3]; /* columns of R */
   get3(R.x, 0, x), get3(R.y, 0, y), get3(R.z, 0, z);
   for (int i = 0; i < 3; ++i) {
