@@ -30,6 +30,7 @@ from hexapod_cosim.models.dynamics import (
     constraints,
     joint_torques,
     mass_matrix,
+    solve_constrained,
 )
 from hexapod_cosim.models.kinematics import (
     BODIES,
