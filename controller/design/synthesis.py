@@ -108,16 +108,21 @@ def design_gains(
         ),
         support=_taken(SupportGains, needs),
         hold=_taken(HoldGains, needs),
-        limits=LimitGains(
-            speed=needs.speed_share * robot.servo.speed_max,
-            torque=needs.torque_share * robot.servo.torque_max,
-        ),
+        limits=_limits(robot, needs),
     )
 
 
 def _taken(kind: type[Any], needs: Requirements) -> Any:
     """Returns a section of the gains whose values are those of the requirements."""
     return kind(**{entry.name: getattr(needs, entry.name) for entry in fields(kind)})
+
+
+def _limits(robot: Robot, needs: Requirements) -> LimitGains:
+    """Returns the limits of commanded speeds [rad/s] and torques [N m]."""
+    return LimitGains(
+        speed=needs.speed_share * robot.servo.speed_max,
+        torque=needs.torque_share * robot.servo.torque_max,
+    )
 
 
 def _check(robot: Robot, needs: Requirements, plants: Plants, *, period: float) -> None:

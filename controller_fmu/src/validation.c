@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "hexapod/checker.h"
+#include "hexapod/range_check.h"
 
 static void legs(hxChecker *c, const hxControllerDefinition *d) {
   char name[32];

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from time import perf_counter
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from hexapod_cosim.controller import BodyCommand, Diagnostics, JointCommand, Measurement
@@ -103,7 +104,7 @@ def diagnostic_columns(controller: JointController) -> dict[tuple[str, ...], NDA
         tuple(f"controller.{leg}.{key}" for leg in LEG_NAMES): getattr(shown, key)
         for key in ("swinging", "unreachable", "lift", "fallback")
     }
-    columns[_leg_vectors("shift", 2)] = shown.shift.view(float)  # x + i y in memory is x, y
+    columns[_leg_vectors("shift", 2)] = np.stack([shown.shift.real, shown.shift.imag], axis=-1)
     columns[_leg_vectors("planned", 3)] = shown.planned
     return columns
 

@@ -1076,7 +1076,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{40079afb-4763-485d-9a13-d56361f83ae4}";
+const char hx_default_guid[] = "{f247d8c4-a7e7-4ece-a85b-a2b2be0886e1}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

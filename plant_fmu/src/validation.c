@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "hexapod/checker.h"
+#include "hexapod/range_check.h"
 #include "method.h"
 
 /* Returns whether a body can have the inertia I: I and (tr I / 2) 1 - I, its second moments of

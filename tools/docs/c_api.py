@@ -12,7 +12,7 @@ HEADERS = (
     "controller_fmu/include/hexapod/controller.h",
     "plant_fmu/include/hexapod/status.h",
     "plant_fmu/include/hexapod/legs.h",
-    "plant_fmu/include/hexapod/checker.h",
+    "plant_fmu/include/hexapod/range_check.h",
     "plant_fmu/include/hexapod/inside.h",
 )
 COMMENT = re.compile(r"/\*(.*?)\*/", flags=re.DOTALL)

@@ -1,7 +1,7 @@
-/* checker.h - range checks of definitions and inputs, shared by the plant and the controller.
+/* range_check.h - range checks of definitions and inputs, shared by the plant and the controller.
  * Users of their headers do not need it. */
-#ifndef HEXAPOD_CHECKER_H
-#define HEXAPOD_CHECKER_H
+#ifndef HEXAPOD_RANGE_CHECK_H
+#define HEXAPOD_RANGE_CHECK_H
 
 #include "hexapod/inside.h"
 #include "hexapod/legs.h"

@@ -1,4 +1,4 @@
-#include "hexapod/checker.h"
+#include "hexapod/range_check.h"
 
 #include <stdio.h>
 #include <string.h>
