@@ -40,6 +40,7 @@ SERVO_MODES = ("position", "torque", "kinematic")
 METHODS = ("rosw3", "ros2", "dp54", "bs32", "rk4")
 PROJECTIONS = ("none", "step")
 TERRAINS = ("flat", "slope")
+SOIL_LAWS = ("none", "bekker", "granular", "mud")
 GAITS = ("tripod", "ripple", "wave", "amble")
 
 
@@ -91,6 +92,8 @@ class Foot:
     """Radius and material of all feet."""
 
     radius: Annotated[float, Number("m", above=0.0)]
+    # flat round pad on soil; 0: the sphere itself
+    pad_radius: Annotated[float, Number("m", at_least=0.0, default=0.0)] = 0.0
     youngs_modulus: Annotated[float, Number("Pa", above=0.0)]
     poisson: Annotated[float, Number("1", above=-1.0, at_most=0.5)]
 
@@ -172,6 +175,34 @@ class Terrain:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Soil:
+    """Law of soft ground and its numbers (eq. 31-37); each law uses those it names."""
+
+    law: Annotated[str, Choice(SOIL_LAWS, default="none")] = "none"
+    # bekker: pressure (Kc/b + Kphi) z^n
+    frictional_modulus: Annotated[float, Number("N/m^(n+2)", at_least=0.0, default=0.0)] = 0.0
+    cohesive_modulus: Annotated[float, Number("N/m^(n+1)", at_least=0.0, default=0.0)] = 0.0
+    exponent: Annotated[float, Number("1", at_least=0.05, at_most=3.0, default=1.0)] = 1.0
+    # granular: resistances of plates in units of `resistance`: facing down and moving down, on
+    # edge and moving down, on edge and moving ahead
+    resistance: Annotated[float, Number("N/m^3", at_least=0.0, default=0.0)] = 0.0
+    alpha_down: Annotated[float, Number("1", at_least=0.0, default=1.0)] = 1.0
+    alpha_side: Annotated[float, Number("1", at_least=0.0, default=0.128)] = 0.128
+    alpha_ahead: Annotated[float, Number("1", at_least=0.0, default=0.37)] = 0.37
+    # mud: pressure yield_pressure + hardening z
+    yield_pressure: Annotated[float, Number("Pa", at_least=0.0, default=0.0)] = 0.0
+    hardening: Annotated[float, Number("Pa/m", at_least=0.0, default=0.0)] = 0.0
+    # all laws: shear strength, its displacement K, stiffness of unloading, damping
+    cohesion: Annotated[float, Number("Pa", at_least=0.0, default=0.0)] = 0.0
+    friction_angle: Annotated[float, Number("rad", at_least=0.0, at_most=1.4, default=0.0)] = 0.0
+    shear_displacement: Annotated[float, Number("m", at_least=1e-5, at_most=1.0, default=0.01)] = (
+        0.01
+    )
+    stiffness: Annotated[float, Number("Pa/m", above=0.0, default=4e8)] = 4e8
+    damping: Annotated[float, Number("Pa s/m", at_least=0.0, default=3e4)] = 3e4
+
+
+@dataclass(frozen=True, kw_only=True)
 class Gait:
     """Parameters of the gait."""
 
@@ -211,6 +242,7 @@ class Robot:
     solver: Solver
     terrain: Terrain
     gait: Gait
+    soil: Soil = Soil()
     source: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property

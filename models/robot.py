@@ -31,6 +31,7 @@ from hexapod_cosim.models.records import (
     METHODS,
     PROJECTIONS,
     SERVO_MODES,
+    SOIL_LAWS,
     TERRAINS,
     Array,
     Baumgarte,
@@ -42,6 +43,7 @@ from hexapod_cosim.models.records import (
     Link,
     Robot,
     Servo,
+    Soil,
     Solver,
     Terrain,
     Torso,
@@ -56,6 +58,7 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     require,
 )
+from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.urdf.table import SECTIONS, element_named, side_table, urdf_table
 from hexapod_cosim.models.validation import check_robot
 
@@ -68,6 +71,7 @@ __all__ = [
     "METHODS",
     "PROJECTIONS",
     "SERVO_MODES",
+    "SOIL_LAWS",
     "TERRAINS",
     "Array",
     "Baumgarte",
@@ -79,6 +83,7 @@ __all__ = [
     "Link",
     "Robot",
     "Servo",
+    "Soil",
     "Solver",
     "Terrain",
     "Torso",
@@ -220,7 +225,11 @@ def _read_friction(
 
 def _read_section(table: Mapping[str, Any], name: str, where: str) -> Any:
     record = SECTIONS[name]
-    given = read_given(record, _section(table, name, where), where)
+    if record is Soil:  # no section: rigid ground
+        section = soil_table(table.get(name, {}), where)
+    else:
+        section = _section(table, name, where)
+    given = read_given(record, section, where)
     if record is Torso and {"mass", "size"} <= given.keys():
         given.setdefault("inertia", box_inertia(given["mass"], given["size"]))
     if record is Contact and "stiffness" not in given:

@@ -34,7 +34,7 @@ GYRATION_PER_DIAGONAL = 1.0
 STANCE_PLANE_TOLERANCE = 0.01
 AXIS_TOLERANCE = 1e-6
 # sections that do not concern the bodies
-SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain")
+SETTINGS = ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil")
 DISSIPATIVE_LAWS = ("exact_restitution", "flores", "lankarani_nikravesh", "hunt_crossley")
 
 
@@ -176,6 +176,33 @@ def _check_com(com: tuple[float, ...], extent: float, where: str) -> None:
         )
 
 
+def _check_soil(robot: Robot, at: str) -> None:
+    """Raises RobotError for soil that bears nothing, or whose unloading is softer than loading."""
+    soil = robot.soil
+    strength = {
+        "bekker": soil.frictional_modulus + soil.cohesive_modulus,
+        "granular": soil.resistance * soil.alpha_down,
+        "mud": soil.yield_pressure + soil.hardening,
+    }
+    if soil.law != "none" and strength[soil.law] <= 0.0:
+        raise RobotError(
+            "soil that bears no load",
+            got=strength[soil.law],
+            expected=f"numbers of the {soil.law} law above 0",
+            fix="give the law's numbers, or a soil of `hexapod list soils`",
+            where=at + "soil",
+        )
+    steepest = {"granular": strength["granular"], "mud": soil.hardening}.get(soil.law, 0.0)
+    if steepest >= soil.stiffness:
+        raise RobotError(
+            "soil whose unloading is no steeper than its loading",
+            got=soil.stiffness,
+            expected=f"a stiffness above {steepest:g} Pa/m, the growth of pressure with depth",
+            fix="raise soil.stiffness",
+            where=at + "soil.stiffness",
+        )
+
+
 def _check_laws(robot: Robot, at: str) -> None:
     contact, solver, servo, friction = robot.contact, robot.solver, robot.servo, robot.friction
     if contact.law in DISSIPATIVE_LAWS and contact.restitution <= 0.0:
@@ -195,6 +222,7 @@ def _check_laws(robot: Robot, at: str) -> None:
             fix="set solver.step",
             where=at + "solver.step",
         )
+    _check_soil(robot, at)
     if servo.torque_continuous > servo.torque_max:
         expected = f"at most torque_max = {servo.torque_max:g} N m"
         raise RobotError(

@@ -15,6 +15,7 @@ from hexapod_cosim.cosim.interface.interface import load_interface
 from hexapod_cosim.cosim.scenario.scenario import list_scenarios
 from hexapod_cosim.cosim.study.plan.bundled import list_studies
 from hexapod_cosim.models import LEG_NAMES, list_robots, load_robot, unknown_name
+from hexapod_cosim.models.soil.presets import list_soils, soil_preset
 
 Rows = list[dict[str, Any]]
 
@@ -66,9 +67,18 @@ def terrains() -> Rows:
     return _choices("TerrainKind")
 
 
+def soils() -> Rows:
+    """Returns the bundled soils with their law and the source of their numbers."""
+    presets = {name: soil_preset(name) for name in list_soils()}
+    return [
+        {"name": name, "law": preset.soil.law, "about": preset.title, "source": preset.source}
+        for name, preset in presets.items()
+    ]
+
+
 def laws() -> Rows:
-    """Returns the laws of the normal and the tangential contact force."""
-    kinds = {"ContactLaw": "contact.law", "FrictionLaw": "friction.law"}
+    """Returns the laws of the normal and the tangential contact force, and of soil."""
+    kinds = {"ContactLaw": "contact.law", "FrictionLaw": "friction.law", "SoilLaw": "soil.law"}
     return [{"key": key} | row for kind, key in kinds.items() for row in _choices(kind)]
 
 
@@ -85,6 +95,7 @@ LISTS: dict[str, Callable[[], Rows]] = {
     "studies": studies,
     "gaits": gaits,
     "terrains": terrains,
+    "soils": soils,
     "laws": laws,
 }
 
@@ -100,7 +111,7 @@ What = Annotated[
 
 
 def list_what(what: What, json: Json = False) -> None:
-    """List robots, scenarios, studies, gaits, terrains or laws."""
+    """List robots, scenarios, studies, gaits, terrains, soils or laws."""
     if what not in LISTS:
         raise unknown_name("list", what, LISTS)
     rows = LISTS[what]()

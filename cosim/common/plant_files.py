@@ -69,7 +69,7 @@ def code_hash() -> str:
     """
     digest = hashlib.sha256()
     for folder in (_COSIM, _COSIM.parent / "controller", _COSIM.parent / "models"):
-        for path in sorted([*folder.rglob("*.py"), *folder.glob("*.toml")]):
+        for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.toml")]):
             digest.update(
                 path.relative_to(_COSIM.parent).as_posix().encode()
                 + hashlib.sha256(path.read_bytes()).digest()

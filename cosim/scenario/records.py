@@ -15,6 +15,7 @@ from hexapod_cosim.models import (
     Friction,
     Gait,
     Servo,
+    Soil,
     Solver,
     Terrain,
 )
@@ -26,6 +27,7 @@ FORMATS = ("parquet", "csv")  # of recordings
 SETTINGS: dict[str, type[Any]] = {
     "gait": Gait,
     "terrain": Terrain,
+    "soil": Soil,
     "contact": Contact,
     "friction": Friction,
     "servo": Servo,

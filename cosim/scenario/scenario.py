@@ -43,7 +43,7 @@ from hexapod_cosim.cosim.scenario.records import (
     Variation,
 )
 from hexapod_cosim.models import Robot, RobotError, ScenarioError, load_robot, unknown_name
-from hexapod_cosim.models.records import STATIC_LAWS
+from hexapod_cosim.models.records import STATIC_LAWS, Soil
 from hexapod_cosim.models.schema import (
     Number,
     expect_table,
@@ -52,6 +52,7 @@ from hexapod_cosim.models.schema import (
     require,
     specs,
 )
+from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.terrain import ground_normal
 from hexapod_cosim.models.validation import check_settings
 
@@ -262,6 +263,8 @@ def _record(record: type[Any], table: Any, where: str) -> Any:
 def _read_setting(name: str, table: Any, where: str) -> dict[str, Any]:
     """Reads a section of settings that robot files have as well."""
     record = SETTINGS[name]
+    if record is Soil:
+        table = soil_table(table, where)
     keys = [key for key in specs(record) if key not in UNUSED.get(name, ())]
     refuse_unknown_keys(expect_table(table, where), keys, where)
     return _read(record, table, where)

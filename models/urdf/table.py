@@ -29,6 +29,7 @@ from hexapod_cosim.models.records import (
     Leg,
     Link,
     Servo,
+    Soil,
     Solver,
     Terrain,
     Torso,
@@ -41,6 +42,7 @@ from hexapod_cosim.models.schema import (
     refuse_unknown_keys,
     specs,
 )
+from hexapod_cosim.models.soil.presets import soil_table
 from hexapod_cosim.models.urdf.assumed import (
     assume_gait,
     assume_servo,
@@ -77,6 +79,7 @@ SECTIONS: dict[str, type[Any]] = {
     "baumgarte": Baumgarte,
     "solver": Solver,
     "terrain": Terrain,
+    "soil": Soil,
     "gait": Gait,
 }
 EXTENSION_FIELDS: dict[str, dict[str, Any]] = {
@@ -311,7 +314,9 @@ def _check_side(side: Mapping[str, Any], where: str) -> None:
     """Raises RobotError for keys and types that are invalid in a robot file."""
     refuse_unknown_keys(side, ["name", "gravity", "source", "links", "legs", *SECTIONS], where)
     for name, record in SECTIONS.items():
-        read_given(record, expect_table(side.get(name, {}), f"{where}: {name}"), f"{where}: {name}")
+        at, value = f"{where}: {name}", side.get(name, {})
+        section = soil_table(value, at) if record is Soil else expect_table(value, at)
+        read_given(record, section, at)
     legs = expect_table(side.get("legs", {}), f"{where}: legs")
     refuse_unknown_keys(legs, list(LEG_NAMES), f"{where}: legs")
     for name, leg in legs.items():

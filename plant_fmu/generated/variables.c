@@ -514,6 +514,13 @@ static const hxVariable outputs[] = {
     {"feet.cone_time[29]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[28]), HX_REAL, 0},
     {"feet.cone_time[30]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[29]), HX_REAL, 0},
     {"feet.cone_time[31]", "s", 0.0, DBL_MAX, offsetof(struct hxVariables, output.cone_time[30]), HX_REAL, 0},
+    {"LF.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[0]), HX_REAL, 6},
+    {"LM.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[1]), HX_REAL, 0},
+    {"LR.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[2]), HX_REAL, 0},
+    {"RF.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[3]), HX_REAL, 0},
+    {"RM.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[4]), HX_REAL, 0},
+    {"RR.foot.sinkage", "m", 0.0, DBL_MAX, offsetof(struct hxVariables, output.foot.sinkage[5]), HX_REAL, 0},
+    {"feet.footprints", "1", 0.0, DBL_MAX, offsetof(struct hxVariables, output.footprints), HX_REAL, 1},
 };
 
 static const hxVariable parameters[] = {
@@ -933,6 +940,22 @@ static const hxVariable parameters[] = {
     {"body.shank_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.shank_radius), HX_REAL, 1},
     {"body.shank_position", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.body.shank_position), HX_REAL, 1},
     {"terrain.grid", "1", 1.0, 9999.0, offsetof(struct hxVariables, definition.terrain.grid), HX_REAL, 1},
+    {"foot.pad_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.foot_pad_radius), HX_REAL, 1},
+    {"soil.law", "", 1, 4, offsetof(struct hxVariables, definition.soil.law), HX_INTEGER, 1},
+    {"soil.frictional_modulus", "N/m^(n+2)", 0.0, 1000000000000.0, offsetof(struct hxVariables, definition.soil.frictional_modulus), HX_REAL, 1},
+    {"soil.cohesive_modulus", "N/m^(n+1)", 0.0, 1000000000000.0, offsetof(struct hxVariables, definition.soil.cohesive_modulus), HX_REAL, 1},
+    {"soil.exponent", "1", 0.05, 3.0, offsetof(struct hxVariables, definition.soil.exponent), HX_REAL, 1},
+    {"soil.resistance", "N/m3", 0.0, 1000000000000.0, offsetof(struct hxVariables, definition.soil.resistance), HX_REAL, 1},
+    {"soil.alpha_down", "1", 0.0, 1000000.0, offsetof(struct hxVariables, definition.soil.alpha_down), HX_REAL, 1},
+    {"soil.alpha_side", "1", 0.0, 1000000.0, offsetof(struct hxVariables, definition.soil.alpha_side), HX_REAL, 1},
+    {"soil.alpha_ahead", "1", 0.0, 1000000.0, offsetof(struct hxVariables, definition.soil.alpha_ahead), HX_REAL, 1},
+    {"soil.yield_pressure", "Pa", 0.0, 1000000000000.0, offsetof(struct hxVariables, definition.soil.yield_pressure), HX_REAL, 1},
+    {"soil.hardening", "Pa/m", 0.0, 1000000000000.0, offsetof(struct hxVariables, definition.soil.hardening), HX_REAL, 1},
+    {"soil.cohesion", "Pa", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.soil.cohesion), HX_REAL, 1},
+    {"soil.friction_angle", "rad", 0.0, 1.4, offsetof(struct hxVariables, definition.soil.friction_angle), HX_REAL, 1},
+    {"soil.shear_displacement", "m", 1e-05, 1.0, offsetof(struct hxVariables, definition.soil.shear_displacement), HX_REAL, 1},
+    {"soil.stiffness", "Pa/m", 1.0, 1000000000000000.0, offsetof(struct hxVariables, definition.soil.stiffness), HX_REAL, 1},
+    {"soil.damping", "Pa.s/m", 0.0, 1000000000.0, offsetof(struct hxVariables, definition.soil.damping), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1087,7 +1110,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{b848c433-3cf2-45d1-80c3-5db2cc14f640}";
+const char hx_default_guid[] = "{597a6136-254e-4724-bc7c-27942b4036ea}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");
@@ -1106,6 +1129,10 @@ _Static_assert(HX_METHOD_ROS2 == 2, "Method");
 _Static_assert(HX_METHOD_DP54 == 3, "Method");
 _Static_assert(HX_METHOD_BS32 == 4, "Method");
 _Static_assert(HX_METHOD_RK4 == 5, "Method");
+_Static_assert(HX_SOIL_NONE == 1, "SoilLaw");
+_Static_assert(HX_SOIL_BEKKER == 2, "SoilLaw");
+_Static_assert(HX_SOIL_GRANULAR == 3, "SoilLaw");
+_Static_assert(HX_SOIL_MUD == 4, "SoilLaw");
 _Static_assert(HX_PROJECTION_NONE == 1, "Projection");
 _Static_assert(HX_PROJECTION_STEP == 2, "Projection");
 _Static_assert(HX_TERRAIN_FLAT == 1, "TerrainKind");

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "elementary.h"
+#include "ground/soil.h"
 #include "terrain.h"
 
 double hx_exact_restitution_chi(double e) {
@@ -78,6 +79,18 @@ static void set_ground(const hxModel *model, const double *material, int row, in
   contact->static_rise[row][slot] = material ? fmax(mu_static - mu, 0.0) : model->static_rise;
 }
 
+/* Sets the soil of a foot to that of a material, NULL: of the definition. */
+static void set_soil(const hxModel *model, const double *material, int slot,
+                     hxContactState *contact) {
+  hxSoil soil;
+  if (material)
+    hx_soil_from_row(material + HX_MATERIAL_SOIL, model->radius[HX_FOOT], model->pad_radius, &soil);
+  else
+    memcpy(&soil, model->soil, sizeof soil);
+  contact->on_soil[slot] = (int)soil.law != HX_SOIL_NONE ? 1.0 : 0.0;
+  memcpy(contact->soil[slot], &soil, sizeof soil);
+}
+
 /* Returns the material under a foot; bodies have the definition's ground. */
 static const double *material_under(const hxModel *model, const hxDepths *depths, int row,
                                     int slot) {
@@ -90,7 +103,9 @@ static const double *material_under(const hxModel *model, const hxDepths *depths
 /* Closes a contact: fixes its damping by the impact speed, m/s, and its ground by its place. */
 static void close_contact(const hxModel *model, const hxDepths *depths, int row, int slot,
                           double impact_speed, hxContactState *contact) {
-  set_ground(model, material_under(model, depths, row, slot), row, slot, contact);
+  const double *material = material_under(model, depths, row, slot);
+  set_ground(model, material, row, slot, contact);
+  if (row == HX_FOOT && model->has_soil) set_soil(model, material, slot, contact);
   contact->closed[row][slot] = 1.0;
   contact->impact_speed[row][slot] = impact_speed;
   contact->damping[row][slot] = hx_contact(model->contact_law)->damping(model, impact_speed);
@@ -110,6 +125,10 @@ static void fill_contact_slots(hxContactState *contact, int row) {
   hx_fill_slots(contact->stiffness[row]);
   hx_fill_slots(contact->mu[row]);
   hx_fill_slots(contact->static_rise[row]);
+  if (row != HX_FOOT) return;
+  hx_fill_slots(contact->on_soil);
+  for (int slot = HX_LEGS; slot < HX_SLOTS; ++slot)
+    memcpy(contact->soil[slot], contact->soil[0], sizeof contact->soil[0]);
 }
 
 /* Holds the cells of feet that touch the ground, and releases those of others. */
@@ -136,6 +155,17 @@ void hx_contact_release(hxContactState *contact) {
     contact->cell[0][slot] = contact->cell[1][slot] = -1.0;
 }
 
+/* Sets the plastic depths of feet that begin in soil, as if they had been pressed into it. */
+static void start_in_soil(const hxDepths *depths, hxContactState *contact) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    hxSoil soil;
+    memcpy(&soil, contact->soil[leg], sizeof soil);
+    if (contact->closed[HX_FOOT][leg] != 0.0 && contact->on_soil[leg] != 0.0)
+      contact->plastic[leg] = hx_soil_plastic_depth(&soil, depths->delta[HX_FOOT][leg]);
+  }
+  hx_fill_slots(contact->plastic);
+}
+
 void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactState *contact) {
   hx_contact_release(contact);
   for (int row = 0; row < HX_ROWS; ++row)
@@ -146,6 +176,7 @@ void hx_contact_start(const hxModel *model, const hxDepths *depths, hxContactSta
       if (depths->delta[row][slot] > 0.0) close_contact(model, depths, row, slot, 0.0, contact);
     fill_contact_slots(contact, row);
   }
+  if (model->has_soil) start_in_soil(depths, contact);
   if (hx_has_cells(model)) hold_cells(model, depths, contact);
 }
 

@@ -15,6 +15,7 @@ HX_HIDDEN_BEGIN
  */
 typedef struct hxEvents {
   int stop, found;
+  hxFootprintLog *footprints; /* that feet leave in soil */
 } hxEvents;
 
 typedef struct hxKernel {
@@ -41,12 +42,14 @@ typedef struct hxKernel {
   void (*coordinates)(const hxModel *model, const hxState *state, const hxCommand *command,
                       hxCoordinates *x, hxCoordinates *rate);
 
-  /* Computes penetration and approach speed of all contacts. */
+  /* Computes penetration and approach speed of all contacts, of feet on soil from the depths at
+   * which they touch it. */
   void (*depths)(const hxModel *model, const hxContactState *contact, const hxPlantMotion *motion,
                  hxDepths *depths);
 
   /* Switches the contacts that are due at the state's time by these penetrations. */
-  void (*switch_contacts)(const hxModel *model, const hxDepths *depths, hxState *state);
+  void (*switch_contacts)(const hxModel *model, hxDepths *depths, hxFootprintLog *footprints,
+                          hxState *state);
 
   /* Measures the path since the last moment, when an importer's solver has completed its step. */
   void (*measure)(const hxModel *model, const hxCommand *command, hxState *state);

@@ -18,13 +18,17 @@ typedef struct {
   uint64_t terrain; /* checksum of the grid; 0: none */
   hxModel model;
   hxState state;
+  hxFootprints footprints; /* the last ones; unused entries are 0 */
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 8;
+static const uint64_t saved_version = 9;
 
+/* Returns the checksum of everything behind it, of the ring the footprints that exist. */
 static uint64_t checksum(const hxSavedPlant *saved) {
-  return hx_checksum(0, &saved->terrain, sizeof *saved - offsetof(hxSavedPlant, terrain));
+  const size_t used = (size_t)hx_footprints_number(&saved->footprints),
+               end = offsetof(hxSavedPlant, footprints.print) + used * sizeof(hxFootprint);
+  return hx_checksum(0, &saved->terrain, end - offsetof(hxSavedPlant, terrain));
 }
 
 /* Sets the plant's message and returns the status. */
@@ -80,6 +84,7 @@ hxStatus hx_plant_reset(hxPlant *plant, const hxDefinition *definition, double t
   if (status != HX_OK) return fail(plant, status, message);
   memset(&plant->model, 0, sizeof plant->model);
   memset(&plant->state, 0, sizeof plant->state);
+  hx_footprints_clear(&plant->footprints);
   hx_model_compile(&plant->model, definition, plant->terrain);
   hx_initial_bodies(definition, body);
   hx_motion_from_bodies(&plant->model, (const double (*)[HX_BODY_STATE])body, &plant->state.motion);
@@ -135,10 +140,13 @@ static hxStatus advance(hxPlant *plant, const hxInput *input, const hxInput *rat
   const int resumes = before.call_input != 0.0 && before.call_input == fingerprint &&
                       before.call_start < before.time;
   hx_command_from_input(&command, input, resumes ? before.call_start : before.time);
+  hx_footprints_begin(&plant->footprints);
+  events->footprints = &plant->footprints;
   status = hx_kernel()->integrate(&plant->model, &command, ramp, t_end, events, &plant->state,
                                   plant->message);
   if (status != HX_OK) {
     plant->state = before;
+    hx_footprints_take_back(&plant->footprints);
     return status;
   }
   const int interrupted = plant->state.time < t_end;
@@ -168,6 +176,15 @@ void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *output) {
   hxCommand command;
   hx_command_from_input(&command, input, plant->state.time);
   hx_kernel()->output(&plant->model, &plant->state, &command, output);
+  output->footprints = plant->footprints.kept.count;
+}
+
+size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t capacity) {
+  const hxFootprints *kept = &plant->footprints.kept;
+  const size_t number = (size_t)hx_footprints_number(kept), first = (size_t)kept->count - number;
+  for (size_t k = 0; k < number && k < capacity; ++k)
+    footprint[k] = kept->print[(first + k) % HX_FOOTPRINTS];
+  return number;
 }
 
 size_t hx_plant_state_size(void) { return sizeof(hxSavedPlant); }
@@ -180,6 +197,7 @@ void hx_plant_get_state(const hxPlant *plant, void *bytes) {
                         .state = plant->state};
   saved.terrain = plant->model.terrain ? hx_terrain_checksum(plant->model.terrain) : 0;
   saved.model.terrain_bits = 0;
+  hx_footprints_copy(&saved.footprints, &plant->footprints.kept);
   saved.checksum = checksum(&saved);
   memcpy(bytes, &saved, sizeof saved);
 }
@@ -197,7 +215,7 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
     return fail(
         plant, HX_BAD_STATE,
         "saved state: got one of another version, expected one of this version; save it again");
-  if (saved.checksum != checksum(&saved))
+  if (saved.checksum != checksum(&saved) || !hx_footprints_are_clear(&saved.footprints))
     return fail(
         plant, HX_BAD_STATE,
         "saved state: got a damaged one, expected one whose checksum is right; save it again");
@@ -208,6 +226,8 @@ hxStatus hx_plant_set_state(hxPlant *plant, const void *bytes, size_t size) {
   saved.model.terrain = saved.terrain ? plant->terrain : NULL;
   plant->model = saved.model;
   plant->state = saved.state;
+  hx_footprints_clear(&plant->footprints);
+  hx_footprints_copy(&plant->footprints.kept, &saved.footprints);
   return HX_OK;
 }
 
@@ -269,10 +289,11 @@ void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
         (plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? switch_band : -switch_band);
 }
 
-/* Returns the penetration that makes a contact switch, or keep its state. */
+/* Returns the penetration that makes a contact switch, or keep its state; outside of the band. */
 static double switching_depth(int closed, double delta, double ddelta) {
-  if (closed) return delta <= -switch_band || (delta < 0.0 && ddelta < 0.0) ? -1.0 : 1.0;
-  return delta >= switch_band || (delta > 0.0 && ddelta > 0.0) ? 1.0 : -1.0;
+  const int touches = closed ? !(delta <= -switch_band || (delta < 0.0 && ddelta < 0.0))
+                             : delta >= switch_band || (delta > 0.0 && ddelta > 0.0);
+  return touches ? fmax(delta, switch_band) : fmin(delta, -switch_band);
 }
 
 int hx_plant_update_contacts(hxPlant *plant) {
@@ -286,7 +307,8 @@ int hx_plant_update_contacts(hxPlant *plant) {
       depths.delta[row][slot] = switching_depth(plant->state.contact.closed[row][slot] != 0.0,
                                                 depths.delta[row][slot], depths.ddelta[row][slot]);
   }
-  hx_kernel()->switch_contacts(model, &depths, &plant->state);
+  hx_footprints_begin(&plant->footprints);
+  hx_kernel()->switch_contacts(model, &depths, &plant->footprints, &plant->state);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
 }
 

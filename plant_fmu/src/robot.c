@@ -5,6 +5,7 @@
 
 #include "contact_law.h"
 #include "elementary.h"
+#include "ground/soil.h"
 
 static void cross(const double a[3], const double b[3], double out[3]) {
   out[0] = a[1] * b[2] - a[2] * b[1];
@@ -173,6 +174,18 @@ static double weight_of(const hxDefinition *d) {
                      d->gravity[2] * d->gravity[2]);
 }
 
+/* Computes the constants of the definition's soil; the terrain is known. */
+static void compile_soil(hxModel *model, const hxDefinition *d) {
+  hxSoil soil;
+  hx_soil_compile(&d->soil, d->foot_radius, d->foot_pad_radius, &soil);
+  memcpy(model->soil, &soil, sizeof soil);
+  model->pad_radius = d->foot_pad_radius;
+  model->has_soil =
+      d->soil.law != HX_SOIL_NONE || (model->terrain && hx_terrain_has_soil(model->terrain));
+  model->bristle_length =
+      d->soil.law == HX_SOIL_NONE ? d->friction.presliding : d->soil.shear_displacement;
+}
+
 /* Copies laws and settings, with derived constants. */
 static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->contact_law = d->contact.law, model->stiffness = d->contact.stiffness;
@@ -195,6 +208,7 @@ static void compile_settings(hxModel *model, const hxDefinition *d) {
   model->method = d->solver.method, model->step = d->solver.step;
   model->tolerance = d->solver.tolerance, model->step_max = d->solver.step_max,
   model->projection = d->solver.projection;
+  compile_soil(model, d);
   model->load_threshold = load_share * weight_of(d);
 }
 

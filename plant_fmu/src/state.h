@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 
+#include "ground/footprints.h"
 #include "hexapod/hexapod.h"
 #include "hexapod/inside.h"
 
@@ -33,6 +34,9 @@ enum {
   HX_ROWS,
   HX_TIBIA_ROWS = HX_TORSO
 };
+
+/* Numbers of hxSoil (ground/soil.h). */
+enum { HX_SOIL_SIZE = 16 };
 
 /* Offsets of position, quaternion, velocity and angular velocity in a body state. */
 enum { HX_R = 0, HX_P = 3, HX_V = 7, HX_W = 10 };
@@ -71,6 +75,7 @@ typedef struct hxModel {
   double gravity[3];
   double alpha, beta; /* Baumgarte */
   int contact_law, friction_law, terrain_kind, servo_mode, method, projection;
+  int has_soil; /* 1: feet may touch soil, of the definition or of a material of the terrain */
   int rows, foot_rows, torso_rows; /* computed: on tibias, of these on feet, on the torso (0, 1) */
   int row[HX_ROWS];                /* rows that are computed: on feet, tibias, torso */
   union {
@@ -83,6 +88,9 @@ typedef struct hxModel {
   double static_rise, per_stribeck;                    /* eq. 18: mu_s - mu, 1/v_s */
   double kp, kd, torque_max, speed_max, rotor_inertia, coulomb_friction;
   double ground_point[3], ground_normal[3];
+  double soil[HX_SOIL_SIZE]; /* an hxSoil, of the definition */
+  double bristle_length;     /* m  presliding, or shear displacement of the soil */
+  double pad_radius;         /* m  of feet on soil; 0: spheres */
   double step, tolerance, step_max;
   double load_threshold; /* N  a foot with a larger load counts its slip */
 } hxModel;
@@ -97,7 +105,8 @@ typedef struct hxCommand {
   double time; /* s  time of the command, from which kinematic drives extrapolate (eq. 13) */
 } hxCommand;
 
-/* State of the contacts. It changes at touch-down and lift-off only, never within a step. */
+/* State of the contacts. It changes at touch-down and lift-off, the plastic depth at the end of
+ * steps; never within a step. */
 typedef struct hxContactState {
   double closed[HX_ROWS][HX_SLOTS];       /* 1 from touch-down to lift-off, else 0 */
   double damping[HX_ROWS][HX_SLOTS];      /* s/m  d of eq. 14, fixed at touch-down */
@@ -105,7 +114,12 @@ typedef struct hxContactState {
   double stiffness[HX_ROWS][HX_SLOTS];    /* N/m^1.5  K of the ground where it touched down */
   double mu[HX_ROWS][HX_SLOTS];           /* 1        friction of that ground */
   double static_rise[HX_ROWS][HX_SLOTS];  /* 1        mu_s - mu of eq. 18 */
-  double cell[2][HX_SLOTS]; /* 1    blocks: column and row over which a foot is; < 0: not held */
+  double on_soil[HX_SLOTS];               /* 1    1: the foot touched down on soil */
+  double soil[HX_SLOTS][HX_SOIL_SIZE];    /* an hxSoil, where on_soil is 1 */
+  double plastic[HX_SLOTS];  /* m    depth at which feet touch soil: z_p, or that of the footprint
+                              *      above which a foot is; 0 on rigid ground */
+  double place[2][HX_SLOTS]; /* m    x and y where feet left the bottom of that footprint */
+  double cell[2][HX_SLOTS];  /* 1    blocks: column and row over which a foot is; < 0: not held */
 } hxContactState;
 
 /* Penetration and approach speed of all contacts; only the model's rows are set. */
@@ -189,10 +203,17 @@ struct hxPlant {
   hxState state;
   const hxTerrain *terrain; /* of later resets */
   char message[HX_MESSAGE_SIZE];
+  hxFootprintLog footprints; /* outside the state, which every call copies */
 };
 
 /* Returns whether a row's contacts are those of feet. */
 static inline int hx_is_of_foot(int row) { return row < HX_KNEE; }
+
+/* Makes the feet's penetrations relative to the depth at which they touch the ground. */
+static inline void hx_depths_on_soil(const hxContactState *contact, hxDepths *depths) {
+  for (int slot = 0; slot < HX_SLOTS; ++slot)
+    depths->delta[HX_FOOT][slot] -= contact->plastic[slot];
+}
 
 /* Returns how many slots of a row of contacts hold one. */
 static inline int hx_slots_of(int row) { return row == HX_TORSO ? HX_SLOTS : HX_LEGS; }

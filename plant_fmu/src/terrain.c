@@ -1,5 +1,7 @@
 #include "terrain.h"
 
+#include "ground/soil.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -115,8 +117,12 @@ static int check_materials(const hxTerrain *terrain, char *message) {
     if (!isnan(row[HX_MATERIAL_STIFFNESS]) && !is_within(row[HX_MATERIAL_STIFFNESS], 1e-3, 1e14))
       return refuse(message, "table: stiffness", row[HX_MATERIAL_STIFFNESS],
                     "1e-3 to 1e14 N/m^1.5, or NaN");
-    if (row[HX_MATERIAL_SOIL] != 0.0)
-      return refuse(message, "table: soil law", row[HX_MATERIAL_SOIL], "0 (none)");
+    const int column = hx_soil_row_error(row + HX_MATERIAL_SOIL);
+    if (column == 0)
+      return refuse(message, "table: soil law", row[HX_MATERIAL_SOIL], "0, 1, 2 or 3");
+    if (column > 0)
+      return refuse(message, "table: number of a soil", row[HX_MATERIAL_SOIL + column],
+                    "a finite number >= 0; shear displacement, stiffness and exponent > 0");
   }
   return 1;
 }
@@ -463,6 +469,13 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
 }
 
 /* ---- materials ---- */
+
+int hx_terrain_has_soil(const hxTerrain *terrain) {
+  int found = 0;
+  for (int64_t i = 0; i < terrain->head.materials; ++i)
+    found |= terrain->table[HX_MATERIAL_COLUMNS * i + HX_MATERIAL_SOIL] != 0.0;
+  return found;
+}
 
 const double *hx_terrain_material(const hxTerrain *terrain, const double point[3]) {
   const hxGridHead *head = &terrain->head;

@@ -3,11 +3,13 @@
  * It is compiled into the shared library with HX_PROBE only. Vectors and matrices are passed as
  * rows of doubles.
  */
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
 #include "contact_law.h"
 #include "elementary.h"
+#include "ground/soil.h"
 #include "hexapod/hexapod.h"
 #include "kernel.h"
 #include "lanes/dynamics.h"
@@ -57,6 +59,7 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, body.knee_radius),
     FIELD(hxDefinition, body.shank_radius),
     FIELD(hxDefinition, body.shank_position),
+    FIELD(hxDefinition, foot_pad_radius),
     FIELD(hxDefinition, contact.law),
     FIELD(hxDefinition, contact.stiffness),
     FIELD(hxDefinition, contact.restitution),
@@ -89,6 +92,22 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, terrain.incline),
     FIELD(hxDefinition, terrain.heading),
     FIELD(hxDefinition, terrain.grid),
+    FIELD(hxDefinition, soil),
+    FIELD(hxSoilDefinition, law),
+    FIELD(hxSoilDefinition, frictional_modulus),
+    FIELD(hxSoilDefinition, cohesive_modulus),
+    FIELD(hxSoilDefinition, exponent),
+    FIELD(hxSoilDefinition, resistance),
+    FIELD(hxSoilDefinition, alpha_down),
+    FIELD(hxSoilDefinition, alpha_side),
+    FIELD(hxSoilDefinition, alpha_ahead),
+    FIELD(hxSoilDefinition, yield_pressure),
+    FIELD(hxSoilDefinition, hardening),
+    FIELD(hxSoilDefinition, cohesion),
+    FIELD(hxSoilDefinition, friction_angle),
+    FIELD(hxSoilDefinition, shear_displacement),
+    FIELD(hxSoilDefinition, stiffness),
+    FIELD(hxSoilDefinition, damping),
     FIELD(hxDefinition, initial.position),
     FIELD(hxDefinition, initial.quaternion),
     FIELD(hxDefinition, initial.velocity),
@@ -125,6 +144,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, foot.peak_force_rate),
     FIELD(hxOutput, foot.landing_rate),
     FIELD(hxOutput, foot.landings),
+    FIELD(hxOutput, foot.sinkage),
     FIELD(hxOutput, foot.contact),
     FIELD(hxOutput, torso.position),
     FIELD(hxOutput, torso.quaternion),
@@ -150,6 +170,7 @@ static const ProbeField fields[] = {
     FIELD(hxOutput, solver.steps),
     FIELD(hxOutput, solver.rejected),
     FIELD(hxOutput, solver.touchdowns),
+    FIELD(hxOutput, footprints),
     FIELD(hxOutput, cone_time),
 };
 
@@ -192,6 +213,47 @@ HX_API void hx_probe_elementary(const double *x, double *sine, double *cosine, d
     hx_sin_cos(x[i], &sine[i], &cosine[i]);
     logarithm[i] = x[i] > -1.0 ? hx_log1p(x[i]) : 0.0;
   }
+}
+
+HX_API void hx_probe_power(const double *x, const double *y, double *power, double *angle, int n) {
+  for (int i = 0; i < n; ++i)
+    power[i] = hx_pow(fabs(x[i]), y[i]), angle[i] = hx_half_turn_angle(fabs(y[i]), x[i]);
+}
+
+/* ---- soil ---- */
+
+/* Writes F_v, its slope, plastic depth, f_n, its elastic part and derivatives, stored energy, shear
+ * base and its slope; row NULL: from the definition. */
+HX_API void hx_probe_soil(const hxSoilDefinition *definition, const double *row, double radius,
+                          double pad, double plastic, double z, double dz, double out[11]) {
+  hxSoil soil;
+  if (row)
+    hx_soil_from_row(row, radius, pad, &soil);
+  else
+    hx_soil_compile(definition, radius, pad, &soil);
+  const hxSoilCurve virgin = hx_soil_virgin(&soil, z), base = hx_soil_shear_base(&soil, z);
+  const hxSoilForce force = hx_soil_normal_force(&soil, plastic, z, dz);
+  out[0] = virgin.force, out[1] = virgin.slope, out[2] = hx_soil_plastic_depth(&soil, z);
+  out[3] = force.force, out[4] = force.elastic, out[5] = force.stiffness, out[6] = force.viscosity;
+  out[7] = hx_soil_stored_energy(&soil, plastic, z);
+  out[8] = base.force, out[9] = base.slope, out[10] = soil.friction;
+}
+
+/* Adds 1500 footprints at x = 0, 1, ... of depths 1, 2, ... mm, then in a call 100 of 2 m at the
+ * first places; writes the depths at four places before the call, in it and after it was taken
+ * back. */
+HX_API void hx_probe_footprints(double depth[3][4]) {
+  static const double place[4] = {0.0, 475.0, 476.0, 1499.0};
+  static hxFootprintLog log;
+  hx_footprints_clear(&log);
+  for (int k = 0; k < 1500; ++k)
+    hx_footprints_add(&log, &(hxFootprint){k, 0.0, 1e-3 * (k + 1), 0.4});
+  hx_footprints_begin(&log);
+  for (int i = 0; i < 4; ++i) depth[0][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
+  for (int k = 0; k < 100; ++k) hx_footprints_add(&log, &(hxFootprint){k, 0.0, 2.0, 0.4});
+  for (int i = 0; i < 4; ++i) depth[1][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
+  hx_footprints_take_back(&log);
+  for (int i = 0; i < 4; ++i) depth[2][i] = hx_footprints_depth(&log.kept, place[i], 0.0);
 }
 
 HX_API double hx_probe_atan2(double y, double x) { return hx_atan2(y, x); }

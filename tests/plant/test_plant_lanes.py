@@ -8,7 +8,9 @@ import ctypes as ct
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from states import changed, random_command, random_pose
 
 from hexapod_cosim.models import load_robot
 from hexapod_cosim.models.records import Array
+from hexapod_cosim.models.soil.presets import soil_preset
 
 SLOTS = 8
 ULP = 2.0**-52
@@ -54,6 +57,13 @@ def logarithmic(low: float, high: float, seed: int) -> Array:
         [-1.0, 1.0], 4096
     )
     return sizes
+
+
+def ground(law: str) -> dict[str, dict[str, Any]]:
+    """Returns the sections of a friction law, or of soil under the feet."""
+    if law != "soil":
+        return {"friction": {"law": law}}
+    return {"soil": asdict(soil_preset("sandy_loam").soil), "foot": {"pad_radius": 0.02}}
 
 
 def test_tanh_is_right_to_a_few_last_places(core: ct.CDLL) -> None:
@@ -109,11 +119,11 @@ def test_smaller_larger_and_absolute_value_are_taken_lane_by_lane(core: ct.CDLL)
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("method", ["rosw3", "dp54"])
-@pytest.mark.parametrize("law", ["tanh", "bristle"])
+@pytest.mark.parametrize("law", ["tanh", "bristle", "soil"])
 def test_the_motion_does_not_depend_on_the_lane_width(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, method: str, law: str
 ) -> None:
-    robot = changed(load_robot("phantomx_mk4"), solver={"method": method}, friction={"law": law})
+    robot = changed(load_robot("phantomx_mk4"), solver={"method": method}, **ground(law))
     command, ends = random_command(robot, 5, size=0.3), (0.004, 0.02)
     plants = [
         Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
@@ -130,12 +140,12 @@ def test_the_motion_does_not_depend_on_the_lane_width(
 
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("garbage", [0x00, 0xFF])
-@pytest.mark.parametrize("law", ["tanh", "bristle"])
+@pytest.mark.parametrize("law", ["tanh", "bristle", "soil"])
 def test_what_lies_on_the_stack_does_not_matter(
     core: ct.CDLL, other_cores: dict[str, ct.CDLL], width: str, garbage: int, law: str
 ) -> None:
     """Lanes that no leg occupies must be written before they are read: 0xFF... is a NaN."""
-    robot = changed(load_robot("athena"), friction={"law": law})
+    robot = changed(load_robot("athena"), **ground(law))
     plants = [
         Plant(library, robot, **random_pose(robot, 5)) for library in (core, other_cores[width])
     ]

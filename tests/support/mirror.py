@@ -37,6 +37,14 @@ HxLink = record(
     ("axis", Vector3),
 )
 HxLeg = record("HxLeg", ("hip_position", Vector3), ("hip_yaw", Real), ("link", HxLink * JOINTS))
+HxSoilDefinition = record(
+    "HxSoilDefinition",
+    ("law", ct.c_int),
+    *reals(
+        "frictional_modulus cohesive_modulus exponent resistance alpha_down alpha_side alpha_ahead "
+        "yield_pressure hardening cohesion friction_angle shear_displacement stiffness damping"
+    ),
+)
 HxDefinition = record(
     "HxDefinition",
     ("torso", record("Torso", ("mass", Real), ("com", Vector3), ("inertia", Vector6))),
@@ -51,6 +59,7 @@ HxDefinition = record(
             *reals("corner_radius knee_radius shank_radius shank_position"),
         ),
     ),
+    ("foot_pad_radius", Real),
     (
         "contact",
         record(
@@ -87,6 +96,7 @@ HxDefinition = record(
         ),
     ),
     ("terrain", record("Terrain", ("kind", ct.c_int), *reals("height incline heading grid"))),
+    ("soil", HxSoilDefinition),
     (
         "initial",
         record(
@@ -150,6 +160,7 @@ HxOutput = record(
             ("peak_force_rate", PerLeg),
             ("landing_rate", PerLeg),
             ("landings", PerLeg),
+            ("sinkage", PerLeg),
             ("contact", ct.c_int * LEGS),
         ),
     ),
@@ -177,5 +188,6 @@ HxOutput = record(
     ),
     ("constraint", record("ConstraintOutput", *reals("position_error velocity_error"))),
     ("solver", record("SolverOutput", *reals("evaluations steps rejected touchdowns"))),
+    ("footprints", Real),
     ("cone_time", Real * CONE_BINS),
 )

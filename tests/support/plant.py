@@ -31,6 +31,7 @@ from hexapod_cosim.models import (
     METHODS,
     PROJECTIONS,
     SERVO_MODES,
+    SOIL_LAWS,
     TERRAINS,
     Leg,
     Link,
@@ -160,7 +161,7 @@ def definition(robot: Robot, **initial: Any) -> Any:
     put(d.torso.inertia, robot.torso.inertia)
     for target, leg in zip(d.leg, robot.legs, strict=True):
         _put_leg(target, leg)
-    d.foot_radius = robot.foot.radius
+    d.foot_radius, d.foot_pad_radius = robot.foot.radius, robot.foot.pad_radius
     _put_settings(d, robot)
     start = {
         "position": (0.0, 0.0, 1.0),
@@ -198,7 +199,8 @@ def _put_settings(d: Any, robot: Robot) -> None:
     d.solver.method = 1 + METHODS.index(robot.solver.method)
     d.solver.projection = 1 + PROJECTIONS.index(robot.solver.projection)
     d.terrain.kind = 1 + TERRAINS.index(robot.terrain.kind)
-    for section in ("contact", "friction", "servo", "baumgarte", "solver", "terrain"):
+    d.soil.law = 1 + SOIL_LAWS.index(robot.soil.law)
+    for section in ("contact", "friction", "servo", "baumgarte", "solver", "terrain", "soil"):
         target, source = getattr(d, section), getattr(robot, section)
         for name, kind in target._fields_:
             if kind is Real:

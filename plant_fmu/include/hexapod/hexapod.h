@@ -48,6 +48,13 @@ typedef enum hxTerrainKind {
   HX_TERRAIN_GRID /* an hxTerrain, see hx_plant_set_terrain */
 } hxTerrainKind;
 
+typedef enum hxSoilLaw {
+  HX_SOIL_NONE = 1,
+  HX_SOIL_BEKKER,
+  HX_SOIL_GRANULAR,
+  HX_SOIL_MUD
+} hxSoilLaw;
+
 typedef enum hxServoMode { HX_SERVO_POSITION = 1, HX_SERVO_TORQUE, HX_SERVO_KINEMATIC } hxServoMode;
 
 typedef enum hxProjection {
@@ -81,6 +88,25 @@ typedef struct hxLeg {
   hxLink link[HX_JOINTS];
 } hxLeg;
 
+/* Soft ground under the feet (eq. 31-38): its law and the numbers of all laws. */
+typedef struct hxSoilDefinition {
+  int law;                   /* hxSoilLaw; HX_SOIL_NONE: rigid ground */
+  double frictional_modulus; /* N/m^(n+2)  Kphi of HX_SOIL_BEKKER */
+  double cohesive_modulus;   /* N/m^(n+1)  Kc */
+  double exponent;           /* 1          n */
+  double resistance;         /* N/m3       unit of the three resistances of HX_SOIL_GRANULAR: */
+  double alpha_down;         /* 1          of a horizontal plate that moves down */
+  double alpha_side;         /* 1          of a plate on edge that moves down */
+  double alpha_ahead;        /* 1          of a plate on edge that moves ahead */
+  double yield_pressure;     /* Pa         of HX_SOIL_MUD, at the surface */
+  double hardening;          /* Pa/m       its growth with depth */
+  double cohesion;           /* Pa         c */
+  double friction_angle;     /* rad        phi */
+  double shear_displacement; /* m          K */
+  double stiffness;          /* Pa/m       Ke of unloading */
+  double damping;            /* Pa s/m     R */
+} hxSoilDefinition;
+
 /* The robot, its laws and its settings. hx_definition_default() fills in the ATHENA-like robot. */
 typedef struct hxDefinition {
   struct {
@@ -99,6 +125,7 @@ typedef struct hxDefinition {
     double shank_radius;    /* m  of a sphere on the tibia's line; 0: none */
     double shank_position;  /* 1  its place, 0 at the joint, 1 at the foot's centre */
   } body;
+  double foot_pad_radius; /* m  flat round pad of feet on soil; 0: the sphere */
   struct {
     int law;                   /* hxContactLaw */
     double stiffness;          /* N/m^1.5  K of eq. 14 */
@@ -142,6 +169,7 @@ typedef struct hxDefinition {
     double heading; /* rad  about z, from x */
     double grid;    /* 1    which grid of an FMU's resources; the plant itself ignores it */
   } terrain;
+  hxSoilDefinition soil;
   struct {
     double position[3];         /* m      torso's centre of mass */
     double quaternion[4];       /* 1      normalised on use */
@@ -189,6 +217,7 @@ typedef struct hxOutput {
     double peak_force_rate[HX_LEGS];  /* N/s  steepest rise of the normal force in that step */
     double landing_rate[HX_LEGS];     /* N/s  largest rise over 1 ms of the last landing (20 ms) */
     double landings[HX_LEGS];         /* 1    touch-downs */
+    double sinkage[HX_LEGS];          /* m    depth of the footprint under the foot, on soil */
     int contact[HX_LEGS];
   } foot;
   struct {
@@ -219,8 +248,18 @@ typedef struct hxOutput {
   struct {
     double evaluations, steps, rejected, touchdowns; /* 1 */
   } solver;
+  double footprints;              /* 1  made in soil since the start */
   double cone_time[HX_CONE_BINS]; /* s  feet under load, by |f_t|/(mu f_n): from 0.9 (i/30)^2 on */
 } hxOutput;
+
+enum { HX_FOOTPRINTS = 1024 }; /* footprints that a plant keeps; older ones are forgotten */
+
+/* A footprint in soil, where a foot left its bottom for the last time. */
+typedef struct hxFootprint {
+  double x, y;   /* m  world axes */
+  double depth;  /* m  plastic depth under the undisturbed surface */
+  double radius; /* m  of the foot */
+} hxFootprint;
 
 /* Minimal coordinates: the torso's state, joint angles and speeds. It consists of doubles only, in
  * this order the continuous states of model exchange. The same structure holds rates and changes
@@ -285,6 +324,10 @@ HX_API void hx_plant_output(hxPlant *plant, const hxInput *input, hxOutput *outp
 
 HX_API double hx_plant_time(const hxPlant *plant);
 HX_API const char *hx_plant_message(const hxPlant *plant); /* "" before the first failure */
+
+/* Copies the last footprints in soil, oldest first, at most `capacity` of them (NULL and 0: none);
+ * returns how many the plant keeps, at most HX_FOOTPRINTS. */
+HX_API size_t hx_plant_footprints(const hxPlant *plant, hxFootprint *footprint, size_t capacity);
 
 /* Save and restore the plant as bytes. hx_plant_set_state checks them; HX_BAD_STATE: the plant is
  * unchanged. */

@@ -57,8 +57,12 @@ static void kernel_coordinates(const hxModel *model, const hxState *state, const
   if (rate) hx_coordinates_rate(&all.motion, &work, rate);
 }
 
-static void kernel_switch_contacts(const hxModel *model, const hxDepths *depths, hxState *state) {
-  if (!hx_switch_contacts(model, depths, state->time, state) && has_bristles(model, HX_FOOT))
+static void kernel_switch_contacts(const hxModel *model, hxDepths *depths,
+                                   hxFootprintLog *footprints, hxState *state) {
+  hxMoment at;
+  if (model->has_soil) hx_moment_of(model, &state->contact, &state->motion, &at);
+  if (!hx_switch_contacts(model, depths, state->time, &at, footprints, state) &&
+      has_bristles(model, HX_FOOT))
     hx_contact_slacken(&state->contact, &state->motion); /* the importer may have set bristles */
 }
 
@@ -125,6 +129,9 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
   end.time = state->time;
   hx_dynamics_evaluate(model, &state->contact, command, state->time, &state->motion, NULL, 1, &work,
                        &rate);
+  if (model->has_soil)
+    hx_soil_yield(&state->contact, h, &state->moment.contact[HX_FOOT], &end.contact[HX_FOOT],
+                  path.plastic);
   trapezoidal_impulses(model, &work, h, &state->completed, &impulses);
   if (!known)
     trapezoidal_impulses(
@@ -135,6 +142,7 @@ static void kernel_measure(const hxModel *model, const hxCommand *command, hxSta
     hx_step_works(&path, &impulses, &works);
     hx_measure_path(&path, &impulses, &works, &state->measured);
   }
+  if (model->has_soil) memcpy(state->contact.plastic, path.plastic, sizeof path.plastic);
   hx_copy_moment(model, &state->moment, &end);
   if (hx_has_cells(model)) settle_cells(model, state);
   hx_fill_measured_slots(model, state);

@@ -5,6 +5,7 @@
 
 #include "../terrain.h"
 #include "kinematics.h"
+#include "soil.h"
 
 /* Distance of a point from the ground, and the ground's normal. */
 typedef struct {
@@ -44,6 +45,7 @@ typedef struct {
   hxReal slip_speed;
   hxReal drag;               /* N s/m   tangential force over slip speed */
   hxReal drag_per_load;      /* s/m     drag over f_n */
+  hxReal stored, hold;       /* J, N/m  of soil: elastic energy, shear without load over bristle */
   hxBristle bristle;         /* set by the bristle law only */
   hxVec3 response;           /* N  stage's addition to the force (eq. 20) */
   hxVec3 shift, speed_shift; /* m, m/s  of the contact point (eq. 20), without its a */
@@ -53,8 +55,9 @@ typedef struct {
 static const double spring_limit =
     0.7; /* 1  of the presliding; bristles below it are springs (eq. 16) */
 
-/* Returns whether the contacts of a row stand on bristles; others slide by the tanh law then. */
-static inline int has_bristles(const hxModel *model, int row) {
+/* Returns whether the friction law of a row's contacts is the bristle law; others slide by the tanh
+ * law then. */
+static inline int is_bristle_law(const hxModel *model, int row) {
   return model->friction_law == HX_FRICTION_BRISTLE && row == HX_FOOT;
 }
 
@@ -83,6 +86,11 @@ static inline void query_grid(const hxModel *model, const hxContactState *state,
                held[2] = {hx_re(state->cell[0][slot]), hx_re(state->cell[1][slot])};
   hx_terrain_face(model->terrain, kind, kind == HX_FACE_NEAREST ? none : held, real, HX_HAS_SLOPES,
                   face);
+}
+
+/* Returns whether bristles of a row's contacts move, those of friction or of soil. */
+static inline int has_bristles(const hxModel *model, int row) {
+  return is_bristle_law(model, row) || has_soil(model, row);
 }
 
 /* Returns distance and normal of a grid at a row's points, lane by lane. Without all, open contacts
@@ -203,6 +211,50 @@ HX_INLINE hxNormalForce hx_normal_force(hxContactLawAt law, hxReal delta, hxReal
   };
 }
 
+/* Returns the normal force of feet, with that of soil in place of the force of rigid ground where
+ * they touched down on soil (eq. 35, 36). The elastic part is that whose power is stored. */
+HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
+                                hxNormalForce rigid) {
+  const hxMask soft = hx_on_soil(state, slot);
+  const hxSoilPack f = hx_soil_pack(state, slot, delta, ddelta);
+  return (hxNormalForce){
+      hx_select(soft, f.force, rigid.force), hx_select(soft, f.held, rigid.elastic),
+      hx_select(soft, f.stiffness, rigid.stiffness), hx_select(soft, f.viscosity, rigid.viscosity)};
+}
+
+/* Returns a where the mask is set, b elsewhere. */
+static inline hxVec3 select3(hxMask mask, hxVec3 a, hxVec3 b) {
+  return (hxVec3){hx_select(mask, a.x, b.x), hx_select(mask, a.y, b.y), hx_select(mask, a.z, b.z)};
+}
+
+/* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal
+ * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 35-38). */
+HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, int slot,
+                             const hxPlantMotion *motion, hxContactWork *contact) {
+  const hxMask soft = hx_on_soil(state, slot);
+  const hxContactKinematics *kin = &contact->kin;
+  const hxSoilPack f = hx_soil_pack(state, slot, kin->delta, kin->ddelta);
+  const hxVec3 b = hx_load_vec3(motion->bristle, slot), none = hx_zero3();
+  const hxReal zero = hx_splat(0.0), yield = f.per_displacement * contact->slip_speed;
+  const hxBristle rigid =
+      is_bristle_law(model, HX_FOOT) ? contact->bristle : (hxBristle){none, none, zero, zero, zero};
+  const hxVec3 grip = hx_scale(f.per_load, b),
+               rate = hx_scale(hx_load(&state->closed[HX_FOOT][slot]),
+                               hx_add_scaled(contact->slip, -yield, b));
+  const hxVec3 force = hx_add_scaled(hx_scale(f.force, hx_sub3(kin->normal, grip)), -f.hold, b);
+  contact->stored =
+      hx_select(soft, f.stored, 0.4 * contact->normal.elastic * hx_max(kin->delta, zero));
+  contact->normal.force = hx_select(soft, f.force, contact->normal.force);
+  contact->normal.elastic = hx_select(soft, f.held, contact->normal.elastic);
+  contact->hold = f.hold;
+  contact->force = select3(soft, force, contact->force);
+  contact->bristle = (hxBristle){.grip = select3(soft, grip, rigid.grip),
+                                 .rate = select3(soft, rate, rigid.rate),
+                                 .stiffness = hx_select(soft, f.per_load, rigid.stiffness),
+                                 .damping = hx_select(soft, zero, rigid.damping),
+                                 .yield = hx_select(soft, yield, rigid.yield)};
+}
+
 /* Computes contact point, penetration and velocity of a row of contacts from the motion of their
  * bodies: centres of mass r, their velocities v, orientations and angular velocities. */
 HX_INLINE hxContactKinematics hx_contact_kinematics(const hxModel *model,
@@ -236,15 +288,15 @@ static inline hxContactKinematics hx_torso_contact(const hxModel *model,
                                hx_torso_vec3(motion, HX_V), torso);
 }
 
-/* Computes the force of the ground on a row of contacts: f_n along the normal, and across it f_t =
- * -mu f_n g(|v_t|) v_t or the bristles' force. All friction laws are chosen by this function. */
-HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *state, int row,
-                                int slot, const hxPlantMotion *motion, hxContactWork *contact) {
+/* Computes the force of rigid ground on a row of contacts: f_n along the normal, and across it f_t
+ * = -mu f_n g(|v_t|) v_t or the bristles' force. All friction laws are chosen by this function. */
+HX_INLINE void rigid_force(const hxModel *model, const hxContactState *state, int row, int slot,
+                           const hxPlantMotion *motion, hxContactWork *contact) {
   const hxContactKinematics *kin = &contact->kin;
   contact->normal = hx_normal_force(hx_law_at(state, row, slot), kin->delta, kin->ddelta);
   contact->slip = hx_add_scaled(kin->velocity, kin->ddelta, kin->normal);
   contact->slip_speed = hx_sqrt(hx_dot(contact->slip, contact->slip));
-  if (has_bristles(model, row)) {
+  if (is_bristle_law(model, row)) {
     contact->bristle =
         hx_bristle(model, state, row, slot, hx_load_vec3(motion->bristle, slot), contact->slip);
     contact->force = hx_scale(contact->normal.force, hx_sub3(kin->normal, contact->bristle.grip));
@@ -256,10 +308,18 @@ HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *stat
       hx_add_scaled(hx_scale(contact->normal.force, kin->normal), -contact->drag, contact->slip);
 }
 
+/* Computes the force of the ground on a row of contacts. */
+HX_INLINE void hx_contact_force(const hxModel *model, const hxContactState *state, int row,
+                                int slot, const hxPlantMotion *motion, hxContactWork *contact) {
+  rigid_force(model, state, row, slot, motion, contact);
+  if (has_soil(model, row)) replace_by_soil(model, state, slot, motion, contact);
+}
+
 /* Returns the power that friction dissipates, W. */
 static inline hxReal hx_friction_power(const hxModel *model, int row,
                                        const hxContactWork *contact) {
-  if (has_bristles(model, row))
+  if (has_soil(model, row)) return -hx_dot(contact->force, contact->slip);
+  if (is_bristle_law(model, row))
     return contact->normal.force * hx_dot(contact->bristle.grip, contact->slip);
   return contact->drag * contact->slip_speed * contact->slip_speed;
 }

@@ -29,6 +29,7 @@ typedef struct {
   double touch;     /* m  largest depth of a contact that has just touched down */
   double last_step; /* limit of accepted and rejected steps */
   const hxPlantMotion *y;
+  hxFootprintLog *footprints;
 } hxStart;
 
 typedef struct {
@@ -109,7 +110,7 @@ static double error_norm(const hxModel *model, const hxPlantMotion *error) {
   }
   for (int i = 0; i < 3 && has_bristles(model, HX_FOOT); ++i)
     for (int slot = 0; slot < HX_PACKS * HX_LANES; slot += HX_LANES)
-      links = hx_max(links, 1.0 / (bristle_scale * model->presliding) *
+      links = hx_max(links, 1.0 / (bristle_scale * model->bristle_length) *
                                 hx_abs(hx_load(&error->bristle[i][slot])));
   hx_store(largest, links);
   for (int lane = 0; lane < HX_LANES; ++lane) worst = larger_of(worst, largest[lane]);
@@ -378,6 +379,9 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
   for (int node = 0; node <= INTERVALS; ++node)
     path.command[node] =
         command_at(start, start->t + h * ((double)node / INTERVALS), &command[node]);
+  if (start->model->has_soil)
+    hx_soil_yield(start->contact, h, &state->moment.contact[HX_FOOT], &end->contact[HX_FOOT],
+                  path.plastic);
   hx_step_works(&path, &trial->impulses, &works);
   hxMeasured *measured = &state->measured;
   hx_measure_path(&path, &trial->impulses, &works, measured);
@@ -387,6 +391,7 @@ static void measure_step(const hxStart *start, double h, const hxMoment *end, hx
   trial->y.push_work += push_work(&trial->impulses, start->y, &trial->y);
   trial->y.dissipated = (measured->contact_loss + measured->friction_loss) + measured->gear_loss;
   hx_copy_moment(start->model, &state->moment, end);
+  if (start->model->has_soil) memcpy(state->contact.plastic, path.plastic, sizeof path.plastic);
 }
 
 /* Advances the state by one accepted step of at most h_max, shortened by the error control and by
@@ -431,7 +436,9 @@ static hxStatus advance(const hxStart *start, double h_max, double *next_step, h
   state->motion = trial.y;
   state->steps += 1.0;
   if (model->terrain) hx_cross_cells(model, &depths, state);
-  *event = hx_switch_contacts(model, &depths, start->t + *taken, state);
+  if (model->has_soil) hx_depths_of_moment(model, &state->contact, &state->moment, &depths);
+  *event = hx_switch_contacts(model, &depths, start->t + *taken, &state->moment, start->footprints,
+                              state);
   return HX_OK;
 }
 
@@ -444,7 +451,8 @@ static hxStatus run_to(const hxModel *model, const hxCommand *command, const hxC
                    .ramp = ramp,
                    .contact = &state->contact,
                    .method = hx_method(model->method),
-                   .y = &state->motion};
+                   .y = &state->motion,
+                   .footprints = events->footprints};
   start.touch = fmax(touch_depth[0], touch_depth[1] * model->tolerance);
   start.last_step = state->steps + state->rejected + steps_allowed(t_end - state->time);
   double first = fmin(state->first_step,

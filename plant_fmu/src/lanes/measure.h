@@ -41,6 +41,7 @@ typedef struct {
   const hxCommand *command[INTERVALS + 1]; /* commands at its nodes */
   double t, h;                             /* s  start and length */
   const hxMoment *from, *to;
+  double plastic[HX_SLOTS]; /* m  plastic depths at its end; set where feet may touch soil */
 } hxPath;
 
 /* ---- moments ---- */
@@ -136,6 +137,7 @@ static inline void hx_depths_of_moment(const hxModel *model, const hxContactStat
     memcpy(depths->delta[model->row[k]], contact->delta, sizeof contact->delta);
     memcpy(depths->ddelta[model->row[k]], contact->ddelta, sizeof contact->ddelta);
   }
+  if (model->has_soil) hx_depths_on_soil(state, depths);
   if (model->terrain) feet_on_grid(model, state, moment, depths);
 }
 
@@ -184,10 +186,13 @@ static inline void start_landing(int slot, double t, hxMeasured *measured) {
   for (int i = 0; i < HX_RISE_SAMPLES; ++i) measured->landing_force[i][slot] = 0.0;
 }
 
-/* Switches the contacts that are due at time t, and starts the measurement of landings; returns
- * whether there were some. */
-static inline int hx_switch_contacts(const hxModel *model, const hxDepths *depths, double t,
+/* Switches the contacts that are due at time t, records footprints and starts the measurement of
+ * landings; returns whether contacts switched. Depths of feet are relative to those at which they
+ * touch the ground; `at` is the moment of time t. */
+static inline int hx_switch_contacts(const hxModel *model, hxDepths *depths, double t,
+                                     const hxMoment *at, hxFootprintLog *footprints,
                                      hxState *state) {
+  if (model->has_soil) hx_soil_switch(&at->contact[HX_FOOT], depths, footprints, &state->contact);
   if (!hx_contact_is_due(model, depths, &state->contact)) return 0;
   int before[HX_SLOTS], after[HX_SLOTS];
   feet_on_ground(model, &state->contact, before);
@@ -207,6 +212,9 @@ HX_RARE void hx_cross_cells(const hxModel *model, hxDepths *depths, hxState *sta
   if (!crossed) return;
   hx_moment_of(model, &state->contact, &state->motion, &state->moment);
   hx_contact_hand_over(&before, &state->moment, crossed, &state->contact);
+  for (int leg = 0; leg < HX_LEGS && model->has_soil; ++leg)
+    if (crossed >> leg & 1 && state->contact.closed[HX_FOOT][leg] == 0.0)
+      state->contact.plastic[leg] = 0.0; /* the new cell is undisturbed */
   hx_depths_of_moment(model, &state->contact, &state->moment, depths);
 }
 
@@ -234,6 +242,24 @@ static inline hxVec3 approach_of(const hxContactMoment *moment, int slot) {
                   hx_load_vec3((const double (*)[HX_SLOTS])moment->normal, slot));
 }
 
+/* Returns the growth of the energy stored in contacts of feet, in soil where they touched down on
+ * it, J. */
+HX_RARE hxReal growth_with_soil(const hxPath *path, int slot, hxReal rigid) {
+  const hxContactState *state = path->contact;
+  double growth[HX_LANES];
+  hx_store(growth, rigid);
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    const int leg = slot + lane;
+    if (!is_in_soil(state, leg)) continue;
+    const hxSoil soil = hx_soil_under(state, leg);
+    const double from = path->from->contact[HX_FOOT].delta[leg],
+                 to = path->to->contact[HX_FOOT].delta[leg];
+    growth[lane] = hx_soil_stored_energy(&soil, path->plastic[leg], to) -
+                   hx_soil_stored_energy(&soil, state->plastic[leg], from);
+  }
+  return hx_load(growth);
+}
+
 /* Computes what a row of contacts and its friction lose in a step with these impulses (eq. 27). */
 HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impulse, hxReal *contact,
                              hxReal *friction) {
@@ -243,8 +269,9 @@ HX_INLINE void contact_works(const hxPath *path, int row, int slot, hxVec3 impul
   const hxVec3 approach =
       hx_scale(hx_splat(0.5), hx_add3(approach_of(from, slot), approach_of(to, slot)));
   const hxReal taken = hx_dot(impulse, approach);
-  const hxReal stored =
+  hxReal stored =
       stored_in_contact(law, &to->delta[slot]) - stored_in_contact(law, &from->delta[slot]);
+  if (has_soil(path->model, row)) stored = growth_with_soil(path, slot, stored);
   *contact = taken - stored;
   *friction = -hx_dot(impulse, slip);
 }
@@ -385,6 +412,7 @@ typedef struct {
   hxVec3 slip_from, slip_to, mean_slip;     /* m/s */
   hxReal delta, slope_from, rise, slope_to; /* m  the cubic of the depth */
   hxContactLawAt law;
+  int row, slot;
 } hxFootPath;
 
 /* Returns the path of a row of feet. */
@@ -402,7 +430,9 @@ HX_INLINE hxFootPath foot_path(const hxPath *path, int row, int slot) {
                       .slope_from = h * hx_load(&from->ddelta[slot]),
                       .rise = hx_load(&to->delta[slot]) - delta,
                       .slope_to = h * hx_load(&to->ddelta[slot]),
-                      .law = hx_law_at(path->contact, row, slot)};
+                      .law = hx_law_at(path->contact, row, slot),
+                      .row = row,
+                      .slot = slot};
 }
 
 /* Normal force of feet, its rate and the sliding speed at a point of a step. */
@@ -416,7 +446,9 @@ HX_INLINE hxFootInstant foot_at(const hxPath *path, const hxFootPath *foot, doub
   const hxReal bends = path->h < shortest_bend ? hx_splat(0.0) : per_step * per_step;
   const hxCubic depth = cubic(foot->delta, foot->slope_from, foot->rise, foot->slope_to, x);
   const hxReal approach = per_step * depth.rate;
-  const hxNormalForce f = hx_normal_force(foot->law, depth.value, approach);
+  hxNormalForce f = hx_normal_force(foot->law, depth.value, approach);
+  if (has_soil(path->model, foot->row))
+    f = with_soil(path->contact, foot->slot, depth.value, approach, f);
   const hxVec3 slip = sliding(foot->slip_from, foot->slip_to, foot->mean_slip, x);
   return (hxFootInstant){f.force, f.stiffness * approach + f.viscosity * (bends * depth.second),
                          hx_sqrt(hx_dot(slip, slip))};
@@ -472,6 +504,12 @@ static inline double force_within(const hxPath *path, int row, int leg, double x
   const hxCubic depth = cubic(hx_splat(delta), hx_splat(h * from->ddelta[leg]),
                               hx_splat(to->delta[leg] - delta), hx_splat(h * to->ddelta[leg]), x);
   const hxContactState *contact = path->contact;
+  if (has_soil(path->model, row) && is_in_soil(contact, leg)) {
+    const hxSoil soil = hx_soil_under(contact, leg);
+    return hx_soil_normal_force(&soil, contact->plastic[leg], hx_lane(depth.value, 0),
+                                hx_lane(depth.rate, 0) / h)
+        .force;
+  }
   const hxContactLawAt law = {hx_splat(contact->closed[row][leg]),
                               hx_splat(contact->damping[row][leg]),
                               hx_splat(contact->stiffness[row][leg])};
@@ -507,7 +545,28 @@ static inline hxReal hx_cone_place(hxReal share) {
 }
 
 static inline int hx_has_cone(const hxModel *model) {
-  return model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE;
+  return (model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE) || model->has_soil;
+}
+
+/* Returns the largest impulse of friction, on soil of shear (eq. 37), under a normal impulse. */
+HX_RARE hxReal cone_with_soil(const hxPath *path, int slot, hxReal along, hxReal rigid) {
+  const double *from = path->from->contact[HX_FOOT].delta, *to = path->to->contact[HX_FOOT].delta;
+  double limit[HX_LANES], pressed[HX_LANES];
+  hx_store(limit, rigid);
+  hx_store(pressed, along);
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    const int leg = slot + lane;
+    if (!is_in_soil(path->contact, leg)) continue;
+    const hxSoil soil = hx_soil_under(path->contact, leg);
+    const double z = fmax(0.5 * (from[leg] + to[leg]), 0.0);
+    limit[lane] = soil.friction * pressed[lane] + path->h * hx_soil_shear_base(&soil, z).force;
+  }
+  return hx_load(limit);
+}
+
+HX_INLINE hxReal cone(const hxPath *path, int row, int slot, hxReal along) {
+  const hxReal rigid = hx_load(&path->contact->mu[row][slot]) * along;
+  return has_soil(path->model, row) ? cone_with_soil(path, slot, along, rigid) : rigid;
 }
 
 /* Adds the step to the time of a row of feet under load, by the share of the cone that its
@@ -522,8 +581,8 @@ static inline void measure_cone(const hxPath *path, int row, const hxImpulses *i
     const hxVec3 normal = mean_vec3(from->normal, to->normal, slot);
     const hxReal along = hx_dot(impulse->contact[row][pack], normal);
     const hxVec3 across = hx_add_scaled(impulse->contact[row][pack], -along, normal);
-    const hxReal share = hx_sqrt(hx_dot(across, across)) /
-                         hx_max(hx_load(&path->contact->mu[row][slot]) * along, hx_splat(1e-300));
+    const hxReal share =
+        hx_sqrt(hx_dot(across, across)) / hx_max(cone(path, row, slot, along), hx_splat(1e-300));
     hx_store(&place[slot], hx_cone_place(share));
     hx_store(&pressed[slot], along);
   }

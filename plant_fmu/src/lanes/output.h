@@ -65,7 +65,7 @@ static hxNumber hx_potential_energy(const hxModel *model, const hxPlantMotion *m
   for (int pack = 0; pack < HX_PACKS; ++pack) {
     const hxContactWork *contact = work->pack[pack].contact;
     const int slot = pack * HX_LANES;
-    legs[pack] = elastic_energy(&contact[HX_FOOT]);
+    legs[pack] = model->has_soil ? contact[HX_FOOT].stored : elastic_energy(&contact[HX_FOOT]);
     for (int k = 1; k < model->rows; ++k) legs[pack] += elastic_energy(&contact[model->row[k]]);
     for (int joint = 0; joint < HX_JOINTS; ++joint)
       legs[pack] -= hx_load(&model->joint[joint].mass[slot]) *
@@ -97,6 +97,10 @@ static void fill_joint(const hxState *state, const hxJointWork *k, int lane, int
 /* Returns the size of the tangential force, N. */
 static hxNumber tangential_force(const hxModel *model, int row, const hxContactWork *foot,
                                  int lane) {
+  if (model->has_soil) {
+    const hxVec3 across = hx_sub3(foot->force, hx_scale(foot->normal.force, foot->kin.normal));
+    return hx_lane(hx_sqrt(hx_dot(across, across)), lane);
+  }
   const hxVec3 grip = foot->bristle.grip;
   return hx_lane(has_bristles(model, row) ? foot->normal.force * hx_sqrt(hx_dot(grip, grip))
                                           : foot->drag * foot->slip_speed,
@@ -146,6 +150,7 @@ static void fill_foot(const hxModel *model, const hxState *state, const hxLegWor
   o->foot.peak_force_rate[leg] = state->measured.peak_rate[leg];
   o->foot.landing_rate[leg] = state->measured.landing_rate[leg];
   o->foot.landings[leg] = state->measured.landings[leg];
+  o->foot.sinkage[leg] = state->contact.plastic[leg];
   o->foot.contact[leg] = state->contact.closed[HX_FOOT][leg] != 0.0;
   for (int k = 1; k < model->foot_rows; ++k)
     add_foot_row(model, state, &work->contact[model->row[k]], model->row[k], lane, leg, o);
@@ -215,6 +220,7 @@ static void hx_output_fill(const hxModel *model, const hxState *state, const hxW
     fill_foot(model, state, w, tibia, lane, leg, o);
   }
   fill_torso(&state->motion, work, o);
+  o->footprints = 0.0; /* hx_plant_output() counts them: they are outside the state */
   for (int i = 0; i < HX_CONE_BINS; ++i) o->cone_time[i] = state->measured.cone_time[i];
   fill_energy(model, state, work, o);
   fill_constraint(model, &state->motion, o);
@@ -231,6 +237,15 @@ static int cone_bin(double share) {
   return (int)place;
 }
 
+/* Returns the largest friction or shear force of a row under its normal force, N. */
+static double cone_limit(const hxModel *model, const hxContactState *state,
+                         const hxContactWork *foot, int row, int leg, int lane) {
+  const double force = hx_lane(foot->normal.force, lane);
+  if (!has_soil(model, row) || !is_in_soil(state, leg)) return state->mu[row][leg] * force;
+  const hxSoil soil = hx_soil_under(state, leg);
+  return soil.friction * force + hx_lane(foot->hold, lane) / soil.per_displacement;
+}
+
 /* Fills the rates of a foot's integrals. */
 static void fill_foot_rates(const hxModel *model, const hxContactState *state,
                             const hxLegWork *work, int lane, int leg, hxOutput *rate) {
@@ -241,8 +256,8 @@ static void fill_foot_rates(const hxModel *model, const hxContactState *state,
                  across = tangential_force(model, model->row[k], foot, lane);
     sum += force;
     if (force > model->load_threshold && hx_has_cone(model))
-      rate->cone_time[cone_bin(across / fmax(state->mu[model->row[k]][leg] * force, 1e-300))] +=
-          1.0;
+      rate->cone_time[cone_bin(
+          across / fmax(cone_limit(model, state, foot, model->row[k], leg, lane), 1e-300))] += 1.0;
   }
   const hxContactWork *deeper = &work->contact[deeper_row(model, work, lane)];
   rate->foot.impulse[leg] = sum;

@@ -5,6 +5,21 @@
 
 #include "forces.h"
 
+/* Replaces the derivatives of the forces on feet by those of soil where they touched down on it. */
+HX_RARE hxContactSlope with_soil_slope(const hxContactState *state, int slot, hxReal deeper,
+                                       const hxContactWork *contact, const hxImplicit *implicit,
+                                       hxContactSlope rigid) {
+  const hxMask soft = hx_on_soil(state, slot);
+  const hxSoilPack ahead = hx_soil_pack(state, slot, deeper, contact->kin.ddelta);
+  const hxReal yield = contact->bristle.yield,
+               bristle = (ahead.force * ahead.per_load + ahead.hold) / (1.0 + implicit->z * yield);
+  return (hxContactSlope){.stiffness = hx_select(soft, ahead.stiffness, rigid.stiffness),
+                          .viscosity = hx_select(soft, ahead.viscosity, rigid.viscosity),
+                          .drag = hx_select(soft, implicit->z * bristle, rigid.drag),
+                          .bristle = hx_select(soft, bristle, rigid.bristle),
+                          .yield = yield};
+}
+
 /* Returns the derivatives of a row's contact forces, taken at the depth expected a step ahead,
  * because a contact that has just touched down has none yet. */
 HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactState *state, int row,
@@ -14,14 +29,17 @@ HX_INLINE hxContactSlope contact_slope(const hxModel *model, const hxContactStat
   const hxReal deeper = kin->delta + implicit->ahead * hx_max(kin->ddelta, hx_splat(0.0));
   const hxNormalForce ahead = hx_normal_force(hx_law_at(state, row, slot), deeper, kin->ddelta);
   hxContactSlope slope = {.stiffness = ahead.stiffness, .viscosity = ahead.viscosity};
-  if (!has_bristles(model, row)) {
+  if (!is_bristle_law(model, row)) {
     slope.drag = ahead.force * contact->drag_per_load;
-    return slope;
+    slope.bristle = slope.yield = hx_splat(0.0);
+    return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
+                                : slope;
   }
   slope.yield = contact->bristle.yield;
   slope.bristle = ahead.force * contact->bristle.stiffness / (1.0 + implicit->z * slope.yield);
   slope.drag = ahead.force * contact->bristle.damping + implicit->z * slope.bristle;
-  return slope;
+  return has_soil(model, row) ? with_soil_slope(state, slot, deeper, contact, implicit, slope)
+                              : slope;
 }
 
 /* Stores them for all stages of a step. */

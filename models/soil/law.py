@@ -1,0 +1,242 @@
+"""Computes the forces of soft ground on a foot: virgin curve, unloading, damping and shear.
+
+The depth z of the foot's lowest point under the undisturbed surface is >= 0 in contact. A monotone
+loading follows the virgin curve F_v(z) of the soil's law. Unloading and reloading follow the line
+A Ke (z - z_p) with the plastic depth z_p, the largest z - F_v(z)/(A Ke) so far. Shear stretches a
+bristle b whose force is the Janosi-Hanamoto curve. plant_fmu/src/ground/soil.c is the fast form,
+with the same names.
+
+A foot is a sphere of radius R = foot.radius, or on soil a flat round pad of foot.pad_radius.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hexapod_cosim.models.records import Array, Foot, Soil
+
+BISECTIONS = 200  # halvings of an interval, more than doubles resolve
+
+
+def soil_radius(foot: Foot) -> float:
+    """Returns the radius b [m] of the foot's pad, or of its sphere."""
+    return foot.pad_radius if foot.pad_radius > 0.0 else foot.radius
+
+
+def soil_area(foot: Foot) -> float:
+    """Returns A = pi b^2 [m^2], the area that unloading refers to."""
+    return math.pi * soil_radius(foot) ** 2
+
+
+def contact_area(foot: Foot, z: float) -> float:
+    """Returns the area [m^2] of the foot's cross-section at the surface, at depth z [m]."""
+    if foot.pad_radius > 0.0 or z >= foot.radius:
+        return soil_area(foot)
+    return math.pi * (2.0 * foot.radius - z) * z
+
+
+def bekker_modulus(soil: Soil, foot: Foot) -> float:
+    """Returns k = Kc/b + Kphi [N/m^(n+2)] of the pressure k z^n (eq. 31)."""
+    return soil.cohesive_modulus / soil_radius(foot) + soil.frictional_modulus
+
+
+def column_sum(foot: Foot, z: float, n: float) -> float:
+    """Returns the integral of (local depth)^n over the foot's area [m^(n+2)] (eq. 32).
+
+    The columns under a sphere end at its lower half: a sphere deeper than R has columns under its
+    whole area.
+    """
+    if foot.pad_radius > 0.0:
+        return float(soil_area(foot) * z**n)
+    R = foot.radius
+    whole = z ** (n + 1.0) * (R / (n + 1.0) - z / ((n + 1.0) * (n + 2.0)))
+    above = max(z - R, 0.0) ** (n + 2.0) / ((n + 1.0) * (n + 2.0))
+    return float(2.0 * math.pi * (whole + above))
+
+
+def column_slope(foot: Foot, z: float, n: float) -> float:
+    """Returns the derivative of `column_sum` by z, z > 0."""
+    if foot.pad_radius > 0.0:
+        return float(soil_area(foot) * n * z ** (n - 1.0))
+    R = foot.radius
+    whole = z**n * (R - z / (n + 1.0))
+    return float(2.0 * math.pi * (whole + max(z - R, 0.0) ** (n + 1.0) / (n + 1.0)))
+
+
+def column_work(foot: Foot, z: float, n: float) -> float:
+    """Returns the integral of `column_sum` from 0 to z."""
+    if foot.pad_radius > 0.0:
+        return float(soil_area(foot) * z ** (n + 1.0) / (n + 1.0))
+    R, pair, triple = foot.radius, (n + 1.0) * (n + 2.0), (n + 1.0) * (n + 2.0) * (n + 3.0)
+    whole = R * z ** (n + 2.0) / pair - z ** (n + 3.0) / triple
+    return float(2.0 * math.pi * (whole + max(z - R, 0.0) ** (n + 3.0) / triple))
+
+
+def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float, float]:
+    """Returns force [N], slope [N/m] and work [J] of granular media at depth z [m] (eq. 33).
+
+    A surface element under the angle beta resists with side + (down - side) cos^2 beta times its
+    depth; the lower half of the sphere counts.
+    """
+    down, side = soil.resistance * soil.alpha_down, soil.resistance * soil.alpha_side
+    if foot.pad_radius > 0.0:
+        A = soil_area(foot)
+        return down * A * z, down * A, down * A * z * z / 2.0
+    R, e, rest = foot.radius, z / foot.radius, down - side
+    if e <= 1.0:
+        o = 1.0 - e
+        force = side * e**2 / 2 + rest * (o * o * e**2 / 2 + 2 * o * e**3 / 3 + e**4 / 4)
+        slope = side * e + rest * (o * o * e + o * e**2 + e**3 / 3)
+        work = side * e**3 / 6 + rest * (e**3 / 6 - e**4 / 12 + e**5 / 60)
+    else:
+        force = side * (e - 0.5) + rest * ((e - 1.0) / 3 + 0.25)
+        slope = side + rest / 3
+        work = side * (1 / 6 + (e * e - e) / 2) + rest * (0.1 + (e - 1.0) / 4 + (e - 1.0) ** 2 / 6)
+    return 2 * math.pi * R**3 * force, 2 * math.pi * R**2 * slope, 2 * math.pi * R**4 * work
+
+
+def virgin_force(soil: Soil, foot: Foot, z: float) -> float:
+    """Returns F_v [N], the force of a first monotone loading to depth z [m] (eq. 31-34)."""
+    if z <= 0.0:
+        return 0.0
+    if soil.law == "bekker":
+        return bekker_modulus(soil, foot) * column_sum(foot, z, soil.exponent)
+    if soil.law == "granular":
+        return granular_sum(soil, foot, z)[0]
+    hardened = soil.hardening * column_sum(foot, z, 1.0)
+    return soil.yield_pressure * column_sum(foot, z, 0.0) + hardened
+
+
+def virgin_slope(soil: Soil, foot: Foot, z: float) -> float:
+    """Returns dF_v/dz [N/m] at z > 0."""
+    if soil.law == "bekker":
+        return bekker_modulus(soil, foot) * column_slope(foot, z, soil.exponent)
+    if soil.law == "granular":
+        return granular_sum(soil, foot, z)[1]
+    hardened = soil.hardening * column_slope(foot, z, 1.0)
+    return soil.yield_pressure * column_slope(foot, z, 0.0) + hardened
+
+
+def virgin_work(soil: Soil, foot: Foot, z: float) -> float:
+    """Returns the work [J] of F_v from 0 to z [m]."""
+    if soil.law == "bekker":
+        return bekker_modulus(soil, foot) * column_work(foot, z, soil.exponent)
+    if soil.law == "granular":
+        return granular_sum(soil, foot, z)[2]
+    hardened = soil.hardening * column_work(foot, z, 1.0)
+    return soil.yield_pressure * column_work(foot, z, 0.0) + hardened
+
+
+def sinkage(soil: Soil, foot: Foot, load: float) -> float:
+    """Returns the depth z [m] at which the virgin curve bears a load [N], by bisection."""
+    low, high = 0.0, 1e-6
+    while virgin_force(soil, foot, high) < load and high < 1e6:
+        high *= 2.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if virgin_force(soil, foot, middle) < load else (low, middle)
+    return high
+
+
+def unloading_stiffness(soil: Soil, foot: Foot) -> float:
+    """Returns A Ke [N/m], the slope of unloading."""
+    return soil_area(foot) * soil.stiffness
+
+
+def plastic_depth(soil: Soil, foot: Foot, z: float) -> float:
+    """Returns z - F_v(z)/(A Ke) [m]: the depth that stays when depth z is unloaded (eq. 35)."""
+    return max(z - virgin_force(soil, foot, z) / unloading_stiffness(soil, foot), 0.0)
+
+
+def elastic_force(soil: Soil, foot: Foot, plastic: float, z: float) -> float:
+    """Returns min(A Ke (z - z_p), F_v(z)) >= 0 [N] at plastic depth z_p [m] (eq. 35)."""
+    if z <= plastic:
+        return 0.0
+    line = unloading_stiffness(soil, foot) * (z - plastic)
+    return min(line, virgin_force(soil, foot, z))
+
+
+def stored_energy(soil: Soil, foot: Foot, plastic: float, z: float) -> float:
+    """Returns the energy [J] that unloading gives back: F^2/(2 A Ke)."""
+    force = elastic_force(soil, foot, plastic, z)
+    return force * force / (2.0 * unloading_stiffness(soil, foot))
+
+
+def soil_normal_force(soil: Soil, foot: Foot, plastic: float, z: float, dz: float) -> float:
+    """Returns f_n >= 0 [N] at depth z [m] and sinking speed dz [m/s]: elastic force and R A dz (eq.
+    36).
+    """
+    if z <= plastic:
+        return 0.0
+    viscous = soil.damping * contact_area(foot, z) * dz
+    return max(elastic_force(soil, foot, plastic, z) + viscous, 0.0)
+
+
+def soil_normal_slopes(
+    soil: Soil, foot: Foot, plastic: float, z: float, dz: float
+) -> tuple[float, float]:
+    """Returns the derivatives of `soil_normal_force` by z [N/m] and by dz [N s/m]."""
+    if soil_normal_force(soil, foot, plastic, z, dz) <= 0.0:
+        return 0.0, 0.0
+    line = unloading_stiffness(soil, foot)
+    yields = virgin_force(soil, foot, z) < line * (z - plastic)
+    slope = virgin_slope(soil, foot, z) if yields else line
+    widens = foot.pad_radius == 0.0 and z < foot.radius
+    area_slope = 2.0 * math.pi * (foot.radius - z) if widens else 0.0
+    return slope + soil.damping * area_slope * dz, soil.damping * contact_area(foot, z)
+
+
+def profile_moment(foot: Foot, z: float) -> float:
+    """Returns the integral of depth over the foot's profile under the surface [m^3].
+
+    The profile of a pad is the rectangle 2 a z, that of a sphere the segment of a circle.
+    """
+    if foot.pad_radius > 0.0:
+        return foot.pad_radius * z * z
+    R, c = foot.radius, foot.radius - z
+    if c <= -R:
+        return math.pi * R * R * (z - R)
+    chord = math.sqrt((R - c) * (R + c))
+    return 2.0 / 3.0 * chord**3 - c * (R * R * math.atan2(chord, c) - c * chord)
+
+
+def shear_limit(soil: Soil, foot: Foot, z: float, load: float) -> float:
+    """Returns T_max [N], the largest shear force at depth z [m] under a normal force (eq. 37).
+
+    Cohesion over the contact area, friction of the load, and in granular media the resistance of
+    the foot's profile.
+    """
+    ahead = 0.0
+    if soil.law == "granular":
+        ahead = soil.resistance * soil.alpha_ahead * profile_moment(foot, z)
+    return soil.cohesion * contact_area(foot, z) + load * math.tan(soil.friction_angle) + ahead
+
+
+def shear_rate(soil: Soil, slip: Array, bristle: Array) -> Array:
+    """Returns db/dt = v - |v| b/K (3,) [m/s] (eq. 38)."""
+    return slip - float(np.linalg.norm(slip)) / soil.shear_displacement * bristle
+
+
+def shear_force(soil: Soil, limit: float, bristle: Array) -> Array:
+    """Returns the shear force -T_max b/K (3,) [N] (eq. 38)."""
+    return -limit / soil.shear_displacement * bristle
+
+
+def table_row(soil: Soil) -> tuple[float, ...]:
+    """Returns columns 3 to 15 of a material in a grid's table; unused ones are 0.
+
+    Column 3 is the law; 4-6 are Kphi, Kc, n (bekker), resistance, alpha_down, alpha_ahead
+    (granular) or yield pressure and hardening (mud); 7-11 are c, tan phi, K, Ke, R; 12 is
+    alpha_side.
+    """
+    curve = {
+        "none": (0.0, 0.0, 0.0),
+        "bekker": (soil.frictional_modulus, soil.cohesive_modulus, soil.exponent),
+        "granular": (soil.resistance, soil.alpha_down, soil.alpha_ahead),
+        "mud": (soil.yield_pressure, soil.hardening, 0.0),
+    }[soil.law]
+    law = float(("none", "bekker", "granular", "mud").index(soil.law))
+    shear = (soil.cohesion, math.tan(soil.friction_angle), soil.shear_displacement)
+    return (law, *curve, *shear, soil.stiffness, soil.damping, soil.alpha_side, 0.0, 0.0, 0.0)

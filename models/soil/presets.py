@@ -1,0 +1,85 @@
+"""Reads soils: measured ones by name from data/*.toml, and the [soil] section of a file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from hexapod_cosim.models.errors import HexapodError, RobotError, unknown_name
+from hexapod_cosim.models.records import Soil
+from hexapod_cosim.models.schema import expect_table, read_given, require
+from hexapod_cosim.models.soil.granular import Coefficients, foot_resistances
+
+PRESET = "preset"  # key of a table that starts from a soil of `list_soils()`
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A soil with its title and the provenance of its numbers."""
+
+    soil: Soil
+    title: str
+    source: str
+
+
+@cache
+def _presets() -> dict[str, Preset]:
+    """Returns all presets, sorted by name."""
+    folder = Path(__file__).parent / "data"
+    tables = {
+        name: (table, f"{path}: {name}")
+        for path in sorted(folder.glob("*.toml"))
+        for name, table in tomllib.loads(path.read_text(encoding="utf-8")).items()
+    }
+    return {name: _preset(dict(tables[name][0]), tables[name][1]) for name in sorted(tables)}
+
+
+def _preset(table: dict[str, Any], where: str) -> Preset:
+    title, source = table.pop("title"), table.pop("source")
+    if "coefficients" in table:
+        given = read_given(Coefficients, table.pop("coefficients"), f"{where}.coefficients")
+        table |= foot_resistances(Coefficients(**given))
+    return Preset(_soil_of(table, where), title, source)
+
+
+def _soil_of(table: Mapping[str, Any], where: str) -> Soil:
+    return Soil(**require(Soil, read_given(Soil, table, where), where))
+
+
+def list_soils() -> list[str]:
+    """Returns the names of the soils in this package."""
+    return list(_presets())
+
+
+def soil_preset(
+    name: str, *, where: str | None = None, error: type[HexapodError] = RobotError
+) -> Preset:
+    """Returns a soil by name. Raises `error` for a name outside `list_soils()`."""
+    if name not in _presets():
+        raise unknown_name("soil", name, list_soils(), where=where, error=error)
+    return _presets()[name]
+
+
+def soil_table(value: Any, where: str) -> Mapping[str, Any]:
+    """Returns the table of numbers of a [soil] section. Raises RobotError.
+
+    The section is the name of a soil or a table. The key `preset` of a table names the soil whose
+    numbers the others replace.
+    """
+    table = {PRESET: value} if isinstance(value, str) else dict(expect_table(value, where))
+    if PRESET not in table:
+        return table
+    name = table.pop(PRESET)
+    if not isinstance(name, str):
+        raise RobotError(
+            "wrong type",
+            got=name,
+            expected="a name of `hexapod list soils`",
+            fix="give a name in quotes",
+            where=f"{where}.{PRESET}",
+        )
+    return asdict(soil_preset(name, where=where).soil) | table

@@ -1,0 +1,64 @@
+#include "footprints.h"
+
+#include <string.h>
+
+/* Returns the ring's entry of footprint k. */
+static int entry(double k) { return (int)((long long)k % HX_FOOTPRINTS); }
+
+int hx_footprints_number(const hxFootprints *footprints) {
+  if (footprints->count >= HX_FOOTPRINTS) return HX_FOOTPRINTS;
+  return footprints->count > 0.0 ? (int)footprints->count : 0; /* 0 for a NaN */
+}
+
+void hx_footprints_clear(hxFootprintLog *log) {
+  const size_t used = (size_t)hx_footprints_number(&log->kept);
+  memset(log->kept.print, 0, used * sizeof(hxFootprint));
+  log->kept.count = log->call_start = 0.0;
+}
+
+void hx_footprints_begin(hxFootprintLog *log) { log->call_start = log->kept.count; }
+
+void hx_footprints_take_back(hxFootprintLog *log) {
+  hxFootprints *kept = &log->kept;
+  const double made = kept->count - log->call_start;
+  const double changed = made < HX_FOOTPRINTS ? made : HX_FOOTPRINTS;
+  for (double k = 0.0; k < changed; k += 1.0)
+    kept->print[entry(log->call_start + k)] = log->lost[entry(log->call_start + k)];
+  kept->count = log->call_start;
+}
+
+void hx_footprints_add(hxFootprintLog *log, const hxFootprint *print) {
+  hxFootprints *kept = &log->kept;
+  const int k = entry(kept->count);
+  if (kept->count - log->call_start < HX_FOOTPRINTS) log->lost[k] = kept->print[k];
+  kept->print[k] = *print;
+  kept->count += 1.0;
+}
+
+double hx_footprints_depth(const hxFootprints *footprints, double x, double y) {
+  const int number = hx_footprints_number(footprints);
+  double depth = 0.0;
+  for (int k = 0; k < number; ++k) {
+    const hxFootprint *print = &footprints->print[k];
+    const double dx = x - print->x, dy = y - print->y;
+    if (dx * dx + dy * dy <= print->radius * print->radius && print->depth > depth)
+      depth = print->depth;
+  }
+  return depth;
+}
+
+int hx_footprints_are_clear(const hxFootprints *footprints) {
+  const unsigned char *byte = (const unsigned char *)footprints->print;
+  unsigned found = 0;
+  for (size_t i = (size_t)hx_footprints_number(footprints) * sizeof(hxFootprint);
+       i < sizeof footprints->print; ++i)
+    found |= byte[i];
+  return found == 0;
+}
+
+void hx_footprints_copy(hxFootprints *to, const hxFootprints *from) {
+  const size_t used = (size_t)hx_footprints_number(from);
+  to->count = from->count;
+  memcpy(to->print, from->print, used * sizeof(hxFootprint));
+  memset(to->print + used, 0, (HX_FOOTPRINTS - used) * sizeof(hxFootprint));
+}

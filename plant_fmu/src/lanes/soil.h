@@ -1,0 +1,153 @@
+/* soil.h - soil under packs of feet: forces on lanes from the scalar functions of ground/soil.h,
+ * plastic depths at the end of a step, footprints
+ *
+ * The functions are out of line, so that rigid ground costs the same with and without them.
+ */
+#ifndef HX_LANES_SOIL_H
+#define HX_LANES_SOIL_H
+
+#include "../ground/soil.h"
+#include "lanes.h"
+
+_Static_assert(sizeof(hxSoil) == HX_SOIL_SIZE * sizeof(double), "a soil consists of numbers");
+
+static const double least_footprint = 1e-6; /* m  shallower ones are not kept */
+
+/* Returns whether a row of contacts may be on soil. */
+static inline int has_soil(const hxModel *model, int row) {
+  return row == HX_FOOT && model->has_soil;
+}
+
+/* Returns which feet touched down on soil. */
+static inline hxMask hx_on_soil(const hxContactState *state, int slot) {
+  return hx_less(hx_splat(0.0), hx_load(&state->on_soil[slot]));
+}
+
+/* Returns the soil on which a foot touched down. */
+static inline hxSoil hx_soil_under(const hxContactState *state, int slot) {
+  hxSoil soil;
+  double numbers[HX_SOIL_SIZE];
+  for (int i = 0; i < HX_SOIL_SIZE; ++i) numbers[i] = hx_re(state->soil[slot][i]);
+  memcpy(&soil, numbers, sizeof soil);
+  return soil;
+}
+
+/* Returns whether a foot is in contact with soil. */
+static inline int is_in_soil(const hxContactState *state, int slot) {
+  return hx_re(state->closed[HX_FOOT][slot]) != 0.0 && hx_re(state->on_soil[slot]) != 0.0;
+}
+
+/* Forces of soil on a pack of feet; 0 on feet that do not touch it. */
+typedef struct {
+  hxReal force;                /* N      f_n */
+  hxReal stiffness, viscosity; /* N/m, N s/m  its derivatives by depth and sinking speed */
+  hxReal held;                 /* N      times the sinking speed: power that is stored */
+  hxReal stored;               /* J      that unloading gives back */
+  hxReal hold, per_load;       /* N/m, 1/m  shear over the bristle: without load, of the load */
+  hxReal per_displacement;     /* 1/m    1/K */
+} hxSoilPack;
+
+/* Returns the forces on feet at these depths and sinking speeds. */
+HX_RARE hxSoilPack hx_soil_pack(const hxContactState *state, int slot, hxReal delta,
+                                hxReal ddelta) {
+  hxNumber z[HX_LANES], dz[HX_LANES], out[8][HX_LANES];
+  memset(out, 0, sizeof out);
+  hx_store(z, delta);
+  hx_store(dz, ddelta);
+  for (int lane = 0; lane < HX_LANES; ++lane) {
+    if (!is_in_soil(state, slot + lane)) continue;
+    const hxSoil soil = hx_soil_under(state, slot + lane);
+    const double plastic = hx_re(state->plastic[slot + lane]), depth = hx_re(z[lane]),
+                 speed = hx_re(dz[lane]), slope_z = hx_slope(z[lane]),
+                 slope_dz = hx_slope(dz[lane]);
+    const hxSoilForce f = hx_soil_normal_force(&soil, plastic, depth, speed);
+    /* the depth of shear does not fall below z_p: a foot that leaves the ground within a step
+     * keeps its grip to the end of the step */
+    const int above = depth < plastic;
+    const hxSoilCurve base = hx_soil_shear_base(&soil, above ? plastic : depth);
+    const double gains = speed > 0.0 ? f.slope / soil.unloading : 1.0;
+    out[0][lane] = hx_with_slope(f.force, f.stiffness * slope_z + f.viscosity * slope_dz);
+    out[1][lane] = f.stiffness, out[2][lane] = f.viscosity;
+    out[3][lane] = hx_with_slope(f.elastic * gains, f.slope * gains * slope_z);
+    out[4][lane] = hx_with_slope(0.5 * f.elastic * f.elastic / soil.unloading,
+                                 f.elastic * f.slope / soil.unloading * slope_z);
+    out[5][lane] = hx_with_slope(soil.per_displacement * base.force,
+                                 above ? 0.0 : soil.per_displacement * base.slope * slope_z);
+    out[6][lane] = soil.friction * soil.per_displacement;
+    out[7][lane] = soil.per_displacement;
+  }
+  return (hxSoilPack){.force = hx_load(out[0]),
+                      .stiffness = hx_load(out[1]),
+                      .viscosity = hx_load(out[2]),
+                      .held = hx_load(out[3]),
+                      .stored = hx_load(out[4]),
+                      .hold = hx_load(out[5]),
+                      .per_load = hx_load(out[6]),
+                      .per_displacement = hx_load(out[7])};
+}
+
+#ifndef HX_TANGENT
+
+/* Returns the largest depth of the cubic through depths and sinking speeds (per step) at both ends
+ * of a step (eq. 28). */
+static inline double hx_deepest(double from, double slope_from, double to, double slope_to) {
+  if (!(slope_from > 0.0 && slope_to < 0.0)) return fmax(from, to);
+  const double rise = to - from, bend = slope_from + slope_to - 2.0 * rise,
+               curve = rise - slope_from - bend;
+  double low = 0.0, high = 1.0;
+  for (int i = 0; i < 40; ++i) {
+    const double x = 0.5 * (low + high);
+    if (slope_from + x * (2.0 * curve + 3.0 * x * bend) > 0.0)
+      low = x;
+    else
+      high = x;
+  }
+  return fmax(from + low * (slope_from + low * (curve + low * bend)), fmax(from, to));
+}
+
+/* Computes the plastic depths at the end of a step of h, by the largest depth on its path (eq. 35).
+ */
+HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxContactMoment *from,
+                           const hxContactMoment *to, double plastic[HX_SLOTS]) {
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    plastic[leg] = state->plastic[leg];
+    if (!is_in_soil(state, leg)) continue;
+    const hxSoil soil = hx_soil_under(state, leg);
+    const double deepest =
+        hx_deepest(from->delta[leg], h * from->ddelta[leg], to->delta[leg], h * to->ddelta[leg]);
+    plastic[leg] = fmax(plastic[leg], hx_soil_plastic_depth(&soil, deepest));
+  }
+  hx_fill_slots(plastic);
+}
+
+/* Records the footprints that feet leave upwards, and looks up those that feet enter from above;
+ * depths are relative to the plastic depths and follow them. An open foot under the undisturbed
+ * surface is above its footprint, whose bottom it may touch again: a footprint is complete when
+ * the foot has left it, and is where the foot lost contact with it last. */
+HX_RARE void hx_soil_switch(const hxContactMoment *feet, hxDepths *depths, hxFootprintLog *log,
+                            hxContactState *state) {
+  double *delta = depths->delta[HX_FOOT];
+  for (int leg = 0; leg < HX_LEGS; ++leg) {
+    double *plastic = &state->plastic[leg],
+           *place[2] = {&state->place[0][leg], &state->place[1][leg]};
+    const double z = delta[leg] + *plastic, x = feet->centre[0][leg], y = feet->centre[1][leg];
+    if (state->closed[HX_FOOT][leg] != 0.0) {
+      if (delta[leg] <= 0.0) *place[0] = x, *place[1] = y;
+      continue;
+    }
+    if (z <= 0.0 && *plastic >= least_footprint)
+      hx_footprints_add(
+          log, &(hxFootprint){*place[0], *place[1], *plastic, hx_soil_under(state, leg).radius});
+    if (z <= 0.0) *plastic = 0.0;
+    if (z > 0.0 && *plastic == 0.0) *plastic = hx_footprints_depth(&log->kept, x, y);
+    delta[leg] = z - *plastic;
+  }
+  hx_fill_slots(state->plastic);
+  hx_fill_slots(state->place[0]);
+  hx_fill_slots(state->place[1]);
+  hx_fill_slots(delta);
+}
+
+#endif
+
+#endif
