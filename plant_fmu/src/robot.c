@@ -180,10 +180,13 @@ static void compile_soil(hxModel *model, const hxDefinition *d) {
   hx_soil_compile(&d->soil, d->foot_radius, d->foot_pad_radius, &soil);
   memcpy(model->soil, &soil, sizeof soil);
   model->pad_radius = d->foot_pad_radius;
-  model->has_soil =
-      d->soil.law != HX_SOIL_NONE || (model->terrain && hx_terrain_has_soil(model->terrain));
-  model->bristle_length =
-      d->soil.law == HX_SOIL_NONE ? d->friction.presliding : d->soil.shear_displacement;
+  const double on_grid = model->terrain ? hx_terrain_shear_displacement(model->terrain) : 0.0;
+  model->has_soil = d->soil.law != HX_SOIL_NONE || on_grid > 0.0;
+  model->bristle_length = d->friction.presliding;
+  if (d->soil.law != HX_SOIL_NONE)
+    model->bristle_length = d->soil.shear_displacement;
+  else if (on_grid > 0.0 && d->friction.law != HX_FRICTION_BRISTLE)
+    model->bristle_length = on_grid;
 }
 
 /* Copies laws and settings, with derived constants. */

@@ -470,11 +470,15 @@ void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cel
 
 /* ---- materials ---- */
 
-int hx_terrain_has_soil(const hxTerrain *terrain) {
-  int found = 0;
-  for (int64_t i = 0; i < terrain->head.materials; ++i)
-    found |= terrain->table[HX_MATERIAL_COLUMNS * i + HX_MATERIAL_SOIL] != 0.0;
-  return found;
+double hx_terrain_shear_displacement(const hxTerrain *terrain) {
+  enum { DISPLACEMENT = HX_MATERIAL_SOIL + 6 };
+  double least = 0.0;
+  for (int64_t i = 0; i < terrain->head.materials; ++i) {
+    const double *row = terrain->table + HX_MATERIAL_COLUMNS * i;
+    if (row[HX_MATERIAL_SOIL] != 0.0 && (least == 0.0 || row[DISPLACEMENT] < least))
+      least = row[DISPLACEMENT];
+  }
+  return least;
 }
 
 const double *hx_terrain_material(const hxTerrain *terrain, const double point[3]) {

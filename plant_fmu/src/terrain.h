@@ -40,8 +40,8 @@ extern const double hx_far; /* m  distance of a wall that is not there */
 void hx_terrain_face(const hxTerrain *terrain, hxFaceKind kind, const double cell[2],
                      const double point[3], int bends, hxFace *face);
 
-/* Returns whether a material of the table is soil. */
-int hx_terrain_has_soil(const hxTerrain *terrain);
+/* Returns the least shear displacement of the table's soils, m; 0 if no material is soil. */
+double hx_terrain_shear_displacement(const hxTerrain *terrain);
 
 /* Returns the row of the table of the material at a point, NULL for the definition's ground. */
 const double *hx_terrain_material(const hxTerrain *terrain, const double point[3]);
