@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grids import Ground, grid_bytes, on_grid
 from plant import Plant, PlantError, pointer
 from states import changed
 
@@ -211,26 +210,3 @@ def test_soil_on_a_slope_creeps_less_than_it_shears(core: ct.CDLL) -> None:
     out = plant.output()
     assert out.foot.force.sum(axis=0) == pytest.approx([0.0, 0.0, robot.weight], abs=1e-3)
     assert np.max(np.linalg.norm(out.foot.bristle, axis=1)) < robot.soil.shear_displacement
-
-
-def test_a_soil_of_a_grids_table_is_the_same_as_that_of_the_definition(core: ct.CDLL) -> None:
-    """A level grid whose material is dry sand, and a definition of rigid ground."""
-    soil, rigid = on_soil("dry_sand"), changed(load_robot("athena"), foot={"pad_radius": 0.025})
-    row = np.concatenate([[np.nan] * 3, law.table_row(soil.soil)])
-    flat, soft = np.zeros((5, 5)), np.ones((5, 5))
-    file = grid_bytes(flat, cell=1.0, origin=(-2.0, -2.0), material=soft, table=row[None])
-    ground = Ground(core, file)
-    pose = standing(soil)
-    start: dict[str, Any] = {
-        "position": np.add(pose.position, (0.0, 0.0, 0.002)),
-        "quaternion": pose.quaternion,
-        "angle": pose.angle,
-    }
-    plane, grid = Plant(core, soil, **start), on_grid(core, rigid, ground, **start)
-    for plant in (plane, grid):
-        walk(plant, 0.5)
-    here, there = plane.output(), grid.output()
-    assert here.footprints == there.footprints
-    assert there.torso.position == pytest.approx(here.torso.position, abs=1e-9)
-    assert there.foot.sinkage == pytest.approx(here.foot.sinkage, abs=1e-9)
-    assert np.max(there.foot.sinkage) > 0.001
