@@ -176,7 +176,7 @@ class Terrain:
 
 @dataclass(frozen=True, kw_only=True)
 class Soil:
-    """Law of soft ground and its numbers (eq. 31-37); each law uses those it names."""
+    """Law of soft ground and its numbers (eq. 40-46); each law uses those it names."""
 
     law: Annotated[str, Choice(SOIL_LAWS, default="none")] = "none"
     # bekker: pressure (Kc/b + Kphi) z^n

@@ -38,12 +38,12 @@ def contact_area(foot: Foot, z: float) -> float:
 
 
 def bekker_modulus(soil: Soil, foot: Foot) -> float:
-    """Returns k = Kc/b + Kphi [N/m^(n+2)] of the pressure k z^n (eq. 31)."""
+    """Returns k = Kc/b + Kphi [N/m^(n+2)] of the pressure k z^n (eq. 40)."""
     return soil.cohesive_modulus / soil_radius(foot) + soil.frictional_modulus
 
 
 def column_sum(foot: Foot, z: float, n: float) -> float:
-    """Returns the integral of (local depth)^n over the foot's area [m^(n+2)] (eq. 32).
+    """Returns the integral of (local depth)^n over the foot's area [m^(n+2)] (eq. 41).
 
     The columns under a sphere end at its lower half: a sphere deeper than R has columns under its
     whole area.
@@ -75,7 +75,7 @@ def column_work(foot: Foot, z: float, n: float) -> float:
 
 
 def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float, float]:
-    """Returns force [N], slope [N/m] and work [J] of granular media at depth z [m] (eq. 33).
+    """Returns force [N], slope [N/m] and work [J] of granular media at depth z [m] (eq. 42).
 
     A surface element under the angle beta resists with side + (down - side) cos^2 beta times its
     depth; the lower half of the sphere counts.
@@ -98,7 +98,7 @@ def granular_sum(soil: Soil, foot: Foot, z: float) -> tuple[float, float, float]
 
 
 def virgin_force(soil: Soil, foot: Foot, z: float) -> float:
-    """Returns F_v [N], the force of a first monotone loading to depth z [m] (eq. 31-34)."""
+    """Returns F_v [N], the force of a first monotone loading to depth z [m] (eq. 40-43)."""
     if z <= 0.0:
         return 0.0
     if soil.law == "bekker":
@@ -146,12 +146,12 @@ def unloading_stiffness(soil: Soil, foot: Foot) -> float:
 
 
 def plastic_depth(soil: Soil, foot: Foot, z: float) -> float:
-    """Returns z - F_v(z)/(A Ke) [m]: the depth that stays when depth z is unloaded (eq. 35)."""
+    """Returns z - F_v(z)/(A Ke) [m]: the depth that stays when depth z is unloaded (eq. 44)."""
     return max(z - virgin_force(soil, foot, z) / unloading_stiffness(soil, foot), 0.0)
 
 
 def elastic_force(soil: Soil, foot: Foot, plastic: float, z: float) -> float:
-    """Returns min(A Ke (z - z_p), F_v(z)) >= 0 [N] at plastic depth z_p [m] (eq. 35)."""
+    """Returns min(A Ke (z - z_p), F_v(z)) >= 0 [N] at plastic depth z_p [m] (eq. 44)."""
     if z <= plastic:
         return 0.0
     line = unloading_stiffness(soil, foot) * (z - plastic)
@@ -166,7 +166,7 @@ def stored_energy(soil: Soil, foot: Foot, plastic: float, z: float) -> float:
 
 def soil_normal_force(soil: Soil, foot: Foot, plastic: float, z: float, dz: float) -> float:
     """Returns f_n >= 0 [N] at depth z [m] and sinking speed dz [m/s]: elastic force and R A dz (eq.
-    36).
+    45).
     """
     if z <= plastic:
         return 0.0
@@ -203,7 +203,7 @@ def profile_moment(foot: Foot, z: float) -> float:
 
 
 def shear_limit(soil: Soil, foot: Foot, z: float, load: float) -> float:
-    """Returns T_max [N], the largest shear force at depth z [m] under a normal force (eq. 37).
+    """Returns T_max [N], the largest shear force at depth z [m] under a normal force (eq. 46).
 
     Cohesion over the contact area, friction of the load, and in granular media the resistance of
     the foot's profile.
@@ -215,12 +215,12 @@ def shear_limit(soil: Soil, foot: Foot, z: float, load: float) -> float:
 
 
 def shear_rate(soil: Soil, slip: Array, bristle: Array) -> Array:
-    """Returns db/dt = v - |v| b/K (3,) [m/s] (eq. 38)."""
+    """Returns db/dt = v - |v| b/K (3,) [m/s] (eq. 47)."""
     return slip - float(np.linalg.norm(slip)) / soil.shear_displacement * bristle
 
 
 def shear_force(soil: Soil, limit: float, bristle: Array) -> Array:
-    """Returns the shear force -T_max b/K (3,) [N] (eq. 38)."""
+    """Returns the shear force -T_max b/K (3,) [N] (eq. 47)."""
     return -limit / soil.shear_displacement * bristle
 
 

@@ -88,7 +88,7 @@ typedef struct hxLeg {
   hxLink link[HX_JOINTS];
 } hxLeg;
 
-/* Soft ground under the feet (eq. 31-38): its law and the numbers of all laws. */
+/* Soft ground under the feet (eq. 40-47): its law and the numbers of all laws. */
 typedef struct hxSoilDefinition {
   int law;                   /* hxSoilLaw; HX_SOIL_NONE: rigid ground */
   double frictional_modulus; /* N/m^(n+2)  Kphi of HX_SOIL_BEKKER */

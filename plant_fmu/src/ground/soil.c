@@ -65,7 +65,7 @@ int hx_soil_row_error(const double row[13]) {
 
 /* ---- virgin curves ---- */
 
-/* Returns the integral of (local depth)^n over the foot, and its slope (eq. 32), times a pressure
+/* Returns the integral of (local depth)^n over the foot, and its slope (eq. 41), times a pressure
  * modulus. p = z^n; q = (z - R)^n of a sphere deeper than R. */
 static hxSoilCurve columns(const hxSoil *soil, double modulus, double n, double z, double p,
                            double q) {
@@ -86,7 +86,7 @@ static hxSoilCurve bekker(const hxSoil *soil, double z) {
   return columns(soil, soil->modulus, n, z, hx_pow(z, n), q);
 }
 
-/* eq. 33; e is the depth in radii */
+/* eq. 42; e is the depth in radii */
 static hxSoilCurve granular(const hxSoil *soil, double z) {
   if (soil->pad != 0.0) return (hxSoilCurve){soil->down * soil->area * z, soil->down * soil->area};
   const double R = soil->radius, e = z / R, o = 1.0 - e, rest = soil->down - soil->side;
@@ -102,7 +102,7 @@ static hxSoilCurve granular(const hxSoil *soil, double z) {
   return (hxSoilCurve){2.0 * pi * R * R * R * force, 2.0 * pi * R * R * slope};
 }
 
-/* eq. 34 */
+/* eq. 43 */
 static hxSoilCurve mud(const hxSoil *soil, double z) {
   const hxSoilCurve yield = columns(soil, soil->yield, 0.0, z, 1.0, 1.0);
   const hxSoilCurve hard = columns(soil, soil->hardening, 1.0, z, z, z - soil->radius);

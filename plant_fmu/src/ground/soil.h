@@ -1,4 +1,4 @@
-/* soil.h - forces of soft ground on a foot (eq. 31-38): virgin curve, unloading, damping and shear;
+/* soil.h - forces of soft ground on a foot (eq. 40-47): virgin curve, unloading, damping and shear;
  * models/soil/law.py is the readable form
  *
  * z is the depth of the foot's lowest point under the undisturbed surface, z_p the plastic depth.
@@ -52,19 +52,19 @@ void hx_soil_from_row(const double row[13], double foot_radius, double pad_radiu
 /* Returns the first of these columns that is not in its range, -1 if there is none. */
 int hx_soil_row_error(const double row[13]);
 
-/* Returns F_v(z), the force of a first monotone loading, and its slope (eq. 31-34). */
+/* Returns F_v(z), the force of a first monotone loading, and its slope (eq. 40-43). */
 hxSoilCurve hx_soil_virgin(const hxSoil *soil, double z);
 
-/* Returns the depth that stays when depth z is unloaded, z - F_v(z)/(A Ke) >= 0 (eq. 35). */
+/* Returns the depth that stays when depth z is unloaded, z - F_v(z)/(A Ke) >= 0 (eq. 44). */
 double hx_soil_plastic_depth(const hxSoil *soil, double z);
 
-/* Returns f_n of a foot at depth z that sinks at dz (eq. 35, 36); 0 where z <= z_p. */
+/* Returns f_n of a foot at depth z that sinks at dz (eq. 44, 45); 0 where z <= z_p. */
 hxSoilForce hx_soil_normal_force(const hxSoil *soil, double plastic, double z, double dz);
 
 /* Returns the energy that unloading gives back, J. */
 double hx_soil_stored_energy(const hxSoil *soil, double plastic, double z);
 
-/* Returns the shear force that does not depend on the load, and its slope by the depth (eq. 37):
+/* Returns the shear force that does not depend on the load, and its slope by the depth (eq. 46):
  * cohesion, and in granular media the resistance of the profile. */
 hxSoilCurve hx_soil_shear_base(const hxSoil *soil, double z);
 

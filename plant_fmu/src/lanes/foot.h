@@ -212,7 +212,7 @@ HX_INLINE hxNormalForce hx_normal_force(hxContactLawAt law, hxReal delta, hxReal
 }
 
 /* Returns the normal force of feet, with that of soil in place of the force of rigid ground where
- * they touched down on soil (eq. 35, 36). The elastic part is that whose power is stored. */
+ * they touched down on soil (eq. 44, 45). The elastic part is that whose power is stored. */
 HX_RARE hxNormalForce with_soil(const hxContactState *state, int slot, hxReal delta, hxReal ddelta,
                                 hxNormalForce rigid) {
   const hxMask soft = hx_on_soil(state, slot);
@@ -228,7 +228,7 @@ static inline hxVec3 select3(hxMask mask, hxVec3 a, hxVec3 b) {
 }
 
 /* Replaces the forces on feet by those of soil where they touched down on it: f_n along the normal
- * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 35-38). */
+ * and the shear -(T_0 + f_n tan phi) b/K across it (eq. 44-47). */
 HX_RARE void replace_by_soil(const hxModel *model, const hxContactState *state, int slot,
                              const hxPlantMotion *motion, hxContactWork *contact) {
   const hxMask soft = hx_on_soil(state, slot);

@@ -548,7 +548,7 @@ static inline int hx_has_cone(const hxModel *model) {
   return (model->mu > 0.0 && model->friction_law != HX_FRICTION_NONE) || model->has_soil;
 }
 
-/* Returns the largest impulse of friction, on soil of shear (eq. 37), under a normal impulse. */
+/* Returns the largest impulse of friction, on soil of shear (eq. 46), under a normal impulse. */
 HX_RARE hxReal cone_with_soil(const hxPath *path, int slot, hxReal along, hxReal rigid) {
   const double *from = path->from->contact[HX_FOOT].delta, *to = path->to->contact[HX_FOOT].delta;
   double limit[HX_LANES], pressed[HX_LANES];

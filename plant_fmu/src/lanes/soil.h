@@ -105,7 +105,7 @@ static inline double hx_deepest(double from, double slope_from, double to, doubl
   return fmax(from + low * (slope_from + low * (curve + low * bend)), fmax(from, to));
 }
 
-/* Computes the plastic depths at the end of a step of h, by the largest depth on its path (eq. 35).
+/* Computes the plastic depths at the end of a step of h, by the largest depth on its path (eq. 44).
  */
 HX_RARE void hx_soil_yield(const hxContactState *state, double h, const hxContactMoment *from,
                            const hxContactMoment *to, double plastic[HX_SLOTS]) {
