@@ -410,6 +410,16 @@ static const hxDefinition default_definition = {
     .initial.speed[5][2] = 0.0,
     .friction.mu_static = 0.0,
     .friction.stribeck_speed = 0.005,
+    .body.torso_box[0] = 0.0,
+    .body.torso_box[1] = 0.0,
+    .body.torso_box[2] = 0.0,
+    .body.torso_centre[0] = 0.0,
+    .body.torso_centre[1] = 0.0,
+    .body.torso_centre[2] = 0.0,
+    .body.corner_radius = 0.0,
+    .body.knee_radius = 0.0,
+    .body.shank_radius = 0.0,
+    .body.shank_position = 0.0,
 };
 
 void hx_definition_default(hxDefinition *definition) {
@@ -911,6 +921,16 @@ static const hxRange definition_ranges[] = {
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(hxDefinition, initial.speed[5][2]), 0},
     {"friction.mu_static", "", 0.0, 100.0, offsetof(hxDefinition, friction.mu_static), 0},
     {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(hxDefinition, friction.stribeck_speed), 0},
+    {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[0]), 0},
+    {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[1]), 0},
+    {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(hxDefinition, body.torso_box[2]), 0},
+    {"body.torso_centre[1]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[0]), 0},
+    {"body.torso_centre[2]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[1]), 0},
+    {"body.torso_centre[3]", "m", -10.0, 10.0, offsetof(hxDefinition, body.torso_centre[2]), 0},
+    {"body.corner_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.corner_radius), 0},
+    {"body.knee_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.knee_radius), 0},
+    {"body.shank_radius", "m", 0.0, 10.0, offsetof(hxDefinition, body.shank_radius), 0},
+    {"body.shank_position", "", 0.0, 1.0, offsetof(hxDefinition, body.shank_position), 0},
 };
 
 size_t hx_definition_ranges(const hxRange **range) {

@@ -922,6 +922,16 @@ static const hxVariable parameters[] = {
     {"initial.RR.tibia.speed", "rad/s", -10000.0, 10000.0, offsetof(struct hxVariables, definition.initial.speed[5][2]), HX_REAL, 0},
     {"friction.mu_static", "1", 0.0, 100.0, offsetof(struct hxVariables, definition.friction.mu_static), HX_REAL, 1},
     {"friction.stribeck_speed", "m/s", 1e-06, 100.0, offsetof(struct hxVariables, definition.friction.stribeck_speed), HX_REAL, 1},
+    {"body.torso_box[1]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[0]), HX_REAL, 3},
+    {"body.torso_box[2]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[1]), HX_REAL, 0},
+    {"body.torso_box[3]", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.torso_box[2]), HX_REAL, 0},
+    {"body.torso_centre[1]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[0]), HX_REAL, 3},
+    {"body.torso_centre[2]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[1]), HX_REAL, 0},
+    {"body.torso_centre[3]", "m", -10.0, 10.0, offsetof(struct hxVariables, definition.body.torso_centre[2]), HX_REAL, 0},
+    {"body.corner_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.corner_radius), HX_REAL, 1},
+    {"body.knee_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.knee_radius), HX_REAL, 1},
+    {"body.shank_radius", "m", 0.0, 10.0, offsetof(struct hxVariables, definition.body.shank_radius), HX_REAL, 1},
+    {"body.shank_position", "1", 0.0, 1.0, offsetof(struct hxVariables, definition.body.shank_position), HX_REAL, 1},
 };
 
 static const hxVariable locals[] = {
@@ -1076,7 +1086,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{e1f0fbc2-55ad-4470-93c0-6529e3b31e94}";
+const char hx_default_guid[] = "{d20d78c4-07bd-4593-affa-cd627e2ce747}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

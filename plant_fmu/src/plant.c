@@ -19,7 +19,7 @@ typedef struct {
 } hxSavedPlant;
 
 static const uint64_t magic = 0x74616c5064507868u; /* "hxPdPlat" */
-static const uint64_t saved_version = 7;
+static const uint64_t saved_version = 8;
 
 static uint64_t checksum(const hxSavedPlant *saved) {
   return hx_checksum(0, &saved->model, sizeof *saved - offsetof(hxSavedPlant, model));
@@ -228,32 +228,33 @@ void hx_plant_rates(const hxPlant *plant, const hxInput *input, hxCoordinates *r
  * their rounding (docs/equations.md). */
 static const double switch_band = 1e-10;
 
-static void feet_of(const hxPlant *plant, double delta[HX_SLOTS], double ddelta[HX_SLOTS]) {
-  hx_kernel()->feet(&plant->model, &plant->state.motion, delta, ddelta);
-}
-
 void hx_plant_indicators(const hxPlant *plant, double indicator[HX_LEGS]) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
-  feet_of(plant, delta, ddelta);
+  hxDepths depths;
+  hx_kernel()->depths(&plant->model, &plant->state.motion, &depths);
   for (int leg = 0; leg < HX_LEGS; ++leg)
     indicator[leg] =
-        delta[leg] + (plant->state.contact.closed[leg] != 0.0 ? switch_band : -switch_band);
+        depths.delta[HX_FOOT][leg] +
+        (plant->state.contact.closed[HX_FOOT][leg] != 0.0 ? switch_band : -switch_band);
 }
 
-/* Returns the penetration that makes a foot switch, or keep its state. */
+/* Returns the penetration that makes a contact switch, or keep its state. */
 static double switching_depth(int closed, double delta, double ddelta) {
   if (closed) return delta <= -switch_band || (delta < 0.0 && ddelta < 0.0) ? -1.0 : 1.0;
   return delta >= switch_band || (delta > 0.0 && ddelta > 0.0) ? 1.0 : -1.0;
 }
 
 int hx_plant_update_contacts(hxPlant *plant) {
-  double delta[HX_SLOTS], ddelta[HX_SLOTS];
+  hxDepths depths;
+  const hxModel *model = &plant->model;
   const hxPlantMotion before = plant->state.motion;
-  feet_of(plant, delta, ddelta);
-  for (int slot = 0; slot < HX_SLOTS; ++slot)
-    delta[slot] =
-        switching_depth(plant->state.contact.closed[slot] != 0.0, delta[slot], ddelta[slot]);
-  hx_kernel()->switch_contacts(&plant->model, delta, ddelta, &plant->state);
+  hx_kernel()->depths(model, &plant->state.motion, &depths);
+  for (int k = 0; k < model->rows + model->torso_rows; ++k) {
+    const int row = model->row[k];
+    for (int slot = 0; slot < hx_slots_of(row); ++slot)
+      depths.delta[row][slot] = switching_depth(plant->state.contact.closed[row][slot] != 0.0,
+                                                depths.delta[row][slot], depths.ddelta[row][slot]);
+  }
+  hx_kernel()->switch_contacts(model, &depths, &plant->state);
   return memcmp(before.bristle, plant->state.motion.bristle, sizeof before.bristle) != 0;
 }
 

@@ -50,6 +50,12 @@ static const ProbeField fields[] = {
     FIELD(hxDefinition, torso.inertia),
     FIELD(hxDefinition, leg),
     FIELD(hxDefinition, foot_radius),
+    FIELD(hxDefinition, body.torso_box),
+    FIELD(hxDefinition, body.torso_centre),
+    FIELD(hxDefinition, body.corner_radius),
+    FIELD(hxDefinition, body.knee_radius),
+    FIELD(hxDefinition, body.shank_radius),
+    FIELD(hxDefinition, body.shank_position),
     FIELD(hxDefinition, contact.law),
     FIELD(hxDefinition, contact.stiffness),
     FIELD(hxDefinition, contact.restitution),
@@ -293,14 +299,14 @@ HX_API void hx_probe_ground(const hxPlant *plant, const double point[3], double 
 /* Switches the plant's contacts and returns them. state: closed, damping, impact speed. */
 HX_API int hx_probe_contact_switch(hxPlant *plant, const double delta[HX_LEGS],
                                    const double ddelta[HX_LEGS], double state[3][HX_LEGS]) {
-  double slots[2][HX_SLOTS] = {{0}};
+  hxDepths depths;
   hxContactState *contact = &plant->state.contact;
-  memcpy(slots[0], delta, HX_LEGS * sizeof(double));
-  memcpy(slots[1], ddelta, HX_LEGS * sizeof(double));
-  const int touchdowns = hx_contact_switch(&plant->model, slots[0], slots[1], contact);
-  memcpy(state[0], contact->closed, HX_LEGS * sizeof(double));
-  memcpy(state[1], contact->damping, HX_LEGS * sizeof(double));
-  memcpy(state[2], contact->impact_speed, HX_LEGS * sizeof(double));
+  memcpy(depths.delta[HX_FOOT], delta, HX_LEGS * sizeof(double));
+  memcpy(depths.ddelta[HX_FOOT], ddelta, HX_LEGS * sizeof(double));
+  const int touchdowns = hx_contact_switch(&plant->model, &depths, contact);
+  memcpy(state[0], contact->closed[HX_FOOT], HX_LEGS * sizeof(double));
+  memcpy(state[1], contact->damping[HX_FOOT], HX_LEGS * sizeof(double));
+  memcpy(state[2], contact->impact_speed[HX_FOOT], HX_LEGS * sizeof(double));
   return touchdowns;
 }
 
@@ -344,15 +350,15 @@ HX_API void hx_probe_foot(hxPlant *plant, const hxInput *input, int leg, double 
   hxImplicit implicit = {.z = 1e-3, .ahead = ahead};
   evaluate(plant, input, 0.0, &implicit, &work, &rate);
   const int lane = leg % HX_LANES, pack = leg / HX_LANES;
-  const hxFootWork *foot = &work.pack[pack].foot;
+  const hxContactWork *foot = &work.pack[pack].contact[HX_FOOT];
+  const hxContactSlope *slope = &implicit.slope[pack].contact[HX_FOOT];
   const hxVec3 tibia = hx_link_vec3(&plant->state.motion, HX_JOINTS - 1, HX_R, leg - lane);
   put3(hx_add3(tibia, foot->kin.arm), lane, out), put3(foot->kin.velocity, lane, out + 3),
       put3(foot->kin.normal, lane, out + 6);
   out[9] = hx_lane(foot->kin.delta, lane), out[10] = hx_lane(foot->kin.ddelta, lane);
   put3(foot->force, lane, out + 11);
-  out[14] = hx_lane(implicit.slope[pack].stiffness, lane),
-  out[15] = hx_lane(implicit.slope[pack].viscosity, lane);
-  out[16] = hx_lane(implicit.slope[pack].drag, lane);
+  out[14] = hx_lane(slope->stiffness, lane), out[15] = hx_lane(slope->viscosity, lane);
+  out[16] = hx_lane(slope->drag, lane);
 }
 
 /* Computes dy/dt under a command that is `age` seconds old: of the bodies, and the powers of
