@@ -1086,7 +1086,7 @@ const size_t hx_state_count = sizeof states / sizeof states[0];
 
 _Static_assert(sizeof states / sizeof states[0] == sizeof(hxCoordinates) / sizeof(double), "each state has its row");
 
-const char hx_default_guid[] = "{d20d78c4-07bd-4593-affa-cd627e2ce747}";
+const char hx_default_guid[] = "{e53ba8fc-50c1-4808-b444-289c4d7bc6b4}";
 
 _Static_assert(HX_CONTACT_EXACT_RESTITUTION == 1, "ContactLaw");
 _Static_assert(HX_CONTACT_FLORES == 2, "ContactLaw");

@@ -53,21 +53,10 @@ static void check_legs(hxChecker *c, const hxDefinition *d) {
   }
 }
 
-/* Checks that spheres of the corners fit into the torso's box. */
-static void check_body(hxChecker *c, const hxDefinition *d) {
-  const double *box = d->body.torso_box, radius = d->body.corner_radius;
-  const int used = box[0] > 0.0 || box[1] > 0.0 || box[2] > 0.0;
-  for (int i = 0; i < 3 && used; ++i)
-    if (box[i] < radius)
-      hx_check_fail(c, "body.corner_radius", radius,
-                    "at most the least of body.torso_box, the half edges of the box it rounds");
-}
-
 /* Checks conditions between several numbers that are within their ranges. */
 static void check_relations(hxChecker *c, const hxDefinition *d) {
   check_inertia(c, "torso.inertia_xx", d->torso.inertia);
   check_legs(c, d);
-  check_body(c, d);
   if ((d->contact.law == HX_CONTACT_EXACT_RESTITUTION || d->contact.law == HX_CONTACT_FLORES) &&
       d->contact.restitution < 1e-3)
     hx_check_fail(c, "contact.restitution", d->contact.restitution,

@@ -223,12 +223,11 @@ static void compile_tibia_points(hxModel *model, const hxDefinition *d, int leg,
   set_tibia_point(model, d, leg, slot, HX_SHANK, shank);
 }
 
-/* Computes the centre of the sphere that rounds a corner of the torso's box; bit i of the slot
- * chooses the corner's side along axis i. */
+/* Computes the place of a corner of the torso's box; bit i of the slot chooses the corner's side
+ * along axis i. */
 static void compile_torso_point(hxModel *model, const hxDefinition *d, int slot) {
   for (int i = 0; i < 3; ++i) {
-    const double half = d->body.torso_box[i] - d->body.corner_radius;
-    const double side = slot >> i & 1 ? half : -half;
+    const double half = d->body.torso_box[i], side = slot >> i & 1 ? half : -half;
     model->point[HX_TORSO][i][slot] = d->body.torso_centre[i] + side - d->torso.com[i];
   }
 }
